@@ -1,0 +1,103 @@
+//! Diagnostics as data; renderers live in the command.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Code, Span};
+
+/// How bad it is: a *must* fault is an error, a *may* fault a warning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The program is not run.
+    Error,
+    /// The program runs; something may go wrong.
+    Warning,
+}
+
+/// A remark attached to a place in the text: the cause (primary) or a step of its history.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Label {
+    /// Where.
+    pub span: Span,
+    /// What is there; lower case, no full stop.
+    pub text: String,
+    /// Whether this is the cause, not the history.
+    pub primary: bool,
+}
+
+/// A replacement of the text under a span.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Edit {
+    /// What is replaced; empty for an insertion.
+    pub span: Span,
+    /// What stands there afterwards.
+    pub text: String,
+}
+
+/// A machine-applicable correction.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Fix {
+    /// What it does, as an instruction.
+    pub title: String,
+    /// The replacements, not overlapping.
+    pub edits: Vec<Edit>,
+}
+
+/// One finding: *what* in the headline, *where* in the labels, *how to mend* in the help.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Diagnostic {
+    /// The registered kind of finding.
+    pub code: Code,
+    /// Error or warning.
+    pub severity: Severity,
+    /// One sentence, lower case, no full stop, user text in backticks.
+    pub headline: String,
+    /// The cause first, then the history in the order of the text.
+    pub labels: Vec<Label>,
+    /// How to mend it.
+    pub help: Vec<String>,
+    /// Corrections an editor can apply.
+    pub fixes: Vec<Fix>,
+}
+
+impl Diagnostic {
+    /// An error at `span`, whose label says `label`.
+    pub fn error(code: Code, span: Span, headline: impl Into<String>, label: impl Into<String>) -> Self {
+        Diagnostic {
+            code,
+            severity: Severity::Error,
+            headline: headline.into(),
+            labels: vec![Label { span, text: label.into(), primary: true }],
+            help: Vec::new(),
+            fixes: Vec::new(),
+        }
+    }
+
+    /// A warning at `span`, whose label says `label`.
+    pub fn warning(code: Code, span: Span, headline: impl Into<String>, label: impl Into<String>) -> Self {
+        Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, span, headline, label) }
+    }
+
+    /// Adds a step of the history.
+    pub fn because(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push(Label { span, text: text.into(), primary: false });
+        self
+    }
+
+    /// Adds a line of help.
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        self.help.push(text.into());
+        self
+    }
+
+    /// Adds a correction that replaces the text under `span`.
+    pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
+        self
+    }
+
+    /// Where the cause stands.
+    pub fn span(&self) -> Span {
+        self.labels.iter().find(|l| l.primary).map(|l| l.span).unwrap_or_default()
+    }
+}

@@ -1,0 +1,398 @@
+//! Expressions in static single assignment form: one list of operations, operands before their users.
+//!
+//! The graph knows numbers only. Truth is 1 or 0; an instance is its index in the scene, "nothing" is -1. It holds no
+//! closures and no laws, so that it can be evaluated in bulk or compiled for other targets.
+
+use std::collections::HashMap;
+use std::fmt::Write;
+
+use serde::{Deserialize, Serialize};
+
+use crate::math;
+
+/// An operation of a [`Graph`], by its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct NodeId(pub u32);
+
+/// Operations on one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum UnaryOp {
+    /// `-x`
+    Neg,
+    /// 1 if x is 0, else 0
+    Not,
+    /// `e^x`
+    Exp,
+    /// natural logarithm
+    Ln,
+    /// square root
+    Sqrt,
+    /// magnitude
+    Abs,
+    /// sine of radians
+    Sin,
+    /// cosine of radians
+    Cos,
+    /// largest whole number not above x
+    Floor,
+}
+
+/// Operations on two numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum BinaryOp {
+    /// `a + b`
+    Add,
+    /// `a - b`
+    Sub,
+    /// `a * b`
+    Mul,
+    /// `a / b`
+    Div,
+    /// `a ^ b`
+    Pow,
+    /// the smaller
+    Min,
+    /// the larger
+    Max,
+    /// 1 if `a < b`
+    Lt,
+    /// 1 if `a <= b`
+    Le,
+    /// 1 if `a == b`
+    Eq,
+    /// 1 if both are not 0
+    And,
+    /// 1 if one is not 0
+    Or,
+}
+
+/// One operation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Op {
+    /// A number.
+    Const(f64),
+    /// Seconds since the run began.
+    Time,
+    /// A state, by its index in the model.
+    State(u32),
+    /// A parameter, by its index in the model.
+    Param(u32),
+    /// A value the plan keeps (a `let`, a step's start), by its index in the plan.
+    Local(u32),
+    /// What a device reports, by its index in the model: the state with its declared imperfection.
+    Reading(u32),
+    /// An operation on one operand.
+    Unary(UnaryOp, NodeId),
+    /// An operation on two operands.
+    Binary(BinaryOp, NodeId, NodeId),
+    /// The second operand if the first is not 0, else the third. Both are evaluated.
+    Select(NodeId, NodeId, NodeId),
+}
+
+impl Op {
+    /// The operands, in order.
+    pub fn operands(&self) -> impl Iterator<Item = NodeId> {
+        let list = match *self {
+            Op::Unary(_, a) => [Some(a), None, None],
+            Op::Binary(_, a, b) => [Some(a), Some(b), None],
+            Op::Select(a, b, c) => [Some(a), Some(b), Some(c)],
+            _ => [None; 3],
+        };
+        list.into_iter().flatten()
+    }
+
+    /// Whether this compares two numbers, so that its value jumps where they cross.
+    pub fn is_comparison(&self) -> bool {
+        matches!(self, Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq, _, _))
+    }
+}
+
+/// The leaves' values at one instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Env<'a> {
+    /// Seconds since the run began.
+    pub time: f64,
+    /// By state index, SI.
+    pub states: &'a [f64],
+    /// By parameter index, SI.
+    pub params: &'a [f64],
+    /// By local index, SI.
+    pub locals: &'a [f64],
+    /// By reading index, SI.
+    pub readings: &'a [f64],
+}
+
+/// A list of operations in which every operand stands before its user.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Graph {
+    ops: Vec<Op>,
+    #[serde(skip)]
+    seen: HashMap<Key, NodeId>,
+}
+
+impl PartialEq for Graph {
+    fn eq(&self, other: &Self) -> bool {
+        self.ops == other.ops
+    }
+}
+
+/// An operation as a hash key: constants by their bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Key {
+    Const(u64),
+    Time,
+    State(u32),
+    Param(u32),
+    Local(u32),
+    Reading(u32),
+    Unary(UnaryOp, NodeId),
+    Binary(BinaryOp, NodeId, NodeId),
+    Select(NodeId, NodeId, NodeId),
+}
+
+fn key(op: Op) -> Key {
+    match op {
+        Op::Const(v) => Key::Const(v.to_bits()),
+        Op::Time => Key::Time,
+        Op::State(i) => Key::State(i),
+        Op::Param(i) => Key::Param(i),
+        Op::Local(i) => Key::Local(i),
+        Op::Reading(i) => Key::Reading(i),
+        Op::Unary(o, a) => Key::Unary(o, a),
+        Op::Binary(o, a, b) => Key::Binary(o, a, b),
+        Op::Select(a, b, c) => Key::Select(a, b, c),
+    }
+}
+
+impl Graph {
+    /// All operations, operands first.
+    pub fn ops(&self) -> &[Op] {
+        &self.ops
+    }
+
+    /// One operation.
+    pub fn op(&self, node: NodeId) -> Op {
+        self.ops[node.0 as usize]
+    }
+
+    /// The constant this node is, if it is one.
+    pub fn constant(&self, node: NodeId) -> Option<f64> {
+        match self.op(node) {
+            Op::Const(v) => Some(v),
+            _ => None,
+        }
+    }
+
+    /// Adds an operation, or finds the equal one; folds constants and neutral elements.
+    pub fn add(&mut self, op: Op) -> NodeId {
+        if let Some(node) = self.simplify(op) {
+            return node;
+        }
+        let op = self.fold(op);
+        let k = key(op);
+        if let Some(&node) = self.seen.get(&k) {
+            return node;
+        }
+        let node = NodeId(self.ops.len() as u32);
+        self.ops.push(op);
+        self.seen.insert(k, node);
+        node
+    }
+
+    /// A constant.
+    pub fn number(&mut self, value: f64) -> NodeId {
+        self.add(Op::Const(value))
+    }
+
+    /// An operation on one operand.
+    pub fn unary(&mut self, op: UnaryOp, a: NodeId) -> NodeId {
+        self.add(Op::Unary(op, a))
+    }
+
+    /// An operation on two operands.
+    pub fn binary(&mut self, op: BinaryOp, a: NodeId, b: NodeId) -> NodeId {
+        self.add(Op::Binary(op, a, b))
+    }
+
+    /// `if c { a } else { b }`.
+    pub fn select(&mut self, c: NodeId, a: NodeId, b: NodeId) -> NodeId {
+        self.add(Op::Select(c, a, b))
+    }
+
+    fn fold(&self, op: Op) -> Op {
+        let value = match op {
+            Op::Unary(o, a) => self.constant(a).map(|a| unary(o, a)),
+            Op::Binary(o, a, b) => self.constant(a).zip(self.constant(b)).map(|(a, b)| binary(o, a, b)),
+            _ => None,
+        };
+        value.map_or(op, Op::Const)
+    }
+
+    /// Exact identities only: nothing here changes a finite result's bits, except that `x - x` and `-x + x` become 0.
+    fn simplify(&mut self, op: Op) -> Option<NodeId> {
+        let zero = |g: &Graph, n| g.constant(n) == Some(0.0);
+        let one = |g: &Graph, n| g.constant(n) == Some(1.0);
+        match op {
+            Op::Binary(BinaryOp::Add, a, b) if zero(self, a) => Some(b),
+            Op::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) if zero(self, b) => Some(a),
+            Op::Binary(BinaryOp::Sub, a, b) if zero(self, a) => Some(self.unary(UnaryOp::Neg, b)),
+            Op::Binary(BinaryOp::Sub, a, b) if a == b => Some(self.number(0.0)),
+            Op::Binary(BinaryOp::Add, a, b)
+                if self.op(a) == Op::Unary(UnaryOp::Neg, b) || self.op(b) == Op::Unary(UnaryOp::Neg, a) =>
+            {
+                Some(self.number(0.0))
+            }
+            Op::Binary(BinaryOp::Mul, a, b) if one(self, a) => Some(b),
+            Op::Binary(BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow, a, b) if one(self, b) => Some(a),
+            Op::Binary(BinaryOp::Mul, a, b) if zero(self, a) || zero(self, b) => Some(self.number(0.0)),
+            Op::Binary(BinaryOp::And, a, b) => match (self.constant(a), self.constant(b)) {
+                (Some(x), _) => Some(if x == 0.0 { a } else { b }),
+                (_, Some(y)) => Some(if y == 0.0 { b } else { a }),
+                _ => None,
+            },
+            Op::Binary(BinaryOp::Or, a, b) => match (self.constant(a), self.constant(b)) {
+                (Some(x), _) => Some(if x == 0.0 { b } else { a }),
+                (_, Some(y)) => Some(if y == 0.0 { a } else { b }),
+                _ => None,
+            },
+            Op::Unary(UnaryOp::Neg, a) => match self.op(a) {
+                Op::Unary(UnaryOp::Neg, inner) => Some(inner),
+                _ => None,
+            },
+            Op::Select(c, a, b) => match self.constant(c) {
+                Some(0.0) => Some(b),
+                Some(_) => Some(a),
+                None if a == b => Some(a),
+                None => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Evaluates every operation in order into `out`, which is resized to fit. The reference semantics of the graph.
+    pub fn eval_all(&self, env: Env<'_>, out: &mut Vec<f64>) {
+        out.clear();
+        out.reserve(self.ops.len());
+        for &op in &self.ops {
+            let value = eval_op(op, env, out);
+            out.push(value);
+        }
+    }
+
+    /// Evaluates one node by evaluating what it depends on. For occasional use; hot paths keep a schedule of their own.
+    pub fn eval(&self, node: NodeId, env: Env<'_>) -> f64 {
+        let mut needed = vec![false; node.0 as usize + 1];
+        needed[node.0 as usize] = true;
+        for i in (0..needed.len()).rev() {
+            if needed[i] {
+                for operand in self.ops[i].operands() {
+                    needed[operand.0 as usize] = true;
+                }
+            }
+        }
+        let mut values = vec![0.0; needed.len()];
+        for i in 0..needed.len() {
+            if needed[i] {
+                values[i] = eval_op(self.ops[i], env, &values);
+            }
+        }
+        values[node.0 as usize]
+    }
+
+    /// The operations `roots` depend on, operands first, each once.
+    pub fn schedule(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
+        let mut needed = vec![false; self.ops.len()];
+        for root in roots {
+            needed[root.0 as usize] = true;
+        }
+        for i in (0..needed.len()).rev() {
+            if needed[i] {
+                for operand in self.ops[i].operands() {
+                    needed[operand.0 as usize] = true;
+                }
+            }
+        }
+        (0..needed.len()).filter(|&i| needed[i]).map(|i| NodeId(i as u32)).collect()
+    }
+
+    /// Whether `node` depends on an operation for which `test` holds.
+    pub fn depends(&self, node: NodeId, test: impl Fn(&Op) -> bool) -> bool {
+        self.schedule([node]).into_iter().any(|n| test(&self.op(n)))
+    }
+
+    /// One line per operation: `%12 = mul %3 %7`.
+    pub fn print(&self) -> String {
+        let mut out = String::new();
+        for (i, op) in self.ops.iter().enumerate() {
+            let _ = match op {
+                Op::Const(v) => writeln!(out, "%{i} = const {v:e}"),
+                Op::Time => writeln!(out, "%{i} = time"),
+                Op::State(s) => writeln!(out, "%{i} = state {s}"),
+                Op::Param(p) => writeln!(out, "%{i} = param {p}"),
+                Op::Local(l) => writeln!(out, "%{i} = local {l}"),
+                Op::Reading(r) => writeln!(out, "%{i} = reading {r}"),
+                Op::Unary(o, a) => writeln!(out, "%{i} = {} %{}", format!("{o:?}").to_lowercase(), a.0),
+                Op::Binary(o, a, b) => writeln!(out, "%{i} = {} %{} %{}", format!("{o:?}").to_lowercase(), a.0, b.0),
+                Op::Select(c, a, b) => writeln!(out, "%{i} = select %{} %{} %{}", c.0, a.0, b.0),
+            };
+        }
+        out
+    }
+}
+
+/// The value of one operation, given the leaves and the values of all operations before it.
+pub fn eval_op(op: Op, env: Env<'_>, values: &[f64]) -> f64 {
+    let at = |n: NodeId| values[n.0 as usize];
+    match op {
+        Op::Const(v) => v,
+        Op::Time => env.time,
+        Op::State(i) => env.states[i as usize],
+        Op::Param(i) => env.params[i as usize],
+        Op::Local(i) => env.locals[i as usize],
+        Op::Reading(i) => env.readings[i as usize],
+        Op::Unary(o, a) => unary(o, at(a)),
+        Op::Binary(o, a, b) => binary(o, at(a), at(b)),
+        Op::Select(c, a, b) => {
+            if at(c) != 0.0 {
+                at(a)
+            } else {
+                at(b)
+            }
+        }
+    }
+}
+
+fn unary(op: UnaryOp, a: f64) -> f64 {
+    match op {
+        UnaryOp::Neg => -a,
+        UnaryOp::Not => truth(a == 0.0),
+        UnaryOp::Exp => math::exp(a),
+        UnaryOp::Ln => math::ln(a),
+        UnaryOp::Sqrt => a.sqrt(),
+        UnaryOp::Abs => a.abs(),
+        UnaryOp::Sin => math::sin(a),
+        UnaryOp::Cos => math::cos(a),
+        UnaryOp::Floor => a.floor(),
+    }
+}
+
+fn binary(op: BinaryOp, a: f64, b: f64) -> f64 {
+    match op {
+        BinaryOp::Add => a + b,
+        BinaryOp::Sub => a - b,
+        BinaryOp::Mul => a * b,
+        BinaryOp::Div => a / b,
+        BinaryOp::Pow => math::pow(a, b),
+        BinaryOp::Min => a.min(b),
+        BinaryOp::Max => a.max(b),
+        BinaryOp::Lt => truth(a < b),
+        BinaryOp::Le => truth(a <= b),
+        BinaryOp::Eq => truth(a == b),
+        BinaryOp::And => truth(a != 0.0 && b != 0.0),
+        BinaryOp::Or => truth(a != 0.0 || b != 0.0),
+    }
+}
+
+fn truth(b: bool) -> f64 {
+    f64::from(u8::from(b))
+}

@@ -1,0 +1,27 @@
+//! What the compiler and the runtime agree on.
+//!
+//! `matterix-lang` turns text into a [`Program`]; `matterix-runtime` executes one. Neither sees the other: everything
+//! they share is declared here, as data.
+//!
+//! - [`span`], [`diagnostic`], [`codes`]: where something stands in the text and what is wrong with it.
+//! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
+//! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
+//! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+
+pub mod codes;
+pub mod diagnostic;
+pub mod graph;
+pub mod math;
+pub mod model;
+pub mod plan;
+pub mod program;
+pub mod quantity;
+pub mod scene;
+pub mod span;
+
+pub use codes::Code;
+pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};
+pub use graph::{BinaryOp, Env, Graph, NodeId, Op, UnaryOp};
+pub use program::Program;
+pub use quantity::Unit;
+pub use span::{FileId, Sources, Span};

@@ -1,0 +1,36 @@
+//! The one place transcendental functions come from, so that a trace does not depend on the system's C library.
+
+/// `e^x`.
+pub fn exp(x: f64) -> f64 {
+    libm::exp(x)
+}
+
+/// Natural logarithm.
+pub fn ln(x: f64) -> f64 {
+    libm::log(x)
+}
+
+/// `x^y`. Small whole exponents are multiplied out, so that `x^2` equals `x*x` to the last bit.
+pub fn pow(x: f64, y: f64) -> f64 {
+    if y == 1.0 {
+        x
+    } else if y == 2.0 {
+        x * x
+    } else if y == 3.0 {
+        x * x * x
+    } else if y == 0.0 {
+        1.0
+    } else {
+        libm::pow(x, y)
+    }
+}
+
+/// Sine of an angle in radians.
+pub fn sin(x: f64) -> f64 {
+    libm::sin(x)
+}
+
+/// Cosine of an angle in radians.
+pub fn cos(x: f64) -> f64 {
+    libm::cos(x)
+}

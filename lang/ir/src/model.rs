@@ -1,0 +1,220 @@
+//! How the lab evolves: states, derivatives, events, mixtures and their ledgers, flattened over the instances.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::InstanceId;
+use crate::{Graph, NodeId, Span, Unit};
+
+/// What the numbers of a discrete or continuous state mean.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Domain {
+    /// A quantity, with the unit it is shown in.
+    Quantity(Unit),
+    /// 1 or 0.
+    Bool,
+    /// An instance by index, or -1 for nothing.
+    Instance,
+}
+
+/// One entry of the state vector.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// `hotplate.target`, `beaker.contents.amount[EtI]`.
+    pub name: String,
+    /// What it means and how it is shown.
+    pub domain: Domain,
+    /// Its value when the run begins; depends on parameters and constants only.
+    pub initial: NodeId,
+    /// Magnitude below which differences do not matter, SI: the absolute error tolerance is derived from it.
+    pub scale: f64,
+    /// Its declaration.
+    pub span: Span,
+}
+
+/// A number that may be varied without compiling again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Param {
+    /// `hotplate.gain`, `ethyl_iodide.rate.Ea`, `target`.
+    pub name: String,
+    /// SI.
+    pub value: f64,
+    /// As the user wrote it.
+    pub unit: Unit,
+    /// Where its value is given.
+    pub span: Span,
+}
+
+/// `d state / dt = rate`, already summed over the processes, each zero while its condition is false.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Derivative {
+    /// Index into [`Model::states`].
+    pub state: u32,
+    /// SI per second.
+    pub rate: NodeId,
+}
+
+/// One process on its instances, for time lines: the derivative already contains it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Process {
+    /// `conduction(hotplate, beaker)`, `mass_action(beaker.contents, ethyl_iodide)`.
+    pub name: String,
+    /// While this is not 0 the process runs; absent if it always does.
+    pub guard: Option<NodeId>,
+    /// Its declaration.
+    pub span: Span,
+}
+
+/// An instantaneous change of the state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Action {
+    /// `state = value`.
+    Assign {
+        /// Index into [`Model::states`].
+        state: u32,
+        /// Evaluated when the action's turn comes.
+        value: NodeId,
+        /// Its statement.
+        span: Span,
+    },
+    /// Moves the fraction `fraction` of every extensive quantity from one mixture to another.
+    Move {
+        /// 0 to 1; outside is a fault.
+        fraction: NodeId,
+        /// Index into [`Model::mixtures`].
+        from: u32,
+        /// Index into [`Model::mixtures`].
+        to: u32,
+        /// Its statement.
+        span: Span,
+    },
+}
+
+/// Actions that happen, in order, each time `when` becomes true; true at the start counts as becoming true.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Event {
+    /// `dissolution(beaker.contents, KI)`.
+    pub name: String,
+    /// The condition.
+    pub when: NodeId,
+    /// What happens.
+    pub actions: Vec<Action>,
+    /// Its declaration.
+    pub span: Span,
+}
+
+/// What a device reports of a quantity.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// `scale.mass`.
+    pub name: String,
+    /// The device.
+    pub instance: InstanceId,
+    /// What is measured; without imperfection.
+    pub value: NodeId,
+    /// Steps of the display, SI.
+    pub resolution: Option<f64>,
+    /// Standard deviation of the noise, SI.
+    pub noise: Option<f64>,
+    /// Time between two reports, s; conditions on a reading are looked at this often.
+    pub period: Option<f64>,
+    /// As shown.
+    pub unit: Unit,
+    /// Its declaration.
+    pub span: Span,
+}
+
+/// A chemical species that occurs in the program.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Species {
+    /// `EtI`, `SO4^2-`, `KNO3(s)`.
+    pub name: String,
+    /// Hill formula; empty for an undefined structure kept by mass.
+    pub formula: String,
+    /// Atoms per unit, by element symbol.
+    pub elements: Vec<(String, f64)>,
+    /// Elementary charges.
+    pub charge: i32,
+    /// kg/mol. For a species kept by mass 1 kg/mol, so that its "amount" in mol is its mass in kg.
+    pub molar_mass: f64,
+    /// Whether it has no defined structure and is counted by mass.
+    pub by_mass: bool,
+    /// Its declaration.
+    pub span: Span,
+}
+
+/// The amount of one species in one mixture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Content {
+    /// Index into [`Model::species`].
+    pub species: u32,
+    /// Index into [`Model::states`]; mol.
+    pub state: u32,
+}
+
+/// A mixture: what a transfer takes a fraction of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mixture {
+    /// The instance, as in `beaker.contents`.
+    pub instance: InstanceId,
+    /// Every extensive quantity by its key (`enthalpy`, `amount[EtI]`), sorted by key; index into [`Model::states`].
+    pub extensive: Vec<(String, u32)>,
+    /// The extensive quantities that are amounts of species.
+    pub contents: Vec<Content>,
+    /// Properties worth reporting (mass, volume, temperature, color); index into [`Model::observables`].
+    pub properties: Vec<u32>,
+    /// The library's concentration of each entry of `contents`; index into [`Model::observables`].
+    pub concentrations: Vec<u32>,
+}
+
+/// A named quantity that follows from the state, recorded beside it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Observable {
+    /// `beaker.contents.temperature`, `beaker.contents[EtI]`.
+    pub name: String,
+    /// One node, or several for a tuple such as a colour.
+    pub value: Vec<NodeId>,
+    /// As shown.
+    pub unit: Unit,
+}
+
+/// A sum over the whole lab that changes only by what crosses its boundary.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Balance {
+    /// `energy`, `element C`, `charge`, `mass`.
+    pub name: String,
+    /// The sum.
+    pub total: NodeId,
+    /// What came in through the boundary since the start (negative: went out), as states that integrate each process.
+    pub exchanges: Vec<u32>,
+    /// As shown.
+    pub unit: Unit,
+    /// Magnitude against which the error is judged, SI: the sum of the magnitudes of the terms.
+    pub magnitude: NodeId,
+}
+
+/// The flattened model of one lab.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Every expression of the model and of the plan.
+    pub graph: Graph,
+    /// Numbers that may be varied.
+    pub params: Vec<Param>,
+    /// The state vector.
+    pub states: Vec<State>,
+    /// At most one per state; a state without one changes only by actions.
+    pub derivatives: Vec<Derivative>,
+    /// For time lines.
+    pub processes: Vec<Process>,
+    /// In the order in which they fire within an instant.
+    pub events: Vec<Event>,
+    /// What devices report.
+    pub readings: Vec<Reading>,
+    /// Species of the program.
+    pub species: Vec<Species>,
+    /// Mixtures of the lab.
+    pub mixtures: Vec<Mixture>,
+    /// Derived quantities to record.
+    pub observables: Vec<Observable>,
+    /// Sums that must close.
+    pub balances: Vec<Balance>,
+}

@@ -1,0 +1,302 @@
+//! What is done: the tree of the workflow. Leaves are operations, every node keeps its span.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::Action;
+use crate::scene::InstanceId;
+use crate::{NodeId, Span, Unit};
+
+/// A node of the plan, by its index in [`Plan::steps`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct StepId(pub u32);
+
+/// A truth value with the text it was written as.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    /// Not 0 if it holds.
+    pub node: NodeId,
+    /// As written.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+    /// What it compares, for reports; empty where it compares no quantities.
+    pub compared: Vec<Comparison>,
+}
+
+/// One comparison inside a condition: `value` against limits, with the unit to show them in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// As written.
+    pub text: String,
+    /// The quantity compared.
+    pub value: NodeId,
+    /// Lower limit, if there is one.
+    pub low: Option<NodeId>,
+    /// Upper limit, if there is one.
+    pub high: Option<NodeId>,
+    /// Unit of the limits.
+    pub unit: Unit,
+}
+
+/// How long something takes, s.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Takes {
+    /// Used at `process` fidelity.
+    pub nominal: NodeId,
+    /// Shortest and longest.
+    pub bounds: Option<(NodeId, NodeId)>,
+}
+
+/// An argument of an operation, as a driver sees it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Argument {
+    /// A quantity with the unit it was written in.
+    Quantity(NodeId, Unit),
+    /// An instance.
+    Instance(InstanceId),
+    /// A text.
+    Text(String),
+}
+
+/// A leaf: a command of a device or a primitive skill.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Operation {
+    /// The verb as declared: `heat`, `stop heating`, `move`.
+    pub verb: String,
+    /// The capability that declares the command; absent for an extern skill.
+    pub capability: Option<String>,
+    /// The device the command is for, or the first argument of a skill.
+    pub device: Option<InstanceId>,
+    /// By parameter name, in order of declaration.
+    pub arguments: Vec<(String, Argument)>,
+    /// Must hold when it starts.
+    pub needs: Vec<Condition>,
+    /// Applied when it starts (commands).
+    pub at_start: Vec<Action>,
+    /// Applied when it ends (extern skills).
+    pub at_end: Vec<Action>,
+    /// How long it takes; at once if absent.
+    pub takes: Option<Takes>,
+    /// It lasts until this holds, if present.
+    pub until: Option<Condition>,
+    /// Instances it writes, for its duration.
+    pub claims: Vec<InstanceId>,
+    /// Failures it may report.
+    pub fails: Vec<String>,
+}
+
+/// Which failures a handler takes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Caught {
+    /// `on slip { }`.
+    Named(String),
+    /// `on failure { }`: every one.
+    Any,
+}
+
+/// What one node does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Step {
+    /// One after the other.
+    Sequence(Vec<StepId>),
+    /// All at once, until all have ended; a failing branch stops its siblings at their next step boundary.
+    Parallel(Vec<StepId>),
+    /// A command or a primitive skill.
+    Operation(Box<Operation>),
+    /// Body with failure handlers and a `finally` that always runs.
+    Guarded {
+        /// What is tried.
+        body: StepId,
+        /// The first that catches the failure runs.
+        handlers: Vec<(Caught, StepId)>,
+        /// Runs afterwards in every case, cancellation included.
+        finally: Option<StepId>,
+    },
+    /// The body of the innermost `Guarded` starts again, at most `times` times; stands only in a handler.
+    Retry {
+        /// How often.
+        times: NodeId,
+    },
+    /// Ordered alternatives: the next is tried when one fails.
+    Try(Vec<StepId>),
+    /// Called skill: checks `needs` before and `effects` after its body.
+    Skill {
+        /// Its verb.
+        verb: String,
+        /// Must hold when it starts.
+        needs: Vec<Condition>,
+        /// Must hold all the time.
+        invariants: Vec<Condition>,
+        /// Must hold when it ends: the promised effects.
+        promises: Vec<Condition>,
+        /// Bounds of its duration, checked when it ends.
+        takes: Option<Takes>,
+        /// What it does.
+        body: StepId,
+    },
+    /// `step NAME { }`: notes when the body starts and ends.
+    Named {
+        /// Its name.
+        name: String,
+        /// Local that receives the start time, s.
+        start: u32,
+        /// Local that receives the end time, s.
+        end: u32,
+        /// What it does.
+        body: StepId,
+    },
+    /// `let x = ...`: evaluates once, with readings taken now.
+    Let {
+        /// Local that receives the value.
+        local: u32,
+        /// The value.
+        value: NodeId,
+    },
+    /// Waits for a time, s.
+    Wait {
+        /// How long.
+        duration: NodeId,
+    },
+    /// Waits for a condition; `timeout` raises the failure `timeout`.
+    WaitUntil {
+        /// What is waited for.
+        condition: Condition,
+        /// At most this long, s.
+        timeout: Option<NodeId>,
+    },
+    /// Waits for a condition, then needs it unbroken for a while; a break starts the clock again.
+    Hold {
+        /// What must hold.
+        condition: Condition,
+        /// For how long, s.
+        duration: NodeId,
+        /// At most this long in all, s.
+        timeout: Option<NodeId>,
+    },
+    /// An invariant over a body; a breach raises the failure `broken`.
+    Keep {
+        /// What must hold all the time.
+        condition: Condition,
+        /// What it does.
+        body: StepId,
+    },
+    /// Its body must start at most `limit` after `since`; else the failure `late`.
+    Within {
+        /// s.
+        limit: NodeId,
+        /// A time, s.
+        since: NodeId,
+        /// What it does.
+        body: StepId,
+    },
+    /// One branch or the other.
+    If {
+        /// Which.
+        condition: Condition,
+        /// If it holds.
+        then: StepId,
+        /// If it does not.
+        otherwise: Option<StepId>,
+    },
+    /// A number of times.
+    Repeat {
+        /// How often; not a whole number is a fault.
+        times: NodeId,
+        /// What is repeated.
+        body: StepId,
+    },
+    /// While a condition holds, at most `max` times; holding longer raises the failure `max`.
+    RepeatWhile {
+        /// Looked at before each turn.
+        condition: Condition,
+        /// At most this often.
+        max: NodeId,
+        /// What is repeated.
+        body: StepId,
+    },
+    /// Waits for the instances to be free and holds them to its end.
+    Claim {
+        /// Which.
+        claims: Vec<InstanceId>,
+        /// What it does.
+        body: StepId,
+    },
+    /// Starts a job that runs beside what follows.
+    Start {
+        /// Its name.
+        job: String,
+        /// What it does.
+        body: StepId,
+    },
+    /// Waits for a job; its failure becomes this step's.
+    Await {
+        /// Its name.
+        job: String,
+    },
+    /// Raises a failure.
+    Fail {
+        /// Its name.
+        name: String,
+        /// In words.
+        text: String,
+    },
+    /// Judges; a failed expectation does not stop the run but makes its result a failure.
+    Expect(Vec<Condition>),
+    /// Records a value at a fixed interval from here to the end of the run.
+    Record {
+        /// Name in the recording.
+        name: String,
+        /// One node, or several for a tuple.
+        value: Vec<NodeId>,
+        /// As shown.
+        unit: Unit,
+        /// Interval, s.
+        every: NodeId,
+    },
+    /// A remark in the recording.
+    Note(String),
+    /// A person confirms; in simulation at once.
+    Ask(String),
+}
+
+/// A node of the tree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlanStep {
+    /// As shown: `place beaker on hotplate by panda`, `parallel`, `step grow`.
+    pub label: String,
+    /// Its statement.
+    pub span: Span,
+    /// What it does.
+    pub step: Step,
+}
+
+/// A value the plan keeps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Local {
+    /// `first`, `grow.start`.
+    pub name: String,
+    /// As shown.
+    pub unit: Unit,
+}
+
+/// The compiled workflow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Name of the workflow.
+    pub workflow: String,
+    /// Its parameters as bound, as shown.
+    pub arguments: Vec<(String, String)>,
+    /// All nodes.
+    pub steps: Vec<PlanStep>,
+    /// The top of the tree.
+    pub root: StepId,
+    /// By the index used in `Op::Local`; not a number until set.
+    pub locals: Vec<Local>,
+}
+
+impl Plan {
+    /// One node.
+    pub fn get(&self, id: StepId) -> &PlanStep {
+        &self.steps[id.0 as usize]
+    }
+}

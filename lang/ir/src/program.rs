@@ -1,0 +1,25 @@
+//! The contract between compiler and runtime.
+
+use serde::{Deserialize, Serialize};
+
+use crate::model::Model;
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// Version of the serialised form; a reader refuses any other.
+pub const PROGRAM_VERSION: u32 = 1;
+
+/// A checked workflow in its lab, ready to execute.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Program {
+    /// [`PROGRAM_VERSION`].
+    pub version: u32,
+    /// Names of the source files, by file id, for spans.
+    pub files: Vec<String>,
+    /// What there is.
+    pub scene: Scene,
+    /// How it evolves.
+    pub model: Model,
+    /// What is done.
+    pub plan: Plan,
+}

@@ -1,0 +1,54 @@
+//! Units as they are shown to people. Inside a program every number is SI.
+
+use serde::{Deserialize, Serialize};
+
+/// A unit for display: `si = value * factor + offset`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unit {
+    /// As the user writes it: `mL`, `degC`, `mol/kg`; empty for a plain number.
+    pub symbol: String,
+    /// SI value of one unit.
+    pub factor: f64,
+    /// SI value of the unit's zero (273.15 for `degC`).
+    pub offset: f64,
+}
+
+impl Unit {
+    /// A plain number.
+    pub fn one() -> Self {
+        Unit { symbol: String::new(), factor: 1.0, offset: 0.0 }
+    }
+
+    /// A unit without offset.
+    pub fn scaled(symbol: impl Into<String>, factor: f64) -> Self {
+        Unit { symbol: symbol.into(), factor, offset: 0.0 }
+    }
+
+    /// A value in this unit from its SI value.
+    pub fn of_si(&self, si: f64) -> f64 {
+        (si - self.offset) / self.factor
+    }
+
+    /// The SI value of a value in this unit.
+    pub fn to_si(&self, value: f64) -> f64 {
+        value * self.factor + self.offset
+    }
+
+    /// The value with six significant digits at most and its symbol: `76.33 degC`.
+    pub fn show(&self, si: f64) -> String {
+        let number = show_number(self.of_si(si));
+        if self.symbol.is_empty() { number } else { format!("{number} {}", self.symbol) }
+    }
+}
+
+/// Six significant digits at most, without trailing zeros; powers of ten outside 1e-4 .. 1e7.
+pub fn show_number(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
+        return value.to_string();
+    }
+    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if (1e-4..1e7).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }
+}

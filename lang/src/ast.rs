@@ -1,0 +1,1105 @@
+//! The syntax tree: what was written, nothing resolved. Error nodes stand where something could not be read.
+
+use matterix_ir::Span;
+
+/// A word as written; for a species with its charge and phase: `EtOH`, `SO4^2-`, `KNO3(s)`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Name {
+    /// The text.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+}
+
+/// `std::heating::IkaRet`, `jacket`, `left.table`: segments joined by `::` or `.`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Path {
+    /// At least one.
+    pub segments: Vec<Name>,
+    /// Where.
+    pub span: Span,
+}
+
+/// A unit as written: `degC`, `kg/(mol*s)`, `%w/w`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnitText {
+    /// The text, without blanks.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+}
+
+/// One source file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct File {
+    /// The `mtx` header's number; absent where the header is missing (which is reported).
+    pub version: Option<u32>,
+    /// `//!` lines, without the marker and one blank.
+    pub docs: Vec<String>,
+    /// In order.
+    pub items: Vec<Item>,
+}
+
+/// A declaration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// `///` lines, without the marker and one blank.
+    pub docs: Vec<String>,
+    /// What it declares.
+    pub kind: ItemKind,
+    /// All of it.
+    pub span: Span,
+}
+
+/// What an item declares.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ItemKind {
+    /// Could not be read; reported already.
+    Error,
+    /// `use std::robots::{FrankaPanda, Robotiq2F85}`; without braces the last segment is the name.
+    Use {
+        /// The module, or module and name.
+        path: Path,
+        /// The braces.
+        names: Option<Vec<Name>>,
+    },
+    /// `dimension Velocity = Length / Time`, `dimension Length`, `dimension Temperature = point TemperatureDifference`.
+    Dimension {
+        /// Its name.
+        name: Name,
+        /// `point` stands before the definition.
+        point: bool,
+        /// Absent for a base dimension.
+        definition: Option<Expr>,
+    },
+    /// `unit bar: Pressure = 1e5 Pa with prefixes`, `unit degC: Temperature = 1 K from 273.15 K also °C`.
+    Unit {
+        /// Its name.
+        name: UnitText,
+        /// Absent where it follows from the definition.
+        dimension: Option<Name>,
+        /// Absent for the base unit of its dimension.
+        definition: Option<Expr>,
+        /// `from`: the value of its zero.
+        origin: Option<Expr>,
+        /// `with prefixes`: takes SI prefixes.
+        prefixes: bool,
+        /// `also`: other spellings.
+        aliases: Vec<UnitText>,
+    },
+    /// `species KI { formula: "KI" }`.
+    Species {
+        /// With charge and phase.
+        name: Name,
+        /// Its properties.
+        fields: Vec<Field>,
+    },
+    /// `solution S0 { KI: 0.66 g, water: 100 g } labelled 0.04 mol/kg of KI`.
+    Solution {
+        /// Its name.
+        name: Name,
+        /// Recipe lines.
+        fields: Vec<Field>,
+        /// The label.
+        labelled: Option<Labelled>,
+    },
+    /// `reaction r: A + 2 B -> C { rate: ... }`.
+    Reaction {
+        /// Its name.
+        name: Name,
+        /// Left side: coefficient (as written, absent for 1) and species.
+        reactants: Vec<Term>,
+        /// `<->`.
+        reversible: bool,
+        /// Right side.
+        products: Vec<Term>,
+        /// Rate, order, window, template, enthalpy.
+        fields: Vec<Field>,
+    },
+    /// `capability Heater: Thermal { ... }`.
+    Capability {
+        /// Its name.
+        name: Name,
+        /// Extended capabilities.
+        extends: Vec<Path>,
+        /// In order.
+        members: Vec<Member>,
+    },
+    /// `asset IkaRet: Heater, Stirrer { gain: 70 W/K }`.
+    Asset {
+        /// Its name.
+        name: Name,
+        /// Capabilities, or assets it builds on.
+        extends: Vec<Path>,
+        /// `urdf "file"` and the like after `from`.
+        source: Option<(Name, String)>,
+        /// In order.
+        lines: Vec<AssetLine>,
+    },
+    /// `process conduction(a: Thermal, b: Thermal) while touching(a, b) { ... }`.
+    Process(Process),
+    /// `event ran_dry when source.volume <= 0 mL { running = false }`.
+    Event(Event),
+    /// `relation touching(a: Body, b: Body) symmetric = a.support == b or b.support == a`.
+    Relation {
+        /// Its name.
+        name: Name,
+        /// Between what.
+        params: Vec<Param>,
+        /// `symmetric` stands after the parameters.
+        symmetric: bool,
+        /// When it holds.
+        definition: Option<Expr>,
+    },
+    /// `fn clamp(x: Ratio) -> Ratio = ...`, `extern fn exp(x: Ratio) -> Ratio`.
+    Fn {
+        /// Bound by the runtime.
+        external: bool,
+        /// Its name.
+        name: Name,
+        /// Its parameters.
+        params: Vec<Param>,
+        /// Result type.
+        result: Option<Type>,
+        /// Its body.
+        body: Option<Expr>,
+    },
+    /// `const R: MolarHeatCapacity = 8.314462618 J/(mol*K)`.
+    Const {
+        /// Its name.
+        name: Name,
+        /// Its type.
+        ty: Option<Type>,
+        /// Its value.
+        value: Expr,
+    },
+    /// `driver IkaNamur for IkaRet over serial(baud: 9600) { ... }`.
+    Driver {
+        /// Its name.
+        name: Name,
+        /// The asset type it drives.
+        device: Path,
+        /// `serial`, `tcp`, `http`.
+        transport: Name,
+        /// The transport's settings.
+        args: Vec<Arg>,
+        /// Its mappings.
+        wires: Vec<Wire>,
+    },
+    /// `lab bench { ... }`.
+    Lab {
+        /// Its name.
+        name: Name,
+        /// Its parameters.
+        params: Vec<Param>,
+        /// In order.
+        lines: Vec<LabLine>,
+    },
+    /// `skill place(item: Graspable) on(target: Surface) ... { }`.
+    Skill {
+        /// Bound by the runtime, without a body.
+        external: bool,
+        /// Verb and parameters.
+        sig: Sig,
+        /// `needs`, `effect`, ...
+        clauses: Vec<Clause>,
+        /// Its steps.
+        body: Option<Block>,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `workflow synthesize(target: Temperature = 76 degC) in bench { } finally { }`.
+    Workflow {
+        /// Its name.
+        name: Name,
+        /// Its parameters.
+        params: Vec<Param>,
+        /// `in any lab` gives no path.
+        lab: Option<Path>,
+        /// Its steps.
+        body: Block,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `study screen of synthesize { ... }`.
+    Study {
+        /// Its name.
+        name: Name,
+        /// The workflow.
+        of: Path,
+        /// In order.
+        lines: Vec<StudyLine>,
+    },
+    /// `fit kinetics of synthesize { ... }`.
+    Fit {
+        /// Its name.
+        name: Name,
+        /// The workflow.
+        of: Path,
+        /// In order.
+        lines: Vec<FitLine>,
+    },
+    /// `test name { ... }`.
+    Test {
+        /// Its name.
+        name: Name,
+        /// Its steps.
+        body: Block,
+    },
+}
+
+/// `labelled 0.04 mol/kg of KI +- 1 %`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labelled {
+    /// The concentration.
+    pub value: Expr,
+    /// Of what.
+    pub species: Name,
+    /// Its tolerance.
+    pub tolerance: Option<Expr>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// A species with its coefficient in an equation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Term {
+    /// 1 where none is written.
+    pub coefficient: f64,
+    /// The species.
+    pub species: Name,
+    /// Both.
+    pub span: Span,
+}
+
+/// `key: value`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Field {
+    /// A word or a species.
+    pub key: Name,
+    /// Its value.
+    pub value: FieldValue,
+    /// Both.
+    pub span: Span,
+}
+
+/// What a field holds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FieldValue {
+    /// `70 W/K`.
+    Expr(Expr),
+    /// `{ EtOH: 1, HI: 1 }`.
+    Fields(Vec<Field>),
+    /// `Robotiq2F85 { ... }`.
+    Literal(AssetLiteral),
+    /// `K+ + 2 I-`: species joined by `+`, in a `dissolves` field.
+    Species(Vec<Term>),
+}
+
+/// `IkaRet { gain: 70 W/K }`, or the type alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssetLiteral {
+    /// The type.
+    pub ty: Path,
+    /// Overrides.
+    pub fields: Vec<Field>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// A line of an asset.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AssetLine {
+    /// Could not be read.
+    Error(Span),
+    /// `gain: 70 W/K`.
+    Field(Field),
+    /// `frame place at (0, 0, 130) mm`.
+    Frame {
+        /// Its name.
+        name: Name,
+        /// Its pose.
+        at: Expr,
+    },
+    /// `lid = Lid { ... }`: a child asset.
+    Part {
+        /// Its name.
+        name: Name,
+        /// Its type.
+        literal: AssetLiteral,
+    },
+}
+
+/// A member of a capability.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Member {
+    /// `///` lines.
+    pub docs: Vec<String>,
+    /// What it is.
+    pub kind: MemberKind,
+    /// All of it.
+    pub span: Span,
+}
+
+/// What a member is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MemberKind {
+    /// Could not be read.
+    Error,
+    /// `param gain: Power`, `state active: Bool = false`, `extensive amount: Amount per Species`.
+    Value {
+        /// Which of them.
+        role: Role,
+        /// Its name.
+        name: Name,
+        /// Its type.
+        ty: Type,
+        /// `per Species`.
+        per: Option<Name>,
+        /// Default, initial value or definition.
+        value: Option<Expr>,
+        /// `{ resolution: 0.01 g }`.
+        options: Vec<NamedExpr>,
+    },
+    /// `view[s: Species]: AmountPerMass = amount[s] / mass`: what `x[S]` means when a unit of this dimension is asked for.
+    View {
+        /// The index.
+        param: Param,
+        /// Its type.
+        ty: Type,
+        /// Its definition.
+        value: Expr,
+    },
+    /// `command heat to(t: Temperature) needs ...`.
+    Command {
+        /// Verb and parameters.
+        sig: Sig,
+        /// `needs`, `effect`, ...
+        clauses: Vec<Clause>,
+    },
+    /// A law on the instance itself.
+    Process(Process),
+    /// An instantaneous change on the instance itself.
+    Event(Event),
+    /// `frame place at (0, 0, 1) mm`; `frame grasp` without `at` is one that every asset must give.
+    Frame {
+        /// Its name.
+        name: Name,
+        /// Its pose.
+        at: Option<Expr>,
+    },
+}
+
+/// Which kind of value a member is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Fixed for an instance.
+    Param,
+    /// Changes by commands, events and processes.
+    State,
+    /// Follows from others.
+    Derived,
+    /// What the device reports.
+    Reading,
+    /// A sum of contributions.
+    Flow,
+    /// A state that a transfer takes a fraction of.
+    Extensive,
+    /// A sub-instance.
+    Part,
+}
+
+/// `process NAME(PARAMS) while COND { LAWS }`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Process {
+    /// Its name.
+    pub name: Name,
+    /// Over what; empty for the instance itself.
+    pub params: Vec<Param>,
+    /// When it runs.
+    pub guard: Option<Expr>,
+    /// Its laws.
+    pub laws: Vec<Law>,
+}
+
+/// `event NAME(PARAMS) when COND { LAWS }`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Its name.
+    pub name: Name,
+    /// Over what; empty for the instance itself.
+    pub params: Vec<Param>,
+    /// When it happens.
+    pub when: Expr,
+    /// What happens.
+    pub laws: Vec<Law>,
+}
+
+/// A line of a law body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Law {
+    /// What it says.
+    pub kind: LawKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// What a law line says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LawKind {
+    /// Could not be read.
+    Error,
+    /// `let q = ...`.
+    Let {
+        /// Its name.
+        name: Name,
+        /// Its value.
+        value: Expr,
+    },
+    /// `for s in r.species { }`.
+    For {
+        /// The variable.
+        var: Name,
+        /// The finite set.
+        set: Expr,
+        /// The lines.
+        body: Vec<Law>,
+    },
+    /// `if c { } else { }`.
+    If {
+        /// Which.
+        cond: Expr,
+        /// If it holds.
+        then: Vec<Law>,
+        /// If not.
+        otherwise: Vec<Law>,
+    },
+    /// `x += e`, `x -= e`, `x = e`, `x' += e`, `x' -= e`, `x' = e`; a prime is [`ExprKind::Prime`] on the target.
+    Assign {
+        /// What changes.
+        target: Expr,
+        /// How.
+        op: AssignOp,
+        /// By what.
+        value: Expr,
+    },
+    /// `move(q, from: source, to: sink)`.
+    Call(Expr),
+}
+
+/// How a law changes its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssignOp {
+    /// `=`
+    Set,
+    /// `+=`
+    Add,
+    /// `-=`
+    Sub,
+}
+
+/// A type.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Type {
+    /// `Heater & Surface`: one or more.
+    pub paths: Vec<Path>,
+    /// `Range<Temperature>`.
+    pub argument: Option<Box<Type>>,
+    /// `?`: may be `nothing`; a limit may be `unlimited`.
+    pub optional: bool,
+    /// `where ...`.
+    pub condition: Option<Expr>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// `name: Type = default`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Param {
+    /// Its name.
+    pub name: Name,
+    /// Its type.
+    pub ty: Option<Type>,
+    /// Its default.
+    pub default: Option<Expr>,
+}
+
+/// `place(item: Graspable) on(target: Surface) by(arm: Arm)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sig {
+    /// One or more words.
+    pub verb: Vec<Name>,
+    /// The first group.
+    pub params: Vec<Param>,
+    /// `on(target: Surface)`: label and its group.
+    pub labelled: Vec<(Name, Vec<Param>)>,
+    /// `-> Mass`.
+    pub result: Option<Type>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// A clause of a skill or command.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clause {
+    /// What it says.
+    pub kind: ClauseKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// What a clause says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ClauseKind {
+    /// `needs t in limits`.
+    Needs(Expr),
+    /// `while v.temperature < 80 degC`.
+    While(Expr),
+    /// `fails slip, unreachable`.
+    Fails(Vec<Name>),
+    /// `effect active = true, target = t`.
+    Effect(Vec<Effect>),
+    /// `takes 6 s in 4 s .. 30 s`.
+    Takes {
+        /// Nominal.
+        nominal: Expr,
+        /// Bounds.
+        bounds: Option<Expr>,
+    },
+    /// `until pumped >= v`.
+    Until(Expr),
+    /// `option within: Mass = 1 g`: what a call may give in braces.
+    Option(Param),
+}
+
+/// One effect.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Effect {
+    /// `active = true`.
+    Assign(Expr, Expr),
+    /// `move(v, from: a, to: b)`.
+    Call(Expr),
+}
+
+/// A line of a driver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wire {
+    /// What it maps.
+    pub kind: WireKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// What a driver line maps.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WireKind {
+    /// Could not be read.
+    Error,
+    /// `heat to(t) sends "OUT_SP_1 {t as degC :.0}", "START_1" expects "*"`.
+    Command {
+        /// The command's call form.
+        sig: Sig,
+        /// What goes out.
+        sends: Vec<String>,
+        /// What must come back.
+        expects: Option<String>,
+    },
+    /// `reading temperature asks "IN_PV_2" expects "{degC} 2"`.
+    Reading {
+        /// The reading.
+        path: Path,
+        /// What goes out.
+        asks: String,
+        /// What comes back.
+        expects: String,
+    },
+    /// `reply "#" fails blocked`.
+    Reply {
+        /// What came back.
+        text: String,
+        /// The failure it means.
+        fails: Name,
+    },
+    /// `open sends "1@1"`.
+    Open {
+        /// What goes out first.
+        sends: Vec<String>,
+    },
+}
+
+/// A line of a lab.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabLine {
+    /// What it says.
+    pub kind: LabLineKind,
+    /// Where.
+    pub span: Span,
+}
+
+/// What a lab line says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LabLineKind {
+    /// Could not be read.
+    Error,
+    /// `ambient: 25 degC`.
+    Setting {
+        /// Its name.
+        name: Name,
+        /// Its value.
+        value: Expr,
+    },
+    /// `beaker = Beaker250mL { } on table at (450, -250) mm holding 10 g of water`.
+    Instance {
+        /// Its name.
+        name: Name,
+        /// Its type and overrides.
+        literal: AssetLiteral,
+        /// `on table`, `at (...)`, `in rack`: label and operand.
+        relations: Vec<(Name, Expr)>,
+        /// `holding ...`.
+        holding: Option<Holding>,
+    },
+    /// `include bench as left at (0, 0, 0) m`.
+    Include {
+        /// The other lab.
+        lab: Path,
+        /// Its name here.
+        name: Name,
+        /// `at (...)`.
+        relations: Vec<(Name, Expr)>,
+    },
+    /// `between hotplate and beaker { conductance: 12.77 W/K }`.
+    Between {
+        /// One.
+        a: Expr,
+        /// The other.
+        b: Expr,
+        /// Pair parameters.
+        fields: Vec<Field>,
+    },
+}
+
+/// What an instance holds at the start.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Holding {
+    /// `10 g of water + 12 mmol of EtOH`: an `of` sum, shaped as a binary expression.
+    Expr(Expr),
+    /// `{ A1: 20 mL of buffer }`.
+    Fields(Vec<Field>),
+}
+
+/// A line of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StudyLine {
+    /// Could not be read.
+    Error(Span),
+    /// `vary target in 60 degC .. 90 degC by sobol`.
+    Vary {
+        /// What varies.
+        path: Expr,
+        /// Where.
+        range: Expr,
+        /// How: name and arguments.
+        by: Option<(Name, Vec<Arg>)>,
+    },
+    /// `runs 100000`.
+    Runs(Expr),
+    /// `report yield = ...`.
+    Report {
+        /// Its name.
+        name: Name,
+        /// What.
+        value: Expr,
+    },
+}
+
+/// A line of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FitLine {
+    /// Could not be read.
+    Error(Span),
+    /// `data "run.csv"`.
+    Data(String),
+    /// `estimate r.rate.A in 1e7 .. 1e10 log`.
+    Estimate {
+        /// What.
+        path: Expr,
+        /// Where.
+        range: Expr,
+        /// On a logarithmic scale.
+        log: bool,
+    },
+    /// `match x with "column" as mol/kg noise 0.01 mol/kg`.
+    Match {
+        /// The model's value.
+        value: Expr,
+        /// The data's column.
+        column: String,
+        /// The column's unit.
+        unit: Option<UnitText>,
+        /// Standard deviation.
+        noise: Option<Expr>,
+    },
+}
+
+/// Steps in braces.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Block {
+    /// In order.
+    pub stmts: Vec<Stmt>,
+    /// With the braces.
+    pub span: Span,
+}
+
+/// `on slip { } finally { }`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Handlers {
+    /// In order.
+    pub on: Vec<(Name, Block)>,
+    /// Always runs.
+    pub finally: Option<Block>,
+}
+
+/// A step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stmt {
+    /// What it does.
+    pub kind: StmtKind,
+    /// All of it.
+    pub span: Span,
+}
+
+/// What a step does.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StmtKind {
+    /// Could not be read.
+    Error,
+    /// `let x: T = e`.
+    Let {
+        /// Its name.
+        name: Name,
+        /// Its type.
+        ty: Option<Type>,
+        /// Its value.
+        value: Expr,
+    },
+    /// `let m <- weigh v on scale`.
+    LetDo {
+        /// Its name.
+        name: Name,
+        /// The step.
+        call: Call,
+    },
+    /// `step grow { }`.
+    Step {
+        /// Its name.
+        name: Name,
+        /// Its steps.
+        body: Block,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `wait 10 s`.
+    Wait {
+        /// How long.
+        duration: Expr,
+    },
+    /// `wait until C timeout D`.
+    WaitUntil {
+        /// What is waited for.
+        cond: Expr,
+        /// At most this long.
+        timeout: Option<Expr>,
+        /// `on timeout { }`.
+        handlers: Handlers,
+    },
+    /// `if c { } else { }`; `else if` is a block of one `if`.
+    If {
+        /// Which.
+        cond: Expr,
+        /// If it holds.
+        then: Block,
+        /// If not.
+        otherwise: Option<Block>,
+    },
+    /// `repeat while C max n { }`.
+    RepeatWhile {
+        /// Looked at before each turn.
+        cond: Expr,
+        /// At most this often.
+        max: Option<Expr>,
+        /// Its steps.
+        body: Block,
+    },
+    /// `repeat n times { }`.
+    Repeat {
+        /// How often.
+        times: Expr,
+        /// Its steps.
+        body: Block,
+    },
+    /// `for w in plate.column(1) { }`.
+    For {
+        /// The variable.
+        var: Name,
+        /// The finite set.
+        set: Expr,
+        /// Its steps.
+        body: Block,
+    },
+    /// `within 5 min after grow.end { }`.
+    Within {
+        /// At most this long.
+        limit: Expr,
+        /// Since when.
+        since: Expr,
+        /// Its steps.
+        body: Block,
+        /// `on late { }`.
+        handlers: Handlers,
+    },
+    /// `hold C for 15 min timeout 1 h`.
+    Hold {
+        /// What must hold.
+        cond: Expr,
+        /// For how long.
+        duration: Expr,
+        /// At most this long in all.
+        timeout: Option<Expr>,
+        /// `on timeout { }`.
+        handlers: Handlers,
+    },
+    /// `keep C { }`.
+    Keep {
+        /// What must hold all the time.
+        cond: Expr,
+        /// Its steps.
+        body: Block,
+        /// `on broken { }`.
+        handlers: Handlers,
+    },
+    /// `try { } else { }`.
+    Try {
+        /// In order.
+        alternatives: Vec<Block>,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `retry 2`.
+    Retry {
+        /// How often.
+        times: Expr,
+    },
+    /// `claim a, b { }`.
+    Claim {
+        /// Which.
+        assets: Vec<Expr>,
+        /// Its steps.
+        body: Block,
+    },
+    /// `sequence { }`.
+    Sequence {
+        /// Its steps.
+        body: Block,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `parallel { }`: one line, one branch.
+    Parallel {
+        /// The branches.
+        body: Block,
+        /// `on`, `finally`.
+        handlers: Handlers,
+    },
+    /// `start job = ...`.
+    Start {
+        /// Its name.
+        name: Name,
+        /// What it does: one call is a block of one statement.
+        body: Block,
+    },
+    /// `await job`.
+    Await {
+        /// Its name.
+        name: Name,
+    },
+    /// `fail slip "text"`.
+    Fail {
+        /// Its name; absent where only a text is given.
+        name: Option<Name>,
+        /// In words.
+        text: Option<String>,
+    },
+    /// `expect C`.
+    Expect {
+        /// What must hold.
+        cond: Expr,
+    },
+    /// `record x every 1 s`.
+    Record {
+        /// What.
+        value: Expr,
+        /// How often.
+        every: Expr,
+    },
+    /// `note "..."`.
+    Note(String),
+    /// `ask "..."`.
+    Ask(String),
+    /// `return e`: the result of a skill.
+    Return {
+        /// Its value.
+        value: Expr,
+    },
+    /// `run synthesize { target: 76 degC }`, in a test.
+    Run {
+        /// The workflow.
+        workflow: Path,
+        /// Its parameters.
+        options: Vec<NamedExpr>,
+    },
+    /// `heat hotplate to 80 degC`.
+    Call(Call),
+}
+
+/// `transfer 100 uL from a to b by p { tips: once }`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Call {
+    /// Bare words; the longest prefix that is a declared verb is the verb, and at most one word may follow it: the object.
+    pub words: Vec<Name>,
+    /// The first argument, where it is more than a bare word or stands after two or more words.
+    pub object: Option<Expr>,
+    /// `to 80 degC`.
+    pub labelled: Vec<(Name, Expr)>,
+    /// `{ tips: once }`.
+    pub options: Vec<NamedExpr>,
+    /// All of it.
+    pub span: Span,
+}
+
+/// `name: value`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedExpr {
+    /// The name.
+    pub name: Name,
+    /// The value.
+    pub value: Expr,
+}
+
+/// An argument of a function.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arg {
+    /// `from:`.
+    pub name: Option<Name>,
+    /// The value.
+    pub value: Expr,
+}
+
+/// An expression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Expr {
+    /// What it says.
+    pub kind: Box<ExprKind>,
+    /// Where.
+    pub span: Span,
+}
+
+/// What an expression says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExprKind {
+    /// Could not be read; stays silent later.
+    Error,
+    /// `3`, `0.5`, `1e-3`.
+    Number(f64),
+    /// `80 degC`.
+    Quantity(f64, UnitText),
+    /// `"text"`, unescaped.
+    Text(String),
+    /// A word: `true`, `nothing`, `beaker`, or a species where only one can stand (`K+`).
+    Name(Name),
+    /// `std::module::name`.
+    Scoped(Path),
+    /// `beaker.contents`.
+    Member(Expr, Name),
+    /// `x[EtI]`, `plate[A1]`: one word, which is a species, a well or a variable by the type of `x`.
+    IndexWord(Expr, Name),
+    /// `plate[A1 .. H12]`.
+    IndexRange(Expr, Name, Name),
+    /// `list[i - 1]`.
+    Index(Expr, Expr),
+    /// `f(x, from: y)`, `r.rate(t)`.
+    Call(Expr, Vec<Arg>),
+    /// `sum(s in r.orders: m[s])`; the function's name is not fixed by the grammar.
+    Fold {
+        /// `sum`, `product`, `all`, `any`, `min`, `max`.
+        fold: Name,
+        /// The variable.
+        var: Name,
+        /// The finite set.
+        set: Expr,
+        /// What is folded.
+        body: Expr,
+    },
+    /// `x'`.
+    Prime(Expr),
+    /// `-x`, `not x`.
+    Unary(Unary, Expr),
+    /// `a + b`, `a in b`, `a is b`.
+    Binary(Binary, Expr, Expr),
+    /// `10 g of water`.
+    Of(Expr, Name),
+    /// `a .. b`.
+    Range(Expr, Expr),
+    /// `x as mol/kg`.
+    As(Expr, UnitText),
+    /// `(1, 2, 3) mm`; one element in parentheses is the element itself.
+    Tuple(Vec<Expr>, Option<UnitText>),
+    /// `[a, b]`.
+    List(Vec<Expr>),
+}
+
+/// Prefix operators.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unary {
+    /// `-`
+    Neg,
+    /// `not`
+    Not,
+}
+
+/// Infix operators, loosest first: `or`, `and`, comparisons (with `in`, `is`), `..`, `+-`, `+ -`, `* /`, `^` (to the right).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Binary {
+    /// `or`
+    Or,
+    /// `and`
+    And,
+    /// `==`
+    Eq,
+    /// `!=`
+    Ne,
+    /// `<`
+    Lt,
+    /// `<=`
+    Le,
+    /// `>`
+    Gt,
+    /// `>=`
+    Ge,
+    /// `in`
+    In,
+    /// `is`
+    Is,
+    /// `+-`
+    PlusMinus,
+    /// `+`
+    Add,
+    /// `-`
+    Sub,
+    /// `*`
+    Mul,
+    /// `/`
+    Div,
+    /// `^`
+    Pow,
+}

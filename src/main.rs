@@ -1,0 +1,2 @@
+//! The matterix command.
+fn main() {}
