@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use serde::{Deserialize, Serialize};
 
@@ -127,7 +128,7 @@ pub struct Env<'a> {
 pub struct Graph {
     ops: Vec<Op>,
     #[serde(skip)]
-    seen: HashMap<Key, NodeId>,
+    seen: HashMap<Key, NodeId, BuildHasherDefault<Mixer>>,
 }
 
 impl PartialEq for Graph {
@@ -148,6 +149,35 @@ enum Key {
     Unary(UnaryOp, NodeId),
     Binary(BinaryOp, NodeId, NodeId),
     Select(NodeId, NodeId, NodeId),
+}
+
+/// Mixes the few words of a [`Key`]. Programs are not written to make keys collide, and the map is never iterated, so
+/// neither secrecy nor order matters; speed does.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mixer(u64);
+
+impl Hasher for Mixer {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|b| self.write_u64(u64::from(*b)));
+    }
+
+    fn write_u32(&mut self, word: u32) {
+        self.write_u64(u64::from(word));
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        // The product's high half depends on all bits of the word, its low half on the low ones only.
+        let product = u128::from(self.0.rotate_left(5) ^ word) * 0x9e37_79b9_7f4a_7c15;
+        self.0 = (product >> 64) as u64 ^ product as u64;
+    }
+
+    fn write_isize(&mut self, word: isize) {
+        self.write_u64(word as u64);
+    }
 }
 
 fn key(op: Op) -> Key {
@@ -281,43 +311,49 @@ impl Graph {
 
     /// Evaluates one node by evaluating what it depends on. For occasional use; hot paths keep a schedule of their own.
     pub fn eval(&self, node: NodeId, env: Env<'_>) -> f64 {
-        let mut needed = vec![false; node.0 as usize + 1];
-        needed[node.0 as usize] = true;
-        for i in (0..needed.len()).rev() {
-            if needed[i] {
-                for operand in self.ops[i].operands() {
-                    needed[operand.0 as usize] = true;
-                }
-            }
-        }
-        let mut values = vec![0.0; needed.len()];
-        for i in 0..needed.len() {
-            if needed[i] {
-                values[i] = eval_op(self.ops[i], env, &values);
-            }
+        let mut values = vec![0.0; node.0 as usize + 1];
+        for n in self.schedule([node]) {
+            values[n.0 as usize] = eval_op(self.op(n), env, &values);
         }
         values[node.0 as usize]
     }
 
     /// The operations `roots` depend on, operands first, each once.
     pub fn schedule(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
-        let mut needed = vec![false; self.ops.len()];
-        for root in roots {
-            needed[root.0 as usize] = true;
-        }
-        for i in (0..needed.len()).rev() {
-            if needed[i] {
-                for operand in self.ops[i].operands() {
-                    needed[operand.0 as usize] = true;
-                }
-            }
-        }
-        (0..needed.len()).filter(|&i| needed[i]).map(|i| NodeId(i as u32)).collect()
+        let mut found = Vec::new();
+        self.below(roots, |node| {
+            found.push(node);
+            false
+        });
+        found.sort_unstable();
+        found
     }
 
     /// Whether `node` depends on an operation for which `test` holds.
     pub fn depends(&self, node: NodeId, test: impl Fn(&Op) -> bool) -> bool {
-        self.schedule([node]).into_iter().any(|n| test(&self.op(n)))
+        self.below([node], |n| test(&self.op(n)))
+    }
+
+    /// Visits what `roots` depend on, each once, in no particular order, until a visit gives true. Costs nothing for
+    /// the rest of the graph: most questions are about a small part of a large one.
+    fn below(&self, roots: impl IntoIterator<Item = NodeId>, mut visit: impl FnMut(NodeId) -> bool) -> bool {
+        let mut seen: Vec<u64> = Vec::new();
+        let mut todo: Vec<NodeId> = roots.into_iter().collect();
+        while let Some(node) = todo.pop() {
+            let (word, bit) = (node.0 as usize / 64, 1 << (node.0 % 64));
+            if seen.len() <= word {
+                seen.resize(word + 1, 0);
+            }
+            if seen[word] & bit != 0 {
+                continue;
+            }
+            seen[word] |= bit;
+            if visit(node) {
+                return true;
+            }
+            todo.extend(self.op(node).operands());
+        }
+        false
     }
 
     /// One line per operation: `%12 = mul %3 %7`.
@@ -362,7 +398,9 @@ pub fn eval_op(op: Op, env: Env<'_>, values: &[f64]) -> f64 {
     }
 }
 
-fn unary(op: UnaryOp, a: f64) -> f64 {
+/// The value of an operation on one number.
+#[inline]
+pub fn unary(op: UnaryOp, a: f64) -> f64 {
     match op {
         UnaryOp::Neg => -a,
         UnaryOp::Not => truth(a == 0.0),
@@ -376,7 +414,9 @@ fn unary(op: UnaryOp, a: f64) -> f64 {
     }
 }
 
-fn binary(op: BinaryOp, a: f64, b: f64) -> f64 {
+/// The value of an operation on two numbers.
+#[inline]
+pub fn binary(op: BinaryOp, a: f64, b: f64) -> f64 {
     match op {
         BinaryOp::Add => a + b,
         BinaryOp::Sub => a - b,

@@ -259,6 +259,28 @@ pub enum Step {
     Ask(String),
 }
 
+impl Step {
+    /// The nodes directly below one, in order.
+    pub fn children(&self) -> Vec<StepId> {
+        match self {
+            Step::Sequence(list) | Step::Parallel(list) | Step::Try(list) => list.clone(),
+            Step::Guarded { body, handlers, finally } => {
+                std::iter::once(*body).chain(handlers.iter().map(|(_, h)| *h)).chain(*finally).collect()
+            }
+            Step::If { then, otherwise, .. } => std::iter::once(*then).chain(*otherwise).collect(),
+            Step::Skill { body, .. }
+            | Step::Named { body, .. }
+            | Step::Keep { body, .. }
+            | Step::Within { body, .. }
+            | Step::Repeat { body, .. }
+            | Step::RepeatWhile { body, .. }
+            | Step::Claim { body, .. }
+            | Step::Start { body, .. } => vec![*body],
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// A node of the tree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlanStep {
