@@ -1,0 +1,279 @@
+//! Items and their lines.
+
+use super::{
+    Sexp,
+    exprs::{args, expr, maybe, named, param, path, sig, ty, unit},
+    leaf, name, names, node, quoted,
+    steps::{block, handlers, labelled},
+};
+use crate::ast::{
+    AssetLine, AssetLiteral, AssignOp, Clause, ClauseKind, Effect, Event, Field, FieldValue, FitLine, Holding, Item,
+    ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Process, Role, StudyLine, Term, Wire,
+    WireKind,
+};
+
+pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
+    (!docs.is_empty()).then(|| node("docs").with(docs.iter().map(|line| quoted(line))))
+}
+
+fn flag(on: bool, word: &str) -> Option<Sexp> {
+    on.then(|| leaf(word))
+}
+
+pub(super) fn item(item: &Item) -> Sexp {
+    let mut all = item_kind(&item.kind);
+    all.parts.extend(docs(&item.docs));
+    all
+}
+
+fn item_kind(kind: &ItemKind) -> Sexp {
+    match kind {
+        ItemKind::Error => node("item-error"),
+        ItemKind::Use { path: of, names: braces } => {
+            node("use").with([path(of)]).with(braces.as_ref().map(|n| node("names").with(names(n))))
+        }
+        ItemKind::Dimension { name: word, point, definition } => {
+            node("dimension").with([name(word)]).with(flag(*point, "point")).with(definition.as_ref().map(expr))
+        }
+        ItemKind::Unit { name: word, dimension, definition, origin, prefixes, aliases } => node("unit")
+            .with([unit(word)])
+            .with(dimension.as_ref().map(name))
+            .with(definition.as_ref().map(expr))
+            .with(maybe("from", origin.as_ref()))
+            .with(flag(*prefixes, "prefixes"))
+            .with((!aliases.is_empty()).then(|| node("also").with(aliases.iter().map(unit)))),
+        ItemKind::Species { name: word, fields: list } => node("species").with([name(word)]).with(fields(list)),
+        ItemKind::Solution { name: word, fields: list, labelled } => {
+            node("solution").with([name(word)]).with(fields(list)).with(labelled.as_ref().map(label))
+        }
+        ItemKind::Reaction { name: word, reactants, reversible, products, fields: list } => node("reaction")
+            .with([name(word), side(reactants), leaf(if *reversible { "<->" } else { "->" }), side(products)])
+            .with(fields(list)),
+        ItemKind::Capability { name: word, extends, members } => {
+            node("capability").with([name(word)]).with(extends.iter().map(path)).with(members.iter().map(member))
+        }
+        ItemKind::Asset { name: word, extends, source, lines } => node("asset")
+            .with([name(word)])
+            .with(extends.iter().map(path))
+            .with(source.as_ref().map(|(kind, file)| node("from").with([name(kind), quoted(file)])))
+            .with(lines.iter().map(asset_line)),
+        ItemKind::Process(of) => process(of),
+        ItemKind::Event(of) => event(of),
+        ItemKind::Relation { name: word, params, symmetric, definition } => node("relation")
+            .with([name(word)])
+            .with(params.iter().map(param))
+            .with(flag(*symmetric, "symmetric"))
+            .with(definition.as_ref().map(expr)),
+        ItemKind::Fn { external, name: word, params, result, body } => node("fn")
+            .with(flag(*external, "extern"))
+            .with([name(word)])
+            .with(params.iter().map(param))
+            .with(result.as_ref().map(|r| node("result").with([ty(r)])))
+            .with(body.as_ref().map(expr)),
+        ItemKind::Const { name: word, ty: of, value } => {
+            node("const").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
+        }
+        ItemKind::Driver { name: word, device, transport, args: list, wires } => node("driver")
+            .with([name(word), path(device), node("over").with([name(transport)]).with(args(list))])
+            .with(wires.iter().map(wire)),
+        ItemKind::Lab { name: word, params, lines } => {
+            node("lab").with([name(word)]).with(params.iter().map(param)).with(lines.iter().map(lab_line))
+        }
+        ItemKind::Skill { external, sig: of, clauses, body, handlers: on } => node("skill")
+            .with(flag(*external, "extern"))
+            .with([sig(of)])
+            .with(clauses.iter().map(clause))
+            .with(body.as_ref().map(block))
+            .with(handlers(on)),
+        ItemKind::Workflow { name: word, params, lab, body, handlers: on } => node("workflow")
+            .with([name(word)])
+            .with(params.iter().map(param))
+            .with([lab.as_ref().map_or_else(|| leaf("any-lab"), path), block(body)])
+            .with(handlers(on)),
+        ItemKind::Study { name: word, of, lines } => {
+            node("study").with([name(word), path(of)]).with(lines.iter().map(study_line))
+        }
+        ItemKind::Fit { name: word, of, lines } => {
+            node("fit").with([name(word), path(of)]).with(lines.iter().map(fit_line))
+        }
+        ItemKind::Test { name: word, body } => node("test").with([name(word), block(body)]),
+    }
+}
+
+fn label(label: &Labelled) -> Sexp {
+    node("labelled").with([expr(&label.value), name(&label.species)]).with(maybe("+-", label.tolerance.as_ref()))
+}
+
+fn side(terms: &[Term]) -> Sexp {
+    let term = |t: &Term| node("term").with([leaf(format!("{:?}", t.coefficient)), name(&t.species)]);
+    node("side").with(terms.iter().map(term))
+}
+
+fn fields(fields: &[Field]) -> Vec<Sexp> {
+    fields.iter().map(field).collect()
+}
+
+fn field(field: &Field) -> Sexp {
+    let value = match &field.value {
+        FieldValue::Expr(value) => expr(value),
+        FieldValue::Fields(inner) => node("fields").with(fields(inner)),
+        FieldValue::Literal(of) => literal(of),
+        FieldValue::Species(terms) => side(terms),
+    };
+    node(format!("{}:", field.key.text)).with([value])
+}
+
+fn literal(literal: &AssetLiteral) -> Sexp {
+    node("literal").with([path(&literal.ty)]).with(fields(&literal.fields))
+}
+
+fn asset_line(line: &AssetLine) -> Sexp {
+    match line {
+        AssetLine::Error(_) => leaf("error"),
+        AssetLine::Field(of) => field(of),
+        AssetLine::Frame { name: word, at } => node("frame").with([name(word), expr(at)]),
+        AssetLine::Part { name: word, literal: of } => node("part").with([name(word), literal(of)]),
+    }
+}
+
+fn member(of: &Member) -> Sexp {
+    let all = match &of.kind {
+        MemberKind::Error => leaf("error"),
+        MemberKind::Value { role, name: word, ty: kind, per, value, options } => node(role_word(*role))
+            .with([name(word), ty(kind)])
+            .with(per.as_ref().map(|p| node("per").with([name(p)])))
+            .with(maybe("=", value.as_ref()))
+            .with(named(options)),
+        MemberKind::View { param: index, ty: kind, value } => node("view").with([param(index), ty(kind), expr(value)]),
+        MemberKind::Command { sig: of, clauses } => node("command").with([sig(of)]).with(clauses.iter().map(clause)),
+        MemberKind::Process(of) => process(of),
+        MemberKind::Event(of) => event(of),
+        MemberKind::Frame { name: word, at } => node("frame").with([name(word)]).with(at.as_ref().map(expr)),
+    };
+    all.with(docs(&of.docs))
+}
+
+fn role_word(role: Role) -> &'static str {
+    match role {
+        Role::Param => "param",
+        Role::State => "state",
+        Role::Derived => "derived",
+        Role::Reading => "reading",
+        Role::Flow => "flow",
+        Role::Extensive => "extensive",
+        Role::Part => "part",
+    }
+}
+
+fn clause(clause: &Clause) -> Sexp {
+    match &clause.kind {
+        ClauseKind::Needs(cond) => node("needs").with([expr(cond)]),
+        ClauseKind::While(cond) => node("while").with([expr(cond)]),
+        ClauseKind::Fails(all) => node("fails").with(names(all)),
+        ClauseKind::Effect(effects) => node("effect").with(effects.iter().map(|effect| match effect {
+            Effect::Assign(target, value) => node("=").with([expr(target), expr(value)]),
+            Effect::Call(call) => expr(call),
+        })),
+        ClauseKind::Takes { nominal, bounds } => node("takes").with([expr(nominal)]).with(maybe("in", bounds.as_ref())),
+        ClauseKind::Until(cond) => node("until").with([expr(cond)]),
+        ClauseKind::Option(of) => node("option").with([param(of)]),
+    }
+}
+
+fn process(of: &Process) -> Sexp {
+    node("process")
+        .with([name(&of.name)])
+        .with(of.params.iter().map(param))
+        .with(maybe("while", of.guard.as_ref()))
+        .with([laws(&of.laws)])
+}
+
+fn event(of: &Event) -> Sexp {
+    node("event")
+        .with([name(&of.name)])
+        .with(of.params.iter().map(param))
+        .with([node("when").with([expr(&of.when)]), laws(&of.laws)])
+}
+
+fn laws(laws: &[Law]) -> Sexp {
+    node("laws").with(laws.iter().map(law))
+}
+
+fn law(law: &Law) -> Sexp {
+    match &law.kind {
+        LawKind::Error => leaf("error"),
+        LawKind::Let { name: word, value } => node("let").with([name(word), expr(value)]),
+        LawKind::For { var, set, body } => node("for").with([name(var), expr(set), laws(body)]),
+        LawKind::If { cond, then, otherwise } => node("if").with([expr(cond), laws(then), laws(otherwise)]),
+        LawKind::Assign { target, op, value } => {
+            let op = match op {
+                AssignOp::Set => "=",
+                AssignOp::Add => "+=",
+                AssignOp::Sub => "-=",
+            };
+            node(op).with([expr(target), expr(value)])
+        }
+        LawKind::Call(call) => expr(call),
+    }
+}
+
+fn texts(word: &str, all: &[String]) -> Sexp {
+    node(word).with(all.iter().map(|text| quoted(text)))
+}
+
+fn wire(wire: &Wire) -> Sexp {
+    match &wire.kind {
+        WireKind::Error => leaf("error"),
+        WireKind::Command { sig: of, sends, expects } => node("command")
+            .with([sig(of), texts("sends", sends)])
+            .with(expects.as_deref().map(|text| node("expects").with([quoted(text)]))),
+        WireKind::Reading { path: of, asks, expects } => {
+            node("reading").with([path(of), quoted(asks), quoted(expects)])
+        }
+        WireKind::Reply { text, fails } => node("reply").with([quoted(text), name(fails)]),
+        WireKind::Open { sends } => node("open").with([texts("sends", sends)]),
+    }
+}
+
+fn lab_line(line: &LabLine) -> Sexp {
+    match &line.kind {
+        LabLineKind::Error => leaf("error"),
+        LabLineKind::Setting { name: word, value } => node("setting").with([name(word), expr(value)]),
+        LabLineKind::Instance { name: word, literal: of, relations, holding } => node("instance")
+            .with([name(word), literal(of)])
+            .with(labelled(relations))
+            .with(holding.as_ref().map(|holding| match holding {
+                Holding::Expr(value) => node("holding").with([expr(value)]),
+                Holding::Fields(list) => node("holding").with([node("fields").with(fields(list))]),
+            })),
+        LabLineKind::Include { lab, name: word, relations } => {
+            node("include").with([path(lab), name(word)]).with(labelled(relations))
+        }
+        LabLineKind::Between { a, b, fields: list } => node("between").with([expr(a), expr(b)]).with(fields(list)),
+    }
+}
+
+fn study_line(line: &StudyLine) -> Sexp {
+    match line {
+        StudyLine::Error(_) => leaf("error"),
+        StudyLine::Vary { path: of, range, by } => node("vary")
+            .with([expr(of), expr(range)])
+            .with(by.as_ref().map(|(how, list)| node("by").with([name(how)]).with(args(list)))),
+        StudyLine::Runs(count) => node("runs").with([expr(count)]),
+        StudyLine::Report { name: word, value } => node("report").with([name(word), expr(value)]),
+    }
+}
+
+fn fit_line(line: &FitLine) -> Sexp {
+    match line {
+        FitLine::Error(_) => leaf("error"),
+        FitLine::Data(file) => node("data").with([quoted(file)]),
+        FitLine::Estimate { path: of, range, log } => {
+            node("estimate").with([expr(of), expr(range)]).with(flag(*log, "log"))
+        }
+        FitLine::Match { value, column, unit: of, noise } => node("match")
+            .with([expr(value), quoted(column)])
+            .with(of.as_ref().map(|u| node("as").with([unit(u)])))
+            .with(maybe("noise", noise.as_ref())),
+    }
+}

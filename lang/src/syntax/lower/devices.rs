@@ -1,0 +1,243 @@
+//! Capabilities with their members and clauses, assets and fields.
+
+use super::{
+    super::{
+        cursor::{Kids, Node},
+        grammar::Rule,
+    },
+    Lower,
+};
+use crate::ast::{
+    AssetLine, AssetLiteral, Clause, ClauseKind, Effect, Field, FieldValue, ItemKind, Member, MemberKind, Path, Role,
+    Term,
+};
+
+impl Lower<'_> {
+    pub(super) fn capability(&mut self, kids: &mut Kids) -> ItemKind {
+        let name = self.name_in(kids);
+        let extends = self.extends_in(kids);
+        let members = self.lines(
+            kids.eat(Rule::members),
+            Rule::only_member,
+            |this, node, span| {
+                let docs = this.docs_before(node.as_span().start());
+                Member { docs, kind: this.member(node), span }
+            },
+            |_, _, span| Some(Member { docs: Vec::new(), kind: MemberKind::Error, span }),
+        );
+        ItemKind::Capability { name, extends, members }
+    }
+
+    fn extends_in(&mut self, kids: &mut Kids) -> Vec<Path> {
+        kids.eat(Rule::extends).map_or_else(Vec::new, |node| self.paths(Kids::of(node).all(Rule::path)))
+    }
+
+    fn member(&mut self, node: Node) -> MemberKind {
+        let rule = node.as_rule();
+        match rule {
+            Rule::process => return MemberKind::Process(self.process(node)),
+            Rule::event => return MemberKind::Event(self.event(node)),
+            _ => {}
+        }
+        let kids = &mut Kids::of(node);
+        match rule {
+            Rule::value_member => self.value_member(kids),
+            Rule::view => {
+                let Some(param) = kids.eat(Rule::param) else { return MemberKind::Error };
+                let param = self.param(param);
+                let Some(ty) = kids.eat(Rule::ty) else { return MemberKind::Error };
+                MemberKind::View { param, ty: self.ty(ty), value: self.expr_in(kids) }
+            }
+            Rule::command => MemberKind::Command { sig: self.sig_in(kids), clauses: self.clauses_in(kids) },
+            Rule::frame_member => {
+                MemberKind::Frame { name: self.name_in(kids), at: kids.eat(Rule::operand).map(|o| self.expr(o)) }
+            }
+            _ => MemberKind::Error,
+        }
+    }
+
+    fn value_member(&mut self, kids: &mut Kids) -> MemberKind {
+        let role = match kids.eat(Rule::role).map(|n| n.as_str()) {
+            Some("param") => Role::Param,
+            Some("state") => Role::State,
+            Some("derived") => Role::Derived,
+            Some("reading") => Role::Reading,
+            Some("flow") => Role::Flow,
+            Some("extensive") => Role::Extensive,
+            Some("part") => Role::Part,
+            _ => return MemberKind::Error,
+        };
+        let name = self.name_in(kids);
+        let Some(ty) = kids.eat(Rule::ty) else { return MemberKind::Error };
+        MemberKind::Value {
+            role,
+            name,
+            ty: self.ty(ty),
+            per: kids.eat(Rule::ident).map(|n| self.name(&n)),
+            value: kids.eat(Rule::cond).map(|c| self.expr(c)),
+            options: self.options_in(kids),
+        }
+    }
+
+    pub(super) fn clauses_in(&mut self, kids: &mut Kids) -> Vec<Clause> {
+        let mut clauses = Vec::new();
+        let Some(node) = kids.eat(Rule::clauses) else { return clauses };
+        let mut kids = Kids::of(node);
+        let mut before = None;
+        while let Some(part) = kids.take() {
+            let (start, span) = (part.as_span().start(), self.span(&part));
+            match part.as_rule() {
+                Rule::bad_clause_rest => self.mistakes.rest(Rule::only_clause, before.unwrap_or(start), &part),
+                Rule::bad_clause => self.mistakes.line(Rule::only_clause, before, &part),
+                _ => clauses.extend(self.clause(part).map(|kind| Clause { kind, span })),
+            }
+            before = Some(start);
+        }
+        clauses
+    }
+
+    fn clause(&mut self, node: Node) -> Option<ClauseKind> {
+        let rule = node.as_rule();
+        let mut inner = Kids::of(node);
+        let kids = &mut inner;
+        Some(match rule {
+            Rule::needs => ClauseKind::Needs(self.expr_in(kids)),
+            Rule::while_ => {
+                kids.has(Rule::kw_while);
+                ClauseKind::While(self.expr_in(kids))
+            }
+            Rule::until => {
+                kids.has(Rule::kw_until);
+                ClauseKind::Until(self.expr_in(kids))
+            }
+            Rule::fails => ClauseKind::Fails(self.names(kids.all(Rule::word))),
+            Rule::effect => {
+                let changes = kids.all(Rule::change);
+                ClauseKind::Effect(changes.into_iter().map(|change| self.effect(change)).collect())
+            }
+            Rule::takes => {
+                ClauseKind::Takes { nominal: self.expr_in(kids), bounds: kids.eat(Rule::operand).map(|b| self.expr(b)) }
+            }
+            Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
+            _ => return None,
+        })
+    }
+
+    fn effect(&mut self, node: Node) -> Effect {
+        let kids = &mut Kids::of(node);
+        let target = self.expr_in(kids);
+        match kids.eat(Rule::cond) {
+            Some(value) => Effect::Assign(target, self.expr(value)),
+            None => Effect::Call(target),
+        }
+    }
+
+    pub(super) fn asset(&mut self, kids: &mut Kids) -> ItemKind {
+        let name = self.name_in(kids);
+        let extends = self.extends_in(kids);
+        let source = kids.eat(Rule::source).map(|node| {
+            let kids = &mut Kids::of(node);
+            (self.name_in(kids), self.text_in(kids))
+        });
+        let lines = self.asset_lines(kids.eat(Rule::asset_body));
+        ItemKind::Asset { name, extends, source, lines }
+    }
+
+    fn asset_lines(&mut self, body: Option<Node>) -> Vec<AssetLine> {
+        let mut lines = Vec::new();
+        let Some(body) = body else { return lines };
+        let mut kids = Kids::of(body);
+        let mut before = None;
+        while let Some(part) = kids.take() {
+            let (start, span, rule) = (part.as_span().start(), self.span(&part), part.as_rule());
+            match rule {
+                Rule::field_end => continue,
+                Rule::bad_field_rest => self.mistakes.rest(Rule::only_asset_line, before.unwrap_or(start), &part),
+                Rule::bad_field => {
+                    let field = self.bad_field(Rule::only_asset_line, before, &part);
+                    lines.push(field.map_or(AssetLine::Error(span), AssetLine::Field));
+                }
+                Rule::field => lines.push(AssetLine::Field(self.field(part))),
+                _ => {
+                    let kids = &mut Kids::of(part);
+                    let name = self.name_in(kids);
+                    lines.push(match rule {
+                        Rule::frame => AssetLine::Frame { name, at: self.expr_in(kids) },
+                        _ => AssetLine::Part { name, literal: self.literal_in(kids) },
+                    });
+                }
+            }
+            before = Some(start);
+        }
+        lines
+    }
+
+    pub(super) fn literal_in(&mut self, kids: &mut Kids) -> AssetLiteral {
+        match kids.take() {
+            Some(node) => self.literal(node),
+            None => {
+                let span = self.place(0, 0);
+                AssetLiteral { ty: Path { segments: Vec::new(), span }, fields: Vec::new(), span }
+            }
+        }
+    }
+
+    fn literal(&mut self, node: Node) -> AssetLiteral {
+        let span = self.span(&node);
+        let kids = &mut Kids::of(node);
+        AssetLiteral { ty: self.path_in(kids), fields: self.fields_in(kids), span }
+    }
+
+    /// The fields that stand next; none where there are none.
+    pub(super) fn fields_in(&mut self, kids: &mut Kids) -> Vec<Field> {
+        let Some(node) = kids.eat(Rule::fields) else { return Vec::new() };
+        let mut fields = Vec::new();
+        let mut kids = Kids::of(node);
+        let mut before = None;
+        while let Some(part) = kids.take() {
+            let start = part.as_span().start();
+            match part.as_rule() {
+                Rule::field_end => continue,
+                Rule::bad_field_rest => self.mistakes.rest(Rule::only_field, before.unwrap_or(start), &part),
+                Rule::bad_field => fields.extend(self.bad_field(Rule::only_field, before, &part)),
+                _ => fields.push(self.field(part)),
+            }
+            before = Some(start);
+        }
+        fields
+    }
+
+    fn field(&mut self, node: Node) -> Field {
+        let span = self.span(&node);
+        let start = node.as_span().start();
+        let mut inner = Kids::of(node);
+        let kids = &mut inner;
+        let key = match kids.eat(Rule::key) {
+            Some(key) => self.name_in(&mut Kids::of(key)),
+            None => crate::ast::Name { text: DISSOLVES.to_owned(), span: self.place(start, start + DISSOLVES.len()) },
+        };
+        let value = match kids.peek() {
+            Some(Rule::fields) => FieldValue::Fields(self.fields_in(kids)),
+            Some(Rule::value_literal) => FieldValue::Literal(self.literal_in(kids)),
+            Some(Rule::side) => FieldValue::Species(self.side_in(kids)),
+            _ => FieldValue::Expr(self.expr_in(kids)),
+        };
+        Field { key, value, span }
+    }
+
+    /// Species with coefficients, joined by `+`.
+    pub(super) fn side_in(&mut self, kids: &mut Kids) -> Vec<Term> {
+        let Some(node) = kids.eat(Rule::side) else { return Vec::new() };
+        let mut terms = Vec::new();
+        for term in Kids::of(node).all(Rule::side_term) {
+            let span = self.span(&term);
+            let mut kids = Kids::of(term);
+            let coefficient = kids.eat(Rule::number).map_or(1.0, |n| self.number(&n));
+            terms.push(Term { coefficient, species: self.name_in(&mut kids), span });
+        }
+        terms
+    }
+}
+
+/// The field whose value is a list of species.
+const DISSOLVES: &str = "dissolves";

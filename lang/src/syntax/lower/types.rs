@@ -1,0 +1,97 @@
+//! Paths, types, parameters and signatures.
+
+use matterix_ir::{Diagnostic, codes};
+
+use super::{
+    super::{
+        cursor::{Kids, Node},
+        grammar::Rule,
+    },
+    Lower,
+};
+use crate::ast::{Param, Path, Sig, Type};
+
+/// The deepest `A<B<C>>`.
+const MAX_ARGUMENTS: usize = 16;
+
+impl Lower<'_> {
+    pub(super) fn path(&self, node: &Node) -> Path {
+        let segments = self.names(Kids::of(node.clone()).all(Rule::ident));
+        Path { segments, span: self.span(node) }
+    }
+
+    pub(super) fn path_in(&self, kids: &mut Kids) -> Path {
+        kids.eat(Rule::path)
+            .map_or_else(|| Path { segments: Vec::new(), span: self.place(0, 0) }, |node| self.path(&node))
+    }
+
+    pub(super) fn paths(&self, nodes: Vec<Node>) -> Vec<Path> {
+        nodes.iter().map(|node| self.path(node)).collect()
+    }
+
+    pub(super) fn ty(&mut self, node: Node) -> Type {
+        let span = self.span(&node);
+        let closing = node.clone().into_inner().filter(|p| p.as_rule() == Rule::rangle).count();
+        let mut kids = Kids::of(node);
+        let mut paths = self.paths(kids.all(Rule::path));
+        let mut arguments = Vec::new();
+        while kids.has(Rule::langle) {
+            arguments.extend(kids.eat(Rule::path).map(|p| self.path(&p)));
+        }
+        if arguments.len() != closing || arguments.len() > MAX_ARGUMENTS {
+            self.report(
+                Diagnostic::error(codes::SYNTAX, span, "`<` and `>` of this type do not match", "here")
+                    .help("write for example `Range<Temperature>`"),
+            );
+            arguments.truncate(MAX_ARGUMENTS);
+        }
+        paths.extend(self.paths(kids.all(Rule::path)));
+        let optional = kids.has(Rule::question);
+        let condition = kids.eat(Rule::cond).map(|c| self.expr(c));
+        let argument = arguments.into_iter().rev().fold(None, |inner, path| {
+            let span = path.span;
+            Some(Box::new(Type { paths: vec![path], argument: inner, optional: false, condition: None, span }))
+        });
+        Type { paths, argument, optional, condition, span }
+    }
+
+    /// The parameters of the group that stands next; none where there is no group.
+    pub(super) fn params_in(&mut self, kids: &mut Kids) -> Vec<Param> {
+        let Some(group) = kids.eat(Rule::params) else { return Vec::new() };
+        Kids::of(group).all(Rule::param).into_iter().map(|p| self.param(p)).collect()
+    }
+
+    pub(super) fn param(&mut self, node: Node) -> Param {
+        let mut kids = Kids::of(node);
+        let name = self.name_in(&mut kids);
+        let ty = kids.eat(Rule::ty).map(|t| self.ty(t));
+        let default = kids.eat(Rule::cond).map(|c| self.expr(c));
+        Param { name, ty, default }
+    }
+
+    pub(super) fn sig_in(&mut self, kids: &mut Kids) -> Sig {
+        let Some(node) = kids.eat(Rule::sig) else {
+            return Sig {
+                verb: Vec::new(),
+                params: Vec::new(),
+                labelled: Vec::new(),
+                result: None,
+                span: self.place(0, 0),
+            };
+        };
+        let span = self.span(&node);
+        let mut kids = Kids::of(node);
+        let verb = kids.eat(Rule::verb).map_or_else(Vec::new, |v| self.names(Kids::of(v).all(Rule::ident)));
+        let params = self.params_in(&mut kids);
+        let labelled = kids
+            .all(Rule::sig_group)
+            .into_iter()
+            .map(|group| {
+                let mut kids = Kids::of(group);
+                (self.name_in(&mut kids), self.params_in(&mut kids))
+            })
+            .collect();
+        let result = kids.eat(Rule::ty).map(|t| self.ty(t));
+        Sig { verb, params, labelled, result, span }
+    }
+}

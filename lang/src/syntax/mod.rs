@@ -1,0 +1,146 @@
+//! Text to syntax tree. Everything that knows the grammar's rules is in here.
+//!
+//! Brackets and texts that were left open are closed first (`scan`, `brackets`, `repair`), so that the grammar sees whole groups; its error
+//! productions skip what is no form (`recovery.pest`), and the skipped line is read once more alone to find where it fails (`mistake`).
+
+mod brackets;
+mod cursor;
+mod decode;
+mod dump;
+mod grammar;
+mod lower;
+mod mistake;
+mod repair;
+mod scan;
+mod spot;
+pub(crate) mod tokens;
+mod words;
+
+use matterix_ir::{Diagnostic, FileId, Span, codes};
+use pest::Parser;
+
+pub use decode::{NotText, decode};
+pub use dump::dump;
+
+use crate::ast::File;
+use grammar::{Grammar, Rule};
+use repair::{Change, Offsets};
+
+/// The deepest nesting of brackets.
+pub const MAX_NESTING: usize = 256;
+
+/// The largest file, in bytes.
+pub const MAX_SIZE: usize = 2 << 20;
+
+/// At most this many findings are shown, and how many more there are.
+const MAX_SHOWN: usize = 100;
+
+/// The tree of a file and what is wrong with its text. Total: what cannot be read becomes error nodes.
+pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
+    if text.len() > MAX_SIZE {
+        return (nothing(), vec![too_large(Span::new(file, 0, 0), text.len())]);
+    }
+    let (mut changes, mut found) = brackets::balance(file, text, &scan::scan(text));
+    found.extend(reserved_character(file, text));
+    if changes.len() > brackets::MAX_CHANGES {
+        return (nothing(), shown(file, text, found, 0));
+    }
+    let (repaired, offsets) = repair::apply(text, &changes);
+    let scan = scan::scan(&repaired);
+    let (depth, deepest) = scan::depth(&scan);
+    if depth >= MAX_NESTING {
+        found.push(too_deep(offsets.span(file, deepest, deepest + 1)));
+        return (nothing(), shown(file, text, found, 0));
+    }
+    let (mut tree, mut mistakes, mut hidden) = with_stack(depth, || read(file, &repaired, &offsets));
+    if !mistakes.is_empty() {
+        let mut holes = Vec::new();
+        for (end, word) in scan::dangling(&repaired, &scan) {
+            let at = offsets.user(end);
+            holes.push(Change { at, remove: 0, insert: MISSING_VALUE });
+            found.push(missing_value(Span::new(file, at, at), word));
+        }
+        if !holes.is_empty() {
+            holes.append(&mut changes);
+            holes.sort_by_key(|change| change.at);
+            let (repaired, offsets) = repair::apply(text, &holes);
+            (tree, mistakes, hidden) = with_stack(depth, || read(file, &repaired, &offsets));
+        }
+    }
+    found.extend(mistakes);
+    (tree, shown(file, text, found, hidden))
+}
+
+/// Reads a text whose brackets match.
+fn read(file: FileId, text: &str, offsets: &Offsets) -> (File, Vec<Diagnostic>, usize) {
+    match Grammar::parse(Rule::file, text).ok().and_then(|mut pairs| pairs.next()) {
+        Some(root) => lower::Lower::new(file, text, offsets).run(root),
+        None => {
+            let span = offsets.span(file, 0, 0);
+            let mistake = Diagnostic::error(codes::SYNTAX, span, "this file cannot be read", "it starts here");
+            (nothing(), vec![mistake], 0)
+        }
+    }
+}
+
+/// Runs `inside` where the stack holds for that many nested brackets, also without optimisation.
+fn with_stack<T: Send>(depth: usize, inside: impl Fn() -> T + Sync) -> T {
+    if depth < SHALLOW {
+        return inside();
+    }
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(DEEP_STACK);
+        let result = thread.spawn_scoped(scope, &inside).ok().and_then(|running| running.join().ok());
+        result.unwrap_or_else(&inside)
+    })
+}
+
+/// Fewer nested brackets than this fit on any stack.
+const SHALLOW: usize = 16;
+
+/// Bytes of stack for [`MAX_NESTING`] brackets.
+const DEEP_STACK: usize = 256 << 20;
+
+fn nothing() -> File {
+    File { version: None, docs: Vec::new(), items: Vec::new() }
+}
+
+/// What stands for a missing value while reading.
+const MISSING_VALUE: &str = "\u{1a}";
+
+fn reserved_character(file: FileId, text: &str) -> Option<Diagnostic> {
+    let at = text.find(MISSING_VALUE)?;
+    let span = Span::new(file, at, at + MISSING_VALUE.len());
+    Some(Diagnostic::error(codes::SYNTAX, span, "the file holds a character that is no text (U+001A)", "here"))
+}
+
+fn missing_value(span: Span, word: &str) -> Diagnostic {
+    let what = if word == "of" { "a species" } else { "a value" };
+    Diagnostic::error(codes::SYNTAX, span, format!("{what} is missing after `{word}`"), "the line ends here")
+        .help("to go on in the next line, indent it")
+}
+
+fn too_large(span: Span, size: usize) -> Diagnostic {
+    let headline = format!("the file is too large: {:.1} MB", size as f64 / 1e6);
+    Diagnostic::error(codes::SYNTAX, span, headline, format!("at most {:.1} MB are read", MAX_SIZE as f64 / 1e6))
+        .help("split it into modules and join them with `use`")
+}
+
+fn too_deep(span: Span) -> Diagnostic {
+    let label = format!("more than {} brackets are open here", MAX_NESTING - 1);
+    Diagnostic::error(codes::SYNTAX, span, "nested too deeply", label)
+        .help("give the inner parts names, as skills or with `let`")
+}
+
+/// The findings in the order of the text, the first ones of very many.
+fn shown(file: FileId, text: &str, mut found: Vec<Diagnostic>, hidden: usize) -> Vec<Diagnostic> {
+    found.sort_by_key(|diagnostic| diagnostic.span().start);
+    let more = hidden + found.len().saturating_sub(MAX_SHOWN);
+    if more > 0 {
+        found.truncate(MAX_SHOWN);
+        let end = Span::new(file, text.len(), text.len());
+        let headline = format!("{more} more syntax errors are not shown");
+        found.push(Diagnostic::error(codes::SYNTAX, end, headline, "the file ends here"));
+    }
+    found
+}

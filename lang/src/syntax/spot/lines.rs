@@ -1,0 +1,167 @@
+//! Lines that start wrongly, stand in the wrong place or go on too long.
+
+use super::{ITEM_WORDS, Mistake, RESERVED, Rule, Spot, either, first_word, is_word, last_word};
+
+/// `heat(plate, 80 degC)` as a step.
+pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
+    let verb = first_word(spot.after);
+    if spot.only != Rule::only_stmt || !spot.is_at_start() || !is_word(verb) {
+        return None;
+    }
+    let rest = spot.after.get(verb.len()..)?;
+    let (headline, help) = match rest.chars().next()? {
+        '(' => ("a step is written without brackets", "write for example `heat plate to 80 degC`"),
+        '.' | '[' | ':' => ("a step starts with a verb", "write for example `heat plate to 80 degC`"),
+        _ => return None,
+    };
+    Some(Mistake::new(headline, "this reads as a value").help(help))
+}
+
+pub(super) fn reserved(spot: &Spot) -> Option<Mistake> {
+    let names = spot
+        .expected
+        .iter()
+        .any(|r| matches!(r, Rule::ident | Rule::path | Rule::param | Rule::bare_word | Rule::verb));
+    if !RESERVED.contains(&spot.token) || !names || spot.is_at_start() || spot.only == Rule::only_wire {
+        return None;
+    }
+    let word = spot.token;
+    Some(Mistake::new(format!("`{word}` is a word of the language and cannot be a name"), "choose another name"))
+}
+
+/// The nearest of some words, if it is near.
+fn nearest<'w>(word: &str, words: &[&'w str]) -> Option<&'w str> {
+    let near = words.iter().map(|w| (strsim::damerau_levenshtein(word, w), *w)).min()?;
+    (near.0 <= 1 + word.len() / 5).then_some(near.1)
+}
+
+/// Words that other languages use.
+const FOREIGN: &[(&str, &str)] = &[
+    ("import", "use"),
+    ("include", "use"),
+    ("def", "fn"),
+    ("function", "fn"),
+    ("func", "fn"),
+    ("protocol", "workflow"),
+    ("procedure", "workflow"),
+    ("class", "asset"),
+    ("device", "asset"),
+    ("compound", "species"),
+    ("reagent", "species"),
+];
+
+pub(super) fn unknown_item(spot: &Spot) -> Option<Mistake> {
+    if spot.only != Rule::only_item || !spot.is_at_start() {
+        return None;
+    }
+    let word = first_word(spot.token);
+    if word.is_empty() || ITEM_WORDS.contains(&word) {
+        let found = spot.token;
+        return Some(Mistake::new(
+            format!("`{found}` is not expected between declarations"),
+            "no declaration starts like this",
+        ));
+    }
+    let foreign = FOREIGN.iter().find(|(other, _)| *other == word).map(|(_, ours)| *ours);
+    Some(unknown(spot, word, foreign.or_else(|| nearest(word, ITEM_WORDS)), "declaration", ITEM_WORDS))
+}
+
+fn unknown(spot: &Spot, word: &str, meant: Option<&str>, what: &str, words: &[&str]) -> Mistake {
+    let headline = format!("`{word}` does not start a {what}");
+    match meant {
+        Some(meant) => Mistake::new(headline, format!("did you mean `{meant}`?")).fix(
+            format!("write `{meant}`"),
+            spot.at,
+            spot.at + word.len(),
+            meant,
+        ),
+        None => {
+            let list: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+            Mistake::new(headline, "not known here")
+                .help(format!("a {what} starts with {}", either(&list.iter().map(String::as_str).collect::<Vec<_>>())))
+        }
+    }
+}
+
+/// The first word of a line in a body whose lines start with fixed words.
+pub(super) fn unknown_line(spot: &Spot) -> Option<Mistake> {
+    let (what, words): (&str, &[&str]) = match spot.only {
+        Rule::only_member => (
+            "member",
+            &[
+                "param",
+                "state",
+                "derived",
+                "reading",
+                "flow",
+                "extensive",
+                "part",
+                "view",
+                "command",
+                "process",
+                "event",
+                "frame",
+            ],
+        ),
+        Rule::only_study_line => ("line of a study", &["vary", "runs", "report"]),
+        Rule::only_fit_line => ("line of a fit", &["data", "estimate", "match"]),
+        _ => return None,
+    };
+    let word = first_word(spot.token);
+    if !spot.is_at_start() || word.is_empty() || words.contains(&word) {
+        return None;
+    }
+    Some(unknown(spot, word, nearest(word, words), what, words))
+}
+
+/// A word that belongs to something above it.
+pub(super) fn out_of_place(spot: &Spot) -> Option<Mistake> {
+    if !spot.is_at_start() || spot.only != Rule::only_stmt {
+        return None;
+    }
+    let word = spot.token;
+    let (headline, help) = match word {
+        "else" => ("`else` has no `if` or `try`", "it stands right after the `}` of an `if` or a `try`"),
+        "while" => ("`while` does not start a step", "write `repeat while CONDITION max N { }`"),
+        "on" => (
+            "`on` handles a failure of nothing",
+            "it stands right after the `}` of a `step`, `sequence`, `parallel`, `try`, `keep` or `within`",
+        ),
+        "finally" => ("`finally` belongs to nothing", "it stands right after the `}` of a block"),
+        "timeout" => {
+            ("`timeout` belongs to nothing", "it stands after `wait until CONDITION` or `hold CONDITION for TIME`")
+        }
+        word if ITEM_WORDS.contains(&word) => ("a declaration stands outside of steps", "close the block above first"),
+        _ => return None,
+    };
+    Some(Mistake::new(headline, "here").help(help))
+}
+
+/// Something complete, and then more on the same line.
+pub(super) fn second_form(spot: &Spot) -> Option<Mistake> {
+    let words = spot.words();
+    let complete = words.is_empty() || words.contains(&"the end of the line");
+    if spot.is_at_start() || !complete || spot.token.is_empty() {
+        return None;
+    }
+    let found = spot.token;
+    let last = last_word(spot.before);
+    let mistake = Mistake::new(format!("`{found}` is not expected after `{last}`"), "the line can be read up to here");
+    Some(match spot.only {
+        Rule::only_stmt if found.starts_with(char::is_alphabetic) => mistake.help("each step stands on its own line"),
+        _ => mistake,
+    })
+}
+
+/// A line that ends where a value must follow.
+pub(super) fn missing_value(spot: &Spot) -> Option<Mistake> {
+    if !spot.token.is_empty() || spot.is_at_start() {
+        return None;
+    }
+    let words = spot.words();
+    if words.is_empty() {
+        return None;
+    }
+    let last = last_word(spot.before);
+    Some(Mistake::new(format!("{} is missing after `{last}`", either(&words)), "the line ends here"))
+}

@@ -1,0 +1,157 @@
+//! Mistaken signs: pasted ones, those of other languages, and the wrong one of two.
+
+use super::{Mistake, RESERVED, Rule, Spot, is_word};
+
+/// Signs that are typed or pasted instead of the plain ones.
+pub(super) fn lookalike(spot: &Spot) -> Option<Mistake> {
+    const SIGNS: &[(char, &str)] = &[
+        ('≥', ">="),
+        ('≤', "<="),
+        ('≠', "!="),
+        ('×', "*"),
+        ('·', "*"),
+        ('⋅', "*"),
+        ('−', "-"),
+        ('–', "-"),
+        ('—', "-"),
+        ('±', "+-"),
+        ('→', "->"),
+        ('⟶', "->"),
+        ('⇌', "<->"),
+        ('↔', "<->"),
+        ('⇄', "<->"),
+        ('÷', "/"),
+        ('“', "\""),
+        ('”', "\""),
+        ('„', "\""),
+        ('º', "°"),
+        ('˚', "°"),
+        ('′', "'"),
+        ('’', "'"),
+        ('‘', "'"),
+        ('…', ".."),
+        ('\u{a0}', " "),
+        ('\u{202f}', " "),
+        ('\u{2009}', " "),
+        ('：', ":"),
+        ('；', ";"),
+    ];
+    let first = spot.token.chars().next()?;
+    let (sign, plain) = SIGNS.iter().find(|(sign, _)| *sign == first)?;
+    let end = spot.at + sign.len_utf8();
+    let headline = match *plain {
+        " " => "this blank is a special one".to_owned(),
+        "\"" => format!("`{sign}` is not a plain quote"),
+        _ => format!("`{sign}` is not a sign of the language"),
+    };
+    Some(Mistake::new(headline, format!("write `{plain}`")).fix(format!("write `{plain}`"), spot.at, end, *plain))
+}
+
+pub(super) fn control(spot: &Spot) -> Option<Mistake> {
+    let first = spot.token.chars().next().filter(|c| c.is_control() || *c == '\u{feff}' || *c == '\u{fffd}')?;
+    let headline = format!("the file holds a character that is no text (U+{:04X})", u32::from(first));
+    Some(Mistake::new(headline, "here"))
+}
+
+pub(super) fn comment(spot: &Spot) -> Option<Mistake> {
+    let sign = ["#", "/*", "--", "%"].into_iter().find(|sign| spot.after.starts_with(sign))?;
+    if sign == "--" && !spot.is_at_start() {
+        return None;
+    }
+    let mistake = Mistake::new(format!("`{sign}` does not start a comment"), "a comment starts with `//`");
+    Some(mistake.fix("write `//`", spot.at, spot.at + sign.len(), "//"))
+}
+
+pub(super) fn quotes(spot: &Spot) -> Option<Mistake> {
+    let inner = spot.after.strip_prefix('\'')?;
+    let end = inner.find('\'')?;
+    let text = inner.get(..end)?;
+    let mistake = Mistake::new("a text stands in double quotes", format!("write `\"{text}\"`"));
+    Some(mistake.fix("use double quotes", spot.at, spot.at + end + 2, format!("\"{text}\"")))
+}
+
+/// Operators of other languages.
+pub(super) fn operator(spot: &Spot) -> Option<Mistake> {
+    const SIGNS: &[(&str, &str)] = &[
+        ("&&", "and"),
+        ("||", "or"),
+        ("<>", "!="),
+        ("=<", "<="),
+        ("=>", ">="),
+        ("===", "=="),
+        ("**", "^"),
+        ("!", "not "),
+        (":=", "="),
+        ("++", "+= 1"),
+    ];
+    if spot.form() == "reaction" {
+        return None;
+    }
+    // The first sign of two may have been read as an operator of its own.
+    let tight = spot.start + spot.before.len() == spot.at;
+    let (start, signs) = match spot.before.char_indices().next_back() {
+        Some((at, '<' | ':')) if tight => (spot.start + at, format!("{}{}", &spot.before[at..], spot.after)),
+        _ => (spot.at, spot.after.to_owned()),
+    };
+    let (sign, ours) = SIGNS.iter().find(|(sign, _)| signs.starts_with(sign) && !signs.starts_with("!="))?;
+    let ours_word = ours.trim_end();
+    let mistake = Mistake::new(format!("`{sign}` is not an operator of the language"), format!("write `{ours_word}`"));
+    Some(mistake.fix(format!("write `{ours_word}`"), start, start + sign.len(), *ours))
+}
+
+pub(super) fn reaction_arrow(spot: &Spot) -> Option<Mistake> {
+    if spot.only != Rule::only_item || spot.form() != "reaction" || !spot.before.contains(':') {
+        return None;
+    }
+    const SIGNS: &[(&str, &str)] = &[
+        ("<=>", "<->"),
+        ("<==>", "<->"),
+        ("<-->", "<->"),
+        ("==>", "->"),
+        ("-->", "->"),
+        ("=>", "->"),
+        ("==", "->"),
+        ("=", "->"),
+        (">", "->"),
+    ];
+    let (sign, ours) = SIGNS.iter().find(|(sign, _)| spot.after.starts_with(sign))?;
+    let mistake = Mistake::new(format!("a reaction is written with `{ours}`"), format!("write `{ours}`"));
+    Some(mistake.fix(format!("write `{ours}`"), spot.at, spot.at + sign.len(), *ours))
+}
+
+/// `=` for `==` in a condition, `==` for `=` in a definition.
+pub(super) fn equals(spot: &Spot) -> Option<Mistake> {
+    let condition = match spot.only {
+        Rule::only_stmt => ["expect", "if", "wait", "repeat", "hold", "keep"].contains(&spot.form()),
+        Rule::only_clause => ["needs", "while", "until"].contains(&spot.form()),
+        Rule::only_item => ["process", "event"].contains(&spot.form()),
+        Rule::only_law | Rule::only_member => ["if", "process", "event"].contains(&spot.form()),
+        _ => false,
+    };
+    let end = spot.at + spot.token.len();
+    match spot.token {
+        "=" if condition => {
+            let mistake = Mistake::new("`=` gives a value, `==` compares", "write `==` in a condition");
+            Some(mistake.fix("write `==`", spot.at, end, "=="))
+        }
+        "==" if !condition && spot.expects("`=`") => {
+            let mistake = Mistake::new("`==` compares, `=` gives a value", "write `=` in a definition");
+            Some(mistake.fix("write `=`", spot.at, end, "="))
+        }
+        _ => None,
+    }
+}
+
+/// `x = 3` as a step.
+pub(super) fn assignment(spot: &Spot) -> Option<Mistake> {
+    if spot.only != Rule::only_stmt
+        || !["=", "<-"].contains(&spot.token)
+        || !is_word(spot.before)
+        || RESERVED.contains(&spot.before)
+    {
+        return None;
+    }
+    let (name, sign) = (spot.before, spot.token);
+    let mistake = Mistake::new(format!("a step cannot change `{name}`"), "`let` gives a name to a value");
+    Some(mistake.fix(format!("write `let {name} {sign} ...`"), spot.start, spot.start, "let "))
+}
