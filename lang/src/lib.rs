@@ -1,3 +1,22 @@
-//! The `.mtx` compiler front end: text to a checked [`matterix_ir::Program`].
+//! The `.mtx` compiler front end: text to a checked [`matterix_ir::Program`]. Pure: no files, no clock, no printing.
+//!
+//! The stages are functions from one representation to the next that return their findings beside the result:
+//! [`syntax`] text to tree, [`names`] modules and scopes, [`elaborate`] the lab's instances and laws as one flat model,
+//! [`lower`] the workflow as a plan, [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
 pub mod ast;
+pub mod check;
+pub mod chem;
+pub mod elaborate;
+pub mod eval;
+pub mod fmt;
+pub mod library;
+pub mod loader;
+pub mod lower;
+pub mod names;
+pub mod program;
+pub mod syntax;
+pub mod units;
+
+pub use loader::{LibraryOnly, Loader};
+pub use program::{Options, check, compile};

@@ -1,0 +1,97 @@
+//! One mistake, one message: findings that only follow from another one are left out.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::{Diagnostic, FileId, Severity, Sources, codes};
+
+/// Where a finding stands and what it is about.
+struct Place {
+    file: FileId,
+    line: usize,
+    /// First and last line of the declaration around it: from one line without indentation to the next.
+    block: (usize, usize),
+    /// The first word in backticks of its headline.
+    subject: String,
+}
+
+/// Leaves out what follows from a syntax mistake, a misspelt name or a broken declaration.
+pub fn without_consequences(diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic> {
+    if diagnostics.len() > MOST {
+        return diagnostics;
+    }
+    let places: Vec<Place> = diagnostics.iter().map(|d| place(d, sources)).collect();
+    let keep: Vec<bool> = (0..diagnostics.len()).map(|i| !follows(i, &diagnostics, &places, sources)).collect();
+    diagnostics.into_iter().zip(keep).filter(|(_, keep)| *keep).map(|(d, _)| d).collect()
+}
+
+/// So many findings are not compared with each other: the first ones are what a reader mends.
+const MOST: usize = 500;
+
+fn place(d: &Diagnostic, sources: &Sources) -> Place {
+    let span = d.span();
+    let (line, _) = sources.line_column(span);
+    let text = sources.get(span.file).map_or("", |s| s.text.as_str());
+    let starts = |l: &&str| l.chars().next().is_some_and(|c| !c.is_whitespace() && c != '}' && c != '/');
+    let lines: Vec<&str> = text.lines().collect();
+    let at = line.min(lines.len());
+    let first = (0..at).rev().find(|i| starts(&lines[*i])).map_or(1, |i| i + 1);
+    let last = (at..lines.len()).find(|i| starts(&lines[*i])).unwrap_or(lines.len());
+    let subject = d.headline.split('`').nth(1).unwrap_or("").to_string();
+    Place { file: span.file, line, block: (first, last), subject }
+}
+
+fn is_error(d: &Diagnostic) -> bool {
+    d.severity == Severity::Error
+}
+
+fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) -> bool {
+    let (d, p) = (&all[i], &places[i]);
+    let syntax = |e: &Diagnostic| e.code == codes::SYNTAX;
+    let others = || all.iter().zip(places).filter(|(e, _)| is_error(e) && !std::ptr::eq(*e, d));
+    // A line that could not be read means nothing.
+    if !syntax(d) && others().any(|(e, q)| syntax(e) && q.file == p.file && q.line == p.line) {
+        return true;
+    }
+    // What a broken or misspelt line would have said is missing elsewhere in its declaration.
+    if d.code == codes::MISSING_FIELD || d.code == codes::MISSING_PROPERTY {
+        let broken = |e: &Diagnostic| syntax(e) || e.code == codes::UNKNOWN_FIELD;
+        return others().any(|(e, q)| broken(e) && q.file == p.file && (p.block.0..=p.block.1).contains(&q.line));
+    }
+    // A name from a line above with a mistake of its own may be fine.
+    if d.code == codes::UNKNOWN_NAME
+        || d.code == codes::UNKNOWN_VERB
+        || (d.code == codes::WRONG_ARGUMENTS && !p.subject.is_empty())
+    {
+        let names = |e: &Diagnostic| {
+            let family = e.code.family;
+            if d.code == codes::WRONG_ARGUMENTS { syntax(e) } else { family == "P0" || family == "N0" }
+        };
+        return others().any(|(e, q)| {
+            names(e)
+                && q.file == p.file
+                && q.line < p.line
+                && (words(line_text(sources, q)).contains(p.subject.as_str()) || suggests(e, &p.subject))
+                && !all.iter().zip(places).any(|(o, r)| o.code == d.code && r.line == q.line && r.subject == p.subject)
+        });
+    }
+    // Contents and equations must be right before one can tell what meets.
+    if d.code == codes::REACTION_NEVER_STARTS {
+        return others().any(|(e, _)| {
+            matches!(e.code.family, "P0" | "N0" | "U1" | "U2" | "U3" | "K2") || e.code == codes::INVALID_RECIPE
+        });
+    }
+    false
+}
+
+/// Whether a finding's correction brings in a name.
+fn suggests(e: &Diagnostic, name: &str) -> bool {
+    e.fixes.iter().flat_map(|f| &f.edits).any(|edit| edit.text == name)
+}
+
+fn line_text<'s>(sources: &'s Sources, p: &Place) -> &'s str {
+    sources.get(p.file).and_then(|s| s.text.lines().nth(p.line.saturating_sub(1))).unwrap_or("")
+}
+
+fn words(line: &str) -> BTreeSet<&str> {
+    line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect()
+}

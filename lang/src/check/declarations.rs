@@ -1,0 +1,193 @@
+//! Every declaration of a file by itself, on stand-ins for the instances it is about.
+
+use matterix_ir::{Diagnostic, Severity, Sources, codes};
+
+use super::ignored;
+use crate::ast::{AssetLine, FieldValue, Item, ItemKind, MemberKind, Param, Role};
+use crate::elaborate::reach::Reach;
+use crate::elaborate::{Elaborator, Tables};
+use crate::eval::types::unsupported;
+use crate::eval::{Scope, Type, Value};
+use crate::lower::Planner;
+use crate::names::DeclId;
+
+/// Checks the declarations of one module.
+pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Vec<Diagnostic> {
+    let mut out = Vec::new();
+    for id in tables.names.declared_by(module) {
+        let mut lab = Elaborator::new(tables, Reach::default());
+        lab.prototype = true;
+        declaration(&mut lab, sources, id, module);
+        out.extend(lab.diagnostics);
+    }
+    out
+}
+
+fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, module: usize) {
+    let item: &'a Item = lab.tables.names.decl(id).item;
+    let later = |lab: &mut Elaborator<'a>, what: &str| {
+        // Not part of a run: said, but no reason not to run.
+        let d = unsupported(item.span, what);
+        let span = crate::names::item_name(item).map_or(item.span, |n| n.1);
+        let mut d = Diagnostic { severity: Severity::Warning, ..d };
+        d.labels[0].span = span;
+        lab.report(d);
+    };
+    match &item.kind {
+        ItemKind::Capability { .. } => capability(lab, id, module),
+        ItemKind::Asset { .. } => asset(lab, id, item),
+        ItemKind::Process(p) => {
+            let mut scope = Scope::module(module);
+            bind(lab, &p.params, module, &mut scope);
+            lab.check_process(p, &mut scope);
+        }
+        ItemKind::Event(e) => {
+            let mut scope = Scope::module(module);
+            bind(lab, &e.params, module, &mut scope);
+            lab.check_event(e, &mut scope);
+        }
+        ItemKind::Fn { params, body, external, name, .. } => {
+            let mut scope = Scope::module(module);
+            bind(lab, params, module, &mut scope);
+            if let Some(body) = body {
+                lab.expr(body, &mut scope);
+            } else if *external && !crate::eval::external::is_bound(&name.text) {
+                lab.report(
+                    Diagnostic::error(
+                        codes::UNBOUND_EXTERN,
+                        name.span,
+                        format!("nothing provides `{}`", name.text),
+                        "declared `extern`",
+                    )
+                    .help("only the standard library declares external functions; give it a body with `= ...`"),
+                );
+            }
+        }
+        ItemKind::Relation { params, definition: Some(body), .. } => {
+            let mut scope = Scope::module(module);
+            bind(lab, params, module, &mut scope);
+            lab.truth(body, &mut scope);
+        }
+        ItemKind::Const { value, ty, name } => {
+            let v = lab.expr(value, &mut Scope::module(module));
+            if let Some(ty) = ty {
+                let ty = lab.resolve_type(ty, module);
+                lab.coerce(v, &ty, value.span, &name.text);
+            }
+        }
+        ItemKind::Solution { .. } => {
+            lab.composition(id);
+            lab.check_label(id);
+        }
+        ItemKind::Reaction { name, fields, .. } => {
+            report(lab, ignored::reaction(fields));
+            for (index, r) in lab.tables.reactions.iter().enumerate() {
+                if r.module == module && r.name.trim_end_matches(".reverse") == name.text {
+                    lab.check_rate(crate::eval::ReactionId(index as u32));
+                }
+            }
+        }
+        ItemKind::Species { fields, .. } => {
+            for f in fields {
+                if let FieldValue::Expr(e) = &f.value
+                    && !matches!(f.key.text.as_str(), "by" | "same_as" | "phase" | "hazards" | "color" | "solubility")
+                {
+                    lab.expr(e, &mut Scope::module(module));
+                }
+            }
+        }
+        ItemKind::Skill { sig, .. } => {
+            report(lab, ignored::parameters(sig));
+            let mut planner = Planner::new(lab, sources);
+            planner.check_skill(id);
+        }
+        ItemKind::Driver { .. } => later(lab, "drivers"),
+        ItemKind::Study { .. } => later(lab, "studies"),
+        ItemKind::Fit { .. } => later(lab, "fits"),
+        ItemKind::Test { .. } => later(lab, "tests"),
+        _ => {}
+    }
+}
+
+fn report(lab: &mut Elaborator<'_>, found: Vec<Diagnostic>) {
+    found.into_iter().for_each(|d| lab.report(d));
+}
+
+/// Binds parameters to stand-ins of their types.
+pub fn bind<'a>(lab: &mut Elaborator<'a>, params: &'a [Param], module: usize, scope: &mut Scope) {
+    for p in params {
+        let v = match &p.ty {
+            Some(ty) => {
+                let ty = lab.resolve_type(ty, module);
+                lab.placeholder(&ty, &p.name.text)
+            }
+            None => Value::Error,
+        };
+        scope.bind(p.name.text.clone(), v);
+    }
+}
+
+fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
+    let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
+    for m in lab.all_members(this) {
+        if m.owner != id {
+            continue;
+        }
+        match &m.member.kind {
+            MemberKind::Value { role, name, ty, options, .. } => {
+                report(lab, ignored::options(*role, options));
+                let ty = lab.resolve_type(ty, module);
+                if *role == Role::Flow {
+                    continue;
+                }
+                lab.initial_mode = matches!(role, Role::State | Role::Extensive);
+                lab.readings_live = *role == Role::Reading;
+                lab.member_value(this, m, name.span);
+                lab.initial_mode = false;
+                lab.readings_live = false;
+                let state = matches!(role, Role::State | Role::Extensive);
+                if state && !matches!(ty, Type::Bool | Type::Quantity { .. } | Type::Instance { .. } | Type::Any) {
+                    let shown = lab.tables.type_name(&ty);
+                    lab.report(unsupported(name.span, &format!("states that hold {shown}")));
+                }
+            }
+            MemberKind::View { param, ty, value } => {
+                let ty = lab.resolve_type(ty, module);
+                let mut scope = Scope::of_member(this, m);
+                bind(lab, std::slice::from_ref(param), module, &mut scope);
+                let v = lab.expr(value, &mut scope);
+                lab.coerce(v, &ty, value.span, "view");
+            }
+            MemberKind::Process(p) => lab.check_process(p, &mut Scope::of_member(this, m)),
+            MemberKind::Event(e) => lab.check_event(e, &mut Scope::of_member(this, m)),
+            MemberKind::Command { sig, clauses } => {
+                report(lab, ignored::parameters(sig));
+                let mut planner = Planner::new(lab, &EMPTY);
+                planner.check_command(this, sig, clauses, m);
+            }
+            MemberKind::Frame { .. } | MemberKind::Error => {}
+        }
+    }
+}
+
+/// Labels of a declaration checked by itself are never shown.
+static EMPTY: std::sync::LazyLock<Sources> = std::sync::LazyLock::new(Sources::default);
+
+fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item) {
+    let ItemKind::Asset { lines, source, .. } = &item.kind else { return };
+    if let Some((word, _)) = source {
+        lab.report(unsupported(word.span, "assets from files"));
+    }
+    for line in lines {
+        if let AssetLine::Field(f) = line {
+            lab.check_fields(id, std::slice::from_ref(f));
+        }
+    }
+    let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
+    lab.use_lines(this);
+    for m in lab.all_members(this) {
+        if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
+            lab.member_value(this, m, name.span);
+        }
+    }
+}

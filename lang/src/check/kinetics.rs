@@ -1,0 +1,114 @@
+//! K1: reactions that can never start.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Span, codes};
+
+use crate::elaborate::tables::ReactionDef;
+use crate::elaborate::{Elaborator, SpeciesId, Tables};
+use crate::names::DeclId;
+
+/// What one workflow's lab says of the reactions: which start, and what there is anywhere.
+#[derive(Clone, Debug)]
+pub struct Starts {
+    /// By reaction index: whether its reactants meet in a vessel.
+    reactions: Vec<bool>,
+    /// Species that some vessel can come to hold.
+    anywhere: BTreeSet<SpeciesId>,
+    /// Name of the lab in the text.
+    lab: Span,
+}
+
+/// Which reactions can start in a lab.
+pub fn starts(lab: &Elaborator<'_>, lab_decl: DeclId) -> Starts {
+    let reactions = meets(lab);
+    let span = crate::names::item_name(lab.tables.names.decl(lab_decl).item).map_or_else(Span::default, |n| n.1);
+    Starts { reactions, anywhere: lab.reach.anywhere(), lab: span }
+}
+
+/// By reaction index: whether its reactants meet in a vessel.
+fn meets(lab: &Elaborator<'_>) -> Vec<bool> {
+    let mixtures = (0..lab.instances.len() as u32).map(InstanceId).filter(|i| lab.per_species(*i).is_some());
+    let none = BTreeSet::new();
+    let held: Vec<&BTreeSet<SpeciesId>> =
+        mixtures.map(|m| lab.reach.set(&lab.instances[m.0 as usize].name).unwrap_or(&none)).collect();
+    let meet = |r: &ReactionDef<'_>| held.iter().any(|held| r.reactants.iter().all(|(s, _)| held.contains(s)));
+    lab.tables.reactions.iter().map(meet).collect()
+}
+
+/// Reports reactions of one module whose reactants meet in no workflow of its file.
+pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) -> Vec<Diagnostic> {
+    let Some(first) = workflows.first() else { return Vec::new() };
+    let anywhere: BTreeSet<SpeciesId> = workflows.iter().flat_map(|w| w.anywhere.iter().copied()).collect();
+    let mut out: Vec<Diagnostic> = Vec::new();
+    let mut reported: Vec<usize> = Vec::new();
+    for (index, r) in tables.reactions.iter().enumerate() {
+        let started = workflows.iter().any(|w| w.reactions.get(index) == Some(&true));
+        if r.module != module || r.reverse || started {
+            continue;
+        }
+        let lab_span = first.lab;
+        let missing: Vec<_> = r.terms.iter().filter(|(s, _)| !anywhere.contains(s)).collect();
+        // What only waits for a reaction reported already is part of that finding.
+        let cause = reported.iter().position(|first| {
+            !missing.is_empty()
+                && missing.iter().all(|(s, _)| tables.reactions[*first].products.iter().any(|(p, _)| p == s))
+        });
+        if let Some(cause) = cause {
+            let text = format!("`{}` waits for it and cannot start either", r.name);
+            out[cause].labels.push(matterix_ir::Label { span: r.span, text, primary: false });
+            continue;
+        }
+        reported.push(index);
+        let d = match missing.as_slice() {
+            [(s, span), rest @ ..] => {
+                let def = tables.species.get(*s);
+                let name = &def.name;
+                let mut d = Diagnostic::error(
+                    codes::REACTION_NEVER_STARTS,
+                    *span,
+                    format!("`{}` can never start: there is no `{name}` anywhere in the workflow", r.name),
+                    format!("no vessel holds `{name}`, nothing makes it"),
+                );
+                for (s, span) in rest {
+                    let other = &tables.species.get(*s).name;
+                    d = d.because(*span, format!("`{other}` is missing as well"));
+                }
+                d = d.because(lab_span, "the contents of this lab were looked at");
+                let sources: Vec<String> = tables
+                    .species
+                    .iter()
+                    .filter(|(_, o)| o.dissolves.iter().any(|(i, _)| i == s))
+                    .map(|(_, o)| o.name.clone())
+                    .take(3)
+                    .collect();
+                if sources.is_empty() {
+                    d.help(format!("add `{name}` to a recipe or to what a vessel holds"))
+                } else {
+                    d.help(format!("`{name}` comes from dissolving {}: add one to a recipe", sources.join(", ")))
+                }
+            }
+            [] => Diagnostic::error(
+                codes::REACTION_NEVER_STARTS,
+                r.span,
+                format!("`{}` can never start: its reactants never meet in one vessel", r.name),
+                "no vessel gets all of them",
+            )
+            .because(lab_span, "transfers between the vessels of this lab were looked at")
+            .help("add a transfer that brings them together"),
+        };
+        out.push(d);
+    }
+    out
+}
+
+/// U4: rate constants of the reactions that can start.
+pub fn rates(lab: &mut Elaborator<'_>) {
+    for (index, meet) in meets(lab).into_iter().enumerate() {
+        let library = lab.tables.names.modules[lab.tables.reactions[index].module].is_library();
+        if !library && meet {
+            lab.check_rate(crate::eval::ReactionId(index as u32));
+        }
+    }
+}

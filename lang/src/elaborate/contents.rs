@@ -1,0 +1,157 @@
+//! What a vessel holds at the start: `10 g of water + 12 mmol of EtOH`, `100 g of S0`.
+
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
+
+use super::{Elaborator, SpeciesId};
+use crate::ast::{Binary, Expr, ExprKind, Name};
+use crate::eval::{Num, Scope, Value};
+use crate::names::DeclId;
+
+/// What a name in a recipe or after `of` stands for.
+pub enum Substance {
+    /// One species.
+    Species(SpeciesId),
+    /// A recipe.
+    Solution(DeclId),
+}
+
+impl<'a> Elaborator<'a> {
+    /// Amounts of a `holding` expression: mol (kg where counted by mass). `owner` names the parameters.
+    pub fn contents(&mut self, e: &'a Expr, owner: &str, module: usize) -> Vec<(SpeciesId, NodeId)> {
+        let mut out = Vec::new();
+        self.add_contents(e, owner, module, &mut out);
+        out
+    }
+
+    fn add_contents(&mut self, e: &'a Expr, owner: &str, module: usize, out: &mut Vec<(SpeciesId, NodeId)>) {
+        match &*e.kind {
+            ExprKind::Binary(Binary::Add, a, b) => {
+                self.add_contents(a, owner, module, out);
+                self.add_contents(b, owner, module, out);
+            }
+            ExprKind::Tuple(items, None) if items.len() == 1 => self.add_contents(&items[0], owner, module, out),
+            ExprKind::Of(quantity, name) => {
+                let mut scope = Scope { lab: true, ..Scope::module(module) };
+                let value = self.expr(quantity, &mut scope);
+                let Some(substance) = self.substance(name, module) else { return };
+                let Value::Num(n) = value else {
+                    self.expected("a mass, a volume or an amount", &value, quantity.span);
+                    return;
+                };
+                if self.graph.constant(n.node).is_some_and(|v| v < 0.0) {
+                    self.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        quantity.span,
+                        "a vessel cannot hold less than nothing",
+                        "negative",
+                    ));
+                    return;
+                }
+                let n = self.name_param(&format!("{owner}.initial[{}]", name.text), n, quantity.span);
+                for (s, node) in self.amounts_of(&substance, n, quantity.span, name) {
+                    match out.iter().position(|(o, _)| *o == s) {
+                        Some(i) => out[i].1 = self.plus(out[i].1, node),
+                        None => out.push((s, node)),
+                    }
+                }
+            }
+            ExprKind::Error => {}
+            _ => self.report(
+                Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    e.span,
+                    "say of what: `10 g of water`",
+                    "not an amount of something",
+                )
+                .help("contents are a sum of quantities with `of`: `10 g of water + 12 mmol of EtOH`"),
+            ),
+        }
+    }
+
+    /// What a name stands for where contents are given.
+    pub fn substance(&mut self, name: &Name, module: usize) -> Option<Substance> {
+        let names = self.tables.names;
+        let id = names.lookup(module, &name.text);
+        if let Some(s) = id.and_then(|id| self.tables.species.of_decl(id)) {
+            return Some(Substance::Species(s));
+        }
+        let is_solution = |k: &crate::ast::ItemKind| matches!(k, crate::ast::ItemKind::Solution { .. });
+        if let Some(id) = id.filter(|id| is_solution(&names.decl(*id).item.kind)) {
+            return Some(Substance::Solution(id));
+        }
+        let d = names.unknown(module, name, "species or solution", |k| {
+            matches!(k, crate::ast::ItemKind::Species { .. } | crate::ast::ItemKind::Solution { .. })
+        });
+        self.report(d);
+        None
+    }
+
+    /// A quantity of a substance as amounts of species.
+    pub fn amounts_of(&mut self, what: &Substance, n: Num, span: Span, name: &Name) -> Vec<(SpeciesId, NodeId)> {
+        let units = &self.tables.units;
+        let (mass, amount, volume) = (units.named("Mass"), units.named("Amount"), units.named("Volume"));
+        let parts: Vec<(SpeciesId, f64)> = match what {
+            Substance::Species(s) => vec![(*s, 1.0 / self.tables.species.get(*s).molar_mass)],
+            Substance::Solution(id) => self.composition(*id),
+        };
+        if parts.is_empty() {
+            return Vec::new();
+        }
+        if n.dimension == mass {
+            return parts.into_iter().map(|(s, per_kg)| (s, self.scaled(n.node, per_kg))).collect();
+        }
+        if n.dimension == volume {
+            let mut per_kg = 0.0;
+            for (s, amount) in &parts {
+                let Some(v) = self.molar_volume(*s, name) else { return Vec::new() };
+                per_kg += amount * v;
+            }
+            return parts.into_iter().map(|(s, amount)| (s, self.scaled(n.node, amount / per_kg))).collect();
+        }
+        if let Substance::Species(s) = what
+            && n.dimension == amount
+        {
+            if self.tables.species.get(*s).by_mass {
+                self.report(
+                    Diagnostic::error(
+                        codes::CONCENTRATION_KIND,
+                        span,
+                        format!("`{}` is counted by mass and has no amount of substance", name.text),
+                        "cannot be given in mol",
+                    )
+                    .help("give a mass: `1 g of ...`"),
+                );
+                return Vec::new();
+            }
+            return vec![(*s, n.node)];
+        }
+        let found = self.describe(&n);
+        let solution = matches!(what, Substance::Solution(_));
+        let wanted = if solution { "a mass or a volume" } else { "a mass, a volume or an amount" };
+        let mut d = Diagnostic::error(
+            codes::UNIT_MISMATCH,
+            span,
+            format!("contents are given as {wanted}, found {found}"),
+            format!("this is {found}"),
+        );
+        if solution && n.dimension == amount {
+            d = d.help("a solution has no single molar mass: give its mass, such as `100 g`");
+        }
+        self.report(d);
+        Vec::new()
+    }
+
+    fn scaled(&mut self, node: NodeId, by: f64) -> NodeId {
+        let factor = self.graph.number(by);
+        self.graph.binary(BinaryOp::Mul, node, factor)
+    }
+
+    /// Molar volume, m^3/mol, of a species that is measured out by volume.
+    fn molar_volume(&mut self, s: SpeciesId, at: &Name) -> Option<f64> {
+        let probe = Name { text: "molar_volume".into(), span: at.span };
+        match self.member(Value::Species(s), &probe) {
+            Value::Num(n) => self.graph.constant(n.node),
+            _ => None,
+        }
+    }
+}

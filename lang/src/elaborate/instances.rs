@@ -1,0 +1,275 @@
+//! Instances: an asset type with its overrides, its parts, its place.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::scene::{InstanceId, Pose};
+use matterix_ir::{NodeId, Span};
+
+use super::tables::MemberRef;
+use super::{Elaborator, MemberKey, SpeciesId};
+use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
+use crate::eval::{Type, Value};
+use crate::names::DeclId;
+
+/// A field given for an instance: where its names are looked up, and whether it stands in the lab.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting<'a> {
+    /// Module of the text.
+    pub module: usize,
+    /// The field.
+    pub field: &'a Field,
+    /// It stands in a lab, so the lab's names are seen, not the instance's.
+    pub lab: bool,
+}
+
+/// An asset in the lab, or a part of one.
+#[derive(Clone, Debug, Default)]
+pub struct Instance<'a> {
+    /// Full name.
+    pub name: String,
+    /// Its asset type; for a part its capability; for a prototype all capabilities asked for.
+    pub kinds: Vec<DeclId>,
+    /// What it is a part of.
+    pub owner: Option<InstanceId>,
+    /// Fields given for it, the strongest first.
+    pub settings: Vec<Setting<'a>>,
+    /// Its parts by name.
+    pub parts: BTreeMap<String, InstanceId>,
+    /// Values of its members, as far as they were asked for.
+    pub values: BTreeMap<MemberKey, Value>,
+    /// State of each amount per species.
+    pub amounts: BTreeMap<(String, SpeciesId), u32>,
+    /// What it holds at the start: mol (or kg where counted by mass).
+    pub contents: Vec<(SpeciesId, NodeId)>,
+    /// `on table`, `in rack`: preposition and instance.
+    pub placed: Vec<(String, InstanceId)>,
+    /// Where.
+    pub pose: Pose,
+    /// Its declaration.
+    pub span: Span,
+}
+
+impl<'a> Instance<'a> {
+    /// The strongest field of a name: module, value, whether it stands in the lab.
+    pub fn setting(&self, name: &str) -> Option<(usize, &'a FieldValue, bool)> {
+        self.settings.iter().find(|s| s.field.key.text == name).map(|s| (s.module, &s.field.value, s.lab))
+    }
+}
+
+impl<'a> Elaborator<'a> {
+    /// Makes an instance of a kind with its parts; `settings` are the fields of its literal.
+    pub fn instantiate(
+        &mut self,
+        name: String,
+        kinds: Vec<DeclId>,
+        mut settings: Vec<Setting<'a>>,
+        owner: Option<InstanceId>,
+        span: Span,
+    ) -> InstanceId {
+        let id = InstanceId(self.instances.len() as u32);
+        for kind in &kinds {
+            let Some(info) = self.tables.kinds.get(kind) else { continue };
+            settings.extend(info.lines.iter().filter_map(|(module, line)| match line {
+                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false }),
+                _ => None,
+            }));
+        }
+        self.instances.push(Instance { name, kinds, owner, settings, span, ..Instance::default() });
+        self.make_parts(id);
+        id
+    }
+
+    fn make_parts(&mut self, id: InstanceId) {
+        for m in self.all_members(id) {
+            let MemberKind::Value { role: Role::Part, name, ty, .. } = &m.member.kind else { continue };
+            if self.instances[id.0 as usize].parts.contains_key(&name.text) {
+                continue;
+            }
+            let Type::Instance { kinds, optional } = self.resolve_type(ty, m.module) else { continue };
+            let given = self.instances[id.0 as usize].setting(&name.text);
+            let literal = given.and_then(|(module, v, lab)| self.part_kind(v, module).map(|k| (k, module, v, lab)));
+            let kinds = match literal {
+                Some((kind, ..)) => {
+                    self.check_part(kind, &kinds, &name.text, id);
+                    vec![kind]
+                }
+                None if optional => continue,
+                None => kinds,
+            };
+            let mut nested = Vec::new();
+            for s in &self.instances[id.0 as usize].settings {
+                if s.field.key.text != name.text {
+                    continue;
+                }
+                let fields: &'a [Field] = match &s.field.value {
+                    FieldValue::Fields(fields) => fields,
+                    FieldValue::Literal(AssetLiteral { fields, .. }) => fields,
+                    _ => &[],
+                };
+                nested.extend(fields.iter().map(|field| Setting { field, ..*s }));
+            }
+            let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
+            let span = self.instances[id.0 as usize].span;
+            let part = self.instantiate(full, kinds, nested, Some(id), span);
+            self.instances[id.0 as usize].parts.insert(name.text.clone(), part);
+        }
+        self.make_children(id);
+    }
+
+    fn make_children(&mut self, id: InstanceId) {
+        let kinds = self.instances[id.0 as usize].kinds.clone();
+        for kind in kinds {
+            let Some(info) = self.tables.kinds.get(&kind) else { continue };
+            let lines = info.lines.clone();
+            for (module, line) in lines {
+                let AssetLine::Part { name, literal } = line else { continue };
+                let Some(kind) = self.kind_named(&literal.ty, module) else { continue };
+                let settings = literal.fields.iter().map(|field| Setting { module, field, lab: false }).collect();
+                let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
+                let part = self.instantiate(full, vec![kind], settings, Some(id), literal.span);
+                self.instances[id.0 as usize].parts.insert(name.text.clone(), part);
+            }
+        }
+    }
+
+    /// A part given by type must be what its declaration asks for.
+    fn check_part(&mut self, kind: DeclId, wanted: &[DeclId], name: &str, of: InstanceId) {
+        let Some(missing) = wanted.iter().find(|w| !self.tables.kinds.get(&kind).is_some_and(|k| k.has(**w))) else {
+            return;
+        };
+        let span = self.instances[of.0 as usize]
+            .settings
+            .iter()
+            .find(|s| s.field.key.text == name)
+            .map_or(self.instances[of.0 as usize].span, |s| s.field.span);
+        let (found, wanted) = (self.tables.kind_name(kind).to_string(), self.tables.kind_name(*missing).to_string());
+        self.report(matterix_ir::Diagnostic::error(
+            matterix_ir::codes::TYPE_MISMATCH,
+            span,
+            format!("`{name}` expects {wanted}, but `{found}` is none"),
+            format!("no {wanted}"),
+        ));
+    }
+
+    fn part_kind(&mut self, value: &'a FieldValue, module: usize) -> Option<DeclId> {
+        match value {
+            FieldValue::Literal(l) => self.kind_named(&l.ty, module),
+            FieldValue::Expr(Expr { kind, .. }) => match &**kind {
+                ExprKind::Name(n) => {
+                    let path = crate::ast::Path { segments: vec![n.clone()], span: n.span };
+                    self.kind_named(&path, module)
+                }
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Every member of an instance, base first.
+    pub fn all_members(&self, id: InstanceId) -> Vec<MemberRef<'a>> {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        if let [kind] = kinds.as_slice() {
+            return self.tables.kinds.get(kind).map(|info| info.visible.clone()).unwrap_or_default();
+        }
+        let mut out: Vec<MemberRef<'a>> = Vec::new();
+        for kind in kinds {
+            let Some(info) = self.tables.kinds.get(kind) else { continue };
+            for m in &info.members {
+                if !out.iter().any(|o| std::ptr::eq(o.member, m.member)) {
+                    out.push(*m);
+                }
+            }
+        }
+        self.tables.visible(out)
+    }
+
+    /// A stand-in that has the capabilities.
+    pub fn prototype_of(&mut self, kinds: Vec<DeclId>, name: &str) -> InstanceId {
+        let depth = name.matches('.').count();
+        let id = InstanceId(self.instances.len() as u32);
+        self.instances.push(Instance { name: name.to_string(), kinds: kinds.clone(), ..Instance::default() });
+        if depth < 3 {
+            self.make_parts(id);
+            self.declare_states(id);
+        }
+        id
+    }
+
+    /// The top-level instance with this name.
+    pub fn find_instance(&self, name: &str) -> Option<InstanceId> {
+        self.instances.iter().position(|i| i.owner.is_none() && i.name == name).map(|i| InstanceId(i as u32))
+    }
+
+    /// All instances that have a kind.
+    pub fn instances_of(&self, kind: DeclId) -> Vec<InstanceId> {
+        (0..self.instances.len() as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect()
+    }
+
+    /// Whether an instance has a kind.
+    pub fn instance_is(&self, id: InstanceId, kind: DeclId) -> bool {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        kinds.iter().any(|k| self.tables.kinds.get(k).is_some_and(|info| info.has(kind)))
+    }
+
+    /// The type of an instance, for messages.
+    pub fn kind_names(&self, id: InstanceId) -> String {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        kinds.iter().map(|k| self.tables.kind_name(*k)).collect::<Vec<_>>().join(" & ")
+    }
+
+    /// A frame that the asset's lines declare.
+    pub fn frame(&self, id: InstanceId, name: &str) -> Option<Value> {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        let found = kinds
+            .iter()
+            .filter_map(|k| self.tables.kinds.get(k))
+            .flat_map(|k| &k.lines)
+            .any(|(_, line)| matches!(line, AssetLine::Frame { name: n, .. } if n.text == name));
+        found.then(|| Value::Frame(id, name.to_string()))
+    }
+
+    /// The member that counts amounts per species, if the instance has one.
+    pub fn per_species(&self, id: InstanceId) -> Option<MemberRef<'a>> {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        kinds.iter().filter_map(|k| self.tables.kinds.get(k)).find_map(|k| k.per_species)
+    }
+
+    /// The concentration kinds of an instance, in the order of the library.
+    #[allow(clippy::type_complexity)]
+    pub fn views(&self, id: InstanceId) -> Vec<(usize, &'a crate::ast::Param, &'a crate::ast::Type, &'a Expr, DeclId)> {
+        self.all_members(id)
+            .into_iter()
+            .filter_map(|m| match &m.member.kind {
+                MemberKind::View { param, ty, value } => Some((m.module, param, ty, value, m.owner)),
+                _ => None,
+            })
+            .collect()
+    }
+
+    /// Derived members, base first.
+    pub fn derived_members(&self, id: InstanceId) -> Vec<MemberRef<'a>> {
+        let derived = |m: &MemberRef<'a>| matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });
+        self.all_members(id).into_iter().filter(derived).collect()
+    }
+
+    /// The type of an extensive quantity.
+    pub fn extensive_type(&mut self, id: InstanceId, member: &str) -> Option<(Type, MemberRef<'a>)> {
+        let m = self.members_of(id, member).into_iter().next()?;
+        let MemberKind::Value { ty, .. } = &m.member.kind else { return None };
+        Some((self.resolve_type(ty, m.module), m))
+    }
+}
+
+impl<'a> Elaborator<'a> {
+    /// Gives a stand-in the fields of its asset's lines.
+    pub fn use_lines(&mut self, id: InstanceId) {
+        for kind in self.instances[id.0 as usize].kinds.clone() {
+            let Some(info) = self.tables.kinds.get(&kind) else { continue };
+            let settings = info.lines.iter().filter_map(|(module, line)| match line {
+                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false }),
+                _ => None,
+            });
+            self.instances[id.0 as usize].settings.extend(settings);
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! A lab: its settings, instances, places, contents and pair parameters.
+
+use matterix_ir::scene::{InstanceId, Pose};
+use matterix_ir::{Diagnostic, codes};
+
+use super::instances::Setting;
+use super::{Elaborator, Pair};
+use crate::ast::{AssetLine, AssetLiteral, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path};
+use crate::eval::types::unsupported;
+use crate::eval::{Scope, Type, Value};
+use crate::names::{DeclId, near};
+
+/// Fields every asset may have beside the members of its capabilities: geometry, of which only the shape is used yet.
+const GEOMETRY: &[&str] = &["shape", "mesh", "collision", "inertia", "friction"];
+
+impl<'a> Elaborator<'a> {
+    /// Builds the instances of a lab, then their states.
+    pub fn lab(&mut self, id: DeclId) {
+        let decl = self.tables.names.decl(id);
+        let ItemKind::Lab { params, lines, name } = &decl.item.kind else { return };
+        self.lab_name = name.span;
+        if let Some(p) = params.first() {
+            self.report(unsupported(p.name.span, "parameters of a lab"));
+        }
+        for line in lines {
+            if let LabLineKind::Setting { name, value } = &line.kind {
+                self.lab_setting(name, value, decl.module);
+            }
+        }
+        let mut made = Vec::new();
+        for line in lines {
+            match &line.kind {
+                LabLineKind::Instance { name, literal, relations, holding } => {
+                    match self.lab_instance(name, literal, decl.module) {
+                        Some(id) => made.push((id, relations, holding)),
+                        // What is wrong with it is said; its uses are fine.
+                        None => {
+                            self.settings.entry(name.text.clone()).or_insert(Value::Error);
+                        }
+                    }
+                }
+                LabLineKind::Include { .. } => self.report(unsupported(line.span, "labs that include labs")),
+                _ => {}
+            }
+        }
+        for (id, relations, holding) in made {
+            self.place(id, relations, decl.module);
+            if let Some(holding) = holding {
+                self.hold(id, holding, decl.module);
+            }
+        }
+        for line in lines {
+            if let LabLineKind::Between { a, b, fields } = &line.kind {
+                self.between(a, b, fields, decl.module);
+            }
+        }
+        for i in 0..self.instances.len() as u32 {
+            self.declare_states(InstanceId(i));
+        }
+    }
+
+    fn lab_setting(&mut self, name: &'a Name, value: &'a Expr, module: usize) {
+        let v = self.expr(value, &mut Scope { lab: true, ..Scope::module(module) });
+        let v = match self.tables.units.dimension("Temperature") {
+            Some(def) if name.text == "ambient" => {
+                let ty = Type::Quantity { dimension: def.dimension.clone(), point: true, optional: false };
+                self.coerce(v, &ty, value.span, &name.text)
+            }
+            _ => v,
+        };
+        let v = match v {
+            Value::Num(n) => Value::Num(self.name_param(&name.text, n, value.span)),
+            other => other,
+        };
+        if self.settings.insert(name.text.clone(), v).is_some() {
+            self.report(Diagnostic::error(
+                codes::DUPLICATE_NAME,
+                name.span,
+                format!("`{}` is given twice", name.text),
+                "given again here",
+            ));
+        }
+    }
+
+    fn lab_instance(&mut self, name: &'a Name, literal: &'a AssetLiteral, module: usize) -> Option<InstanceId> {
+        if let Some(first) = self.find_instance(&name.text) {
+            let span = self.instances[first.0 as usize].span;
+            self.report(
+                Diagnostic::error(
+                    codes::DUPLICATE_NAME,
+                    name.span,
+                    format!("`{}` is declared twice", name.text),
+                    "declared again here",
+                )
+                .because(span, "first declared here"),
+            );
+            return None;
+        }
+        let kind = self.kind_named(&literal.ty, module)?;
+        if !self.tables.kinds[&kind].is_asset {
+            let names = self.tables.names;
+            let fits: Vec<String> = self
+                .tables
+                .kinds
+                .values()
+                .filter(|k| k.is_asset && k.has(kind))
+                .map(|k| format!("{}::{}", names.modules[names.decl(k.id).module].name, k.name))
+                .take(3)
+                .collect();
+            let mut d = Diagnostic::error(
+                codes::WRONG_KIND,
+                literal.ty.span,
+                format!("`{}` is a capability, not a thing", self.tables.kind_name(kind)),
+                "a lab holds assets",
+            );
+            d.help.extend(near::question(&fits));
+            self.report(d);
+            return None;
+        }
+        self.check_fields(kind, &literal.fields);
+        let settings = literal.fields.iter().map(|field| Setting { module, field, lab: true }).collect();
+        Some(self.instantiate(name.text.clone(), vec![kind], settings, None, name.span))
+    }
+
+    /// The capability or asset a path names.
+    pub fn kind_named(&mut self, path: &Path, module: usize) -> Option<DeclId> {
+        let name = path.segments.last()?;
+        let is_kind = |k: &ItemKind| matches!(k, ItemKind::Capability { .. } | ItemKind::Asset { .. });
+        let found = self.tables.names.lookup(module, &name.text).filter(|id| self.tables.kinds.contains_key(id));
+        if found.is_none() {
+            let d = self.tables.names.unknown(module, name, "asset", is_kind);
+            self.report(d);
+        }
+        found
+    }
+
+    /// Reports fields that are no member of the kind.
+    pub fn check_fields(&mut self, kind: DeclId, fields: &'a [Field]) {
+        let Some(info) = self.tables.kinds.get(&kind) else { return };
+        let mut known: Vec<String> =
+            info.members.iter().filter_map(|m| super::tables::member_name(m.member)).map(|n| n.text.clone()).collect();
+        known.extend(GEOMETRY.iter().map(|s| (*s).to_string()));
+        known.extend(info.lines.iter().filter_map(|(_, l)| match l {
+            AssetLine::Part { name, .. } => Some(name.text.clone()),
+            _ => None,
+        }));
+        let keys: Vec<&str> = known.iter().map(String::as_str).collect();
+        let mut found = Vec::new();
+        super::fields::unknown_fields(fields, &keys, &format!("`{}`", info.name), &mut found);
+        for d in found {
+            self.report(d);
+        }
+        for f in fields.iter().filter(|f| f.key.text != "shape" && GEOMETRY.contains(&f.key.text.as_str())) {
+            let d = unsupported(f.key.span, "meshes, collision shapes, inertia and friction");
+            self.report(Diagnostic { severity: matterix_ir::Severity::Warning, ..d });
+        }
+    }
+
+    fn place(&mut self, id: InstanceId, relations: &'a [(Name, Expr)], module: usize) {
+        for (label, operand) in relations {
+            let v = self.expr(operand, &mut Scope { lab: true, ..Scope::module(module) });
+            match (label.text.as_str(), v) {
+                (_, Value::Error) => {}
+                ("at", Value::Tuple(items)) => {
+                    if let Some(position) = self.position(&items, operand) {
+                        self.instances[id.0 as usize].pose = Pose { position, rpy: [0.0; 3] };
+                    }
+                }
+                ("at", other) => {
+                    self.expected("a position `(x, y, z) mm`", &other, operand.span);
+                }
+                (word, Value::Instance(on)) if on != id => {
+                    self.instances[id.0 as usize].placed.push((word.to_string(), on));
+                }
+                (_, Value::Instance(_)) => self.report(Diagnostic::error(
+                    codes::CIRCULAR,
+                    operand.span,
+                    "a thing cannot stand on itself",
+                    "this is the same instance",
+                )),
+                (_, other) => {
+                    self.expected("an instance of the lab", &other, operand.span);
+                }
+            }
+        }
+    }
+
+    fn position(&mut self, items: &[Value], at: &Expr) -> Option<[f64; 3]> {
+        let length = self.tables.units.named("Length");
+        let mut out = [0.0; 3];
+        if items.len() < 2 || items.len() > 3 {
+            self.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                at.span,
+                format!("a position has two or three coordinates, not {}", items.len()),
+                "not a position",
+            ));
+            return None;
+        }
+        for (slot, item) in out.iter_mut().zip(items) {
+            let ty = Type::Quantity { dimension: length.clone(), point: false, optional: false };
+            let Value::Num(n) = self.coerce(item.clone(), &ty, at.span, "at") else { return None };
+            *slot = self.graph.constant(n.node)?;
+        }
+        Some(out)
+    }
+
+    fn hold(&mut self, id: InstanceId, holding: &'a Holding, module: usize) {
+        let e = match holding {
+            Holding::Expr(e) => e,
+            Holding::Fields(fields) => {
+                let span = fields.first().map_or(self.instances[id.0 as usize].span, |f| f.span);
+                self.report(unsupported(span, "contents of wells"));
+                return;
+            }
+        };
+        let inst = &self.instances[id.0 as usize];
+        let (name, declared) = (inst.name.clone(), inst.span);
+        let own = self.per_species(id).map(|_| id);
+        let target = own
+            .or_else(|| self.instances[id.0 as usize].parts.values().copied().find(|p| self.per_species(*p).is_some()));
+        let Some(target) = target else {
+            let kind = self.kind_names(id);
+            self.report(
+                Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    e.span,
+                    format!("`{name}` ({kind}) cannot hold anything"),
+                    "has no contents",
+                )
+                .because(declared, "declared here"),
+            );
+            return;
+        };
+        let contents = self.contents(e, &name, module);
+        self.instances[target.0 as usize].contents = contents;
+    }
+
+    fn between(&mut self, a: &'a Expr, b: &'a Expr, fields: &'a [Field], module: usize) {
+        let mut side = |e: &'a Expr| match self.expr(e, &mut Scope { lab: true, ..Scope::module(module) }) {
+            Value::Instance(i) => Some(i),
+            other => {
+                self.expected("an instance of the lab", &other, e.span);
+                None
+            }
+        };
+        let (Some(a), Some(b)) = (side(a), side(b)) else { return };
+        for f in fields {
+            let FieldValue::Expr(value) = &f.value else { continue };
+            let is_pair = |k: &ItemKind| matches!(k, ItemKind::Fn { params, .. } if params.len() == 2);
+            let known = self.tables.names.lookup(module, &f.key.text);
+            if !known.is_some_and(|id| is_pair(&self.tables.names.decl(id).item.kind)) {
+                let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
+                d.help.push("pair parameters are functions of two bodies, such as `conductance`".into());
+                self.report(d);
+                continue;
+            }
+            self.pairs.push(Pair { a, b, name: f.key.text.clone(), value, module, resolved: None });
+        }
+    }
+}

@@ -1,0 +1,671 @@
+//! Processes and events over the instances of the lab.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::model::{Action, Event};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
+
+use super::tables::MemberRef;
+use super::{Contribution, Elaborator, ProcessInstance, SpeciesId};
+use crate::ast::{self, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
+use crate::eval::{Num, ReactionId, Scope, Type, Value};
+use crate::names::DeclId;
+
+/// A law waiting to be written out for its instances.
+#[derive(Clone)]
+struct Job<'a> {
+    process: &'a ast::Process,
+    scope: Scope,
+    name: String,
+}
+
+/// What a law body contributes to.
+enum Target {
+    Flow(InstanceId, DeclId, String),
+    Derivative(u32),
+}
+
+impl<'a> Elaborator<'a> {
+    /// Writes out every process that the plan can make run. Processes that read flows come after all others.
+    pub fn processes(&mut self) {
+        let mut waiting = Vec::new();
+        for job in self.process_jobs() {
+            if !self.process(&job) {
+                waiting.push(job);
+            }
+        }
+        self.flows_sealed = true;
+        for job in waiting {
+            self.process(&job);
+        }
+    }
+
+    fn process_jobs(&mut self) -> Vec<Job<'a>> {
+        let mut jobs = Vec::new();
+        for i in 0..self.instances.len() as u32 {
+            let id = InstanceId(i);
+            for m in self.all_members(id) {
+                let MemberKind::Process(process) = &m.member.kind else { continue };
+                let name = format!("{}({})", process.name.text, self.instances[i as usize].name);
+                jobs.push(Job { process, scope: Scope::of_member(id, m), name });
+            }
+        }
+        for (decl, process) in self.tables.processes.clone() {
+            let module = self.tables.names.decl(decl).module;
+            for (scope, name) in self.tuples(&process.params, module, process.guard.as_ref(), &process.name) {
+                jobs.push(Job { process, scope, name });
+            }
+        }
+        jobs
+    }
+
+    /// Every tuple of instances, species and reactions that fits the parameters, as scopes; once per unordered pair
+    /// where the condition asks for a symmetric relation of the two.
+    fn tuples(
+        &mut self,
+        params: &'a [Param],
+        module: usize,
+        guard: Option<&'a Expr>,
+        name: &Name,
+    ) -> Vec<(Scope, String)> {
+        let mut sets: Vec<Vec<Value>> = Vec::new();
+        for p in params {
+            let ty = match &p.ty {
+                Some(ty) => self.resolve_type(ty, module),
+                None => Type::Any,
+            };
+            sets.push(match ty {
+                Type::Instance { kinds, .. } => (0..self.instances.len() as u32)
+                    .map(InstanceId)
+                    .filter(|i| kinds.iter().all(|k| self.instance_is(*i, *k)))
+                    .map(Value::Instance)
+                    .collect(),
+                Type::Reaction => {
+                    (0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect()
+                }
+                Type::Species => self.reach.anywhere().into_iter().map(Value::Species).collect(),
+                _ => Vec::new(),
+            });
+        }
+        let unordered = params.len() == 2 && guard.is_some_and(|g| self.asks_symmetric(g, params, module));
+        let mut out: Vec<Vec<Value>> = vec![Vec::new()];
+        for set in &sets {
+            let mut longer = Vec::new();
+            for prefix in &out {
+                let after = self.second(prefix, params.len(), unordered);
+                longer.extend(
+                    set.iter().filter(|v| after(v)).map(|v| [prefix.as_slice(), std::slice::from_ref(v)].concat()),
+                );
+            }
+            out = longer;
+        }
+        out.into_iter()
+            .map(|values| {
+                let mut scope = Scope::module(module);
+                let shown: Vec<String> = values.iter().map(|v| self.show(v)).collect();
+                for (p, v) in params.iter().zip(values) {
+                    scope.bind(p.name.text.clone(), v);
+                }
+                (scope, format!("{}({})", name.text, shown.join(", ")))
+            })
+            .collect()
+    }
+
+    /// What may follow the first of a pair: another instance, or what can be in it. Decided before tuples are made, for
+    /// there are many more species and reactions than any one mixture meets.
+    fn second(&self, first: &[Value], length: usize, unordered: bool) -> impl Fn(&Value) -> bool {
+        let first = match (first, length) {
+            ([Value::Instance(a)], 2) => Some(*a),
+            _ => None,
+        };
+        let held = first.and_then(|a| self.reach.set(&self.instances[a.0 as usize].name));
+        let has = move |s: &SpeciesId| held.is_some_and(|held| held.contains(s));
+        move |v| match (first, v) {
+            (Some(a), Value::Instance(b)) => a != *b && (!unordered || a < *b),
+            (Some(_), Value::Reaction(r)) => self.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| has(s)),
+            (Some(_), Value::Species(s)) => has(s),
+            _ => true,
+        }
+    }
+
+    fn show(&self, v: &Value) -> String {
+        match v {
+            Value::Instance(i) => self.instances[i.0 as usize].name.clone(),
+            Value::Species(s) => self.tables.species.get(*s).name.clone(),
+            Value::Reaction(r) => self.tables.reactions[r.0 as usize].name.clone(),
+            _ => String::new(),
+        }
+    }
+
+    fn asks_symmetric(&self, e: &Expr, params: &[Param], module: usize) -> bool {
+        match &*e.kind {
+            ExprKind::Binary(_, a, b) => {
+                self.asks_symmetric(a, params, module) || self.asks_symmetric(b, params, module)
+            }
+            ExprKind::Call(callee, args) => {
+                let ExprKind::Name(n) = &*callee.kind else { return false };
+                let Some(id) = self.tables.names.lookup(module, &n.text) else { return false };
+                let symmetric =
+                    matches!(self.tables.names.decl(id).item.kind, ItemKind::Relation { symmetric: true, .. });
+                symmetric
+                    && args.len() == 2
+                    && args.iter().all(
+                        |a| matches!(&*a.value.kind, ExprKind::Name(n) if params.iter().any(|p| p.name.text == n.text)),
+                    )
+            }
+            _ => false,
+        }
+    }
+
+    /// Writes out one process; false if it reads a flow that is not complete yet.
+    fn process(&mut self, job: &Job<'a>) -> bool {
+        let mut scope = job.scope.clone();
+        self.touched_flow = false;
+        let guard = match &job.process.guard {
+            Some(g) => match self.truth(g, &mut scope) {
+                Some(node) if self.never(node) => return true,
+                Some(node) => Some(node).filter(|n| self.graph.constant(*n).is_none()),
+                None => return true,
+            },
+            None => None,
+        };
+        let index = self.processes.len();
+        self.processes.push(ProcessInstance { name: job.name.clone(), guard, span: job.process.name.span });
+        let mut found = Vec::new();
+        self.law_body(&job.process.laws, &mut scope, &mut found);
+        if self.touched_flow && !self.flows_sealed {
+            self.processes.truncate(index);
+            self.touched_flow = false;
+            return false;
+        }
+        for (target, node) in found {
+            let contribution = Contribution { process: index, node };
+            match target {
+                Target::Flow(id, owner, name) => self.flows.entry((id, owner, name)).or_default().push(contribution),
+                Target::Derivative(state) => self.rates.entry(state).or_default().push(contribution),
+            }
+        }
+        true
+    }
+
+    fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+        let depth = scope.vars.len();
+        for law in laws {
+            match &law.kind {
+                LawKind::Error => {}
+                LawKind::Let { name, value } => {
+                    let v = self.expr(value, scope);
+                    scope.bind(name.text.clone(), v);
+                }
+                LawKind::For { var, set, body } => {
+                    for item in self.set(set, scope).unwrap_or_default() {
+                        scope.bind(var.text.clone(), item);
+                        self.law_body(body, scope, out);
+                        scope.vars.pop();
+                    }
+                }
+                LawKind::If { cond, then, otherwise } => {
+                    let Some(c) = self.truth(cond, scope) else { continue };
+                    let zero = self.graph.number(0.0);
+                    for (laws, positive) in [(then, true), (otherwise, false)] {
+                        let mut inner = Vec::new();
+                        self.law_body(laws, scope, &mut inner);
+                        for (target, node) in inner {
+                            let node = if positive {
+                                self.graph.select(c, node, zero)
+                            } else {
+                                self.graph.select(c, zero, node)
+                            };
+                            out.push((target, node));
+                        }
+                    }
+                }
+                LawKind::Assign { target, op, value } => self.law_assign(target, *op, value, law.span, scope, out),
+                LawKind::Call(call) => self.law_move(call, scope, out),
+            }
+        }
+        scope.vars.truncate(depth);
+    }
+
+    fn law_assign(
+        &mut self,
+        target: &'a Expr,
+        op: AssignOp,
+        value: &'a Expr,
+        span: Span,
+        scope: &mut Scope,
+        out: &mut Vec<(Target, NodeId)>,
+    ) {
+        let v = self.expr(value, scope);
+        let (place, prime) = match &*target.kind {
+            ExprKind::Prime(inner) => (inner, true),
+            _ => (target, false),
+        };
+        if !prime {
+            let Some((id, m)) = self.flow_target(place, scope) else {
+                self.report(
+                    Diagnostic::error(
+                        codes::INVALID_LAW,
+                        span,
+                        "a process changes flows and derivatives only",
+                        "not a flow",
+                    )
+                    .help("write `x' += rate` for a state; only an event assigns `x = value`"),
+                );
+                return;
+            };
+            if op == AssignOp::Set {
+                self.report(
+                    Diagnostic::error(codes::INVALID_LAW, span, "a flow is a sum of contributions", "assigned here")
+                        .help("use `+=` or `-=`, so that other processes can contribute too"),
+                );
+                return;
+            }
+            let MemberKind::Value { name, ty, .. } = &m.member.kind else { return };
+            let ty = self.resolve_type(ty, m.module);
+            let v = if op == AssignOp::Sub { self.signed(v) } else { v };
+            if let Value::Num(n) = self.coerce(v, &ty, value.span, &name.text) {
+                out.push((Target::Flow(id, m.owner, name.text.clone()), n.node));
+            }
+            return;
+        }
+        let current = self.expr(place, scope);
+        let Value::Num(state) = current else {
+            self.expected("a continuous state", &current, place.span);
+            return;
+        };
+        let rate_dimension = state.dimension.over(&self.duration());
+        let ty = Type::Quantity { dimension: rate_dimension, point: false, optional: false };
+        let v = if op == AssignOp::Sub { self.signed(v) } else { v };
+        let Value::Num(n) = self.coerce(v, &ty, value.span, "rate of change") else { return };
+        match self.graph.op(state.node) {
+            Op::State(index) => out.push((Target::Derivative(index), n.node)),
+            // A species that can never get into this mixture has no state to change.
+            Op::Const(_) => {}
+            _ if self.prototype => {}
+            _ => self.report(Diagnostic::error(
+                codes::INVALID_LAW,
+                place.span,
+                "only a state has a derivative",
+                "not a state",
+            )),
+        }
+    }
+
+    fn signed(&mut self, v: Value) -> Value {
+        match v {
+            Value::Num(n) => Value::Num(Num { node: self.graph.unary(UnaryOp::Neg, n.node), ..n }),
+            other => other,
+        }
+    }
+
+    /// The flow that a place names, without reading it.
+    fn flow_target(&mut self, place: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, MemberRef<'a>)> {
+        let (id, name) = match &*place.kind {
+            ExprKind::Name(n) => (scope.this?, n),
+            ExprKind::Member(base, n) => match self.expr(base, scope) {
+                Value::Instance(id) | Value::Qualified(id, _) => (id, n),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        let m = self.members_of(id, &name.text).into_iter().next()?;
+        matches!(&m.member.kind, MemberKind::Value { role: Role::Flow, .. }).then_some((id, m))
+    }
+
+    /// The sum of all contributions to a flow, each zero while its process rests.
+    pub fn read_flow(&mut self, id: InstanceId, m: MemberRef<'a>, _: Span) -> Value {
+        let MemberKind::Value { name, ty, .. } = &m.member.kind else { return Value::Error };
+        self.touched_flow = true;
+        let ty = self.resolve_type(ty, m.module);
+        let Type::Quantity { dimension, .. } = ty else { return Value::Error };
+        let parts = self.flows.get(&(id, m.owner, name.text.clone())).cloned().unwrap_or_default();
+        let node = self.gated_sum(&parts);
+        if self.flows_sealed {
+            self.flow_sums.insert(node, parts);
+        }
+        self.num(node, dimension)
+    }
+
+    /// The sum of contributions, each zero while its process rests.
+    pub fn gated_sum(&mut self, parts: &[Contribution]) -> NodeId {
+        let mut sum = self.graph.number(0.0);
+        for c in parts {
+            let node = self.gated(c);
+            sum = self.plus(sum, node);
+        }
+        sum
+    }
+
+    /// A contribution, zero while its process rests.
+    pub fn gated(&mut self, c: &Contribution) -> NodeId {
+        match self.processes[c.process].guard {
+            Some(guard) => {
+                let zero = self.graph.number(0.0);
+                self.graph.select(guard, c.node, zero)
+            }
+            None => c.node,
+        }
+    }
+
+    /// `move(q, from: a, to: b)` as a flow of everything: the fraction per second of each extensive quantity.
+    fn law_move(&mut self, call: &'a Expr, scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+        let Some((rate, from, to)) = self.move_call(call, true, scope) else { return };
+        self.moves.insert((from, to));
+        let keys: Vec<_> =
+            self.extensive.iter().filter(|(k, _)| k.instance == from).map(|(k, i)| (k.clone(), *i)).collect();
+        for (key, index) in keys {
+            let state = self.graph.add(Op::State(index));
+            let flow = self.times(state, rate);
+            let less = self.graph.unary(UnaryOp::Neg, flow);
+            out.push((Target::Derivative(index), less));
+            let there = super::ExtensiveKey { instance: to, ..key };
+            if let Some(target) = self.extensive.get(&there) {
+                out.push((Target::Derivative(*target), flow));
+            }
+        }
+    }
+
+    /// `move(q, from: a, to: b)`: the fraction (per second if `rate`) and the mixtures.
+    pub fn move_call(
+        &mut self,
+        call: &'a Expr,
+        rate: bool,
+        scope: &mut Scope,
+    ) -> Option<(NodeId, InstanceId, InstanceId)> {
+        let ExprKind::Call(callee, args) = &*call.kind else { return None };
+        if !matches!(&*callee.kind, ExprKind::Name(n) if n.text == "move") {
+            self.report(
+                Diagnostic::error(
+                    codes::INVALID_LAW,
+                    callee.span,
+                    "only `move(...)` may stand here by itself",
+                    "has no effect",
+                )
+                .help("write `move(quantity, from: a, to: b)`"),
+            );
+            return None;
+        }
+        let mut quantity = None;
+        let mut ends: BTreeMap<&str, InstanceId> = BTreeMap::new();
+        for arg in args {
+            let v = self.expr(&arg.value, scope);
+            match (arg.name.as_ref().map(|n| n.text.as_str()), v) {
+                (_, Value::Error) => return None,
+                (None, Value::Num(n)) => quantity = Some((n, arg.value.span)),
+                (Some(end @ ("from" | "to")), Value::Instance(i)) => {
+                    let mixture = self.mixture_in(i, arg.value.span)?;
+                    ends.insert(end, mixture);
+                }
+                (_, other) => {
+                    self.expected("`move(quantity, from: a, to: b)`", &other, arg.value.span);
+                    return None;
+                }
+            }
+        }
+        let (Some((q, at)), Some(&from), Some(&to)) = (quantity, ends.get("from"), ends.get("to")) else {
+            self.report(
+                Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    call.span,
+                    "`move` needs a quantity, `from` and `to`",
+                    "incomplete",
+                )
+                .help("write `move(quantity, from: a, to: b)`"),
+            );
+            return None;
+        };
+        let amount = if rate { q.dimension.times(&self.duration()) } else { q.dimension.clone() };
+        if amount.is_one() {
+            return Some((q.node, from, to));
+        }
+        for m in self.derived_members(from) {
+            let MemberKind::Value { ty, .. } = &m.member.kind else { continue };
+            let ty = self.resolve_type(ty, m.module);
+            let Type::Quantity { dimension, point: false, .. } = &ty else { continue };
+            if *dimension == amount {
+                let Value::Num(size) = self.member_value(from, m, at) else { return None };
+                return Some((self.graph.binary(BinaryOp::Div, q.node, size.node), from, to));
+            }
+        }
+        let found = self.describe(&q);
+        self.report(Diagnostic::error(
+            codes::UNIT_MISMATCH,
+            at,
+            format!("contents are moved by mass, volume or fraction, not by {found}"),
+            format!("this is {found}"),
+        ));
+        None
+    }
+
+    fn mixture_in(&mut self, id: InstanceId, span: Span) -> Option<InstanceId> {
+        if self.per_species(id).is_some() {
+            return Some(id);
+        }
+        let part = self.instances[id.0 as usize].parts.values().copied().find(|p| self.per_species(*p).is_some());
+        if part.is_none() {
+            let name = self.instances[id.0 as usize].name.clone();
+            self.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                span,
+                format!("`{name}` has no contents"),
+                "nothing to move",
+            ));
+        }
+        part
+    }
+
+    /// Writes out every event, in the order of the text.
+    pub fn events(&mut self) -> Vec<Event> {
+        let mut found: Vec<(&'a ast::Event, Scope, String)> = Vec::new();
+        for i in 0..self.instances.len() as u32 {
+            let id = InstanceId(i);
+            for m in self.all_members(id) {
+                if let MemberKind::Event(e) = &m.member.kind {
+                    let name = format!("{}({})", e.name.text, self.instances[i as usize].name);
+                    found.push((e, Scope::of_member(id, m), name));
+                }
+            }
+        }
+        for index in 0..self.tables.names.decls.len() {
+            let decl = self.tables.names.decls[index];
+            if let ItemKind::Event(e) = &decl.item.kind {
+                for (scope, name) in self.tuples(&e.params, decl.module, Some(&e.when), &e.name) {
+                    found.push((e, scope, name));
+                }
+            }
+        }
+        let mut events = Vec::new();
+        for (e, mut scope, name) in found {
+            let Some(when) = self.truth(&e.when, &mut scope) else { continue };
+            if self.never(when) {
+                continue;
+            }
+            let mut actions = Vec::new();
+            self.event_body(&e.laws, None, &mut scope, &mut actions);
+            if !actions.is_empty() {
+                events.push(Event { name, when, actions, span: e.name.span });
+            }
+        }
+        events
+    }
+
+    fn event_body(&mut self, laws: &'a [Law], guard: Option<NodeId>, scope: &mut Scope, out: &mut Vec<Action>) {
+        let depth = scope.vars.len();
+        for law in laws {
+            match &law.kind {
+                LawKind::Error => {}
+                LawKind::Let { name, value } => {
+                    let v = self.expr(value, scope);
+                    scope.bind(name.text.clone(), v);
+                }
+                LawKind::For { var, set, body } => {
+                    for item in self.set(set, scope).unwrap_or_default() {
+                        scope.bind(var.text.clone(), item);
+                        self.event_body(body, guard, scope, out);
+                        scope.vars.pop();
+                    }
+                }
+                LawKind::If { cond, then, otherwise } => {
+                    let Some(c) = self.truth(cond, scope) else { continue };
+                    let both = |this: &mut Self, c: NodeId| match guard {
+                        Some(g) => this.graph.binary(BinaryOp::And, g, c),
+                        None => c,
+                    };
+                    let yes = both(self, c);
+                    self.event_body(then, Some(yes), scope, out);
+                    let not = self.graph.unary(UnaryOp::Not, c);
+                    let no = both(self, not);
+                    self.event_body(otherwise, Some(no), scope, out);
+                }
+                LawKind::Assign { target, op, value } => {
+                    if *op != AssignOp::Set {
+                        self.report(
+                            Diagnostic::error(
+                                codes::INVALID_LAW,
+                                law.span,
+                                "an event is an instant: it assigns, it does not flow",
+                                "not an assignment",
+                            )
+                            .help("write `x = x + ...`"),
+                        );
+                        continue;
+                    }
+                    out.extend(self.assignment(target, value, guard, scope));
+                }
+                LawKind::Call(call) => {
+                    if let Some((fraction, from, to)) = self.move_call(call, false, scope) {
+                        let fraction = match guard {
+                            Some(g) => {
+                                let zero = self.graph.number(0.0);
+                                self.graph.select(g, fraction, zero)
+                            }
+                            None => fraction,
+                        };
+                        out.push(self.move_action(fraction, from, to, law.span));
+                    }
+                }
+            }
+        }
+        scope.vars.truncate(depth);
+    }
+
+    /// A transfer; mixtures are numbered in the order of the instances.
+    pub fn move_action(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Action {
+        self.moves.insert((from, to));
+        let (from, to) = (self.mixture_index(from), self.mixture_index(to));
+        Action::Move { fraction, from, to, span }
+    }
+
+    /// Index of a mixture in the model.
+    pub fn mixture_index(&self, id: InstanceId) -> u32 {
+        (0..id.0).filter(|i| self.per_species(InstanceId(*i)).is_some()).count() as u32
+    }
+
+    /// `place = value` as an action; with a condition the place keeps its value where it does not hold.
+    pub fn assignment(
+        &mut self,
+        target: &'a Expr,
+        value: &'a Expr,
+        guard: Option<NodeId>,
+        scope: &mut Scope,
+    ) -> Option<Action> {
+        let place = self.expr(target, scope);
+        let (ty, node) = match &place {
+            Value::Num(n) => {
+                (Type::Quantity { dimension: n.dimension.clone(), point: n.point, optional: true }, n.node)
+            }
+            Value::Bool(n) => (Type::Bool, *n),
+            Value::InstanceNode(n) => (Type::Instance { kinds: Vec::new(), optional: true }, *n),
+            Value::Error => return None,
+            other => {
+                self.expected("a state", other, target.span);
+                return None;
+            }
+        };
+        let Op::State(state) = self.graph.op(node) else {
+            if !self.prototype && self.graph.constant(node).is_none() {
+                self.report(
+                    Diagnostic::error(codes::INVALID_LAW, target.span, "only a state can be assigned", "not a state")
+                        .help("parameters are fixed, derived quantities follow from states"),
+                );
+            }
+            return None;
+        };
+        let v = self.expr(value, scope);
+        let v = self.coerce(v, &ty, value.span, "value");
+        let mut new = self.value_node(&v)?;
+        self.note_held(state, new);
+        if let Some(g) = guard {
+            new = self.graph.select(g, new, node);
+        }
+        Some(Action::Assign { state, value: new, span: target.span.to(value.span) })
+    }
+
+    /// Notes what a state that holds an instance may come to hold.
+    fn note_held(&mut self, state: u32, value: NodeId) {
+        if self.states[state as usize].domain != matterix_ir::model::Domain::Instance {
+            return;
+        }
+        match self.graph.op(value) {
+            Op::Const(v) => {
+                self.holds.entry(state).or_default().insert(v as i64);
+            }
+            Op::State(from) => {
+                self.copies.insert((state, from));
+            }
+            _ => {}
+        }
+    }
+}
+
+impl<'a> Elaborator<'a> {
+    /// Checks a process by itself; its parameters are bound in the scope.
+    pub fn check_process(&mut self, p: &'a ast::Process, scope: &mut Scope) {
+        self.flows_sealed = true;
+        if let Some(g) = &p.guard {
+            self.truth(g, scope);
+        }
+        let mut found = Vec::new();
+        self.law_body(&p.laws, scope, &mut found);
+        self.check_antisymmetry(p, found);
+    }
+
+    /// What one body loses the other must gain: a process of two bodies that contributes to one flow of both.
+    fn check_antisymmetry(&mut self, p: &'a ast::Process, found: Vec<(Target, NodeId)>) {
+        let mut sums: BTreeMap<(DeclId, String), (Vec<InstanceId>, NodeId)> = BTreeMap::new();
+        for (target, node) in found {
+            let Target::Flow(id, owner, name) = target else { continue };
+            let zero = self.graph.number(0.0);
+            let entry = sums.entry((owner, name)).or_insert((Vec::new(), zero));
+            if !entry.0.contains(&id) {
+                entry.0.push(id);
+            }
+            entry.1 = self.graph.binary(BinaryOp::Add, entry.1, node);
+        }
+        for ((_, flow), (bodies, sum)) in sums {
+            if p.params.len() == 2 && !bodies.is_empty() && self.graph.constant(sum) != Some(0.0) {
+                self.report(
+                    Diagnostic::error(
+                        codes::FLOW_UNBALANCED,
+                        p.name.span,
+                        format!(
+                            "`{}` does not conserve `{flow}`: what one body loses the other does not gain",
+                            p.name.text
+                        ),
+                        "the two contributions do not cancel",
+                    )
+                    .help("contribute the same quantity with `-=` to one body and `+=` to the other"),
+                );
+            }
+        }
+    }
+
+    /// Checks an event by itself; its parameters are bound in the scope.
+    pub fn check_event(&mut self, e: &'a ast::Event, scope: &mut Scope) {
+        self.truth(&e.when, scope);
+        let mut actions = Vec::new();
+        self.event_body(&e.laws, None, scope, &mut actions);
+    }
+}

@@ -1,0 +1,74 @@
+//! Which species can get into which mixture: by what it holds, by transfers, by reactions and dissociation.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::scene::InstanceId;
+
+use super::{Elaborator, SpeciesId, Tables};
+
+/// Species by mixture name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reach {
+    sets: BTreeMap<String, BTreeSet<SpeciesId>>,
+}
+
+impl Reach {
+    /// The species that can get into a mixture.
+    pub fn of(&self, mixture: &str) -> Vec<SpeciesId> {
+        self.set(mixture).map(|s| s.iter().copied().collect()).unwrap_or_default()
+    }
+
+    /// The species that can get into a mixture, if any can.
+    pub fn set(&self, mixture: &str) -> Option<&BTreeSet<SpeciesId>> {
+        self.sets.get(mixture)
+    }
+
+    /// Everything that can get into any mixture.
+    pub fn anywhere(&self) -> BTreeSet<SpeciesId> {
+        self.sets.values().flatten().copied().collect()
+    }
+
+    /// Closes the initial contents under transfers, reactions and dissociation.
+    pub fn compute(lab: &Elaborator<'_>) -> Reach {
+        let mut sets: BTreeMap<InstanceId, BTreeSet<SpeciesId>> = BTreeMap::new();
+        for i in 0..lab.instances.len() as u32 {
+            let id = InstanceId(i);
+            if lab.per_species(id).is_some() {
+                let held = lab.instances[i as usize].contents.iter().map(|c| c.0).collect();
+                sets.insert(id, held);
+            }
+        }
+        loop {
+            let before: usize = sets.values().map(BTreeSet::len).sum();
+            for set in sets.values_mut() {
+                close(set, lab.tables);
+            }
+            for (from, to) in &lab.moves {
+                let moved = sets.get(from).cloned().unwrap_or_default();
+                sets.entry(*to).or_default().extend(moved);
+            }
+            if sets.values().map(BTreeSet::len).sum::<usize>() == before {
+                break;
+            }
+        }
+        let name = |id: InstanceId| lab.instances[id.0 as usize].name.clone();
+        Reach { sets: sets.into_iter().map(|(id, set)| (name(id), set)).collect() }
+    }
+}
+
+/// Adds what the species can turn into.
+fn close(set: &mut BTreeSet<SpeciesId>, tables: &Tables<'_>) {
+    loop {
+        let before = set.len();
+        let ions: Vec<_> = set.iter().flat_map(|s| tables.species.get(*s).dissolves.iter().map(|d| d.0)).collect();
+        set.extend(ions);
+        for r in &tables.reactions {
+            if r.reactants.iter().all(|(s, _)| set.contains(s)) {
+                set.extend(r.products.iter().map(|p| p.0));
+            }
+        }
+        if set.len() == before {
+            return;
+        }
+    }
+}

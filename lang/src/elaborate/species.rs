@@ -1,0 +1,355 @@
+//! The species table: composition, charge and molar mass of everything declared.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::SpeciesId;
+use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind, Name, Term};
+use crate::chem::formula::{Formula, FormulaErrorKind};
+use crate::chem::structure::{Structure, StructureErrorKind};
+use crate::names::{DeclId, Names};
+use crate::units::Units;
+
+/// A declared species.
+#[derive(Clone, Debug)]
+pub struct SpeciesDef<'a> {
+    /// Its declaration.
+    pub decl: DeclId,
+    /// As declared.
+    pub name: String,
+    /// Its module.
+    pub module: usize,
+    /// Composition and charge; absent for an undefined structure.
+    pub formula: Option<Formula>,
+    /// Its structure, where one is declared.
+    pub structure: Option<Structure>,
+    /// kg/mol; 1 for a species counted by mass.
+    pub molar_mass: f64,
+    /// Counted by mass.
+    pub by_mass: bool,
+    /// Its properties.
+    pub fields: &'a [Field],
+    /// What it splits into in water, with counts.
+    pub dissolves: Vec<(SpeciesId, f64)>,
+    /// Where its name stands.
+    pub span: Span,
+}
+
+/// All species, and which one a declaration means (aliases share one).
+#[derive(Debug, Default)]
+pub struct SpeciesTable<'a> {
+    all: Vec<SpeciesDef<'a>>,
+    by_decl: BTreeMap<DeclId, SpeciesId>,
+}
+
+/// Fields of a species that have a meaning to the compiler or to the library's laws.
+const FIELDS: &[&str] = &[
+    "smiles",
+    "formula",
+    "same_as",
+    "dissolves",
+    "by",
+    "molar_mass",
+    "density",
+    "molar_volume",
+    "heat_capacity",
+    "specific_heat",
+    "boiling_point",
+    "melting_point",
+    "flash_point",
+    "phase",
+    "hazards",
+    "absorbs",
+    "color",
+    "solubility",
+    "autoignition",
+    "vapor_pressure",
+    "pka",
+];
+
+impl<'a> SpeciesTable<'a> {
+    /// Reads every `species` item.
+    pub fn new(names: &'a Names<'a>, units: &Units, diagnostics: &mut Vec<Diagnostic>) -> Self {
+        let mut table = SpeciesTable::default();
+        let mut aliases = Vec::new();
+        for (index, decl) in names.decls.iter().enumerate() {
+            let id = DeclId(index as u32);
+            let ItemKind::Species { name, fields } = &decl.item.kind else { continue };
+            if let Some(FieldValue::Expr(Expr { kind, .. })) = field(fields, "same_as").map(|f| &f.value)
+                && let ExprKind::Name(other) = &**kind
+            {
+                aliases.push((id, decl.module, other));
+                continue;
+            }
+            let def = species(id, decl.module, name, fields, units, diagnostics);
+            table.by_decl.insert(id, SpeciesId(table.all.len() as u32));
+            table.all.push(def);
+        }
+        for (id, module, other) in aliases {
+            match names.lookup(module, &other.text).and_then(|d| table.by_decl.get(&d).copied()) {
+                Some(target) => {
+                    table.by_decl.insert(id, target);
+                }
+                None => diagnostics.push(names.unknown(module, other, "species", is_species)),
+            }
+        }
+        for index in 0..table.all.len() {
+            let fields = table.all[index].fields;
+            let Some(f) = field(fields, "dissolves") else { continue };
+            let FieldValue::Species(terms) = &f.value else { continue };
+            let module = table.all[index].module;
+            let ions = table.terms(names, module, terms, diagnostics);
+            check_dissociation(&table, index, &ions, f.span, diagnostics);
+            table.all[index].dissolves = ions;
+        }
+        table
+    }
+
+    /// Species of equation terms with their counts; unknown ones are reported and left out.
+    pub fn terms(
+        &self,
+        names: &Names<'_>,
+        module: usize,
+        terms: &[Term],
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> Vec<(SpeciesId, f64)> {
+        let mut out = Vec::new();
+        for term in terms {
+            match self.lookup(names, module, &term.species) {
+                Ok(id) => out.push((id, term.coefficient)),
+                Err(d) => diagnostics.push(*d),
+            }
+        }
+        out
+    }
+
+    /// The species a name means in a module.
+    pub fn lookup(&self, names: &Names<'_>, module: usize, name: &Name) -> Result<SpeciesId, Box<Diagnostic>> {
+        names
+            .lookup(module, &name.text)
+            .and_then(|d| self.by_decl.get(&d).copied())
+            .ok_or_else(|| Box::new(names.unknown(module, name, "species", is_species)))
+    }
+
+    /// The species a declaration means.
+    pub fn of_decl(&self, decl: DeclId) -> Option<SpeciesId> {
+        self.by_decl.get(&decl).copied()
+    }
+
+    /// One species.
+    pub fn get(&self, id: SpeciesId) -> &SpeciesDef<'a> {
+        &self.all[id.0 as usize]
+    }
+
+    /// All species.
+    pub fn iter(&self) -> impl Iterator<Item = (SpeciesId, &SpeciesDef<'a>)> {
+        self.all.iter().enumerate().map(|(i, s)| (SpeciesId(i as u32), s))
+    }
+}
+
+fn is_species(kind: &ItemKind) -> bool {
+    matches!(kind, ItemKind::Species { .. })
+}
+
+/// The field with this key.
+pub fn field<'a>(fields: &'a [Field], key: &str) -> Option<&'a Field> {
+    fields.iter().find(|f| f.key.text == key)
+}
+
+fn text<'a>(fields: &'a [Field], key: &str) -> Option<(&'a str, Span)> {
+    match &field(fields, key)?.value {
+        FieldValue::Expr(e) => match &*e.kind {
+            ExprKind::Text(t) => Some((t, e.span)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn species<'a>(
+    decl: DeclId,
+    module: usize,
+    name: &Name,
+    fields: &'a [Field],
+    units: &Units,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> SpeciesDef<'a> {
+    super::fields::unknown_fields(fields, FIELDS, "a species", diagnostics);
+    let by_mass = field(fields, "by").is_some();
+    let formula = text(fields, "formula").and_then(|(t, span)| read_formula(t, span, diagnostics));
+    let structure = text(fields, "smiles").and_then(|(t, span)| match Structure::parse(t) {
+        Ok(s) => Some(s),
+        Err(e) => {
+            diagnostics.push(
+                Diagnostic::error(
+                    codes::FORMULA_INVALID,
+                    span,
+                    format!("`{t}` is not a SMILES structure"),
+                    structure_error(&e.kind),
+                )
+                .help("a SMILES string writes atoms and bonds: ethanol is `CCO`"),
+            );
+            None
+        }
+    });
+    if let (Some(f), Some(s)) = (&formula, structure.as_ref().map(|s| &s.formula))
+        && f != s
+    {
+        let span = text(fields, "formula").map_or(name.span, |t| t.1);
+        diagnostics.push(Diagnostic::error(
+            codes::FORMULA_INVALID,
+            span,
+            format!("the formula of `{}` is {f}, but its structure is {s}", name.text),
+            "does not agree with `smiles`",
+        ));
+    }
+    let declared = field(fields, "formula").is_some() || field(fields, "smiles").is_some();
+    if !declared && !by_mass {
+        diagnostics.push(
+            Diagnostic::error(
+                codes::MISSING_FIELD,
+                name.span,
+                format!("`{}` has neither `smiles` nor `formula`", name.text),
+                "its composition is unknown",
+            )
+            .help("add `formula: \"...\"`, or `by: mass` for an undefined structure"),
+        );
+    }
+    if let Some(f) = structure.as_ref().map(|s| &s.formula).or(formula.as_ref()) {
+        let stated = crate::chem::SpeciesName::split(&name.text).charge;
+        if stated != 0 && stated != f.charge {
+            diagnostics.push(
+                Diagnostic::error(
+                    codes::FORMULA_INVALID,
+                    name.span,
+                    format!("`{}` is declared with a charge of {}", name.text, f.charge),
+                    format!("the name says {stated:+}"),
+                )
+                .help("write the charge in the formula too: `formula: \"SO4^2-\"`"),
+            );
+        }
+    }
+    let formula = structure.as_ref().map(|s| s.formula.clone()).or(formula);
+    let molar_mass = match &formula {
+        Some(f) => f.molar_mass().unwrap_or_else(|e| {
+            diagnostics.push(Diagnostic::error(
+                codes::FORMULA_INVALID,
+                name.span,
+                format!("{} has no standard atomic weight", e.0.symbol()),
+                "its molar mass is unknown",
+            ));
+            f64::NAN
+        }),
+        None => 1.0,
+    };
+    check_molar_mass(name, fields, molar_mass, units, diagnostics);
+    SpeciesDef {
+        decl,
+        name: name.text.clone(),
+        module,
+        formula,
+        structure,
+        molar_mass,
+        by_mass,
+        fields,
+        dissolves: Vec::new(),
+        span: name.span,
+    }
+}
+
+fn read_formula(t: &str, span: Span, diagnostics: &mut Vec<Diagnostic>) -> Option<Formula> {
+    match Formula::parse(t) {
+        Ok(f) => Some(f),
+        Err(e) => {
+            let (what, help) = match &e.kind {
+                FormulaErrorKind::UnknownElement(s) => (format!("no element has the symbol `{s}`"), None),
+                other => (formula_error(other), Some("write atoms and counts: `C2H6O`, `Ca(OH)2`, `SO4^2-`")),
+            };
+            // One byte past the opening quote; escapes do not occur in formulas.
+            let at = span.start as usize + 1 + e.offset;
+            let exact = Span::new(span.file, at, at + e.len);
+            let mut d = Diagnostic::error(codes::FORMULA_INVALID, exact, format!("`{t}` is not a formula"), what);
+            d.help.extend(help.map(String::from));
+            diagnostics.push(d);
+            None
+        }
+    }
+}
+
+fn formula_error(kind: &FormulaErrorKind) -> String {
+    match kind {
+        FormulaErrorKind::Empty => "no atoms".into(),
+        FormulaErrorKind::UnknownElement(s) => format!("no element has the symbol `{s}`"),
+        FormulaErrorKind::UnexpectedCharacter(c) => format!("`{c}` has no place here"),
+        FormulaErrorKind::Unclosed(c) => format!("`{c}` is not closed"),
+        FormulaErrorKind::Unopened(c) => format!("`{c}` closes nothing"),
+        FormulaErrorKind::BadCount => "a count is a whole number from 1 to a million".into(),
+        FormulaErrorKind::TooDeep => "too many brackets inside each other".into(),
+    }
+}
+
+fn structure_error(kind: &StructureErrorKind) -> String {
+    match kind {
+        StructureErrorKind::Empty => "nothing is written".into(),
+        StructureErrorKind::UnexpectedCharacter => "a character that has no place here".into(),
+        StructureErrorKind::UnexpectedEnd => "it ends inside an atom or branch".into(),
+        StructureErrorKind::UnknownElement(s) => format!("no element has the symbol `{s}`"),
+        StructureErrorKind::OpenRing(n) => format!("ring bond {n} is opened and not closed"),
+        StructureErrorKind::ConflictingRing(n) => format!("the two ends of ring bond {n} differ"),
+        StructureErrorKind::Parentheses => "parentheses do not pair".into(),
+        StructureErrorKind::BracketAtom(a) => format!("the atom `[{a}]` cannot be read"),
+        StructureErrorKind::Valence(e) => format!("{e} has too many bonds"),
+        StructureErrorKind::NotAromatic => "a lower-case ring that cannot be aromatic".into(),
+        StructureErrorKind::Wildcard => "`*` stands for no element".into(),
+        StructureErrorKind::TooLarge => "too long, or nested too deeply".into(),
+        StructureErrorKind::Unsupported => "not understood".into(),
+    }
+}
+
+/// A stated molar mass must agree with the formula to one part in a thousand.
+fn check_molar_mass(name: &Name, fields: &[Field], computed: f64, units: &Units, diagnostics: &mut Vec<Diagnostic>) {
+    let Some(f) = field(fields, "molar_mass") else { return };
+    let FieldValue::Expr(e) = &f.value else { return };
+    let ExprKind::Quantity(v, u) = &*e.kind else { return };
+    let Ok(unit) = units.resolve(&u.text) else { return };
+    let stated = unit.unit.to_si(*v);
+    if (stated / computed - 1.0).abs() > 1e-3 {
+        diagnostics.push(Diagnostic::error(
+            codes::FORMULA_INVALID,
+            e.span,
+            format!("the molar mass of `{}` is {}", name.text, unit.unit.show(computed)),
+            "does not agree with the formula",
+        ));
+    }
+}
+
+fn check_dissociation(
+    table: &SpeciesTable<'_>,
+    index: usize,
+    ions: &[(SpeciesId, f64)],
+    span: Span,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let salt = &table.all[index];
+    let Some(formula) = &salt.formula else { return };
+    let mut charge = 0.0;
+    let mut counts: BTreeMap<_, f64> = BTreeMap::new();
+    for (ion, n) in ions {
+        let Some(f) = &table.get(*ion).formula else { return };
+        charge += n * f64::from(f.charge);
+        for (element, count) in &f.elements {
+            *counts.entry(*element).or_default() += n * count.to_f64();
+        }
+    }
+    let same = counts.len() == formula.elements.len()
+        && formula.elements.iter().all(|(e, c)| counts.get(e).is_some_and(|n| (n - c.to_f64()).abs() < 1e-9));
+    if !same || (charge - f64::from(formula.charge)).abs() > 1e-9 {
+        diagnostics.push(Diagnostic::error(
+            codes::UNBALANCED,
+            span,
+            format!("`{}` ({formula}) does not split into these ions", salt.name),
+            "atoms or charge differ",
+        ));
+    }
+}

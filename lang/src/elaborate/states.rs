@@ -1,0 +1,267 @@
+//! States: allocated once all instances exist, before anything reads them.
+
+use matterix_ir::model::{Domain, State};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
+
+use super::tables::MemberRef;
+use super::{Elaborator, ExtensiveKey, SpeciesId};
+use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
+use crate::eval::{Num, Scope, Type, Value};
+
+impl<'a> Elaborator<'a> {
+    /// Allocates the states of an instance.
+    pub fn declare_states(&mut self, id: InstanceId) {
+        for m in self.all_members(id) {
+            let MemberKind::Value { role, name, ty, per, options, .. } = &m.member.kind else { continue };
+            if !matches!(role, Role::State | Role::Extensive) {
+                continue;
+            }
+            let ty = self.resolve_type(ty, m.module);
+            let scale = self.scale_of(options, m.module, &ty);
+            let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
+            if per.is_some() {
+                for s in self.mixture_species(id) {
+                    let species = self.tables.species.get(s).name.clone();
+                    let index = self.allocate(id, format!("{full}[{species}]"), &ty, options, scale, m.member.span);
+                    self.instances[id.0 as usize].amounts.insert((name.text.clone(), s), index);
+                    let key = ExtensiveKey { instance: id, member: name.text.clone(), species: Some(s) };
+                    self.extensive.insert(key, index);
+                }
+                continue;
+            }
+            let index = self.allocate(id, full, &ty, options, scale, m.member.span);
+            let value = self.state_node(index, &ty);
+            for initial in [false, true] {
+                for live in [false, true] {
+                    if !initial {
+                        let key = (m.owner, name.text.clone(), initial, live);
+                        self.instances[id.0 as usize].values.insert(key, value.clone());
+                    }
+                }
+            }
+            if *role == Role::Extensive {
+                let key = ExtensiveKey { instance: id, member: name.text.clone(), species: None };
+                self.extensive.insert(key, index);
+            }
+        }
+    }
+
+    fn allocate(
+        &mut self,
+        owner: InstanceId,
+        name: String,
+        ty: &Type,
+        options: &'a [NamedExpr],
+        scale: f64,
+        span: Span,
+    ) -> u32 {
+        let domain = match ty {
+            Type::Bool => Domain::Bool,
+            Type::Instance { .. } => Domain::Instance,
+            _ => Domain::Quantity(self.declared_unit(options, ty).unwrap_or_else(|| self.type_unit(ty))),
+        };
+        let initial = self.graph.number(f64::NAN);
+        let index = self.states.len() as u32;
+        self.state_owner.push(owner);
+        self.states.push(State { name, domain, initial, scale, span });
+        index
+    }
+
+    fn state_node(&mut self, index: u32, ty: &Type) -> Value {
+        let node = self.graph.add(Op::State(index));
+        match ty {
+            Type::Bool => Value::Bool(node),
+            Type::Instance { .. } => Value::InstanceNode(node),
+            Type::Quantity { dimension, point, .. } => {
+                let Domain::Quantity(unit) = &self.states[index as usize].domain else { return Value::Error };
+                let unit = Some(unit.clone());
+                Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit, literal: false })
+            }
+            _ => Value::Error,
+        }
+    }
+
+    /// `{ scale: 1 mmol }`: the magnitude below which differences do not matter.
+    fn scale_of(&mut self, options: &'a [NamedExpr], module: usize, ty: &Type) -> f64 {
+        let Some(o) = options.iter().find(|o| o.name.text == "scale") else { return 1.0 };
+        let expected = match ty {
+            Type::Quantity { dimension, .. } => {
+                Type::Quantity { dimension: dimension.clone(), point: false, optional: false }
+            }
+            other => other.clone(),
+        };
+        let v = self.expr(&o.value, &mut Scope::module(module));
+        match self.coerce(v, &expected, o.value.span, "scale") {
+            Value::Num(n) => self.graph.constant(n.node).unwrap_or(1.0),
+            _ => 1.0,
+        }
+    }
+
+    /// `{ unit: "mmol" }`: how the member is shown.
+    pub fn declared_unit(&mut self, options: &'a [NamedExpr], ty: &Type) -> Option<Unit> {
+        let o = options.iter().find(|o| o.name.text == "unit")?;
+        let ExprKind::Text(text) = &*o.value.kind else { return None };
+        let Type::Quantity { dimension, .. } = ty else { return None };
+        match self.tables.unit(text) {
+            Ok(r) if r.dimension.agrees(dimension) => Some(r.unit),
+            _ => {
+                let wanted = self.tables.type_name(ty);
+                self.report(Diagnostic::error(
+                    codes::UNIT_MISMATCH,
+                    o.value.span,
+                    format!("`{text}` is not a unit of {wanted}"),
+                    "cannot show this member",
+                ));
+                None
+            }
+        }
+    }
+
+    /// The unit a type is shown in where nothing says otherwise.
+    pub fn type_unit(&self, ty: &Type) -> Unit {
+        match ty {
+            Type::Quantity { dimension, point: true, .. } => match self.tables.units.preferred_point(dimension) {
+                Some((symbol, def)) => Unit { symbol, factor: def.factor, offset: def.offset.unwrap_or(0.0) },
+                None => self.tables.si(dimension),
+            },
+            Type::Quantity { dimension, .. } => {
+                self.tables.units.percent(dimension).unwrap_or_else(|| self.tables.si(dimension))
+            }
+            _ => Unit::one(),
+        }
+    }
+
+    /// The value of a scalar state: now, or (in initial mode) at the start.
+    pub fn state_value(
+        &mut self,
+        id: InstanceId,
+        m: MemberRef<'a>,
+        name: &str,
+        ty: &Type,
+        initial: Option<&'a Expr>,
+    ) -> Value {
+        if !self.initial_mode {
+            // States of an instance are declared before they are read; here is only what could not be.
+            return Value::Error;
+        }
+        if let Some((module, field, lab)) = self.instances[id.0 as usize].setting(name)
+            && let Some(e) = Self::field_expr(field)
+        {
+            let mut scope = if lab { Scope { lab: true, ..Scope::module(module) } } else { Scope::of(id, module) };
+            let v = self.expr(e, &mut scope);
+            let v = self.coerce(v, ty, e.span, name);
+            return match v {
+                Value::Num(n) => {
+                    let full = format!("{}.{name}", self.instances[id.0 as usize].name);
+                    Value::Num(self.name_param(&full, n, e.span))
+                }
+                other => other,
+            };
+        }
+        match initial {
+            Some(e) => {
+                let v = self.expr(e, &mut Scope::of_member(id, m));
+                self.coerce(v, ty, e.span, name)
+            }
+            None if matches!(ty, Type::Instance { optional: true, .. }) => Value::Nothing,
+            None if self.prototype => self.placeholder(ty, name),
+            None => {
+                let inst = &self.instances[id.0 as usize];
+                let (inst_name, span) = (inst.name.clone(), inst.span);
+                self.report(
+                    Diagnostic::error(
+                        codes::MISSING_FIELD,
+                        span,
+                        format!("`{inst_name}` needs an initial `{name}`"),
+                        "not given, and there is no default",
+                    )
+                    .because(m.member.span, "declared here"),
+                );
+                Value::Error
+            }
+        }
+    }
+
+    /// Evaluates all initial values; what an instance holds goes into its amounts.
+    pub fn initialise(&mut self) {
+        for i in 0..self.instances.len() as u32 {
+            let amounts: Vec<((String, SpeciesId), u32)> =
+                self.instances[i as usize].amounts.iter().map(|(k, v)| (k.clone(), *v)).collect();
+            for ((_, s), index) in amounts {
+                let held = self.instances[i as usize].contents.iter().find(|(c, _)| *c == s).map(|c| c.1);
+                let node = held.unwrap_or_else(|| self.graph.number(0.0));
+                self.states[index as usize].initial = node;
+            }
+        }
+        // A parameter that nothing reads must be given all the same.
+        for i in 0..self.instances.len() as u32 {
+            let id = InstanceId(i);
+            for m in self.all_members(id) {
+                if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
+                    self.member_value(id, m, name.span);
+                }
+            }
+        }
+        self.initial_mode = true;
+        for i in 0..self.instances.len() as u32 {
+            let id = InstanceId(i);
+            for m in self.all_members(id) {
+                let MemberKind::Value { role: Role::State | Role::Extensive, name, per: None, .. } = &m.member.kind
+                else {
+                    continue;
+                };
+                let value = self.member_value(id, m, name.span);
+                let current = self.instances[i as usize].values.get(&(m.owner, name.text.clone(), false, false));
+                let index = match current {
+                    Some(Value::Num(Num { node, .. }) | Value::Bool(node) | Value::InstanceNode(node)) => {
+                        match self.graph.op(*node) {
+                            Op::State(index) => index,
+                            _ => continue,
+                        }
+                    }
+                    _ => continue,
+                };
+                let Some(node) = self.value_node(&value) else { continue };
+                if let Some(held) = self.graph.constant(node)
+                    && self.states[index as usize].domain == Domain::Instance
+                {
+                    self.holds.entry(index).or_default().insert(held as i64);
+                }
+                self.states[index as usize].initial = node;
+            }
+        }
+        self.initial_mode = false;
+    }
+
+    /// The node of a value that a state can hold.
+    pub fn value_node(&mut self, value: &Value) -> Option<NodeId> {
+        match value {
+            Value::Num(n) => Some(n.node),
+            Value::Bool(n) | Value::InstanceNode(n) => Some(*n),
+            Value::Instance(i) | Value::Qualified(i, _) => Some(self.graph.number(f64::from(i.0))),
+            Value::Nothing => Some(self.graph.number(-1.0)),
+            Value::Unlimited => Some(self.graph.number(f64::INFINITY)),
+            _ => None,
+        }
+    }
+
+    /// The product of two nodes.
+    pub fn times(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.graph.binary(BinaryOp::Mul, a, b)
+    }
+
+    /// The sum of two nodes.
+    pub fn plus(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.graph.binary(BinaryOp::Add, a, b)
+    }
+
+    /// The species that can get into a mixture.
+    pub fn mixture_species(&self, id: InstanceId) -> Vec<SpeciesId> {
+        if self.prototype {
+            return self.tables.species.iter().take(1).map(|s| s.0).collect();
+        }
+        let name = &self.instances[id.0 as usize].name;
+        self.reach.of(name)
+    }
+}

@@ -1,0 +1,272 @@
+//! What all elaboration looks up: units, kinds with their inherited members, species, reactions.
+
+use std::collections::BTreeMap;
+use std::sync::RwLock;
+
+use matterix_ir::{Diagnostic, Span, Unit, codes};
+
+use super::species::SpeciesTable;
+use super::units;
+use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
+use crate::names::{DeclId, Names};
+use crate::units::text::UnitError;
+use crate::units::{Dimension, Resolved, Units};
+
+/// A member of a capability as seen from a kind that has it.
+#[derive(Clone, Copy, Debug)]
+pub struct MemberRef<'a> {
+    /// The capability that declares it.
+    pub owner: DeclId,
+    /// Its declaration.
+    pub member: &'a Member,
+    /// Where names in it are looked up.
+    pub module: usize,
+}
+
+/// A capability or an asset type with everything it inherits.
+#[derive(Clone, Debug)]
+pub struct Kind<'a> {
+    /// Its declaration.
+    pub id: DeclId,
+    /// Its name.
+    pub name: String,
+    /// Whether it is an asset type.
+    pub is_asset: bool,
+    /// Itself and everything it extends, most derived first.
+    pub ancestors: Vec<DeclId>,
+    /// Members of all its capabilities, base first.
+    pub members: Vec<MemberRef<'a>>,
+    /// Those of them that no more derived capability declares again.
+    pub visible: Vec<MemberRef<'a>>,
+    /// The member that counts amounts per species, if there is one.
+    pub per_species: Option<MemberRef<'a>>,
+    /// The visible ones by name; more than one is ambiguous.
+    by_name: BTreeMap<&'a str, Vec<MemberRef<'a>>>,
+    /// Lines of all its assets, most derived first, with their module.
+    pub lines: Vec<(usize, &'a AssetLine)>,
+    /// Where its name stands.
+    pub span: Span,
+}
+
+impl Kind<'_> {
+    /// Whether it has (or is) the kind.
+    pub fn has(&self, kind: DeclId) -> bool {
+        self.ancestors.contains(&kind)
+    }
+}
+
+/// A reaction in one direction.
+#[derive(Clone, Debug)]
+pub struct ReactionDef<'a> {
+    /// Its name; the reverse direction has `.reverse` appended.
+    pub name: String,
+    /// Its module.
+    pub module: usize,
+    /// Species consumed, with coefficients.
+    pub reactants: Vec<(super::SpeciesId, f64)>,
+    /// Species made, with coefficients.
+    pub products: Vec<(super::SpeciesId, f64)>,
+    /// Its fields.
+    pub fields: &'a [Field],
+    /// This is the reverse of a `<->`.
+    pub reverse: bool,
+    /// The item.
+    pub span: Span,
+    /// The equation's terms, for diagnostics.
+    pub terms: Vec<(super::SpeciesId, Span)>,
+}
+
+/// Everything declared, ready for lookups.
+#[derive(Debug)]
+pub struct Tables<'a> {
+    /// Declarations and scopes.
+    pub names: &'a Names<'a>,
+    /// Dimensions and units.
+    pub units: Units,
+    /// Units of the text that were read before: the same few stand in every law and step.
+    read: RwLock<BTreeMap<String, Resolved>>,
+    /// SI units of dimensions that were asked for before.
+    si: RwLock<BTreeMap<Dimension, Unit>>,
+    /// Capabilities and assets.
+    pub kinds: BTreeMap<DeclId, Kind<'a>>,
+    /// Species.
+    pub species: SpeciesTable<'a>,
+    /// Reactions whose species are all known.
+    pub reactions: Vec<ReactionDef<'a>>,
+    /// Processes over instances, from all modules.
+    pub processes: Vec<(DeclId, &'a Process)>,
+}
+
+impl<'a> Tables<'a> {
+    /// Builds the tables; findings in declarations are returned beside them.
+    pub fn new(names: &'a Names<'a>) -> (Self, Vec<Diagnostic>) {
+        let mut diagnostics = Vec::new();
+        let units = units::declare(names, &mut diagnostics);
+        let mut tables = Tables {
+            names,
+            units,
+            read: RwLock::default(),
+            si: RwLock::default(),
+            kinds: BTreeMap::new(),
+            species: SpeciesTable::default(),
+            reactions: Vec::new(),
+            processes: Vec::new(),
+        };
+        for index in 0..names.decls.len() as u32 {
+            tables.kind(DeclId(index), &mut Vec::new(), &mut diagnostics);
+            if let ItemKind::Process(p) = &names.decl(DeclId(index)).item.kind {
+                tables.processes.push((DeclId(index), p));
+            }
+        }
+        tables.species = SpeciesTable::new(names, &tables.units, &mut diagnostics);
+        tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
+        (tables, diagnostics)
+    }
+
+    fn kind(&mut self, id: DeclId, open: &mut Vec<DeclId>, diagnostics: &mut Vec<Diagnostic>) {
+        if self.kinds.contains_key(&id) {
+            return;
+        }
+        let decl = self.names.decl(id);
+        let (name, extends, is_asset) = match &decl.item.kind {
+            ItemKind::Capability { name, extends, .. } => (name, extends, false),
+            ItemKind::Asset { name, extends, .. } => (name, extends, true),
+            _ => return,
+        };
+        open.push(id);
+        let mut kind = Kind {
+            id,
+            name: name.text.clone(),
+            is_asset,
+            ancestors: vec![id],
+            members: Vec::new(),
+            visible: Vec::new(),
+            per_species: None,
+            by_name: BTreeMap::new(),
+            lines: Vec::new(),
+            span: name.span,
+        };
+        if let ItemKind::Asset { lines, .. } = &decl.item.kind {
+            kind.lines.extend(lines.iter().map(|l| (decl.module, l)));
+        }
+        for path in extends {
+            self.inherit(&mut kind, path, decl.module, open, diagnostics);
+        }
+        if let ItemKind::Capability { members, .. } = &decl.item.kind {
+            kind.members.extend(members.iter().map(|member| MemberRef { owner: id, member, module: decl.module }));
+        }
+        open.pop();
+        let counts = |m: &&MemberRef<'a>| {
+            matches!(&m.member.kind, MemberKind::Value { role: Role::Extensive, per: Some(_), .. })
+        };
+        kind.per_species = kind.members.iter().find(counts).copied();
+        let members = kind.members.clone();
+        self.kinds.insert(id, kind);
+        let visible = self.visible(members);
+        if let Some(kind) = self.kinds.get_mut(&id) {
+            for m in &visible {
+                if let Some(name) = member_name(m.member) {
+                    kind.by_name.entry(&name.text).or_default().push(*m);
+                }
+            }
+            kind.visible = visible;
+        }
+    }
+
+    /// The members that no more derived capability declares again.
+    pub fn visible(&self, members: Vec<MemberRef<'a>>) -> Vec<MemberRef<'a>> {
+        let hidden = |m: &MemberRef<'a>| {
+            let Some(name) = member_name(m.member) else { return false };
+            members.iter().any(|o| {
+                o.owner != m.owner
+                    && member_name(o.member).is_some_and(|n| n.text == name.text)
+                    && self.kinds.get(&o.owner).is_some_and(|k| k.has(m.owner))
+            })
+        };
+        members.iter().filter(|m| !hidden(m)).copied().collect()
+    }
+
+    fn inherit(
+        &mut self,
+        kind: &mut Kind<'a>,
+        path: &Path,
+        module: usize,
+        open: &mut Vec<DeclId>,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        let Some(name) = path.segments.last() else { return };
+        let is_kind = |k: &ItemKind| matches!(k, ItemKind::Capability { .. } | ItemKind::Asset { .. });
+        let base = self.names.lookup(module, &name.text).filter(|id| is_kind(&self.names.decl(*id).item.kind));
+        let Some(base) = base else {
+            diagnostics.push(self.names.unknown(module, name, "capability or asset", is_kind));
+            return;
+        };
+        if open.contains(&base) {
+            diagnostics.push(Diagnostic::error(
+                codes::CIRCULAR,
+                path.span,
+                format!("`{}` extends itself", kind.name),
+                "this leads back to it",
+            ));
+            return;
+        }
+        self.kind(base, open, diagnostics);
+        let Some(base) = self.kinds.get(&base) else { return };
+        for &ancestor in &base.ancestors {
+            if !kind.ancestors.contains(&ancestor) {
+                kind.ancestors.push(ancestor);
+            }
+        }
+        for member in &base.members {
+            let known = kind.members.iter().any(|m| std::ptr::eq(m.member, member.member));
+            if !known {
+                kind.members.push(*member);
+            }
+        }
+        kind.lines.extend(base.lines.iter().copied());
+    }
+
+    /// Resolves a unit as written.
+    pub fn unit(&self, text: &str) -> Result<Resolved, UnitError> {
+        if let Some(known) = self.read.read().ok().and_then(|read| read.get(text).cloned()) {
+            return Ok(known);
+        }
+        let resolved = self.units.resolve(text)?;
+        if let Ok(mut read) = self.read.write() {
+            read.insert(text.to_string(), resolved.clone());
+        }
+        Ok(resolved)
+    }
+
+    /// The SI unit of a dimension, for display.
+    pub fn si(&self, dimension: &Dimension) -> Unit {
+        if let Some(known) = self.si.read().ok().and_then(|si| si.get(dimension).cloned()) {
+            return known;
+        }
+        let unit = self.units.si(dimension);
+        if let Ok(mut si) = self.si.write() {
+            si.insert(dimension.clone(), unit.clone());
+        }
+        unit
+    }
+
+    /// The members of a kind that a name means; more than one is ambiguous.
+    pub fn members(&self, kind: DeclId, name: &str) -> &[MemberRef<'a>] {
+        self.kinds.get(&kind).and_then(|info| info.by_name.get(name)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The name under which a capability or asset is known, for messages.
+    pub fn kind_name(&self, id: DeclId) -> &str {
+        self.kinds.get(&id).map_or("", |k| k.name.as_str())
+    }
+}
+
+/// The name of a member that has one.
+pub fn member_name(member: &Member) -> Option<&Name> {
+    match &member.kind {
+        MemberKind::Value { name, .. } | MemberKind::Frame { name, .. } => Some(name),
+        MemberKind::Process(p) => Some(&p.name),
+        MemberKind::Event(e) => Some(&e.name),
+        MemberKind::View { .. } | MemberKind::Command { .. } | MemberKind::Error => None,
+    }
+}

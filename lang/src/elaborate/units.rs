@@ -1,0 +1,228 @@
+//! Declares the dimensions and units of all modules.
+
+use matterix_ir::{Diagnostic, codes};
+
+use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, UnitText};
+use crate::names::{Names, near};
+use crate::units::text::UnitError;
+use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units};
+
+/// Reads every `dimension` and `unit` item, in the order of the modules.
+pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
+    let mut units = Units::default();
+    for module in names.modules {
+        for item in &module.tree.items {
+            match &item.kind {
+                ItemKind::Dimension { name, point, definition } => {
+                    if let Some(first) = units.dimension(&name.text).map(|d| d.span) {
+                        diagnostics.push(
+                            Diagnostic::error(
+                                codes::DUPLICATE_NAME,
+                                name.span,
+                                format!("the dimension `{}` is declared twice", name.text),
+                                "declared again here",
+                            )
+                            .because(first, "first declared here"),
+                        );
+                        continue;
+                    }
+                    match definition {
+                        None => units.add_base(&name.text, name.span),
+                        Some(e) => {
+                            let dimension = dimension(&units, e, diagnostics);
+                            units.add_dimension(&name.text, DimensionDef { dimension, point: *point, span: name.span });
+                        }
+                    }
+                }
+                ItemKind::Unit { .. } => unit(&mut units, item, diagnostics),
+                _ => {}
+            }
+        }
+    }
+    units
+}
+
+fn dimension(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Dimension {
+    match &*e.kind {
+        ExprKind::Number(1.0) => Dimension::one(),
+        ExprKind::Name(n) => match units.dimension(&n.text) {
+            Some(def) => def.dimension.clone(),
+            None => {
+                let mut d = Diagnostic::error(
+                    codes::UNKNOWN_NAME,
+                    n.span,
+                    format!("there is no dimension `{}`", n.text),
+                    "not declared above",
+                );
+                d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
+                diagnostics.push(d);
+                Dimension::any()
+            }
+        },
+        ExprKind::Binary(Binary::Mul, a, b) => {
+            dimension(units, a, diagnostics).times(&dimension(units, b, diagnostics))
+        }
+        ExprKind::Binary(Binary::Div, a, b) => dimension(units, a, diagnostics).over(&dimension(units, b, diagnostics)),
+        ExprKind::Binary(Binary::Pow, a, b) => match exponent(b) {
+            Some(e) => dimension(units, a, diagnostics).power(e),
+            None => malformed(e, diagnostics),
+        },
+        ExprKind::Tuple(items, None) if items.len() == 1 => dimension(units, &items[0], diagnostics),
+        ExprKind::Error => Dimension::any(),
+        _ => malformed(e, diagnostics),
+    }
+}
+
+fn malformed(e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Dimension {
+    diagnostics.push(
+        Diagnostic::error(codes::SYNTAX, e.span, "a dimension is a product of powers of dimensions", "not a dimension")
+            .help("write, for example, `dimension Speed = Length / Duration`"),
+    );
+    Dimension::any()
+}
+
+/// A constant exponent: `2`, `-1`, `(1 / 2)`.
+pub fn exponent(e: &Expr) -> Option<Rational> {
+    match &*e.kind {
+        ExprKind::Number(v) => Rational::approximate(*v),
+        ExprKind::Unary(crate::ast::Unary::Neg, inner) => {
+            let r = exponent(inner)?;
+            Some(Rational::new(-r.num, r.den))
+        }
+        ExprKind::Binary(Binary::Div, a, b) => {
+            let (a, b) = (exponent(a)?, exponent(b)?);
+            (b.num != 0).then(|| Rational::new(a.num * b.den, a.den * b.num))
+        }
+        ExprKind::Tuple(items, None) if items.len() == 1 => exponent(&items[0]),
+        _ => None,
+    }
+}
+
+fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
+    let ItemKind::Unit { name, dimension, definition, origin, prefixes, aliases } = &item.kind else { return };
+    let declared = dimension.as_ref().and_then(|n| {
+        let found = units.dimension(&n.text).cloned();
+        if found.is_none() {
+            let mut d = Diagnostic::error(
+                codes::UNKNOWN_NAME,
+                n.span,
+                format!("there is no dimension `{}`", n.text),
+                "not declared above",
+            );
+            d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
+            diagnostics.push(d);
+        }
+        found
+    });
+    let (value, factor) = match definition {
+        Some(e) => match constant(units, e, diagnostics) {
+            Some(v) => v,
+            None => return,
+        },
+        None => (declared.as_ref().map_or_else(Dimension::any, |d| d.dimension.clone()), 1.0),
+    };
+    if let Some(d) = &declared
+        && !d.dimension.agrees(&value)
+    {
+        diagnostics.push(Diagnostic::error(
+            codes::UNIT_MISMATCH,
+            name.span,
+            format!(
+                "`{}` is declared as {} but defined as {}",
+                name.text,
+                units.describe(&d.dimension, d.point),
+                units.describe(&value, false)
+            ),
+            "the definition has another dimension",
+        ));
+        return;
+    }
+    let offset = origin.as_ref().and_then(|e| constant(units, e, diagnostics)).map(|(_, v)| v);
+    let offset = offset.or_else(|| declared.as_ref().is_some_and(|d| d.point).then_some(0.0));
+    let def = UnitDef { dimension: value, factor, offset, prefixes: *prefixes, span: name.span };
+    for spelling in std::iter::once(name).chain(aliases) {
+        if let Some(first) = units.declared(&spelling.text).map(|u| u.span) {
+            diagnostics.push(
+                Diagnostic::error(
+                    codes::DUPLICATE_NAME,
+                    spelling.span,
+                    format!("the unit `{}` is declared twice", spelling.text),
+                    "declared again here",
+                )
+                .because(first, "first declared here"),
+            );
+            continue;
+        }
+        units.add_unit(&spelling.text, def.clone());
+    }
+}
+
+/// A constant quantity: dimension and SI value.
+fn constant(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Option<(Dimension, f64)> {
+    match &*e.kind {
+        ExprKind::Number(v) => Some((Dimension::one(), *v)),
+        ExprKind::Quantity(v, u) => match units.resolve(&u.text) {
+            Ok(r) => Some((r.dimension, r.unit.to_si(*v))),
+            Err(error) => {
+                diagnostics.push(unit_error(u, error));
+                None
+            }
+        },
+        ExprKind::Binary(op @ (Binary::Mul | Binary::Div), a, b) => {
+            let (a, b) = (constant(units, a, diagnostics)?, constant(units, b, diagnostics)?);
+            Some(if *op == Binary::Mul { (a.0.times(&b.0), a.1 * b.1) } else { (a.0.over(&b.0), a.1 / b.1) })
+        }
+        ExprKind::Tuple(items, None) if items.len() == 1 => constant(units, &items[0], diagnostics),
+        ExprKind::Error => None,
+        _ => {
+            diagnostics.push(
+                Diagnostic::error(codes::SYNTAX, e.span, "a unit is defined by a constant quantity", "not a constant")
+                    .help("write, for example, `unit bar: Pressure = 1e5 Pa with prefixes`"),
+            );
+            None
+        }
+    }
+}
+
+/// The diagnostic for a unit that could not be resolved.
+pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
+    match error {
+        UnitError::Unknown { name, near } => {
+            let mut d = Diagnostic::error(
+                codes::UNKNOWN_UNIT,
+                unit.span,
+                format!("there is no unit `{name}`"),
+                "not a declared unit",
+            );
+            d.help.extend(near::question(&near));
+            if let Some(best) = near.first() {
+                let mended = unit.text.replacen(&name, best, 1);
+                d = d.fix(format!("replace with `{mended}`"), unit.span, mended);
+            }
+            if name == "%" {
+                d.help = vec!["say of what: `%w/w` (by mass) or `%v/v` (by volume)".into()];
+                d.fixes.clear();
+            }
+            d
+        }
+        UnitError::PointInDerived { name, mended } => {
+            let mut d = Diagnostic::error(
+                codes::TEMPERATURE_POINT,
+                unit.span,
+                format!("`{name}` is a point on a scale and cannot be part of the unit `{}`", unit.text),
+                "a derived unit needs a difference",
+            );
+            if let Some(mended) = mended {
+                d = d.help(format!("write `{mended}`")).fix(format!("replace with `{mended}`"), unit.span, mended);
+            }
+            d
+        }
+        UnitError::Malformed => Diagnostic::error(
+            codes::UNKNOWN_UNIT,
+            unit.span,
+            format!("`{}` is not a unit", unit.text),
+            "cannot be read as a product of units",
+        )
+        .help("a unit is one word without blanks: `kg/(mol*s)`, `W/(m^2*K)`, `1/s`"),
+    }
+}

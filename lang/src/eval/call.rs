@@ -1,0 +1,304 @@
+//! Calls of functions, relations and methods.
+
+use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
+
+use super::{Num, Scope, Type, Value};
+use crate::ast::{Arg, Expr, ExprKind, ItemKind, Param};
+use crate::elaborate::Elaborator;
+use crate::names::{DeclId, near};
+use crate::units::Dimension;
+
+impl<'a> Elaborator<'a> {
+    /// `f(a, b: c)`.
+    pub fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Value {
+        let f = match &*callee.kind {
+            // A function is looked up where a name that is not a function would be refused.
+            ExprKind::Name(n) if scope.var(&n.text).is_none() => {
+                match self.tables.names.lookup(scope.module, &n.text) {
+                    Some(id) if self.is_function(id) => Value::Function(id),
+                    _ => {
+                        let d = self.tables.names.unknown(scope.module, n, "function", |k| {
+                            matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
+                        });
+                        self.report(d);
+                        return Value::Error;
+                    }
+                }
+            }
+            _ => self.expr(callee, scope),
+        };
+        match f {
+            Value::Error => Value::Error,
+            Value::Function(id) => self.call_declared(id, args, span, scope),
+            Value::Method(of, name) => self.call_method(*of, &name, args, span, scope),
+            other => self.expected("a function", &other, callee.span),
+        }
+    }
+
+    fn is_function(&self, id: DeclId) -> bool {
+        matches!(self.tables.names.decl(id).item.kind, ItemKind::Fn { .. } | ItemKind::Relation { .. })
+    }
+
+    fn call_declared(&mut self, id: DeclId, args: &'a [Arg], span: Span, scope: &mut Scope) -> Value {
+        let decl = self.tables.names.decl(id);
+        let (params, name): (&'a [Param], &str) = match &decl.item.kind {
+            ItemKind::Fn { params, name, .. } | ItemKind::Relation { params, name, .. } => (params, &name.text),
+            _ => return Value::Error,
+        };
+        let Some(values) = self.arguments(params, decl.module, args, span, name, scope) else { return Value::Error };
+        if let Some(v) = self.pair_setting(name, &values) {
+            return v;
+        }
+        match &decl.item.kind {
+            ItemKind::Fn { external: true, result, .. } => {
+                let spans: Vec<Span> = params.iter().map(|p| p.name.span).collect();
+                let at = args.first().map_or(span, |a| a.value.span);
+                let result = result.as_ref().map(|t| self.resolve_type(t, decl.module));
+                self.external(name, values, result, at, &spans)
+            }
+            ItemKind::Fn { body, result, .. } => match body {
+                Some(body) => {
+                    let v = self.call_body(id, params, values, body, decl.module);
+                    match result {
+                        Some(ty) => {
+                            let ty = self.resolve_type(ty, decl.module);
+                            self.coerce(v, &ty, body.span, name)
+                        }
+                        None => v,
+                    }
+                }
+                None => Value::Error,
+            },
+            ItemKind::Relation { definition: Some(body), .. } => {
+                match self.call_body(id, params, values, body, decl.module) {
+                    v @ (Value::Bool(_) | Value::Error) => v,
+                    other => self.expected("a condition", &other, body.span),
+                }
+            }
+            ItemKind::Relation { .. } if self.prototype => Value::Bool(self.graph.number(1.0)),
+            _ => {
+                self.report(
+                    super::types::unsupported(span, "relations that follow from geometry")
+                        .because(decl.item.span, "declared without a definition here"),
+                );
+                Value::Error
+            }
+        }
+    }
+
+    fn call_body(
+        &mut self,
+        id: DeclId,
+        params: &'a [Param],
+        values: Vec<Value>,
+        body: &'a Expr,
+        module: usize,
+    ) -> Value {
+        if let Some((name, at)) = self.ring(&self.open_calls, id) {
+            self.report(
+                Diagnostic::error(
+                    codes::CIRCULAR,
+                    at,
+                    format!("`{name}` calls itself"),
+                    "leads back to the same function",
+                )
+                .help("functions are written out when compiling, so recursion has no end"),
+            );
+            return Value::Error;
+        }
+        self.open_calls.push(id);
+        let mut inner = Scope::module(module);
+        for (p, v) in params.iter().zip(values) {
+            inner.bind(p.name.text.clone(), v);
+        }
+        let compared = std::mem::take(&mut self.comparisons);
+        let v = self.expr(body, &mut inner);
+        self.comparisons = compared;
+        self.open_calls.pop();
+        v
+    }
+
+    /// Arguments by position and name, in the order of the parameters. A parameter that is not given takes its default
+    /// or the local of the same name (`T` in a rate).
+    fn arguments(
+        &mut self,
+        params: &'a [Param],
+        module: usize,
+        args: &'a [Arg],
+        span: Span,
+        callee: &str,
+        scope: &mut Scope,
+    ) -> Option<Vec<Value>> {
+        let mut given: Vec<Option<Value>> = vec![None; params.len()];
+        let mut good = true;
+        for (position, arg) in args.iter().enumerate() {
+            let index = match &arg.name {
+                Some(n) => params.iter().position(|p| p.name.text == n.text),
+                None => Some(position).filter(|i| *i < params.len()),
+            };
+            let value = self.expr(&arg.value, scope);
+            let Some(index) = index else {
+                good = false;
+                let at = arg.name.as_ref().map_or(arg.value.span, |n| n.span);
+                let near = arg
+                    .name
+                    .as_ref()
+                    .map_or_else(Vec::new, |n| near::nearest(&n.text, params.iter().map(|p| &p.name.text)));
+                let mut d = Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    at,
+                    match &arg.name {
+                        Some(n) => format!("`{callee}` has no parameter `{}`", n.text),
+                        None => format!("`{callee}` takes {} arguments, {} are given", params.len(), args.len()),
+                    },
+                    "not a parameter",
+                );
+                d.help.extend(near::question(&near));
+                self.report(d);
+                continue;
+            };
+            let param = &params[index];
+            let value = match &param.ty {
+                Some(ty) => {
+                    let ty = self.resolve_type(ty, module);
+                    self.coerce(value, &ty, arg.value.span, &param.name.text)
+                }
+                None => value,
+            };
+            let value = match (value, &self.rate_prefix) {
+                (Value::Num(n), Some(prefix)) => {
+                    let full = format!("{prefix}.{}", param.name.text);
+                    Value::Num(self.name_param(&full, n, arg.value.span))
+                }
+                (v, _) => v,
+            };
+            given[index] = Some(value);
+        }
+        let mut out = Vec::new();
+        for (param, value) in params.iter().zip(given) {
+            let value = match (value, &param.default) {
+                (Some(v), _) => v,
+                (None, Some(default)) => self.expr(default, &mut Scope::module(module)),
+                (None, None) => match scope.var(&param.name.text) {
+                    Some(v) => v.clone(),
+                    // A parameter that is not known may be meant for the one that is missing.
+                    None if !good => Value::Error,
+                    None => {
+                        self.report(Diagnostic::error(
+                            codes::WRONG_ARGUMENTS,
+                            span,
+                            format!("`{callee}` needs `{}`", param.name.text),
+                            "not given",
+                        ));
+                        good = false;
+                        Value::Error
+                    }
+                },
+            };
+            good &= value != Value::Error;
+            out.push(value);
+        }
+        good.then_some(out)
+    }
+
+    /// A pair parameter: a function of two instances whose value a lab gives with `between`.
+    fn pair_setting(&mut self, name: &str, values: &[Value]) -> Option<Value> {
+        let instance = |v: &Value| match v {
+            Value::Instance(i) | Value::Qualified(i, _) => Some(*i),
+            _ => None,
+        };
+        let [a, b] = values else { return None };
+        let (a, b) = (instance(a)?, instance(b)?);
+        let found =
+            self.pairs.iter().position(|p| p.name == name && ((p.a == a && p.b == b) || (p.a == b && p.b == a)))?;
+        if let Some(v) = &self.pairs[found].resolved {
+            return Some(v.clone());
+        }
+        let (value, module) = (self.pairs[found].value, self.pairs[found].module);
+        let v = self.expr(value, &mut Scope { lab: true, ..Scope::module(module) });
+        let result =
+            self.tables.names.lookup(module, name).and_then(|id| match &self.tables.names.decl(id).item.kind {
+                ItemKind::Fn { result: Some(ty), .. } => Some((ty, self.tables.names.decl(id).module)),
+                _ => None,
+            });
+        let v = match result {
+            Some((ty, m)) => {
+                let ty = self.resolve_type(ty, m);
+                self.coerce(v, &ty, value.span, name)
+            }
+            None => v,
+        };
+        let (x, y) = (self.instances[a.0 as usize].name.clone(), self.instances[b.0 as usize].name.clone());
+        let v = match v {
+            Value::Num(n) => Value::Num(self.name_param(&format!("{name}({x}, {y})"), n, value.span)),
+            other => other,
+        };
+        self.pairs[found].resolved = Some(v.clone());
+        Some(v)
+    }
+
+    fn call_method(&mut self, of: Value, name: &str, args: &'a [Arg], span: Span, scope: &mut Scope) -> Value {
+        let values: Vec<Value> = args.iter().map(|a| self.expr(&a.value, scope)).collect();
+        match (of, name, values.as_slice()) {
+            (_, _, v) if v.contains(&Value::Error) => Value::Error,
+            (Value::Reaction(r), _, _) => self.reaction_method(r, name, values, span, scope),
+            (Value::Species(s), "count", [Value::Species(ion)]) => {
+                let count =
+                    self.tables.species.get(s).dissolves.iter().find(|(i, _)| i == ion).map_or(0.0, |(_, n)| *n);
+                self.number(count, Dimension::one(), false)
+            }
+            (Value::Instance(_), "basis", _) => Value::Error,
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    span,
+                    format!("`{name}` cannot be called with these arguments"),
+                    "wrong arguments",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    /// A stand-in for a value of a type, for checking a declaration by itself.
+    pub fn placeholder(&mut self, ty: &Type, name: &str) -> Value {
+        match ty {
+            Type::Any | Type::Reaction => Value::Error,
+            Type::Quantity { dimension, point, .. } => {
+                let index = self.params.len() as u32;
+                self.params.push(matterix_ir::model::Param {
+                    name: name.to_string(),
+                    value: 1.0,
+                    unit: matterix_ir::Unit::one(),
+                    span: Span::default(),
+                });
+                let node = self.graph.add(Op::Param(index));
+                Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit: None, literal: false })
+            }
+            Type::Bool => {
+                let zero = self.graph.number(0.0);
+                let Value::Num(n) = self.placeholder(&Type::ratio(), name) else { return Value::Error };
+                Value::Bool(self.graph.binary(BinaryOp::Lt, zero, n.node))
+            }
+            Type::Text => Value::Text(String::new()),
+            Type::Species => {
+                if self.tables.species.iter().next().is_some() {
+                    Value::Species(super::SpeciesId(0))
+                } else {
+                    Value::Error
+                }
+            }
+            Type::Range(inner) => match (self.placeholder(inner, name), self.placeholder(inner, name)) {
+                (Value::Num(a), Value::Num(b)) => Value::Range(Box::new(a), Box::new(b)),
+                _ => Value::Error,
+            },
+            Type::List(inner) => Value::List(vec![self.placeholder(inner, name)]),
+            Type::Color => Value::Tuple((0..3).map(|_| self.placeholder(&Type::ratio(), name)).collect()),
+            Type::Frame => match self.instances.first() {
+                Some(_) => Value::Frame(matterix_ir::scene::InstanceId(0), name.to_string()),
+                None => Value::Error,
+            },
+            Type::Instance { kinds, .. } => Value::Instance(self.prototype_of(kinds.clone(), name)),
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Whether a value may stand where a type is expected.
+
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::{Num, Type, Value};
+use crate::elaborate::Elaborator;
+use crate::names::near;
+
+impl Elaborator<'_> {
+    /// The value as the type, or a report; `what` names the place in messages.
+    pub fn coerce(&mut self, value: Value, ty: &Type, span: Span, what: &str) -> Value {
+        match (value, ty) {
+            (Value::Error, _) => Value::Error,
+            (value, Type::Any) => value,
+            (Value::Num(n), Type::Quantity { .. }) => self.coerce_quantity(n, ty, span, what),
+            (Value::Concentration(m, s), Type::Quantity { dimension, .. }) => {
+                let probe = Num {
+                    node: self.graph.number(1.0),
+                    dimension: dimension.clone(),
+                    point: false,
+                    unit: None,
+                    literal: false,
+                };
+                self.concentration(m, s, &probe, span).unwrap_or(Value::Error)
+            }
+            (Value::Unlimited, Type::Quantity { dimension, point, optional: true }) => {
+                let node = self.graph.number(f64::INFINITY);
+                Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit: None, literal: false })
+            }
+            (v @ Value::Bool(_), Type::Bool)
+            | (v @ Value::Text(_), Type::Text)
+            | (v @ Value::Species(_), Type::Species)
+            | (v @ Value::Reaction(_), Type::Reaction)
+            | (v @ Value::Frame(..), Type::Frame)
+            | (v @ Value::Nothing, Type::Instance { optional: true, .. })
+            | (v @ Value::InstanceNode(_), Type::Instance { .. }) => v,
+            // An instance stands for its own place.
+            (Value::Instance(i), Type::Frame) => Value::Frame(i, String::new()),
+            (Value::Instance(i) | Value::Qualified(i, _), Type::Instance { kinds, .. }) => {
+                self.coerce_instance(i, kinds, ty, span, what)
+            }
+            (Value::Range(a, b), Type::Range(inner)) => {
+                let low = self.coerce(Value::Num(*a), inner, span, what);
+                let high = self.coerce(Value::Num(*b), inner, span, what);
+                match (low, high) {
+                    (Value::Num(a), Value::Num(b)) => Value::Range(Box::new(a), Box::new(b)),
+                    _ => Value::Error,
+                }
+            }
+            (Value::List(items), Type::List(inner)) => {
+                Value::List(items.into_iter().map(|i| self.coerce(i, inner, span, what)).collect())
+            }
+            (Value::Tuple(items), Type::Color) if items.len() == 3 => {
+                Value::Tuple(items.into_iter().map(|i| self.coerce(i, &Type::ratio(), span, what)).collect())
+            }
+            (other, _) => {
+                let expected = self.tables.type_name(ty);
+                let found = match &other {
+                    Value::Num(n) => self.describe(n),
+                    v => v.what().to_string(),
+                };
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    span,
+                    format!("`{what}` expects {expected}, found {found}"),
+                    format!("this is {found}"),
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    fn coerce_quantity(&mut self, n: Num, ty: &Type, span: Span, what: &str) -> Value {
+        let Type::Quantity { dimension, point, .. } = ty else { return Value::Error };
+        if !n.dimension.agrees(dimension) {
+            let expected = self.tables.units.describe(dimension, *point);
+            let found = self.describe(&n);
+            let mut d = Diagnostic::error(
+                codes::UNIT_MISMATCH,
+                span,
+                format!("`{what}` expects {expected}, found {found}"),
+                format!("this is {found}"),
+            );
+            if n.dimension.is_one() && n.literal {
+                d = d.help(format!("give the number a unit, such as `{}`", self.tables.units.symbol(dimension)));
+            } else if let Some(hint) = self.tables.units.hint(&n.dimension, dimension) {
+                d = d.help(hint);
+            }
+            self.report(d);
+            return Value::Error;
+        }
+        if *point && !n.point && !n.dimension.is_any() {
+            // `353 K` as one literal is a temperature where one is expected.
+            if n.literal {
+                return Value::Num(Num { point: true, ..n });
+            }
+            self.report(
+                Diagnostic::error(
+                    codes::TEMPERATURE_POINT,
+                    span,
+                    format!("`{what}` expects a temperature, found a difference"),
+                    "this is a difference",
+                )
+                .help("add it to a temperature: `25 degC + 10 K`"),
+            );
+            return Value::Error;
+        }
+        if !*point && n.point {
+            let mut d = Diagnostic::error(
+                codes::TEMPERATURE_POINT,
+                span,
+                format!("`{what}` expects a difference, found a temperature"),
+                "this is a point on a scale",
+            );
+            d = d.help("a difference of temperatures is written in `K`");
+            self.report(d);
+            return Value::Error;
+        }
+        let dimension = if n.dimension.is_any() { dimension.clone() } else { n.dimension.clone() };
+        Value::Num(Num { dimension, point: *point, ..n })
+    }
+
+    fn coerce_instance(
+        &mut self,
+        id: matterix_ir::scene::InstanceId,
+        kinds: &[crate::names::DeclId],
+        ty: &Type,
+        span: Span,
+        what: &str,
+    ) -> Value {
+        let Some(&missing) = kinds.iter().find(|k| !self.instance_is(id, **k)) else { return Value::Instance(id) };
+        let inst = &self.instances[id.0 as usize];
+        let (name, kind, declared) = (inst.name.clone(), self.kind_names(id), inst.span);
+        let wanted = self.tables.type_name(ty);
+        let mut fitting: Vec<String> = (0..self.instances.len() as u32)
+            .map(matterix_ir::scene::InstanceId)
+            .filter(|i| kinds.iter().all(|k| self.instance_is(*i, *k)))
+            .map(|i| self.instances[i.0 as usize].name.clone())
+            .collect();
+        fitting.truncate(3);
+        let mut d = Diagnostic::error(
+            codes::TYPE_MISMATCH,
+            span,
+            format!("`{what}` expects {wanted}, but `{name}` is {kind}"),
+            format!("`{name}` is no {}", self.tables.kind_name(missing)),
+        )
+        .because(declared, format!("`{name}` is declared here"));
+        if !fitting.is_empty() {
+            d.help.extend(near::question(&fitting));
+        }
+        self.report(d);
+        Value::Error
+    }
+}

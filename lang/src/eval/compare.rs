@@ -1,0 +1,291 @@
+//! Comparisons, ranges, membership; each notes what it compared, for reports.
+
+use matterix_ir::plan::Comparison;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, Unit, codes};
+
+use super::{Num, Scope, Value};
+use crate::ast::{Binary, Expr, ExprKind, UnitText};
+use crate::elaborate::Elaborator;
+use crate::elaborate::units::unit_error;
+
+impl<'a> Elaborator<'a> {
+    /// A truth value's node, or a report.
+    pub fn truth(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<NodeId> {
+        match self.expr(e, scope) {
+            Value::Bool(n) => Some(n),
+            Value::Error => None,
+            other => {
+                self.expected("a condition", &other, e.span);
+                None
+            }
+        }
+    }
+
+    /// `a op b` for comparisons.
+    pub fn compare(&mut self, op: Binary, a: Value, b: Value, at_a: Span, at_b: Span) -> Value {
+        if let Some(node) = self.same_instance(&a, &b) {
+            return self.equality(op, node, at_a);
+        }
+        if let (Value::Bool(x), Value::Bool(y)) = (&a, &b) {
+            let node = self.graph.binary(BinaryOp::Eq, *x, *y);
+            return self.equality(op, node, at_a);
+        }
+        if let (Value::Text(x), Value::Text(y)) = (&a, &b) {
+            let node = self.graph.number(f64::from(u8::from(x == y)));
+            return self.equality(op, node, at_a);
+        }
+        // `x == 5 g +- 0.1 g`.
+        if let (Binary::Eq | Binary::Ne, Value::Range(..)) = (op, &b) {
+            return match self.inside(a, b, at_a, at_b) {
+                Value::Bool(node) => self.equality(op, node, at_a),
+                other => other,
+            };
+        }
+        let Some((x, y)) = self.comparable(a, b, at_a, at_b) else { return Value::Error };
+        let node = match op {
+            Binary::Lt => self.graph.binary(BinaryOp::Lt, x.node, y.node),
+            Binary::Le => self.graph.binary(BinaryOp::Le, x.node, y.node),
+            Binary::Gt => self.graph.binary(BinaryOp::Lt, y.node, x.node),
+            Binary::Ge => self.graph.binary(BinaryOp::Le, y.node, x.node),
+            _ => {
+                let node = self.graph.binary(BinaryOp::Eq, x.node, y.node);
+                return self.equality(op, node, at_a);
+            }
+        };
+        let upper = matches!(op, Binary::Lt | Binary::Le);
+        // The side that is a constant is the limit.
+        let (value, limit, span, upper) = if self.is_fixed(x.node) && !self.is_fixed(y.node) {
+            (&y, &x, at_b, !upper)
+        } else {
+            (&x, &y, at_a, upper)
+        };
+        let (low, high) = if upper { (None, Some(limit.node)) } else { (Some(limit.node), None) };
+        self.compared(value, low, high, limit, span);
+        Value::Bool(node)
+    }
+
+    fn equality(&mut self, op: Binary, node: NodeId, span: Span) -> Value {
+        match op {
+            Binary::Eq => Value::Bool(node),
+            Binary::Ne => Value::Bool(self.graph.unary(UnaryOp::Not, node)),
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    span,
+                    "only quantities have an order",
+                    "compare with `==` or `!=`",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    fn is_fixed(&self, node: NodeId) -> bool {
+        !self.graph.depends(node, |op| {
+            matches!(
+                op,
+                matterix_ir::Op::State(_)
+                    | matterix_ir::Op::Time
+                    | matterix_ir::Op::Reading(_)
+                    | matterix_ir::Op::Local(_)
+            )
+        })
+    }
+
+    fn compared(&mut self, value: &Num, low: Option<NodeId>, high: Option<NodeId>, limit: &Num, span: Span) {
+        let unit = limit.unit.clone().or_else(|| value.unit.clone()).unwrap_or_else(|| self.shown(value));
+        self.comparisons.push((span, Comparison { text: String::new(), value: value.node, low, high, unit }));
+    }
+
+    /// The unit a quantity is shown in where the user gave none.
+    pub fn shown(&self, n: &Num) -> Unit {
+        if n.point
+            && let Some((symbol, def)) = self.tables.units.preferred_point(&n.dimension)
+        {
+            return Unit { symbol, factor: def.factor, offset: def.offset.unwrap_or(0.0) };
+        }
+        self.tables.si(&n.dimension)
+    }
+
+    fn same_instance(&mut self, a: &Value, b: &Value) -> Option<NodeId> {
+        let node = |this: &mut Self, v: &Value| match v {
+            Value::Instance(i) | Value::Qualified(i, _) => Some(this.graph.number(f64::from(i.0))),
+            Value::InstanceNode(n) => Some(*n),
+            Value::Nothing => Some(this.graph.number(-1.0)),
+            _ => None,
+        };
+        let (x, y) = (node(self, a)?, node(self, b)?);
+        Some(self.graph.binary(BinaryOp::Eq, x, y))
+    }
+
+    /// Two quantities of one dimension and scale; a concentration takes its kind from the other side.
+    fn comparable(&mut self, a: Value, b: Value, at_a: Span, at_b: Span) -> Option<(Num, Num)> {
+        let (a, b) = match (a, b) {
+            (Value::Concentration(m, s), Value::Num(n)) => (self.concentration(m, s, &n, at_a)?, Value::Num(n)),
+            (Value::Num(n), Value::Concentration(m, s)) => {
+                let c = self.concentration(m, s, &n, at_b)?;
+                (Value::Num(n), c)
+            }
+            (a @ Value::Concentration(..), Value::Concentration(..)) => {
+                self.kindless(at_a);
+                let _ = a;
+                return None;
+            }
+            other => other,
+        };
+        let (mut x, mut y) = match (a, b) {
+            (Value::Num(x), Value::Num(y)) => (x, y),
+            (Value::Num(x), Value::Unlimited) => {
+                let y = Num { node: self.graph.number(f64::INFINITY), literal: false, unit: None, ..x.clone() };
+                (x, y)
+            }
+            (Value::Error, _) | (_, Value::Error) => return None,
+            (Value::Num(_), other) => {
+                self.expected("a quantity", &other, at_b);
+                return None;
+            }
+            (other, _) => {
+                self.expected("a quantity", &other, at_a);
+                return None;
+            }
+        };
+        self.absolute(&mut x, &mut y);
+        if !x.dimension.agrees(&y.dimension) {
+            let (p, q) = (self.describe(&x), self.describe(&y));
+            let mut d = Diagnostic::error(
+                codes::UNIT_MISMATCH,
+                at_b,
+                format!("{p} cannot be compared with {q}"),
+                format!("this is {q}"),
+            )
+            .because(at_a, format!("this is {p}"));
+            if y.dimension.is_one() && y.literal {
+                d = d.help(format!("give the number a unit: `{}`", self.tables.units.symbol(&x.dimension)));
+            }
+            self.report(d);
+            return None;
+        }
+        if x.point != y.point && !x.dimension.is_any() && !y.dimension.is_any() {
+            let span = if x.point { at_b } else { at_a };
+            self.report(
+                Diagnostic::error(
+                    codes::TEMPERATURE_POINT,
+                    span,
+                    "a temperature cannot be compared with a difference",
+                    "this is a difference",
+                )
+                .help("a temperature is written in `degC`, or as one literal in `K`"),
+            );
+            return None;
+        }
+        Some((x, y))
+    }
+
+    /// A literal in kelvin takes the point type of the other side.
+    fn absolute(&self, x: &mut Num, y: &mut Num) {
+        if x.point && !y.point && y.literal && x.dimension == y.dimension {
+            y.point = true;
+        }
+        if y.point && !x.point && x.literal && x.dimension == y.dimension {
+            x.point = true;
+        }
+    }
+
+    /// `low .. high`.
+    pub fn range(&mut self, low: Value, high: Value, at_low: Span, at_high: Span) -> Value {
+        let unlimited = |v: &Value, n: &Num, this: &mut Self, sign: f64| match v {
+            Value::Unlimited => {
+                Some(Num { node: this.graph.number(sign * f64::INFINITY), literal: false, ..n.clone() })
+            }
+            _ => None,
+        };
+        let (a, b) = match (&low, &high) {
+            (Value::Unlimited, Value::Num(n)) => (unlimited(&low, n, self, -1.0), Some(n.clone())),
+            (Value::Num(n), Value::Unlimited) => (Some(n.clone()), unlimited(&high, n, self, 1.0)),
+            _ => match self.comparable(low, high, at_low, at_high) {
+                Some((a, b)) => (Some(a), Some(b)),
+                None => return Value::Error,
+            },
+        };
+        let (Some(a), Some(b)) = (a, b) else { return Value::Error };
+        if let (Some(x), Some(y)) = (self.graph.constant(a.node), self.graph.constant(b.node))
+            && x > y
+        {
+            self.report(Diagnostic::error(
+                codes::EMPTY_RANGE,
+                at_low.to(at_high),
+                "the range is empty: its lower end is above its upper end",
+                "nothing lies in it",
+            ));
+            return Value::Error;
+        }
+        Value::Range(Box::new(a), Box::new(b))
+    }
+
+    /// `x in range` or `x in list`.
+    pub fn inside(&mut self, x: Value, set: Value, at_x: Span, at_set: Span) -> Value {
+        match set {
+            Value::Range(low, high) => {
+                let Some((value, low)) = self.comparable(x.clone(), Value::Num(*low), at_x, at_set) else {
+                    return Value::Error;
+                };
+                let Some((_, high)) = self.comparable(x, Value::Num(*high), at_x, at_set) else { return Value::Error };
+                let above = self.graph.binary(BinaryOp::Le, low.node, value.node);
+                let below = self.graph.binary(BinaryOp::Le, value.node, high.node);
+                self.compared(&value, Some(low.node), Some(high.node), &low, at_x);
+                Value::Bool(self.graph.binary(BinaryOp::And, above, below))
+            }
+            Value::List(items) => {
+                let mut any = self.graph.number(0.0);
+                for item in items {
+                    let Value::Bool(one) = self.compare(Binary::Eq, x.clone(), item, at_x, at_set) else {
+                        return Value::Error;
+                    };
+                    any = self.graph.binary(BinaryOp::Or, any, one);
+                }
+                Value::Bool(any)
+            }
+            Value::Error => Value::Error,
+            other => self.expected("a range or a list", &other, at_set),
+        }
+    }
+
+    /// `x is word`: a truth value among the members of x.
+    pub fn is(&mut self, a: &'a Expr, b: &'a Expr, scope: &mut Scope) -> Value {
+        let value = self.expr(a, scope);
+        let (base, word) = match (&value, &*b.kind) {
+            (Value::Error, _) => return Value::Error,
+            (Value::Instance(i) | Value::Qualified(i, _), ExprKind::Name(word)) => (*i, word),
+            _ => {
+                self.report(super::types::unsupported(b.span, "`is` conditions on this value"));
+                return Value::Error;
+            }
+        };
+        match self.member(Value::Instance(base), word) {
+            v @ (Value::Bool(_) | Value::Error) => v,
+            other => self.expected("a truth value", &other, b.span),
+        }
+    }
+
+    /// `x as unit`: the value of that dimension, shown in that unit.
+    pub fn as_unit(&mut self, value: Value, unit: &UnitText, span: Span) -> Value {
+        let resolved = match self.tables.unit(&unit.text) {
+            Ok(r) => r,
+            Err(error) => {
+                self.report(unit_error(unit, error));
+                return Value::Error;
+            }
+        };
+        let wanted = Num {
+            node: self.graph.number(resolved.unit.to_si(1.0)),
+            dimension: resolved.dimension,
+            point: resolved.point,
+            unit: Some(resolved.unit.clone()),
+            literal: true,
+        };
+        match self.comparable(value, Value::Num(wanted), span, unit.span) {
+            Some((x, _)) => Value::Num(Num { unit: Some(resolved.unit), ..x }),
+            None => Value::Error,
+        }
+    }
+}

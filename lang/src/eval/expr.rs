@@ -1,0 +1,449 @@
+//! Expressions, one construct at a time.
+
+use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
+
+use super::{Num, Scope, Value};
+use crate::ast::{Binary, Expr, ExprKind, ItemKind, Name, Unary, UnitText};
+use crate::elaborate::Elaborator;
+use crate::elaborate::units::unit_error;
+use crate::names::near;
+use crate::units::Dimension;
+
+impl<'a> Elaborator<'a> {
+    /// Evaluates an expression; what is wrong is reported and gives [`Value::Error`].
+    pub fn expr(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
+        match &*e.kind {
+            ExprKind::Error => Value::Error,
+            ExprKind::Number(v) => self.number(*v, Dimension::one(), true),
+            ExprKind::Quantity(v, unit) => self.quantity(*v, unit),
+            ExprKind::Text(t) => Value::Text(t.clone()),
+            ExprKind::Name(n) => self.name_of(n, scope),
+            ExprKind::Scoped(path) => match path.segments.last() {
+                Some(n) => self.name_of(n, scope),
+                None => Value::Error,
+            },
+            ExprKind::Member(base, name) => {
+                let base = self.expr(base, scope);
+                self.member(base, name)
+            }
+            ExprKind::IndexWord(base, word) => {
+                let base = self.expr(base, scope);
+                self.index(base, word, scope)
+            }
+            ExprKind::IndexRange(_, a, b) => {
+                self.report(super::types::unsupported(a.span.to(b.span), "ranges of wells"));
+                Value::Error
+            }
+            ExprKind::Index(base, index) => {
+                let base = self.expr(base, scope);
+                match &*index.kind {
+                    ExprKind::Name(word) => self.index(base, word, scope),
+                    _ => self.index_number(base, index, scope),
+                }
+            }
+            ExprKind::Call(callee, args) => self.call(callee, args, e.span, scope),
+            ExprKind::Fold { fold, var, set, body } => self.fold(fold, var, set, body, scope),
+            ExprKind::Prime(_) => {
+                self.report(
+                    Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        e.span,
+                        "a derivative cannot be read",
+                        "only `+=` and `-=` on it",
+                    )
+                    .help("in a process, write `x' += rate`"),
+                );
+                Value::Error
+            }
+            ExprKind::Unary(Unary::Neg, inner) => self.negate(inner, scope),
+            ExprKind::Unary(Unary::Not, inner) => {
+                let value = self.truth(inner, scope);
+                value.map_or(Value::Error, |n| Value::Bool(self.graph.unary(UnaryOp::Not, n)))
+            }
+            ExprKind::Binary(op, a, b) => self.binary(*op, a, b, e.span, scope),
+            ExprKind::Of(inner, species) => self.of(inner, species, scope),
+            ExprKind::Range(a, b) => {
+                let (low, high) = (self.expr(a, scope), self.expr(b, scope));
+                self.range(low, high, a.span, b.span)
+            }
+            ExprKind::As(inner, unit) => {
+                let value = self.expr(inner, scope);
+                self.as_unit(value, unit, inner.span)
+            }
+            ExprKind::Tuple(items, unit) => self.tuple(items, unit.as_ref(), scope),
+            ExprKind::List(items) => {
+                let values = items.iter().map(|i| self.expr(i, scope)).collect();
+                Value::List(values)
+            }
+        }
+    }
+
+    /// A constant number.
+    pub fn number(&mut self, value: f64, dimension: Dimension, literal: bool) -> Value {
+        let node = self.graph.number(value);
+        Value::Num(Num { node, dimension, point: false, unit: None, literal })
+    }
+
+    /// A number without a display unit.
+    pub fn num(&self, node: matterix_ir::NodeId, dimension: Dimension) -> Value {
+        Value::Num(Num { node, dimension, point: false, unit: None, literal: false })
+    }
+
+    fn quantity(&mut self, value: f64, unit: &UnitText) -> Value {
+        match self.tables.unit(&unit.text) {
+            Ok(r) => {
+                let si = r.unit.to_si(value);
+                if r.point && si < 0.0 {
+                    self.report(Diagnostic::error(
+                        codes::TEMPERATURE_POINT,
+                        unit.span,
+                        "this temperature is below absolute zero",
+                        "there is none so low",
+                    ));
+                    return Value::Error;
+                }
+                let node = self.graph.number(si);
+                let unit = Some(r.unit);
+                Value::Num(Num { node, dimension: r.dimension, point: r.point, unit, literal: true })
+            }
+            Err(error) => {
+                self.report(unit_error(unit, error));
+                Value::Error
+            }
+        }
+    }
+
+    /// What a bare word stands for.
+    pub fn name_of(&mut self, n: &Name, scope: &mut Scope) -> Value {
+        if let Some(v) = scope.var(&n.text) {
+            return v.clone();
+        }
+        match n.text.as_str() {
+            "true" => return Value::Bool(self.graph.number(1.0)),
+            "false" => return Value::Bool(self.graph.number(0.0)),
+            "nothing" => return Value::Nothing,
+            "unlimited" => return Value::Unlimited,
+            "elapsed" => {
+                let node = self.graph.add(Op::Time);
+                let dimension =
+                    self.tables.units.dimension("Duration").map_or_else(Dimension::any, |d| d.dimension.clone());
+                return self.num(node, dimension);
+            }
+            "self" => {
+                if let Some(this) = scope.this {
+                    return Value::Instance(this);
+                }
+            }
+            _ => {}
+        }
+        if let Some(this) = scope.this
+            && self.has_member(this, &n.text)
+        {
+            return match self.own_member(this, scope.owner, &n.text) {
+                Some(m) => self.member_value(this, m, n.span),
+                None => self.member(Value::Instance(this), n),
+            };
+        }
+        if let Some(value) = self.setting(&n.text) {
+            return value;
+        }
+        if scope.lab
+            && let Some(id) = self.find_instance(&n.text)
+        {
+            return Value::Instance(id);
+        }
+        if let Some(id) = self.tables.names.lookup(scope.module, &n.text) {
+            return self.declared(id, n);
+        }
+        self.unknown_name(n, scope)
+    }
+
+    fn declared(&mut self, id: crate::names::DeclId, n: &Name) -> Value {
+        let decl = self.tables.names.decl(id);
+        match &decl.item.kind {
+            ItemKind::Const { value, ty, .. } => {
+                if let Some((name, at)) = self.ring(&self.open_consts, id) {
+                    self.report(Diagnostic::error(
+                        codes::CIRCULAR,
+                        at,
+                        format!("`{name}` is defined by itself"),
+                        "needs its own value",
+                    ));
+                    return Value::Error;
+                }
+                self.open_consts.push(id);
+                let v = self.expr(value, &mut Scope::module(decl.module));
+                self.open_consts.pop();
+                match ty {
+                    Some(ty) => {
+                        let ty = self.resolve_type(ty, decl.module);
+                        self.coerce(v, &ty, value.span, &n.text)
+                    }
+                    None => v,
+                }
+            }
+            ItemKind::Species { .. } => self.tables.species.of_decl(id).map_or(Value::Error, Value::Species),
+            ItemKind::Reaction { name, .. } => {
+                let position =
+                    self.tables.reactions.iter().position(|r| r.name == name.text && r.module == decl.module);
+                position.map_or(Value::Error, |i| Value::Reaction(super::ReactionId(i as u32)))
+            }
+            ItemKind::Solution { .. } => Value::Solution(id),
+            ItemKind::Capability { .. } | ItemKind::Asset { .. } => Value::Kind(id),
+            ItemKind::Fn { .. } | ItemKind::Relation { .. } => Value::Function(id),
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::WRONG_KIND,
+                    n.span,
+                    format!("`{}` is not a value", n.text),
+                    "cannot stand in an expression",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    fn unknown_name(&mut self, n: &Name, scope: &Scope) -> Value {
+        let mut candidates: Vec<String> = scope.vars.iter().map(|v| v.0.clone()).collect();
+        candidates.extend(self.settings.keys().cloned());
+        if let Some(this) = scope.this {
+            candidates.extend(self.member_names(this));
+        }
+        if scope.lab {
+            candidates.extend(self.instances.iter().filter(|i| i.owner.is_none()).map(|i| i.name.clone()));
+        }
+        let is_value = |k: &ItemKind| {
+            matches!(
+                k,
+                ItemKind::Const { .. } | ItemKind::Species { .. } | ItemKind::Fn { .. } | ItemKind::Solution { .. }
+            )
+        };
+        let names = self.tables.names;
+        let visible = names.visible(scope.module).filter(|(_, id)| is_value(&names.decl(*id).item.kind));
+        candidates.extend(visible.map(|(n, _)| n.to_string()));
+        if n.text == "ambient" {
+            self.report(
+                Diagnostic::error(
+                    codes::MISSING_FIELD,
+                    self.lab_name,
+                    "the lab has no `ambient` temperature",
+                    "needs `ambient`",
+                )
+                .because(n.span, "used here")
+                .help("add `ambient: 22 degC` to the lab"),
+            );
+            self.settings.insert(n.text.clone(), Value::Error);
+            return Value::Error;
+        }
+        let is_unit = self.tables.units.find(&n.text).is_some();
+        let near = if is_unit { Vec::new() } else { near::nearest(&n.text, candidates) };
+        let mut d =
+            Diagnostic::error(codes::UNKNOWN_NAME, n.span, format!("there is no `{}` here", n.text), "not declared");
+        if is_unit {
+            d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
+        }
+        d.help.extend(near::question(&near));
+        if let Some(best) = near.first() {
+            d = d.fix(format!("replace with `{best}`"), n.span, best.clone());
+        } else if let Some(module) = names.declared_in(&n.text).filter(|m| !m.is_empty()) {
+            d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", n.text));
+        }
+        self.report(d);
+        Value::Error
+    }
+
+    fn negate(&mut self, inner: &'a Expr, scope: &mut Scope) -> Value {
+        match self.expr(inner, scope) {
+            Value::Error => Value::Error,
+            Value::Num(n) if !n.point => {
+                let node = self.graph.unary(UnaryOp::Neg, n.node);
+                Value::Num(Num { node, ..n })
+            }
+            // `-5 degC` is a point below zero, not the negative of a point.
+            Value::Num(n) if n.literal => {
+                let (Some(unit), Some(si)) = (&n.unit, self.graph.constant(n.node)) else { return Value::Error };
+                let si = unit.to_si(-unit.of_si(si));
+                if si < 0.0 {
+                    self.report(Diagnostic::error(
+                        codes::TEMPERATURE_POINT,
+                        inner.span,
+                        "this temperature is below absolute zero",
+                        "there is none so low",
+                    ));
+                    return Value::Error;
+                }
+                let node = self.graph.number(si);
+                Value::Num(Num { node, ..n })
+            }
+            other => {
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    inner.span,
+                    format!("{} cannot be negated", other.what()),
+                    "has no negative",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
+        match op {
+            Binary::And | Binary::Or => {
+                let (x, y) = (self.truth(a, scope), self.truth(b, scope));
+                let (Some(x), Some(y)) = (x, y) else { return Value::Error };
+                let op = if op == Binary::And { BinaryOp::And } else { BinaryOp::Or };
+                Value::Bool(self.graph.binary(op, x, y))
+            }
+            Binary::Is => self.is(a, b, scope),
+            Binary::In => {
+                let (x, range) = (self.expr(a, scope), self.expr(b, scope));
+                self.inside(x, range, a.span, b.span)
+            }
+            Binary::Eq | Binary::Ne | Binary::Lt | Binary::Le | Binary::Gt | Binary::Ge => {
+                let (x, y) = (self.expr(a, scope), self.expr(b, scope));
+                self.compare(op, x, y, a.span, b.span)
+            }
+            Binary::PlusMinus => {
+                let (x, y) = (self.expr(a, scope), self.expr(b, scope));
+                let low = self.arith(Binary::Sub, x.clone(), y.clone(), a.span, b.span, span);
+                let high = self.arith(Binary::Add, x, y, a.span, b.span, span);
+                self.range(low, high, a.span, b.span)
+            }
+            Binary::Pow => self.power(a, b, scope),
+            Binary::Add | Binary::Sub | Binary::Mul | Binary::Div => {
+                let (x, y) = (self.expr(a, scope), self.expr(b, scope));
+                self.arith(op, x, y, a.span, b.span, span)
+            }
+        }
+    }
+
+    /// `X of S` outside a recipe only says what is meant: the quantity is X.
+    fn of(&mut self, inner: &'a Expr, species: &'a Name, scope: &mut Scope) -> Value {
+        let value = self.expr(inner, scope);
+        let _ = self.name_of(species, scope);
+        value
+    }
+
+    fn tuple(&mut self, items: &'a [Expr], unit: Option<&UnitText>, scope: &mut Scope) -> Value {
+        if let ([single], None) = (items, unit) {
+            return self.expr(single, scope);
+        }
+        let resolved = match unit.map(|u| (u, self.tables.unit(&u.text))) {
+            Some((u, Err(error))) => {
+                self.report(unit_error(u, error));
+                return Value::Error;
+            }
+            Some((_, Ok(r))) => Some(r),
+            None => None,
+        };
+        let values = items
+            .iter()
+            .map(|item| {
+                let value = self.expr(item, scope);
+                match (&resolved, value) {
+                    (Some(r), Value::Num(n)) if n.dimension.is_one() => {
+                        let factor = self.graph.number(r.unit.factor);
+                        let node = self.graph.binary(BinaryOp::Mul, n.node, factor);
+                        Value::Num(Num {
+                            node,
+                            dimension: r.dimension.clone(),
+                            point: false,
+                            unit: Some(r.unit.clone()),
+                            literal: true,
+                        })
+                    }
+                    (_, value) => value,
+                }
+            })
+            .collect();
+        Value::Tuple(values)
+    }
+
+    fn fold(&mut self, fold: &Name, var: &Name, set: &'a Expr, body: &'a Expr, scope: &mut Scope) -> Value {
+        let items = self.set(set, scope);
+        let Some(items) = items else { return Value::Error };
+        let mut result: Option<Value> = None;
+        for item in items {
+            scope.bind(var.text.clone(), item);
+            let value = self.expr(body, scope);
+            scope.vars.pop();
+            result = Some(match result {
+                None => value,
+                Some(so_far) => match self.fold_two(&fold.text, so_far, value, body.span) {
+                    Some(v) => v,
+                    None => {
+                        self.report(
+                            Diagnostic::error(
+                                codes::UNKNOWN_NAME,
+                                fold.span,
+                                format!("there is no fold `{}`", fold.text),
+                                "not a fold",
+                            )
+                            .help("use `sum`, `product`, `min`, `max`, `all` or `any`"),
+                        );
+                        return Value::Error;
+                    }
+                },
+            });
+        }
+        result.unwrap_or_else(|| match fold.text.as_str() {
+            "product" => self.number(1.0, Dimension::any(), false),
+            "all" => Value::Bool(self.graph.number(1.0)),
+            "any" => Value::Bool(self.graph.number(0.0)),
+            _ => self.number(0.0, Dimension::any(), false),
+        })
+    }
+
+    fn fold_two(&mut self, fold: &str, a: Value, b: Value, span: Span) -> Option<Value> {
+        Some(match fold {
+            "sum" => self.arith(Binary::Add, a, b, span, span, span),
+            "product" => self.arith(Binary::Mul, a, b, span, span, span),
+            "min" => self.extreme(BinaryOp::Min, a, b, span),
+            "max" => self.extreme(BinaryOp::Max, a, b, span),
+            "all" | "any" => match (a, b) {
+                (Value::Bool(a), Value::Bool(b)) => {
+                    let op = if fold == "all" { BinaryOp::And } else { BinaryOp::Or };
+                    Value::Bool(self.graph.binary(op, a, b))
+                }
+                (Value::Error, _) | (_, Value::Error) => Value::Error,
+                (a, _) => self.expected("a truth value", &a, span),
+            },
+            _ => return None,
+        })
+    }
+
+    /// The members of a finite set: a list, or all instances of a type.
+    pub fn set(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<Value>> {
+        match self.expr(e, scope) {
+            Value::List(items) => Some(items),
+            Value::Kind(kind) => Some(self.instances_of(kind).into_iter().map(Value::Instance).collect()),
+            Value::Error => None,
+            other => {
+                self.report(
+                    Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        e.span,
+                        format!("{} is not a finite set", other.what()),
+                        "cannot be gone through one by one",
+                    )
+                    .help("use a list `[a, b]`, a capability, or a set such as `m.species`"),
+                );
+                None
+            }
+        }
+    }
+
+    /// "expected X, found Y".
+    pub fn expected(&mut self, what: &str, found: &Value, span: Span) -> Value {
+        if *found != Value::Error {
+            self.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                span,
+                format!("expected {what}, found {}", found.what()),
+                format!("this is {}", found.what()),
+            ));
+        }
+        Value::Error
+    }
+}

@@ -1,0 +1,156 @@
+//! The functions the library declares with `extern fn`, bound by name in one table.
+
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
+
+use super::{Num, Type, Value};
+use crate::elaborate::Elaborator;
+use crate::units::Dimension;
+
+/// How an external function is computed.
+#[derive(Clone, Copy)]
+enum Bound {
+    /// One quantity to one.
+    Unary(UnaryOp),
+    /// Two of one dimension to one of it.
+    Extreme(BinaryOp),
+    /// A number held between two limits.
+    Clamp,
+    /// Square root: the dimension halves.
+    Sqrt,
+    /// Magnitude: the dimension stays.
+    Abs,
+    /// The absolute value of a point on a scale.
+    Absolute,
+    /// One of two values by a condition.
+    Choose,
+    /// The species of a set that state a property.
+    Having,
+    /// What the lab placed the instance on, by the preposition used there.
+    Placed,
+}
+
+const TABLE: &[(&str, Bound)] = &[
+    ("exp", Bound::Unary(UnaryOp::Exp)),
+    ("ln", Bound::Unary(UnaryOp::Ln)),
+    ("sin", Bound::Unary(UnaryOp::Sin)),
+    ("cos", Bound::Unary(UnaryOp::Cos)),
+    ("floor", Bound::Unary(UnaryOp::Floor)),
+    ("min", Bound::Extreme(BinaryOp::Min)),
+    ("max", Bound::Extreme(BinaryOp::Max)),
+    ("clamp", Bound::Clamp),
+    ("sqrt", Bound::Sqrt),
+    ("abs", Bound::Abs),
+    ("kelvin", Bound::Absolute),
+    ("choose", Bound::Choose),
+    ("having", Bound::Having),
+    ("placed", Bound::Placed),
+];
+
+/// Whether the compiler provides an external function of this name.
+pub fn is_bound(name: &str) -> bool {
+    TABLE.iter().any(|(n, _)| *n == name)
+}
+
+impl Elaborator<'_> {
+    /// Calls an external function; the values are coerced to the parameters' types already.
+    pub fn external(
+        &mut self,
+        name: &str,
+        values: Vec<Value>,
+        result: Option<Type>,
+        at: Span,
+        params: &[Span],
+    ) -> Value {
+        let Some((_, bound)) = TABLE.iter().find(|(n, _)| *n == name) else {
+            let declared = params.first().copied().unwrap_or(at);
+            self.report(
+                Diagnostic::error(codes::UNBOUND_EXTERN, at, format!("nothing provides `{name}`"), "called here")
+                    .because(declared, "declared `extern` here"),
+            );
+            return Value::Error;
+        };
+        let computed = match (bound, values.as_slice()) {
+            (Bound::Unary(op), [Value::Num(n)]) => {
+                let node = self.graph.unary(*op, n.node);
+                self.num(node, Dimension::any())
+            }
+            (Bound::Extreme(op), [a, b]) => self.extreme(*op, a.clone(), b.clone(), at),
+            (Bound::Clamp, [x, low, high]) => {
+                let raised = self.extreme(BinaryOp::Max, x.clone(), low.clone(), at);
+                self.extreme(BinaryOp::Min, raised, high.clone(), at)
+            }
+            (Bound::Sqrt, [Value::Num(n)]) => {
+                let node = self.graph.unary(UnaryOp::Sqrt, n.node);
+                self.num(node, n.dimension.power(crate::units::Rational::new(1, 2)))
+            }
+            (Bound::Abs, [Value::Num(n)]) if !n.point => {
+                let node = self.graph.unary(UnaryOp::Abs, n.node);
+                Value::Num(Num { node, literal: false, ..n.clone() })
+            }
+            (Bound::Absolute, [Value::Num(n)]) => {
+                Value::Num(Num { point: false, unit: None, literal: false, ..n.clone() })
+            }
+            (Bound::Choose, [Value::Bool(c), a, b]) => self.choose(*c, a.clone(), b.clone(), at),
+            (Bound::Having, [Value::List(set), Value::Text(property)]) => {
+                let states = |v: &Value| match v {
+                    Value::Species(s) => {
+                        let fields = self.tables.species.get(*s).fields;
+                        crate::elaborate::species::field(fields, property).is_some()
+                    }
+                    _ => false,
+                };
+                Value::List(set.iter().filter(|v| states(v)).cloned().collect())
+            }
+            (Bound::Placed, [Value::Instance(i), Value::Text(word)]) => self.placed(*i, word),
+            (_, values) if values.contains(&Value::Error) => Value::Error,
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    at,
+                    format!("`{name}` cannot be called with these arguments"),
+                    "wrong arguments",
+                ));
+                Value::Error
+            }
+        };
+        match result {
+            Some(ty) => self.coerce(computed, &ty, at, name),
+            None => computed,
+        }
+    }
+
+    fn choose(&mut self, c: NodeId, a: Value, b: Value, at: Span) -> Value {
+        match (a, b) {
+            (Value::Num(a), Value::Num(b)) => {
+                if !a.dimension.agrees(&b.dimension)
+                    || (a.point != b.point && !a.dimension.is_any() && !b.dimension.is_any())
+                {
+                    let (x, y) = (self.describe(&a), self.describe(&b));
+                    self.report(Diagnostic::error(
+                        codes::UNIT_MISMATCH,
+                        at,
+                        format!("both choices must be alike: {x} and {y}"),
+                        "different dimensions",
+                    ));
+                    return Value::Error;
+                }
+                let node = self.graph.select(c, a.node, b.node);
+                let dimension = if a.dimension.is_any() { b.dimension } else { a.dimension };
+                Value::Num(Num { node, dimension, point: a.point || b.point, unit: a.unit, literal: false })
+            }
+            (Value::Bool(a), Value::Bool(b)) => Value::Bool(self.graph.select(c, a, b)),
+            (Value::Tuple(a), Value::Tuple(b)) if a.len() == b.len() => {
+                let pairs: Vec<_> = a.into_iter().zip(b).collect();
+                Value::Tuple(pairs.into_iter().map(|(a, b)| self.choose(c, a, b, at)).collect())
+            }
+            (Value::Error, _) | (_, Value::Error) => Value::Error,
+            (a, _) => self.expected("two alike values", &a, at),
+        }
+    }
+
+    fn placed(&self, id: InstanceId, word: &str) -> Value {
+        let inst = &self.instances[id.0 as usize];
+        inst.placed.iter().find(|(label, _)| label == word).map_or(Value::Nothing, |(_, on)| Value::Instance(*on))
+    }
+}

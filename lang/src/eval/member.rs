@@ -1,0 +1,704 @@
+//! Members of instances: parameters, states, derived quantities, flows, parts; and what stands in `[ ]`.
+
+use matterix_ir::model::Reading;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
+
+use super::{Num, Scope, SpeciesId, Type, Value};
+use crate::ast::{Expr, FieldValue, MemberKind, Name, NamedExpr, Role};
+use crate::elaborate::tables::MemberRef;
+use crate::elaborate::{Elaborator, MemberKey};
+use crate::names::{DeclId, near};
+use crate::units::Dimension;
+
+impl<'a> Elaborator<'a> {
+    /// `base.name`.
+    pub fn member(&mut self, base: Value, name: &Name) -> Value {
+        match base {
+            Value::Error => Value::Error,
+            Value::Instance(id) => self.instance_member(id, name),
+            Value::Qualified(id, kind) => {
+                let found = self.tables.members(kind, &name.text);
+                self.pick(id, found, name)
+            }
+            Value::Species(s) => self.species_property(s, name),
+            Value::Reaction(r) => self.reaction_member(r, name),
+            Value::Step(start, end) => self.step_member(start, end, name),
+            Value::Range(low, high) => match name.text.as_str() {
+                "min" => Value::Num(*low),
+                "max" => Value::Num(*high),
+                _ => self.no_member(&Value::Range(low, high), name, vec!["min".into(), "max".into()]),
+            },
+            Value::InstanceNode(_) => {
+                self.report(super::types::unsupported(name.span, "members of an instance known only when running"));
+                Value::Error
+            }
+            other => self.no_member(&other, name, Vec::new()),
+        }
+    }
+
+    fn no_member(&mut self, base: &Value, name: &Name, known: Vec<String>) -> Value {
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_MEMBER,
+            name.span,
+            format!("{} has no `{}`", base.what(), name.text),
+            "not a member",
+        );
+        d.help.extend(near::question(&near::nearest(&name.text, known)));
+        self.report(d);
+        Value::Error
+    }
+
+    fn step_member(&mut self, start: u32, end: u32, name: &Name) -> Value {
+        let duration = self.duration();
+        let node = match name.text.as_str() {
+            "start" => self.graph.add(Op::Local(start)),
+            "end" => self.graph.add(Op::Local(end)),
+            "elapsed" => {
+                // Until its end is known (a number equals itself), a step lasts to now.
+                let (now, since) = (self.graph.add(Op::Time), self.graph.add(Op::Local(start)));
+                let end = self.graph.add(Op::Local(end));
+                let ended = self.graph.binary(BinaryOp::Eq, end, end);
+                let until = self.graph.select(ended, end, now);
+                self.graph.binary(BinaryOp::Sub, until, since)
+            }
+            _ => {
+                let known = vec!["start".into(), "end".into(), "elapsed".into()];
+                return self.no_member(&Value::Step(start, end), name, known);
+            }
+        };
+        self.num(node, duration)
+    }
+
+    /// The dimension of time.
+    pub fn duration(&self) -> Dimension {
+        self.tables.units.dimension("Duration").map_or_else(Dimension::any, |d| d.dimension.clone())
+    }
+
+    fn instance_member(&mut self, id: InstanceId, name: &Name) -> Value {
+        if name.text == "species" && self.per_species(id).is_some() {
+            let set = self.mixture_species(id);
+            return Value::List(set.into_iter().map(Value::Species).collect());
+        }
+        if let Some(part) = self.instances[id.0 as usize].parts.get(&name.text) {
+            return Value::Instance(*part);
+        }
+        if let Some(frame) = self.frame(id, &name.text) {
+            return frame;
+        }
+        let found = self.members_of(id, &name.text);
+        if !found.is_empty() {
+            return self.pick(id, &found, name);
+        }
+        let kind = self.ancestors_of(id).into_iter().find(|k| self.tables.kind_name(*k) == name.text);
+        if let Some(kind) = kind {
+            return Value::Qualified(id, kind);
+        }
+        if name.text == "basis" && self.per_species(id).is_some() {
+            return Value::Method(Box::new(Value::Instance(id)), "basis".into());
+        }
+        // A vessel answers for its contents: `beaker.color`, `beaker.volume`.
+        let parts: Vec<InstanceId> = self.instances[id.0 as usize].parts.values().copied().collect();
+        let mut answering = parts.into_iter().filter(|p| self.has_member(*p, &name.text));
+        if let (Some(part), None) = (answering.next(), answering.next()) {
+            return self.instance_member(part, name);
+        }
+        self.unknown_member(id, name)
+    }
+
+    fn unknown_member(&mut self, id: InstanceId, name: &Name) -> Value {
+        let inst = &self.instances[id.0 as usize];
+        let (inst_name, span) = (inst.name.clone(), inst.span);
+        let kind = self.kind_names(id);
+        let near = near::nearest(&name.text, self.member_names(id));
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_MEMBER,
+            name.span,
+            format!("`{inst_name}` ({kind}) has no `{}`", name.text),
+            "not a member",
+        );
+        if !self.prototype {
+            d = d.because(span, format!("`{inst_name}` is declared here"));
+        }
+        d.help.extend(near::question(&near));
+        if let Some(best) = near.first() {
+            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+        }
+        self.report(d);
+        Value::Error
+    }
+
+    /// The members an instance has under a name; more than one is ambiguous.
+    pub fn members_of(&self, id: InstanceId, name: &str) -> Vec<MemberRef<'a>> {
+        let mut found: Vec<MemberRef<'a>> = Vec::new();
+        for kind in &self.instances[id.0 as usize].kinds {
+            for m in self.tables.members(*kind, name) {
+                if !found.iter().any(|f| std::ptr::eq(f.member, m.member)) {
+                    found.push(*m);
+                }
+            }
+        }
+        found
+    }
+
+    /// Of several members with one name, the one that the text of a capability means: its own or an inherited one.
+    pub fn own_member(&self, id: InstanceId, owner: Option<DeclId>, name: &str) -> Option<MemberRef<'a>> {
+        let found = self.members_of(id, name);
+        let own = self.tables.members(owner.filter(|_| found.len() > 1)?, name);
+        let mut meant = found.into_iter().filter(|f| own.iter().any(|o| std::ptr::eq(o.member, f.member)));
+        meant.next().filter(|_| meant.next().is_none())
+    }
+
+    /// The first declaration of the ring that leads from `id` back to it, if `id` is open already. To name the same
+    /// one wherever the ring is entered makes it one finding.
+    pub fn ring(&self, open: &[DeclId], id: DeclId) -> Option<(String, Span)> {
+        let start = open.iter().position(|o| *o == id)?;
+        let first = open[start..].iter().min()?;
+        crate::names::item_name(self.tables.names.decl(*first).item)
+    }
+
+    /// Whether an instance has a member (or part, or frame) of this name.
+    pub fn has_member(&self, id: InstanceId, name: &str) -> bool {
+        let inst = &self.instances[id.0 as usize];
+        inst.parts.contains_key(name)
+            || !self.members_of(id, name).is_empty()
+            || (matches!(name, "species" | "basis") && self.per_species(id).is_some())
+    }
+
+    /// Names of all members, for suggestions.
+    pub fn member_names(&self, id: InstanceId) -> Vec<String> {
+        let inst = &self.instances[id.0 as usize];
+        let mut names: Vec<String> = inst.parts.keys().cloned().collect();
+        for kind in &inst.kinds {
+            let Some(info) = self.tables.kinds.get(kind) else { continue };
+            names.extend(
+                info.members
+                    .iter()
+                    .filter_map(|m| crate::elaborate::tables::member_name(m.member))
+                    .map(|n| n.text.clone()),
+            );
+        }
+        names
+    }
+
+    fn pick(&mut self, id: InstanceId, found: &[MemberRef<'a>], name: &Name) -> Value {
+        match found {
+            [one] => self.member_value(id, *one, name.span),
+            [] => self.unknown_member(id, name),
+            many => {
+                let owners: Vec<String> =
+                    many.iter().map(|m| format!("`{}.{}`", self.tables.kind_name(m.owner), name.text)).collect();
+                let inst = self.instances[id.0 as usize].name.clone();
+                self.report(
+                    Diagnostic::error(
+                        codes::AMBIGUOUS_NAME,
+                        name.span,
+                        format!("`{inst}` has several members `{}`", name.text),
+                        "which one?",
+                    )
+                    .help(format!("say which: {}", owners.join(" or "))),
+                );
+                Value::Error
+            }
+        }
+    }
+
+    /// The value of a member, made once per instance.
+    pub fn member_value(&mut self, id: InstanceId, m: MemberRef<'a>, at: Span) -> Value {
+        let MemberKind::Value { role, name, .. } = &m.member.kind else {
+            return match &m.member.kind {
+                MemberKind::Frame { name, .. } => Value::Frame(id, name.text.clone()),
+                _ => Value::Error,
+            };
+        };
+        if *role == Role::Flow {
+            return self.read_flow(id, m, at);
+        }
+        let key: MemberKey = (m.owner, name.text.clone(), self.initial_mode, self.readings_live);
+        if let Some(v) = self.instances[id.0 as usize].values.get(&key) {
+            return v.clone();
+        }
+        let open = (id, key.clone());
+        if self.open_members.contains(&open) {
+            self.report(Diagnostic::error(
+                codes::CIRCULAR,
+                name.span,
+                format!("`{}` depends on itself", name.text),
+                "leads back to its own value",
+            ));
+            return Value::Error;
+        }
+        self.open_members.push(open);
+        let flow_before = std::mem::take(&mut self.touched_flow);
+        // What a definition compares inside is no part of what the user's condition compares.
+        let compared = std::mem::take(&mut self.comparisons);
+        let value = self.make_member(id, m);
+        self.comparisons = compared;
+        self.open_members.pop();
+        let cache = !self.touched_flow;
+        self.touched_flow |= flow_before;
+        if cache {
+            self.instances[id.0 as usize].values.insert(key, value.clone());
+        }
+        value
+    }
+
+    fn make_member(&mut self, id: InstanceId, m: MemberRef<'a>) -> Value {
+        let MemberKind::Value { role, name, ty, per, value, options } = &m.member.kind else { return Value::Error };
+        let ty = self.resolve_type(ty, m.module);
+        if *role == Role::Param || *role == Role::Derived {
+            let setting = self.instances[id.0 as usize].setting(&name.text);
+            if let Some((module, field, lab)) = setting {
+                let value = self.param(id, &name.text, &ty, module, field, lab);
+                self.check_limits(&value, field, &name.text, &ty, options, m.module);
+                return value;
+            }
+        }
+        match role {
+            Role::Param => match value {
+                Some(e) => self.param_default(id, &name.text, &ty, e, m.module),
+                None if self.prototype => self.placeholder(&ty, &name.text),
+                None if matches!(ty, Type::Instance { optional: true, .. }) => Value::Nothing,
+                None => {
+                    self.missing_param(id, m, &name.text, &ty);
+                    Value::Error
+                }
+            },
+            Role::Derived => match value {
+                Some(e) => {
+                    let v = self.expr(e, &mut Scope::of_member(id, m));
+                    self.coerce(v, &ty, e.span, &name.text)
+                }
+                None => Value::Error,
+            },
+            Role::State => self.state_value(id, m, &name.text, &ty, value.as_ref()),
+            Role::Extensive if per.is_some() => Value::Method(Box::new(Value::Instance(id)), name.text.clone()),
+            Role::Extensive => self.state_value(id, m, &name.text, &ty, value.as_ref()),
+            Role::Reading => self.reading(id, m, &name.text, &ty, value.as_ref(), options),
+            Role::Part => match self.instances[id.0 as usize].parts.get(&name.text) {
+                Some(part) => Value::Instance(*part),
+                None => Value::Nothing,
+            },
+            Role::Flow => Value::Error,
+        }
+    }
+
+    /// `{ above: 0 J/K }`, `{ at_least: 0 W }`: what a parameter may be.
+    fn check_limits(
+        &mut self,
+        value: &Value,
+        field: &'a FieldValue,
+        name: &str,
+        ty: &Type,
+        options: &'a [NamedExpr],
+        module: usize,
+    ) {
+        let (Value::Num(n), FieldValue::Expr(at)) = (value, field) else { return };
+        let Some(given) = self.known(n.node) else { return };
+        for o in options.iter().filter(|o| matches!(o.name.text.as_str(), "above" | "at_least")) {
+            let v = self.expr(&o.value, &mut Scope::module(module));
+            let Value::Num(limit) = self.coerce(v, ty, o.value.span, &o.name.text) else { continue };
+            let Some(least) = self.known(limit.node) else { continue };
+            let strict = o.name.text == "above";
+            if given > least || (!strict && given >= least) {
+                continue;
+            }
+            let unit = n.unit.clone().unwrap_or_else(|| self.shown(n));
+            let least = unit.show(least);
+            self.report(
+                Diagnostic::error(
+                    codes::OUT_OF_RANGE,
+                    at.span,
+                    format!("`{name}` cannot be {}", unit.show(given)),
+                    if strict { format!("must be above {least}") } else { format!("must be at least {least}") },
+                )
+                .because(o.value.span, "its limit stands here"),
+            );
+        }
+    }
+
+    fn missing_param(&mut self, id: InstanceId, m: MemberRef<'a>, name: &str, ty: &Type) {
+        let inst = &self.instances[id.0 as usize];
+        let (inst_name, span) = (inst.name.clone(), inst.span);
+        let expected = self.tables.type_name(ty);
+        self.report(
+            Diagnostic::error(
+                codes::MISSING_FIELD,
+                span,
+                format!("`{inst_name}` needs `{name}`: {expected}"),
+                "not given, and there is no default",
+            )
+            .because(m.member.span, format!("`{}` declares it here", self.tables.kind_name(m.owner)))
+            .help(format!("give it in the braces: `{{ {name}: ... }}`")),
+        );
+    }
+
+    fn param(
+        &mut self,
+        id: InstanceId,
+        name: &str,
+        ty: &Type,
+        module: usize,
+        field: &'a FieldValue,
+        lab: bool,
+    ) -> Value {
+        match field {
+            FieldValue::Expr(e) => {
+                let mut scope = if lab { Scope { lab: true, ..Scope::module(module) } } else { Scope::of(id, module) };
+                let v = self.expr(e, &mut scope);
+                let v = self.coerce(v, ty, e.span, name);
+                self.as_param(id, name, v, e.span)
+            }
+            FieldValue::Fields(_) | FieldValue::Literal(_) | FieldValue::Species(_) => Value::Error,
+        }
+    }
+
+    fn param_default(&mut self, id: InstanceId, name: &str, ty: &Type, e: &'a Expr, module: usize) -> Value {
+        let v = self.expr(e, &mut Scope::of(id, module));
+        let v = self.coerce(v, ty, e.span, name);
+        self.as_param(id, name, v, e.span)
+    }
+
+    /// Constants become parameters of the model, so that a study can vary them.
+    fn as_param(&mut self, id: InstanceId, name: &str, value: Value, span: Span) -> Value {
+        let full = format!("{}.{name}", self.instances[id.0 as usize].name);
+        match value {
+            Value::Num(n) => Value::Num(self.name_param(&full, n, span)),
+            Value::Range(a, b) => {
+                let low = self.name_param(&format!("{full}.min"), *a, span);
+                let high = self.name_param(&format!("{full}.max"), *b, span);
+                Value::Range(Box::new(low), Box::new(high))
+            }
+            other => other,
+        }
+    }
+
+    /// A constant as a named parameter; anything else as it is.
+    pub fn name_param(&mut self, name: &str, n: Num, span: Span) -> Num {
+        let Some(value) = self.graph.constant(n.node).filter(|v| v.is_finite()) else { return n };
+        if self.prototype {
+            return n;
+        }
+        let unit = n.unit.clone().unwrap_or_else(|| self.shown(&n));
+        let index = self.params.len() as u32;
+        self.params.push(matterix_ir::model::Param { name: name.to_string(), value, unit, span });
+        Num { node: self.graph.add(Op::Param(index)), literal: false, ..n }
+    }
+
+    fn reading(
+        &mut self,
+        id: InstanceId,
+        m: MemberRef<'a>,
+        name: &str,
+        ty: &Type,
+        value: Option<&'a Expr>,
+        options: &'a [NamedExpr],
+    ) -> Value {
+        let Some(e) = value else { return Value::Error };
+        let live = std::mem::replace(&mut self.readings_live, false);
+        let v = self.expr(e, &mut Scope::of_member(id, m));
+        let v = self.coerce(v, ty, e.span, name);
+        let mut found: [Option<f64>; 3] = [None; 3];
+        for (i, key) in ["resolution", "noise", "period"].iter().enumerate() {
+            let Some(o) = options.iter().find(|o| o.name.text == *key) else { continue };
+            let v = self.expr(&o.value, &mut Scope::of_member(id, m));
+            let expected = if *key == "period" {
+                Type::Quantity { dimension: self.duration(), point: false, optional: false }
+            } else {
+                difference(ty)
+            };
+            if let Value::Num(n) = self.coerce(v, &expected, o.value.span, key) {
+                found[i] = self.known(n.node);
+            }
+        }
+        self.readings_live = live;
+        let Value::Num(n) = v else { return v };
+        if !live {
+            return Value::Num(n);
+        }
+        let full = format!("{}.{name}", self.instances[id.0 as usize].name);
+        let unit = self.declared_unit(options, ty).or_else(|| n.unit.clone()).unwrap_or_else(|| self.shown(&n));
+        let index = self.readings.len() as u32;
+        let [resolution, noise, period] = found;
+        self.readings.push(Reading {
+            name: full,
+            instance: id,
+            value: n.node,
+            resolution,
+            noise,
+            period,
+            unit: unit.clone(),
+            span: m.member.span,
+        });
+        Value::Num(Num { node: self.graph.add(Op::Reading(index)), unit: Some(unit), literal: false, ..n })
+    }
+
+    /// `x[word]`.
+    pub fn index(&mut self, base: Value, word: &Name, scope: &mut Scope) -> Value {
+        let species = match scope.var(&word.text) {
+            Some(Value::Species(s)) => Some(*s),
+            Some(Value::Error) => return Value::Error,
+            _ => None,
+        };
+        match base {
+            Value::Error => Value::Error,
+            Value::Instance(id) | Value::Qualified(id, _) => {
+                let Some(target) = self.indexed(id) else {
+                    let name = self.instances[id.0 as usize].name.clone();
+                    self.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        word.span,
+                        format!("`{name}` holds nothing that could be asked for `{}`", word.text),
+                        "no contents",
+                    ));
+                    return Value::Error;
+                };
+                match self.species_named(species, word, scope) {
+                    Some(s) => Value::Concentration(target, s),
+                    None => Value::Error,
+                }
+            }
+            Value::Method(of, member) => match (*of, self.species_named(species, word, scope)) {
+                (Value::Instance(id), Some(s)) => self.amount(id, &member, s),
+                _ => Value::Error,
+            },
+            list @ (Value::List(_) | Value::Tuple(_)) => {
+                let at = match word.text.parse::<f64>() {
+                    Ok(v) => self.number(v, Dimension::one(), true),
+                    Err(_) => self.name_of(word, scope),
+                };
+                self.element(list, at, word.span)
+            }
+            other => {
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    word.span,
+                    format!("{} has no `[ ]`", other.what()),
+                    "cannot be asked for parts",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    /// `list[2]`, counted from 0.
+    pub fn index_number(&mut self, base: Value, index: &'a Expr, scope: &mut Scope) -> Value {
+        let at = self.expr(index, scope);
+        self.element(base, at, index.span)
+    }
+
+    fn element(&mut self, base: Value, at: Value, span: Span) -> Value {
+        let (Value::List(items) | Value::Tuple(items), Value::Num(n)) = (&base, &at) else {
+            let wrong = if matches!(base, Value::List(_) | Value::Tuple(_)) { at } else { base };
+            return self.expected("a list and a whole number", &wrong, span);
+        };
+        match self.graph.constant(n.node) {
+            Some(v) if v >= 0.0 && v.fract() == 0.0 && (v as usize) < items.len() => items[v as usize].clone(),
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    span,
+                    format!("the list has {} elements", items.len()),
+                    "not the number of one of them (the first is 0)",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    fn species_named(&mut self, known: Option<SpeciesId>, word: &Name, scope: &Scope) -> Option<SpeciesId> {
+        if known.is_some() {
+            return known;
+        }
+        match self.tables.species.lookup(self.tables.names, scope.module, word) {
+            Ok(s) => Some(s),
+            Err(d) => {
+                self.report(*d);
+                None
+            }
+        }
+    }
+
+    /// The mixture `x[S]` asks: the instance itself or its one part with contents.
+    fn indexed(&self, id: InstanceId) -> Option<InstanceId> {
+        if self.per_species(id).is_some() {
+            return Some(id);
+        }
+        let mut parts = self.instances[id.0 as usize].parts.values().filter(|p| self.per_species(**p).is_some());
+        match (parts.next(), parts.next()) {
+            (Some(p), None) => Some(*p),
+            _ => None,
+        }
+    }
+
+    /// The concentration of a species in the kind `wanted` asks for.
+    pub fn concentration(&mut self, id: InstanceId, s: SpeciesId, wanted: &Num, span: Span) -> Option<Value> {
+        let views = self.views(id);
+        let mut kinds = Vec::new();
+        for (module, param, ty, value, owner) in views {
+            let ty = self.resolve_type(ty, module);
+            let Type::Quantity { dimension, .. } = &ty else { continue };
+            if !dimension.agrees(&wanted.dimension) {
+                kinds.push(dimension.clone());
+                continue;
+            }
+            let def = self.tables.species.get(s);
+            let counts = self
+                .tables
+                .units
+                .dimension("Amount")
+                .is_some_and(|a| a.dimension.over(dimension).is_free_of(&a.dimension));
+            if def.by_mass && counts {
+                let (name, declared) = (def.name.clone(), def.span);
+                self.report(
+                    Diagnostic::error(
+                        codes::CONCENTRATION_KIND,
+                        span,
+                        format!("`{name}` is counted by mass and has no amount of substance"),
+                        "cannot be asked for in mol",
+                    )
+                    .because(declared, "declared `by: mass` here")
+                    .help("use a mass fraction (`as %w/w`) or a mass concentration (`as g/L`)"),
+                );
+                return None;
+            }
+            let key = (id, s, owner, dimension.clone());
+            if let Some(v) = self.view_values.get(&key) {
+                return Some(v.clone());
+            }
+            let mut scope = Scope::of(id, module);
+            scope.bind(param.name.text.clone(), Value::Species(s));
+            let compared = std::mem::take(&mut self.comparisons);
+            let v = self.expr(value, &mut scope);
+            self.comparisons = compared;
+            let v = self.coerce(v, &ty, value.span, "view");
+            if !self.initial_mode {
+                self.view_values.insert(key, v.clone());
+            }
+            return Some(v);
+        }
+        let found = self.describe(wanted);
+        let kinds: Vec<String> = kinds.iter().map(|k| self.tables.units.describe(k, false)).collect();
+        self.report(
+            Diagnostic::error(
+                codes::CONCENTRATION_KIND,
+                span,
+                format!("a concentration cannot be compared with {found}"),
+                format!("asked for as {found}"),
+            )
+            .help(format!("kinds of concentration: {}", kinds.join(", "))),
+        );
+        None
+    }
+
+    /// The amount of a species in a mixture: a state, or zero where it can never get there.
+    pub fn amount(&mut self, id: InstanceId, member: &str, s: SpeciesId) -> Value {
+        let Some((ty, _)) = self.extensive_type(id, member) else { return Value::Error };
+        let Type::Quantity { dimension, .. } = ty else { return Value::Error };
+        let index = self.instances[id.0 as usize].amounts.get(&(member.to_string(), s)).copied();
+        let node = match index {
+            Some(i) if self.initial_mode => self.states[i as usize].initial,
+            Some(i) => self.graph.add(Op::State(i)),
+            None => self.graph.number(0.0),
+        };
+        self.num(node, dimension)
+    }
+
+    fn species_property(&mut self, s: SpeciesId, name: &Name) -> Value {
+        let def = self.tables.species.get(s);
+        match name.text.as_str() {
+            "molar_mass" => {
+                let node = self.graph.number(def.molar_mass);
+                let dimension = self.tables.units.named("Mass").over(&self.tables.units.named("Amount"));
+                return self.num(node, dimension);
+            }
+            "charge" => {
+                let charge = def.formula.as_ref().map_or(0, |f| f.charge);
+                return self.number(f64::from(charge), Dimension::one(), false);
+            }
+            "splits" => {
+                let splits = f64::from(u8::from(!def.dissolves.is_empty()));
+                return Value::Bool(self.graph.number(splits));
+            }
+            "ions" => return Value::List(def.dissolves.iter().map(|(i, _)| Value::Species(*i)).collect()),
+            "count" => return Value::Method(Box::new(Value::Species(s)), "count".into()),
+            _ => {}
+        }
+        let (module, fields, by_mass, molar_mass) = (def.module, def.fields, def.by_mass, def.molar_mass);
+        if let Some(v) = self.property(module, fields, &name.text) {
+            return v;
+        }
+        let per_amount = |this: &mut Self, specific: Value| match specific {
+            Value::Num(n) => {
+                let m = this.graph.number(molar_mass);
+                let node = this.graph.binary(BinaryOp::Mul, n.node, m);
+                let dimension =
+                    n.dimension.times(&this.tables.units.named("Mass").over(&this.tables.units.named("Amount")));
+                this.num(node, dimension)
+            }
+            other => other,
+        };
+        // What follows from another stated property by definition of density and specific heat.
+        let derived = match name.text.as_str() {
+            "molar_volume" => self.property(module, fields, "density").map(|v| match v {
+                Value::Num(n) => {
+                    let m = self.graph.number(molar_mass);
+                    let node = self.graph.binary(BinaryOp::Div, m, n.node);
+                    let mass = self.tables.units.named("Mass").over(&self.tables.units.named("Amount"));
+                    self.num(node, mass.over(&n.dimension))
+                }
+                other => other,
+            }),
+            "heat_capacity" => self.property(module, fields, "specific_heat").map(|v| per_amount(self, v)),
+            _ => None,
+        };
+        if let Some(v) = derived {
+            return v;
+        }
+        if self.prototype {
+            return self.number(1.0, Dimension::any(), false);
+        }
+        let def = self.tables.species.get(s);
+        let by = if by_mass { "`specific_heat`" } else { "`heat_capacity`" };
+        let wanted = match name.text.as_str() {
+            "molar_volume" => "`density`".to_string(),
+            "heat_capacity" => by.to_string(),
+            other => format!("`{other}`"),
+        };
+        let (species, span) = (def.name.clone(), def.span);
+        self.report(
+            Diagnostic::error(
+                codes::MISSING_PROPERTY,
+                span,
+                format!("`{species}` has no {wanted}, which is needed here"),
+                format!("{wanted} is missing"),
+            )
+            .because(name.span, "needed by this law")
+            .help(format!("add {wanted} to the species, with its source")),
+        );
+        Value::Error
+    }
+
+    fn property(&mut self, module: usize, fields: &'a [crate::ast::Field], key: &str) -> Option<Value> {
+        let field = crate::elaborate::species::field(fields, key)?;
+        match &field.value {
+            FieldValue::Expr(e) => Some(self.expr(e, &mut Scope::module(module))),
+            _ => None,
+        }
+    }
+
+    /// The kinds an instance has, itself included, most derived first.
+    pub fn ancestors_of(&self, id: InstanceId) -> Vec<DeclId> {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        kinds.iter().filter_map(|k| self.tables.kinds.get(k)).flat_map(|k| k.ancestors.iter().copied()).collect()
+    }
+}
+
+fn difference(ty: &Type) -> Type {
+    match ty {
+        Type::Quantity { dimension, .. } => {
+            Type::Quantity { dimension: dimension.clone(), point: false, optional: false }
+        }
+        other => other.clone(),
+    }
+}

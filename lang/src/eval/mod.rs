@@ -1,0 +1,62 @@
+//! Evaluation of expressions: names to values, quantities to nodes of the graph.
+//!
+//! The same evaluator checks a declaration (on prototypes of the instances it is about) and flattens it (on the lab's
+//! own), so that what was checked is what runs.
+
+pub mod arith;
+pub mod call;
+pub mod coerce;
+pub mod compare;
+pub mod expr;
+pub mod external;
+pub mod member;
+pub mod reaction;
+pub mod types;
+pub mod value;
+
+use matterix_ir::scene::InstanceId;
+
+pub use types::Type;
+pub use value::{Num, ReactionId, SpeciesId, Value};
+
+/// What names mean at one place of the text.
+#[derive(Clone, Debug, Default)]
+pub struct Scope {
+    /// The module whose names are seen.
+    pub module: usize,
+    /// The instance whose members are seen without a dot.
+    pub this: Option<InstanceId>,
+    /// The capability whose text this is: of several members with one name, it means its own.
+    pub owner: Option<crate::names::DeclId>,
+    /// Whether the lab's instances are seen.
+    pub lab: bool,
+    /// Local names, innermost last.
+    pub vars: Vec<(String, Value)>,
+}
+
+impl Scope {
+    /// The names of a module only.
+    pub fn module(module: usize) -> Self {
+        Scope { module, ..Scope::default() }
+    }
+
+    /// The members of an instance, then the names of a module.
+    pub fn of(this: InstanceId, module: usize) -> Self {
+        Scope { module, this: Some(this), ..Scope::default() }
+    }
+
+    /// The names seen by the text of a member of an instance.
+    pub fn of_member(this: InstanceId, member: crate::elaborate::tables::MemberRef<'_>) -> Self {
+        Scope { owner: Some(member.owner), ..Scope::of(this, member.module) }
+    }
+
+    /// The innermost local with this name.
+    pub fn var(&self, name: &str) -> Option<&Value> {
+        self.vars.iter().rev().find(|(n, _)| n == name).map(|(_, v)| v)
+    }
+
+    /// Adds a local.
+    pub fn bind(&mut self, name: impl Into<String>, value: Value) {
+        self.vars.push((name.into(), value));
+    }
+}

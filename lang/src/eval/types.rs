@@ -1,0 +1,144 @@
+//! Types of parameters, members and results.
+
+use matterix_ir::{Diagnostic, codes};
+
+use crate::ast;
+use crate::elaborate::Tables;
+use crate::names::DeclId;
+use crate::names::near;
+use crate::units::Dimension;
+
+/// A resolved type.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Type {
+    /// Unknown (reported already) or left open.
+    Any,
+    /// A quantity; `point` for a scale such as temperature.
+    Quantity {
+        /// The dimension of a difference.
+        dimension: Dimension,
+        /// A point on a scale.
+        point: bool,
+        /// May be `unlimited`.
+        optional: bool,
+    },
+    /// A truth value.
+    Bool,
+    /// A text.
+    Text,
+    /// A species.
+    Species,
+    /// A reaction.
+    Reaction,
+    /// A named point of an instance.
+    Frame,
+    /// `Range<T>`.
+    Range(Box<Type>),
+    /// `List<T>`.
+    List(Box<Type>),
+    /// Three plain numbers 0..1: red, green, blue.
+    Color,
+    /// An instance that has all of these capabilities (or is of this asset type).
+    Instance {
+        /// All of them.
+        kinds: Vec<DeclId>,
+        /// May be `nothing`.
+        optional: bool,
+    },
+}
+
+impl Type {
+    /// A plain number.
+    pub fn ratio() -> Type {
+        Type::Quantity { dimension: Dimension::one(), point: false, optional: false }
+    }
+}
+
+/// Names of types that are not dimensions, capabilities or assets.
+const BUILT_IN: &[&str] = &["Bool", "Text", "Int", "Species", "Reaction", "Frame", "Range", "List", "Color", "Any"];
+
+impl Tables<'_> {
+    /// Resolves a type as written in a module.
+    pub fn resolve_type(&self, ty: &ast::Type, module: usize, diagnostics: &mut Vec<Diagnostic>) -> Type {
+        if let Some(condition) = &ty.condition {
+            diagnostics.push(unsupported(condition.span, "`where` conditions on a type"));
+        }
+        if ty.paths.len() == 1 && ty.paths[0].segments.len() == 1 {
+            let name = &ty.paths[0].segments[0];
+            let argument = |d: &mut Vec<Diagnostic>| {
+                Box::new(ty.argument.as_ref().map_or(Type::Any, |a| self.resolve_type(a, module, d)))
+            };
+            match name.text.as_str() {
+                "Bool" => return Type::Bool,
+                "Text" => return Type::Text,
+                "Int" => return Type::ratio(),
+                "Species" => return Type::Species,
+                "Reaction" => return Type::Reaction,
+                "Frame" => return Type::Frame,
+                "Color" => return Type::Color,
+                "Any" => return Type::Any,
+                "Range" => return Type::Range(argument(diagnostics)),
+                "List" => return Type::List(argument(diagnostics)),
+                _ => {}
+            }
+            if let Some(def) = self.units.dimension(&name.text) {
+                let dimension = def.dimension.clone();
+                return Type::Quantity { dimension, point: def.point, optional: ty.optional };
+            }
+        }
+        let mut kinds = Vec::new();
+        for path in &ty.paths {
+            let Some(name) = path.segments.last() else { return Type::Any };
+            match self.names.lookup(module, &name.text).filter(|id| self.kinds.contains_key(id)) {
+                Some(id) => kinds.push(id),
+                None => {
+                    diagnostics.push(self.unknown_type(name, module));
+                    return Type::Any;
+                }
+            }
+        }
+        Type::Instance { kinds, optional: ty.optional }
+    }
+
+    fn unknown_type(&self, name: &ast::Name, module: usize) -> Diagnostic {
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_NAME,
+            name.span,
+            format!("there is no type `{}`", name.text),
+            "not a dimension, capability or asset",
+        );
+        let kinds = self.names.visible(module).filter(|(_, id)| self.kinds.contains_key(id)).map(|(n, _)| n);
+        let names: Vec<&str> = kinds.chain(self.units.dimension_names()).chain(BUILT_IN.iter().copied()).collect();
+        let near = near::nearest(&name.text, names);
+        d.help.extend(near::question(&near));
+        if let Some(best) = near.first() {
+            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+        }
+        d
+    }
+
+    /// A type in words, for "expected ...".
+    pub fn type_name(&self, ty: &Type) -> String {
+        match ty {
+            Type::Any => "anything".into(),
+            Type::Quantity { dimension, point, .. } => self.units.describe(dimension, *point),
+            Type::Bool => "a truth value".into(),
+            Type::Text => "a text".into(),
+            Type::Species => "a species".into(),
+            Type::Reaction => "a reaction".into(),
+            Type::Frame => "a frame".into(),
+            Type::Color => "a colour".into(),
+            Type::Range(inner) => format!("a range of {}", self.type_name(inner)),
+            Type::List(inner) => format!("a list of {}", self.type_name(inner)),
+            Type::Instance { kinds, .. } => {
+                kinds.iter().map(|k| self.kinds[k].name.clone()).collect::<Vec<_>>().join(" & ")
+            }
+        }
+    }
+}
+
+/// "not supported yet" at a span.
+pub fn unsupported(span: matterix_ir::Span, what: &str) -> Diagnostic {
+    Diagnostic::error(codes::UNSUPPORTED, span, format!("{what} are not supported yet"), "no meaning yet")
+        .help("this part of the language is read and formatted, but cannot be checked or run in this version")
+}

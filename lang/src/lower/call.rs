@@ -1,0 +1,558 @@
+//! Calls: which skill or command a verb means, and its arguments.
+
+use matterix_ir::plan::{Argument, Step, StepId};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::{Planner, ResultSlot};
+use crate::ast::{Block, Call, Clause, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
+use crate::elaborate::tables::MemberRef;
+use crate::eval::{Num, Scope, Value};
+use crate::names::{DeclId, near, verb_text};
+
+/// What a verb can mean.
+#[derive(Clone)]
+pub enum Verb<'a> {
+    /// A skill in scope.
+    Skill(DeclId),
+    /// A command of a capability.
+    Command(DeclId, MemberRef<'a>),
+}
+
+/// The arguments of a call, in the words of its signature.
+pub struct Bound {
+    /// By parameter name, in order of declaration.
+    pub values: Vec<(String, Value)>,
+}
+
+impl<'a> Planner<'a, '_> {
+    /// Lowers a call; gives its node and, for a skill with a result, the value.
+    pub fn call(&mut self, call: &'a Call, span: Span, scope: &mut Scope) -> Option<(StepId, Option<Value>)> {
+        let (verbs, count) = self.find_verb(call, scope)?;
+        let bare = call.words.get(count);
+        let object = match (bare, &call.object) {
+            (Some(word), None) => {
+                let e = Expr { kind: Box::new(ExprKind::Name(word.clone())), span: word.span };
+                // A bare word is a name like any other; it is evaluated here because it has no expression of its own.
+                Some((self.name_value(&e, scope), word.span))
+            }
+            (None, Some(e)) => Some((self.lab.expr(e, scope), e.span)),
+            _ => None,
+        };
+        if let Some((Value::Error, _)) = object {
+            for (_, e) in &call.labelled {
+                self.lab.expr(e, scope);
+            }
+            return None;
+        }
+        let verb_span = call.words.first().map_or(call.span, |w| w.span.to(call.words[count - 1].span));
+        let verb = self.choose(&verbs, &object, call, verb_span, scope)?;
+        match verb {
+            Verb::Skill(id) => self.skill(id, call, object, span, scope),
+            Verb::Command(owner, m) => self.command(owner, m, call, object, span, scope).map(|s| (s, None)),
+        }
+    }
+
+    fn name_value(&mut self, e: &Expr, scope: &mut Scope) -> Value {
+        let ExprKind::Name(n) = &*e.kind else { return Value::Error };
+        self.lab.name_of(n, scope)
+    }
+
+    /// The meanings of the longest declared verb that the words begin with, and its number of words.
+    fn find_verb(&mut self, call: &'a Call, scope: &Scope) -> Option<(Vec<Verb<'a>>, usize)> {
+        let longest = call.words.len();
+        for n in (1..=longest).rev() {
+            let rest = longest - n;
+            if rest > 1 || (rest == 1 && call.object.is_some()) {
+                continue;
+            }
+            let verbs = self.verbs(&verb_text(&call.words[..n]), scope.module);
+            if !verbs.is_empty() {
+                return Some((verbs, n));
+            }
+        }
+        self.unknown_verb(call, scope);
+        None
+    }
+
+    fn verbs(&self, verb: &str, module: usize) -> Vec<Verb<'a>> {
+        let names = self.lab.tables.names;
+        let mut out = Vec::new();
+        if let Some(id) = names.lookup(module, verb)
+            && matches!(names.decl(id).item.kind, ItemKind::Skill { .. })
+        {
+            out.push(Verb::Skill(id));
+        }
+        for (id, kind) in &self.lab.tables.kinds {
+            for m in kind.members.iter().filter(|m| m.owner == *id) {
+                if let MemberKind::Command { sig, .. } = &m.member.kind
+                    && verb_text(&sig.verb) == verb
+                {
+                    out.push(Verb::Command(*id, *m));
+                }
+            }
+        }
+        out
+    }
+
+    fn unknown_verb(&mut self, call: &'a Call, scope: &Scope) {
+        let names = self.lab.tables.names;
+        let mut all: Vec<String> = names
+            .visible(scope.module)
+            .filter(|(_, id)| matches!(names.decl(*id).item.kind, ItemKind::Skill { .. }))
+            .map(|(n, _)| n.to_string())
+            .collect();
+        for kind in self.lab.tables.kinds.values() {
+            for m in &kind.members {
+                if let MemberKind::Command { sig, .. } = &m.member.kind {
+                    all.push(verb_text(&sig.verb));
+                }
+            }
+        }
+        let words = if call.object.is_none() && call.words.len() > 1 {
+            &call.words[..call.words.len() - 1]
+        } else {
+            &call.words[..]
+        };
+        let text = verb_text(words);
+        let span = words.first().map_or(call.span, |w| w.span.to(words[words.len() - 1].span));
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_VERB,
+            span,
+            format!("no skill or command is called `{text}`"),
+            "not a known verb",
+        );
+        let near = near::nearest(&text, &all);
+        d.help.extend(near::question(&near));
+        if let Some(best) = near.first() {
+            d = d.fix(format!("replace with `{best}`"), span, best.clone());
+        }
+        if let Some(module) = names.declared_in(&text).filter(|m| !m.is_empty()) {
+            d.help.push(format!("it is declared in `{module}`: add `use {module}::{text}`"));
+        }
+        self.lab.report(d);
+    }
+
+    /// The meaning that fits the object and the labels.
+    fn choose(
+        &mut self,
+        verbs: &[Verb<'a>],
+        object: &Option<(Value, Span)>,
+        call: &'a Call,
+        verb_span: Span,
+        scope: &mut Scope,
+    ) -> Option<Verb<'a>> {
+        let mut lacking = Vec::new();
+        let mut fitting: Vec<(Verb<'a>, usize)> = Vec::new();
+        for verb in verbs {
+            match verb {
+                Verb::Skill(id) => {
+                    let ItemKind::Skill { sig, .. } = &self.lab.tables.names.decl(*id).item.kind else { continue };
+                    fitting.push((verb.clone(), misfit(sig, call)));
+                }
+                Verb::Command(owner, m) => {
+                    let MemberKind::Command { sig, .. } = &m.member.kind else { continue };
+                    match self.device(sig, object, call, scope) {
+                        Some(id) if self.lab.instance_is(id, *owner) => fitting.push((verb.clone(), misfit(sig, call))),
+                        device => lacking.push((*owner, device)),
+                    }
+                }
+            }
+        }
+        let best = fitting.iter().map(|f| f.1).min();
+        let chosen: Vec<_> = fitting.iter().filter(|f| Some(f.1) == best).map(|f| f.0.clone()).collect();
+        if let Some(one) = chosen.first() {
+            return Some(one.clone());
+        }
+        self.no_such_device(&lacking, verb_span, call);
+        None
+    }
+
+    fn no_such_device(
+        &mut self,
+        lacking: &[(DeclId, Option<matterix_ir::scene::InstanceId>)],
+        verb: Span,
+        call: &Call,
+    ) {
+        let Some(&(owner, device)) = lacking.first() else { return };
+        let capability = self.lab.tables.kind_name(owner).to_string();
+        let able: Vec<String> = lacking
+            .iter()
+            .flat_map(|(o, _)| self.lab.instances_of(*o))
+            .map(|i| self.lab.instances[i.0 as usize].name.clone())
+            .take(3)
+            .collect();
+        let text = self.text(verb);
+        let mut d = match device {
+            Some(id) => {
+                let inst = &self.lab.instances[id.0 as usize];
+                let (name, span) = (inst.name.clone(), inst.span);
+                let kind = self.lab.kind_names(id);
+                Diagnostic::error(
+                    codes::WRONG_DEVICE,
+                    call.span,
+                    format!("`{name}` ({kind}) cannot `{text}`: it is no {capability}"),
+                    format!("needs a {capability}"),
+                )
+                .because(span, format!("`{name}` is declared here"))
+            }
+            None => Diagnostic::error(
+                codes::WRONG_DEVICE,
+                call.span,
+                format!("`{text}` needs a device that is a {capability}"),
+                "which device?",
+            ),
+        };
+        d.help.extend(near::question(&able));
+        self.lab.report(d);
+    }
+
+    /// The device a command is for: the object where the verb takes no first argument, else the one after `by`.
+    fn device(
+        &mut self,
+        sig: &Sig,
+        object: &Option<(Value, Span)>,
+        call: &'a Call,
+        scope: &mut Scope,
+    ) -> Option<matterix_ir::scene::InstanceId> {
+        let value = if sig.params.is_empty() {
+            object.as_ref().map(|o| o.0.clone())
+        } else {
+            let by = call.labelled.iter().find(|(l, _)| l.text == "by")?;
+            Some(self.lab.expr(&by.1, scope))
+        };
+        match value {
+            Some(Value::Instance(i) | Value::Qualified(i, _)) => Some(i),
+            _ => None,
+        }
+    }
+
+    /// Arguments in the words of a signature. `device` stands for a command, whose `by` may name the device.
+    #[allow(clippy::too_many_arguments)]
+    pub fn bind_arguments(
+        &mut self,
+        sig: &'a Sig,
+        clauses: &'a [Clause],
+        module: usize,
+        call: &'a Call,
+        object: Option<(Value, Span)>,
+        device: bool,
+        scope: &mut Scope,
+    ) -> Option<Bound> {
+        let mut values = Vec::new();
+        let mut good = true;
+        let what = verb_text(&sig.verb);
+        match (sig.params.first(), object) {
+            (Some(p), Some((v, span))) => good &= self.argument(p, v, span, module, &mut values),
+            (Some(p), None) => {
+                let ty = p.ty.as_ref().map(|t| self.lab.resolve_type(t, module));
+                let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
+                self.lab.report(Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    call.span,
+                    format!("`{what}` needs {wanted} after it"),
+                    format!("`{}` is missing", p.name.text),
+                ));
+                good = false;
+            }
+            (None, Some((_, span))) if !device => {
+                self.lab.report(Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    span,
+                    format!("`{what}` takes nothing after it"),
+                    "not expected",
+                ));
+                good = false;
+            }
+            _ => {}
+        }
+        let mut unknown = false;
+        for (i, (label, e)) in call.labelled.iter().enumerate() {
+            if call.labelled[..i].iter().any(|(l, _)| l.text == label.text) {
+                self.lab.report(Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    label.span.to(e.span),
+                    format!("`{}` is given twice", label.text),
+                    "given again here",
+                ));
+                good = false;
+                continue;
+            }
+            let group = sig.labelled.iter().find(|(l, _)| l.text == label.text);
+            match group.and_then(|(_, params)| params.first()) {
+                Some(p) => {
+                    let v = self.lab.expr(e, scope);
+                    good &= self.argument(p, v, e.span, module, &mut values);
+                }
+                None if device && label.text == "by" && !sig.params.is_empty() => {}
+                None => {
+                    let v = self.lab.expr(e, scope);
+                    unknown = true;
+                    good = false;
+                    if v != Value::Error {
+                        self.unknown_label(sig, label, e.span);
+                    }
+                }
+            }
+        }
+        for (label, params) in &sig.labelled {
+            let Some(p) = params.first() else { continue };
+            // A label that is not known may be meant for the one that is missing.
+            if unknown || call.labelled.iter().any(|(l, _)| l.text == label.text) {
+                continue;
+            }
+            match &p.default {
+                Some(e) => {
+                    let v = self.lab.expr(e, &mut Scope::module(module));
+                    good &= self.argument(p, v, e.span, module, &mut values);
+                }
+                None => {
+                    let ty = p.ty.as_ref().map(|t| self.lab.resolve_type(t, module));
+                    let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
+                    self.lab.report(
+                        Diagnostic::error(
+                            codes::WRONG_ARGUMENTS,
+                            call.span,
+                            format!("`{what}` needs `{} ...`: {wanted}", label.text),
+                            format!("`{}` is missing", label.text),
+                        )
+                        .help(format!("its form is `{}`", self.form(sig))),
+                    );
+                    good = false;
+                }
+            }
+        }
+        good &= self.options(&what, clauses, module, &call.options, call.span, scope, &mut values);
+        good.then_some(Bound { values })
+    }
+
+    fn argument(&mut self, p: &'a Param, v: Value, span: Span, module: usize, out: &mut Vec<(String, Value)>) -> bool {
+        let v = match &p.ty {
+            Some(ty) => {
+                let ty = self.lab.resolve_type(ty, module);
+                self.lab.coerce(v, &ty, span, &p.name.text)
+            }
+            None => v,
+        };
+        let good = v != Value::Error;
+        out.push((p.name.text.clone(), v));
+        good
+    }
+
+    fn unknown_label(&mut self, sig: &Sig, label: &Name, span: Span) {
+        let form = self.form(sig);
+        self.lab.report(
+            Diagnostic::error(
+                codes::WRONG_ARGUMENTS,
+                label.span.to(span),
+                format!("`{}` does not take `{}`", verb_text(&sig.verb), label.text),
+                "not expected",
+            )
+            .help(format!("its form is `{form}`")),
+        );
+    }
+
+    /// The call form of a signature: `place ITEM on TARGET by ARM`.
+    pub fn form(&self, sig: &Sig) -> String {
+        let mut out = verb_text(&sig.verb);
+        let mut add = |text: String| {
+            out.push(' ');
+            out.push_str(&text);
+        };
+        if let Some(p) = sig.params.first() {
+            add(p.name.text.to_uppercase());
+        }
+        for (label, params) in &sig.labelled {
+            add(label.text.clone());
+            if let Some(p) = params.first() {
+                add(p.name.text.to_uppercase());
+            }
+        }
+        out
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn options(
+        &mut self,
+        what: &str,
+        clauses: &'a [Clause],
+        module: usize,
+        given: &'a [NamedExpr],
+        span: Span,
+        scope: &mut Scope,
+        out: &mut Vec<(String, Value)>,
+    ) -> bool {
+        let declared: Vec<&'a Param> = clauses
+            .iter()
+            .filter_map(|c| match &c.kind {
+                crate::ast::ClauseKind::Option(p) => Some(p),
+                _ => None,
+            })
+            .collect();
+        let mut good = true;
+        for o in given {
+            match declared.iter().find(|p| p.name.text == o.name.text) {
+                Some(p) => {
+                    let v = self.lab.expr(&o.value, scope);
+                    good &= self.argument(p, v, o.value.span, module, out);
+                }
+                None => {
+                    let near = near::nearest(&o.name.text, declared.iter().map(|p| &p.name.text));
+                    let mut d = Diagnostic::error(
+                        codes::WRONG_ARGUMENTS,
+                        o.name.span,
+                        format!("`{what}` has no option `{}`", o.name.text),
+                        "not an option",
+                    );
+                    d.help.extend(near::question(&near));
+                    self.lab.report(d);
+                    good = false;
+                }
+            }
+        }
+        let misspelt = given.iter().any(|o| !declared.iter().any(|p| p.name.text == o.name.text));
+        for p in declared {
+            if misspelt || given.iter().any(|o| o.name.text == p.name.text) {
+                continue;
+            }
+            match &p.default {
+                Some(e) => {
+                    let v = self.lab.expr(e, &mut Scope::module(module));
+                    good &= self.argument(p, v, e.span, module, out);
+                }
+                None => {
+                    self.lab.report(
+                        Diagnostic::error(
+                            codes::WRONG_ARGUMENTS,
+                            span,
+                            format!("`{what}` needs the option `{}`", p.name.text),
+                            "no default",
+                        )
+                        .help(format!("add `{{ {}: ... }}` at the end of the call", p.name.text)),
+                    );
+                    good = false;
+                }
+            }
+        }
+        good
+    }
+
+    fn skill(
+        &mut self,
+        id: DeclId,
+        call: &'a Call,
+        object: Option<(Value, Span)>,
+        span: Span,
+        scope: &mut Scope,
+    ) -> Option<(StepId, Option<Value>)> {
+        let decl = self.lab.tables.names.decl(id);
+        let ItemKind::Skill { sig, clauses, body, handlers, .. } = &decl.item.kind else { return None };
+        let bound = self.bind_arguments(sig, clauses, decl.module, call, object, false, scope)?;
+        let mut inner = Scope::module(decl.module);
+        for (name, v) in &bound.values {
+            inner.bind(name.clone(), v.clone());
+        }
+        let label = self.text(span);
+        let Some(body) = body else {
+            let step = self.primitive(sig, clauses, &bound, &label, span, &mut inner);
+            return step.map(|s| (s, None));
+        };
+        if let Some((verb, at)) = self.lab.ring(&self.open, id) {
+            self.lab.report(
+                Diagnostic::error(
+                    codes::CIRCULAR,
+                    at,
+                    format!("`{verb}` calls itself"),
+                    "leads back to the same skill",
+                )
+                .help("use `repeat` to do something again"),
+            );
+            return None;
+        }
+        self.open.push(id);
+        let result = self.skill_body(sig, clauses, body, handlers, &label, span, &mut inner);
+        self.open.pop();
+        result
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn skill_body(
+        &mut self,
+        sig: &'a Sig,
+        clauses: &'a [Clause],
+        body: &'a Block,
+        handlers: &'a Handlers,
+        label: &str,
+        span: Span,
+        inner: &mut Scope,
+    ) -> Option<(StepId, Option<Value>)> {
+        let slot = sig.result.as_ref().map(|ty| {
+            let ty = self.lab.resolve_type(ty, inner.module);
+            let unit = self.lab.type_unit(&ty);
+            let local = self.local(label, unit);
+            ResultSlot { ty, local, value: None }
+        });
+        let declares = slot.is_some();
+        self.results.push(slot);
+        let outer_handlers = std::mem::take(&mut self.handlers);
+        let contract = self.contract(clauses, inner);
+        let steps = self.block(body, inner);
+        let (needs, invariants, promises, takes) = contract;
+        let verb = verb_text(&sig.verb);
+        let step = Step::Skill { verb: verb.clone(), needs, invariants, promises, takes, body: steps };
+        let id = self.add(label, span, step);
+        // Outside the skill's node, so that a retry looks at its needs again.
+        let id = self.with_handlers(label, span, id, handlers, inner);
+        self.handlers = outer_handlers;
+        let slot = self.results.pop().flatten();
+        let value = slot.and_then(|s| s.value);
+        if declares && value.is_none() {
+            self.lab.report(Diagnostic::error(
+                codes::MISPLACED,
+                sig.span,
+                format!("`{verb}` declares a result but does not `return` one"),
+                "gives nothing",
+            ));
+        }
+        Some((id, value))
+    }
+
+    /// Arguments as a driver sees them.
+    pub fn driver_arguments(&mut self, bound: &Bound) -> Vec<(String, Argument)> {
+        bound
+            .values
+            .iter()
+            .filter_map(|(name, v)| {
+                let argument = match v {
+                    Value::Num(Num { node, unit, .. }) => {
+                        let unit = unit.clone().unwrap_or_else(|| match v {
+                            Value::Num(n) => self.lab.shown(n),
+                            _ => matterix_ir::Unit::one(),
+                        });
+                        Argument::Quantity(*node, unit)
+                    }
+                    Value::Instance(i) | Value::Qualified(i, _) => Argument::Instance(*i),
+                    Value::Frame(i, frame) if frame.is_empty() => Argument::Instance(*i),
+                    Value::Frame(i, frame) => {
+                        Argument::Text(format!("{}.{frame}", self.lab.instances[i.0 as usize].name))
+                    }
+                    Value::Text(t) => Argument::Text(t.clone()),
+                    _ => return None,
+                };
+                Some((name.clone(), argument))
+            })
+            .collect()
+    }
+}
+
+/// How badly a call's labels fit a signature.
+fn misfit(sig: &Sig, call: &Call) -> usize {
+    let unknown = call.labelled.iter().filter(|(l, _)| !sig.labelled.iter().any(|(s, _)| s.text == l.text)).count();
+    let missing = sig
+        .labelled
+        .iter()
+        .filter(|(l, p)| {
+            !call.labelled.iter().any(|(c, _)| c.text == l.text) && p.first().is_some_and(|p| p.default.is_none())
+        })
+        .count();
+    unknown + missing
+}

@@ -1,0 +1,542 @@
+//! Statements, one construct at a time.
+
+use matterix_ir::plan::{Caught, Step, StepId};
+use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
+
+use super::Planner;
+use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
+use crate::eval::types::unsupported;
+use crate::eval::{Num, Scope, Type, Value};
+use crate::names::DeclId;
+
+impl<'a> Planner<'a, '_> {
+    /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
+    pub fn stmt(&mut self, s: &'a Stmt, scope: &mut Scope) -> Option<StepId> {
+        let label = self.text(head(s));
+        let step = match &s.kind {
+            StmtKind::Error => return None,
+            StmtKind::Call(call) => return self.call(call, s.span, scope).map(|c| c.0),
+            StmtKind::Let { name, ty, value } => return self.bind(name, ty.as_ref(), value, s.span, scope),
+            StmtKind::LetDo { name, call } => {
+                let (step, value) = self.call(call, s.span, scope)?;
+                match value {
+                    Some(v) => scope.bind(name.text.clone(), v),
+                    None => {
+                        scope.bind(name.text.clone(), Value::Error);
+                        self.lab.report(
+                            Diagnostic::error(
+                                codes::TYPE_MISMATCH,
+                                call.span,
+                                "this step has no result",
+                                "gives nothing to name",
+                            )
+                            .because(name.span, "named here")
+                            .help("a skill gives a result with `return` and says so with `-> Type`"),
+                        );
+                    }
+                }
+                return Some(step);
+            }
+            StmtKind::Step { name, body, handlers } => {
+                if matches!(scope.var(&name.text), Some(Value::Step(..))) {
+                    self.lab.report(
+                        Diagnostic::error(
+                            codes::DUPLICATE_NAME,
+                            name.span,
+                            format!("there are two steps `{}`", name.text),
+                            "named again here",
+                        )
+                        .help("give it another name, so that `.start` and `.end` say which is meant"),
+                    );
+                }
+                let seconds = self.seconds();
+                let start = self.local(format!("{}.start", name.text), seconds.clone());
+                let end = self.local(format!("{}.end", name.text), seconds);
+                scope.bind(name.text.clone(), Value::Step(start, end));
+                let inner = self.block(body, scope);
+                let named = Step::Named { name: name.text.clone(), start, end, body: inner };
+                let id = self.add(format!("step {}", name.text), s.span, named);
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Wait { duration } => Step::Wait { duration: self.duration_node(duration, scope, "wait")? },
+            StmtKind::WaitUntil { cond, timeout, handlers } => {
+                let condition = self.condition(cond, scope)?;
+                let timeout = self.optional_duration(timeout.as_ref(), scope)?;
+                let id = self.add(label.clone(), s.span, Step::WaitUntil { condition, timeout });
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Hold { cond, duration, timeout, handlers } => {
+                let condition = self.condition(cond, scope)?;
+                let duration = self.duration_node(duration, scope, "for")?;
+                let timeout = self.optional_duration(timeout.as_ref(), scope)?;
+                let id = self.add(label.clone(), s.span, Step::Hold { condition, duration, timeout });
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Keep { cond, body, handlers } => {
+                let condition = self.condition(cond, scope)?;
+                let body = self.block(body, scope);
+                let id = self.add(label.clone(), s.span, Step::Keep { condition, body });
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Within { limit, since, body, handlers } => {
+                let limit = self.duration_node(limit, scope, "within")?;
+                let since = self.duration_node(since, scope, "after")?;
+                let body = self.block(body, scope);
+                let id = self.add(label.clone(), s.span, Step::Within { limit, since, body });
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::If { cond, then, otherwise } => {
+                let condition = self.condition(cond, scope)?;
+                let then = self.block(then, scope);
+                let otherwise = otherwise.as_ref().map(|b| self.block(b, scope));
+                Step::If { condition, then, otherwise }
+            }
+            StmtKind::Repeat { times, body } => {
+                let times = self.count(times, scope)?;
+                Step::Repeat { times, body: self.block(body, scope) }
+            }
+            StmtKind::RepeatWhile { cond, max, body } => {
+                let condition = self.condition(cond, scope)?;
+                let Some(max) = max else {
+                    self.lab.report(
+                        Diagnostic::error(codes::MISSING_FIELD, s.span, "a loop needs a bound", "could go on for ever")
+                            .help("write `repeat while ... max 100 { }`"),
+                    );
+                    return None;
+                };
+                let max = self.count(max, scope)?;
+                Step::RepeatWhile { condition, max, body: self.block(body, scope) }
+            }
+            StmtKind::For { var, set, body } => {
+                let items = self.lab.set(set, scope)?;
+                let mut turns = Vec::new();
+                for item in items {
+                    let depth = scope.vars.len();
+                    scope.bind(var.text.clone(), item);
+                    turns.push(self.block(body, scope));
+                    super::leave(scope, depth);
+                }
+                Step::Sequence(turns)
+            }
+            StmtKind::Try { alternatives, handlers } => {
+                let steps = alternatives.iter().map(|b| self.block(b, scope)).collect();
+                let id = self.add("try", s.span, Step::Try(steps));
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Retry { times } => {
+                if self.handlers == 0 {
+                    self.lab.report(
+                        Diagnostic::error(
+                            codes::MISPLACED,
+                            s.span,
+                            "`retry` stands only in a failure handler",
+                            "nothing failed here",
+                        )
+                        .help("write `{ ... } on slip { retry 2 }`"),
+                    );
+                    return None;
+                }
+                Step::Retry { times: self.count(times, scope)? }
+            }
+            StmtKind::Claim { assets, body } => {
+                let mut claims = Vec::new();
+                for a in assets {
+                    match self.lab.expr(a, scope) {
+                        Value::Instance(i) | Value::Qualified(i, _) => claims.push(i),
+                        other => {
+                            self.lab.expected("an instance to claim", &other, a.span);
+                        }
+                    }
+                }
+                Step::Claim { claims, body: self.block(body, scope) }
+            }
+            StmtKind::Sequence { body, handlers } => return Some(self.guarded(&label, s.span, body, handlers, scope)),
+            StmtKind::Parallel { body, handlers } => {
+                let depth = scope.vars.len();
+                let branches = self.statements(body, scope);
+                super::leave(scope, depth);
+                let id = self.add("parallel", s.span, Step::Parallel(branches));
+                return Some(self.with_handlers(&label, s.span, id, handlers, scope));
+            }
+            StmtKind::Start { name, body } => {
+                self.jobs.insert(name.text.clone());
+                let body = self.block(body, scope);
+                Step::Start { job: name.text.clone(), body }
+            }
+            StmtKind::Await { name } => {
+                if !self.jobs.contains(&name.text) {
+                    let near = crate::names::near::nearest(&name.text, &self.jobs);
+                    let mut d = Diagnostic::error(
+                        codes::UNKNOWN_NAME,
+                        name.span,
+                        format!("no job `{}` was started", name.text),
+                        "not started above",
+                    );
+                    d.help.extend(crate::names::near::question(&near));
+                    self.lab.report(d);
+                    return None;
+                }
+                Step::Await { job: name.text.clone() }
+            }
+            StmtKind::Fail { name, text } => {
+                self.plain(text.as_deref().unwrap_or(""), s.span)?;
+                let name = name.as_ref().map_or("failure", |n| n.text.as_str()).to_string();
+                self.failures.insert(name.clone());
+                Step::Fail { name, text: text.clone().unwrap_or_default() }
+            }
+            StmtKind::Expect { cond } => {
+                let mut parts = Vec::new();
+                conjuncts(cond, &mut parts);
+                let mut conditions = Vec::new();
+                for part in parts {
+                    conditions.push(self.condition(part, scope)?);
+                }
+                Step::Expect(conditions)
+            }
+            StmtKind::Record { value, every } => return self.record(value, every, s.span, scope),
+            StmtKind::Note(text) => {
+                self.plain(text, s.span)?;
+                Step::Note(text.clone())
+            }
+            StmtKind::Ask(text) => {
+                self.plain(text, s.span)?;
+                Step::Ask(text.clone())
+            }
+            StmtKind::Return { value } => return self.give(value, s.span, scope),
+            StmtKind::Run { .. } => {
+                self.lab.report(unsupported(s.span, "`run` statements"));
+                return None;
+            }
+        };
+        Some(self.add(label, s.span, step))
+    }
+
+    /// Wraps a node in its failure handlers, if it has any.
+    pub fn with_handlers(
+        &mut self,
+        label: &str,
+        span: Span,
+        body: StepId,
+        handlers: &'a Handlers,
+        scope: &mut Scope,
+    ) -> StepId {
+        if handlers.on.is_empty() && handlers.finally.is_none() {
+            return body;
+        }
+        let mut caught = Vec::new();
+        for (name, block) in &handlers.on {
+            self.check_failure(name);
+            self.handlers += 1;
+            let step = self.block(block, scope);
+            self.handlers -= 1;
+            let which = if name.text == "failure" { Caught::Any } else { Caught::Named(name.text.clone()) };
+            caught.push((which, step));
+        }
+        let finally = handlers.finally.as_ref().map(|b| self.block(b, scope));
+        self.add(label, span, Step::Guarded { body, handlers: caught, finally })
+    }
+
+    /// A value that only a run will have.
+    fn unknown_value(&mut self, ty: &Type, name: &str) -> Value {
+        let before = self.lab.params.len();
+        let value = self.lab.placeholder(ty, name);
+        for p in &mut self.lab.params[before..] {
+            p.value = f64::NAN;
+        }
+        value
+    }
+
+    /// Reports braces in a text: values in texts have no meaning yet.
+    fn plain(&mut self, text: &str, span: Span) -> Option<()> {
+        if text.contains('{') {
+            self.lab.report(unsupported(span, "values inside texts"));
+            return None;
+        }
+        Some(())
+    }
+
+    fn seconds(&self) -> Unit {
+        Unit::scaled("s", 1.0)
+    }
+
+    /// A duration's node, s.
+    pub fn duration_node(&mut self, e: &'a Expr, scope: &mut Scope, what: &str) -> Option<NodeId> {
+        let v = self.lab.expr(e, scope);
+        let ty = Type::Quantity { dimension: self.lab.duration(), point: false, optional: false };
+        match self.lab.coerce(v, &ty, e.span, what) {
+            Value::Num(n) => {
+                if self.lab.graph.constant(n.node).is_some_and(|v| v < 0.0) {
+                    self.lab.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        e.span,
+                        "a duration cannot be negative",
+                        "before it begins",
+                    ));
+                    return None;
+                }
+                Some(n.node)
+            }
+            _ => None,
+        }
+    }
+
+    fn optional_duration(&mut self, e: Option<&'a Expr>, scope: &mut Scope) -> Option<Option<NodeId>> {
+        match e {
+            Some(e) => self.duration_node(e, scope, "timeout").map(Some),
+            None => Some(None),
+        }
+    }
+
+    fn count(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<NodeId> {
+        let v = self.lab.expr(e, scope);
+        match self.lab.coerce(v, &Type::ratio(), e.span, "number of times") {
+            Value::Num(n) => {
+                if let Some(v) = self.lab.graph.constant(n.node)
+                    && (v < 0.0 || v.fract() != 0.0)
+                {
+                    self.lab.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        e.span,
+                        "how often is a whole number",
+                        "not a whole number",
+                    ));
+                    return None;
+                }
+                Some(n.node)
+            }
+            _ => None,
+        }
+    }
+
+    /// `let x = e`: a value that depends on the run is taken now and kept.
+    fn bind(
+        &mut self,
+        name: &Name,
+        ty: Option<&'a crate::ast::Type>,
+        value: &'a Expr,
+        span: Span,
+        scope: &mut Scope,
+    ) -> Option<StepId> {
+        let mut v = self.lab.expr(value, scope);
+        if let Some(ty) = ty {
+            let ty = self.lab.resolve_type(ty, scope.module);
+            v = self.lab.coerce(v, &ty, value.span, &name.text);
+        }
+        if let Value::Concentration(..) = v {
+            self.lab.kindless(value.span);
+            v = Value::Error;
+        }
+        let (kept, steps) = self.keep(&name.text, v, span);
+        scope.bind(name.text.clone(), kept);
+        match steps.as_slice() {
+            [] => None,
+            [one] => Some(*one),
+            _ => Some(self.add(format!("let {}", name.text), span, Step::Sequence(steps))),
+        }
+    }
+
+    /// Keeps what depends on the run in locals; returns how later text sees it.
+    fn keep(&mut self, name: &str, v: Value, span: Span) -> (Value, Vec<StepId>) {
+        match v {
+            Value::Num(n) => {
+                if !self.depends_on_run(n.node) {
+                    return (Value::Num(n), Vec::new());
+                }
+                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                let (node, step) = self.keep_node(name, n.node, unit, span);
+                (Value::Num(Num { node, literal: false, ..n }), vec![step])
+            }
+            Value::Bool(n) if self.depends_on_run(n) => {
+                let (node, step) = self.keep_node(name, n, Unit::one(), span);
+                (Value::Bool(node), vec![step])
+            }
+            Value::InstanceNode(n) => {
+                let (node, step) = self.keep_node(name, n, Unit::one(), span);
+                (Value::InstanceNode(node), vec![step])
+            }
+            Value::Tuple(items) => {
+                let mut steps = Vec::new();
+                let kept = items
+                    .into_iter()
+                    .enumerate()
+                    .map(|(i, item)| {
+                        let (v, s) = self.keep(&format!("{name}[{i}]"), item, span);
+                        steps.extend(s);
+                        v
+                    })
+                    .collect();
+                (Value::Tuple(kept), steps)
+            }
+            other => (other, Vec::new()),
+        }
+    }
+
+    fn keep_node(&mut self, name: &str, value: NodeId, unit: Unit, span: Span) -> (NodeId, StepId) {
+        let local = self.local(name, unit);
+        let step = self.add(format!("let {name}"), span, Step::Let { local, value });
+        (self.lab.graph.add(Op::Local(local)), step)
+    }
+
+    fn depends_on_run(&self, node: NodeId) -> bool {
+        let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
+        self.lab.graph.depends(node, live)
+    }
+
+    /// `return e`.
+    fn give(&mut self, value: &'a Expr, span: Span, scope: &mut Scope) -> Option<StepId> {
+        let v = self.lab.expr(value, scope);
+        let Some(Some(slot)) = self.results.last().cloned() else {
+            let (headline, help) = if self.results.is_empty() {
+                ("`return` stands only in a skill", "a workflow has no result; use `record` or `expect`")
+            } else {
+                ("this skill declares no result", "say what it gives in its signature: `-> Mass`")
+            };
+            self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "nothing takes this value").help(help));
+            return None;
+        };
+        let Value::Num(n) = self.lab.coerce(v, &slot.ty, value.span, "result") else {
+            if let Some(Some(slot)) = self.results.last_mut() {
+                slot.value = Some(Value::Error);
+            }
+            return None;
+        };
+        let node = self.lab.graph.add(Op::Local(slot.local));
+        if let Some(unit) = &n.unit {
+            self.locals[slot.local as usize].unit = unit.clone();
+        }
+        if let Some(Some(slot)) = self.results.last_mut() {
+            slot.value = Some(Value::Num(Num { node, literal: false, ..n.clone() }));
+        }
+        let label = self.text(span);
+        Some(self.add(label, span, Step::Let { local: slot.local, value: n.node }))
+    }
+
+    fn record(&mut self, value: &'a Expr, every: &'a Expr, span: Span, scope: &mut Scope) -> Option<StepId> {
+        let v = self.lab.expr(value, scope);
+        let every = self.duration_node(every, scope, "every")?;
+        let (nodes, unit) = match v {
+            Value::Num(n) => {
+                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                (vec![n.node], unit)
+            }
+            Value::Bool(n) => (vec![n], Unit::one()),
+            Value::Tuple(items) => {
+                let nums: Vec<Num> = items
+                    .into_iter()
+                    .filter_map(|i| match i {
+                        Value::Num(n) => Some(n),
+                        _ => None,
+                    })
+                    .collect();
+                let unit = nums.first().map_or_else(Unit::one, |n| self.lab.shown(n));
+                (nums.iter().map(|n| n.node).collect(), unit)
+            }
+            Value::Concentration(..) => {
+                self.lab.kindless(value.span);
+                return None;
+            }
+            other => {
+                self.lab.expected("a quantity to record", &other, value.span);
+                return None;
+            }
+        };
+        let name = self.text(value.span);
+        let label = self.text(span);
+        Some(self.add(label, span, Step::Record { name, value: nodes, unit, every }))
+    }
+
+    /// Binds a workflow's parameters: given from outside, or their defaults. Returns them as shown.
+    pub fn workflow_parameters(
+        &mut self,
+        params: &'a [Param],
+        arguments: &[(String, DeclId)],
+        scope: &mut Scope,
+    ) -> Vec<(String, String)> {
+        let mut shown = Vec::new();
+        for p in params {
+            let ty = match &p.ty {
+                Some(ty) => self.lab.resolve_type(ty, scope.module),
+                None => Type::Any,
+            };
+            if let Type::Instance { .. } = ty {
+                self.lab.report(unsupported(p.name.span, "roles: parameters that a lab binds"));
+                scope.bind(p.name.text.clone(), Value::Error);
+                continue;
+            }
+            let given = arguments.iter().find(|(n, _)| *n == p.name.text).map(|(_, id)| *id);
+            let (value, span) = match (given, &p.default) {
+                (Some(id), _) => {
+                    let decl = self.lab.tables.names.decl(id);
+                    let crate::ast::ItemKind::Const { value, .. } = &decl.item.kind else { continue };
+                    (self.lab.expr(value, &mut Scope::module(decl.module)), value.span)
+                }
+                (None, Some(e)) => (self.lab.expr(e, scope), e.span),
+                // Checked by itself, a workflow may have any value; a run needs one.
+                (None, None) if !self.to_run => (self.unknown_value(&ty, &p.name.text), p.name.span),
+                (None, None) => {
+                    self.lab.report(
+                        Diagnostic::error(
+                            codes::MISSING_FIELD,
+                            p.name.span,
+                            format!("`{}` has no value", p.name.text),
+                            "no default",
+                        )
+                        .help(format!("give it with `--set {}=...`, or add a default `= ...`", p.name.text)),
+                    );
+                    (Value::Error, p.name.span)
+                }
+            };
+            let v = self.lab.coerce(value, &ty, span, &p.name.text);
+            let v = match v {
+                Value::Num(n) => {
+                    if let (Some(unit), Some(si)) = (&n.unit, self.lab.graph.constant(n.node)) {
+                        shown.push((p.name.text.clone(), unit.show(si)));
+                    } else if let Some(si) = self.lab.graph.constant(n.node) {
+                        shown.push((p.name.text.clone(), matterix_ir::quantity::show_number(si)));
+                    }
+                    Value::Num(self.lab.name_param(&p.name.text, n, span))
+                }
+                other => other,
+            };
+            scope.bind(p.name.text.clone(), v);
+        }
+        shown
+    }
+}
+
+/// The part of a statement that names it: without its block.
+fn head(s: &Stmt) -> Span {
+    let until = |body: Span| Span { end: body.start.max(s.span.start), ..s.span };
+    match &s.kind {
+        StmtKind::Step { body, .. }
+        | StmtKind::Repeat { body, .. }
+        | StmtKind::RepeatWhile { body, .. }
+        | StmtKind::For { body, .. }
+        | StmtKind::Within { body, .. }
+        | StmtKind::Keep { body, .. }
+        | StmtKind::Claim { body, .. }
+        | StmtKind::Sequence { body, .. }
+        | StmtKind::Parallel { body, .. }
+        | StmtKind::Start { body, .. } => until(body.span),
+        StmtKind::If { then, .. } => until(then.span),
+        StmtKind::Try { alternatives, .. } => alternatives.first().map_or(s.span, |b| until(b.span)),
+        StmtKind::WaitUntil { timeout, cond, .. } => {
+            Span { end: timeout.as_ref().map_or(cond.span.end, |t| t.span.end), ..s.span }
+        }
+        StmtKind::Hold { timeout, duration, .. } => {
+            Span { end: timeout.as_ref().map_or(duration.span.end, |t| t.span.end), ..s.span }
+        }
+        _ => s.span,
+    }
+}
+
+/// The parts of an `and`.
+fn conjuncts<'a>(e: &'a Expr, out: &mut Vec<&'a Expr>) {
+    match &*e.kind {
+        ExprKind::Binary(Binary::And, a, b) => {
+            conjuncts(a, out);
+            conjuncts(b, out);
+        }
+        _ => out.push(e),
+    }
+}

@@ -1,0 +1,351 @@
+//! Modules, declarations and scopes: which item a name stands for.
+
+pub mod near;
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
+
+use crate::ast::{self, Item, ItemKind, Name};
+use crate::library;
+use crate::loader::Loader;
+
+/// A module: one file.
+#[derive(Debug)]
+pub struct Module {
+    /// `std::thermal`, `sn1`; the file that is compiled has the empty name.
+    pub name: String,
+    /// Its file.
+    pub file: FileId,
+    /// Its tree.
+    pub tree: ast::File,
+}
+
+impl Module {
+    /// Whether it is part of the standard library.
+    pub fn is_library(&self) -> bool {
+        self.name.starts_with("std::")
+    }
+}
+
+/// A declaration, by its index in [`Names`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DeclId(pub u32);
+
+/// An item that has a name.
+#[derive(Clone, Copy, Debug)]
+pub struct Decl<'a> {
+    /// Index of its module.
+    pub module: usize,
+    /// The item.
+    pub item: &'a Item,
+}
+
+/// All declarations and what each module's text sees of them.
+#[derive(Debug)]
+pub struct Names<'a> {
+    /// All modules.
+    pub modules: &'a [Module],
+    /// All named items.
+    pub decls: Vec<Decl<'a>>,
+    scopes: Vec<BTreeMap<String, DeclId>>,
+    own: Vec<BTreeMap<String, DeclId>>,
+}
+
+/// Parses the root file and everything it imports; the library comes first.
+pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Module>, Vec<Diagnostic>) {
+    let (mut modules, mut diagnostics, mut read) = library_and(sources, root);
+    let mut queue = vec![(String::new(), root)];
+    while let Some((name, file)) = queue.pop() {
+        let (tree, found) = read.take().unwrap_or_else(|| {
+            let text = sources.get(file).map(|s| s.text.clone()).unwrap_or_default();
+            crate::syntax::parse(file, &text)
+        });
+        diagnostics.extend(found);
+        for item in &tree.items {
+            let ItemKind::Use { path, names } = &item.kind else { continue };
+            let known = |m: &str, modules: &[Module], queue: &[(String, FileId)]| {
+                modules.iter().any(|x| x.name == m) || queue.iter().any(|x| x.0 == m)
+            };
+            if path.segments[0].text == "std" {
+                continue;
+            }
+            let found = module_candidates(path, names.is_some()).into_iter().find_map(|module| {
+                if known(&module, &modules, &queue) || module == name {
+                    return Some(None);
+                }
+                loader.load(file, &module).map(|(display, text)| Some((module, sources.add(display, text))))
+            });
+            match found {
+                Some(Some(new)) => queue.push(new),
+                Some(None) => {}
+                None => {
+                    let module = module_candidates(path, names.is_some()).swap_remove(0);
+                    diagnostics.push(
+                        Diagnostic::error(
+                            codes::UNKNOWN_MODULE,
+                            path.span,
+                            format!("there is no module `{module}`"),
+                            "imported here",
+                        )
+                        .help(format!("a module is a file: `{}.mtx` beside this one", module.replace("::", "/"))),
+                    );
+                }
+            }
+        }
+        modules.push(Module { name, file, tree });
+    }
+    (modules, diagnostics)
+}
+
+/// A tree and what is wrong with its text.
+type Read = (ast::File, Vec<Diagnostic>);
+
+/// The library's modules, their findings, and the root file. They are read side by side: reading the library takes most
+/// of the time of a check of a small file.
+fn library_and(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, Option<Read>) {
+    let files: Vec<FileId> = library::MODULES.iter().map(|(name, text)| sources.add(*name, *text)).collect();
+    let library = library::MODULES.iter().zip(&files).map(|((_, text), file)| (*file, *text));
+    let root = sources.get(root).map(|s| (root, s.text.as_str()));
+    let texts: Vec<(FileId, &str)> = library.chain(root).collect();
+    let read: Vec<OnceLock<Read>> = texts.iter().map(|_| OnceLock::new()).collect();
+    // The longest first, so that all are ready at about the same time.
+    let mut order: Vec<usize> = (0..texts.len()).collect();
+    order.sort_by_key(|i| std::cmp::Reverse(texts[*i].1.len()));
+    let next = AtomicUsize::new(0);
+    let work = || {
+        while let Some(&i) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let (file, text) = texts[i];
+            read[i].get_or_init(|| crate::syntax::parse(file, text));
+        }
+    };
+    let helpers = std::thread::available_parallelism().map_or(1, usize::from).min(READERS) - 1;
+    std::thread::scope(|scope| {
+        for _ in 0..helpers {
+            // Where there is no thread to be had, this one does the work.
+            let _ = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
+        }
+        work();
+    });
+    let mut read = read
+        .into_iter()
+        .zip(&texts)
+        .map(|(read, (file, text))| read.into_inner().unwrap_or_else(|| crate::syntax::parse(*file, text)));
+    let mut modules = Vec::new();
+    let mut diagnostics = Vec::new();
+    for (((name, _), file), (tree, found)) in library::MODULES.iter().zip(files).zip(read.by_ref()) {
+        diagnostics.extend(found);
+        modules.push(Module { name: (*name).to_string(), file, tree });
+    }
+    (modules, diagnostics, read.next())
+}
+
+/// More threads than this do not read the library any faster: one module is a third of it.
+const READERS: usize = 4;
+
+/// Bytes of stack of a thread: what the main one has.
+pub(crate) const STACK: usize = 8 << 20;
+
+/// Module paths a `use` may mean: with braces the path, without them the path or the path less its last segment.
+fn module_candidates(path: &ast::Path, braces: bool) -> Vec<String> {
+    let join = |n: usize| path.segments[..n].iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
+    let n = path.segments.len();
+    if braces || n == 1 { vec![join(n)] } else { vec![join(n - 1), join(n)] }
+}
+
+/// The name an item is found by: its own, or the words of a skill's verb.
+pub fn item_name(item: &Item) -> Option<(String, Span)> {
+    let of = |n: &Name| Some((n.text.clone(), n.span));
+    match &item.kind {
+        ItemKind::Species { name, .. }
+        | ItemKind::Solution { name, .. }
+        | ItemKind::Reaction { name, .. }
+        | ItemKind::Capability { name, .. }
+        | ItemKind::Asset { name, .. }
+        | ItemKind::Relation { name, .. }
+        | ItemKind::Fn { name, .. }
+        | ItemKind::Const { name, .. }
+        | ItemKind::Driver { name, .. }
+        | ItemKind::Lab { name, .. }
+        | ItemKind::Workflow { name, .. }
+        | ItemKind::Study { name, .. }
+        | ItemKind::Fit { name, .. }
+        | ItemKind::Test { name, .. } => of(name),
+        ItemKind::Process(p) => of(&p.name),
+        ItemKind::Event(e) => of(&e.name),
+        ItemKind::Skill { sig, .. } => Some((verb_text(&sig.verb), sig.span)),
+        ItemKind::Error | ItemKind::Use { .. } | ItemKind::Dimension { .. } | ItemKind::Unit { .. } => None,
+    }
+}
+
+/// The words of a verb, joined by blanks.
+pub fn verb_text(words: &[Name]) -> String {
+    words.iter().map(|w| w.text.as_str()).collect::<Vec<_>>().join(" ")
+}
+
+impl<'a> Names<'a> {
+    /// Collects the declarations of all modules and resolves their imports.
+    pub fn new(modules: &'a [Module]) -> (Self, Vec<Diagnostic>) {
+        let mut names = Names { modules, decls: Vec::new(), scopes: Vec::new(), own: Vec::new() };
+        let mut diagnostics = Vec::new();
+        for (index, module) in modules.iter().enumerate() {
+            let own = names.collect(index, module, &mut diagnostics);
+            names.own.push(own);
+        }
+        let prelude = names.prelude();
+        for (index, module) in modules.iter().enumerate() {
+            let mut scope = prelude.clone();
+            names.import(module, &mut scope, &mut diagnostics);
+            scope.extend(names.own[index].iter().map(|(k, v)| (k.clone(), *v)));
+            names.scopes.push(scope);
+        }
+        (names, diagnostics)
+    }
+
+    fn collect(
+        &mut self,
+        index: usize,
+        module: &'a Module,
+        diagnostics: &mut Vec<Diagnostic>,
+    ) -> BTreeMap<String, DeclId> {
+        let mut own: BTreeMap<String, DeclId> = BTreeMap::new();
+        for item in &module.tree.items {
+            let Some((name, span)) = item_name(item) else { continue };
+            let id = DeclId(self.decls.len() as u32);
+            self.decls.push(Decl { module: index, item });
+            if let Some(first) = own.insert(name.clone(), id) {
+                let first_span = item_name(self.decl(first).item).map_or(span, |n| n.1);
+                own.insert(name.clone(), first);
+                diagnostics.push(
+                    Diagnostic::error(
+                        codes::DUPLICATE_NAME,
+                        span,
+                        format!("`{name}` is declared twice"),
+                        "declared again here",
+                    )
+                    .because(first_span, "first declared here")
+                    .help("give one of them another name"),
+                );
+            }
+        }
+        own
+    }
+
+    fn module_index(&self, name: &str) -> Option<usize> {
+        self.modules.iter().position(|m| m.name == name)
+    }
+
+    fn prelude(&self) -> BTreeMap<String, DeclId> {
+        let mut scope = BTreeMap::new();
+        let Some(prelude) = self.module_index("std::prelude") else { return scope };
+        for item in &self.modules[prelude].tree.items {
+            let ItemKind::Use { path, .. } = &item.kind else { continue };
+            let name = path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
+            if let Some(module) = self.module_index(&name) {
+                scope.extend(self.own[module].iter().map(|(k, v)| (k.clone(), *v)));
+            }
+        }
+        scope
+    }
+
+    fn import(&self, module: &Module, scope: &mut BTreeMap<String, DeclId>, diagnostics: &mut Vec<Diagnostic>) {
+        for item in &module.tree.items {
+            let ItemKind::Use { path, names } = &item.kind else { continue };
+            let candidates = module_candidates(path, names.is_some());
+            let Some((position, from)) =
+                candidates.iter().enumerate().find_map(|(i, c)| self.module_index(c).map(|m| (i, m)))
+            else {
+                if path.segments[0].text == "std" {
+                    let near = near::nearest(&candidates[0], self.modules.iter().map(|m| &m.name));
+                    let headline = format!("there is no module `{}`", candidates[0]);
+                    let mut d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
+                    d.help.extend(near::question(&near));
+                    diagnostics.push(d);
+                }
+                continue;
+            };
+            let last = path.segments.last().into_iter().collect::<Vec<_>>();
+            let wanted: Vec<&Name> = match names {
+                Some(list) => list.iter().collect(),
+                None if position == 0 && candidates.len() > 1 => last,
+                None => {
+                    scope.extend(self.own[from].iter().map(|(k, v)| (k.clone(), *v)));
+                    continue;
+                }
+            };
+            for name in wanted {
+                match self.own[from].get(&name.text) {
+                    Some(&id) => {
+                        scope.insert(name.text.clone(), id);
+                    }
+                    None => diagnostics.push(self.not_in_module(name, from)),
+                }
+            }
+        }
+    }
+
+    fn not_in_module(&self, name: &Name, module: usize) -> Diagnostic {
+        let from = &self.modules[module].name;
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_NAME,
+            name.span,
+            format!("`{from}` declares no `{}`", name.text),
+            "not found",
+        );
+        let near = near::nearest(&name.text, self.own[module].keys());
+        d.help.extend(near::question(&near));
+        if let Some(best) = near.first() {
+            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+        } else if let Some(other) = self.declared_in(&name.text) {
+            d.help.push(format!("`{}` is declared in `{other}`", name.text));
+        }
+        d
+    }
+
+    /// The declaration.
+    pub fn decl(&self, id: DeclId) -> Decl<'a> {
+        self.decls[id.0 as usize]
+    }
+
+    /// What `name` stands for in a module.
+    pub fn lookup(&self, module: usize, name: &str) -> Option<DeclId> {
+        self.scopes[module].get(name).copied()
+    }
+
+    /// Everything a module sees.
+    pub fn visible(&self, module: usize) -> impl Iterator<Item = (&str, DeclId)> {
+        self.scopes[module].iter().map(|(k, v)| (k.as_str(), *v))
+    }
+
+    /// What a module itself declares, in the order of its text.
+    pub fn declared_by(&self, module: usize) -> impl Iterator<Item = DeclId> + '_ {
+        self.decls.iter().enumerate().filter(move |(_, d)| d.module == module).map(|(i, _)| DeclId(i as u32))
+    }
+
+    /// The library module that declares a name, for help.
+    pub fn declared_in(&self, name: &str) -> Option<&str> {
+        (0..self.modules.len()).find(|&m| self.own[m].contains_key(name)).map(|m| self.modules[m].name.as_str())
+    }
+
+    /// A name that nothing visible has, with suggestions among what `fits`.
+    pub fn unknown(&self, module: usize, name: &Name, what: &str, fits: impl Fn(&ItemKind) -> bool) -> Diagnostic {
+        let candidates = self.visible(module).filter(|(_, id)| fits(&self.decl(*id).item.kind)).map(|(n, _)| n);
+        let near = near::nearest(&name.text, candidates);
+        let mut d = Diagnostic::error(
+            codes::UNKNOWN_NAME,
+            name.span,
+            format!("there is no {what} `{}`", name.text),
+            "not declared",
+        );
+        let import = self.declared_in(&name.text).filter(|m| !m.is_empty());
+        if let Some(module) = import {
+            d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", name.text));
+        } else if let Some(best) = near.first() {
+            d.help.extend(near::question(&near));
+            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+        }
+        d
+    }
+}

@@ -1,0 +1,515 @@
+//! The whole front end: from a file to a program.
+
+use matterix_ir::model::{Content, Mixture, Model, Observable};
+use matterix_ir::program::PROGRAM_VERSION;
+use matterix_ir::scene::{Frame, InstanceId, Pose, Scene, Shape};
+use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
+
+use crate::ast::{AssetLine, Expr, ExprKind, FieldValue, ItemKind, MemberKind, Role};
+use crate::check as checks;
+use crate::elaborate::reach::Reach;
+use crate::elaborate::{Elaborator, Tables};
+use crate::eval::{Num, Type, Value};
+use crate::loader::Loader;
+use crate::lower::Planner;
+use crate::names::{self, DeclId, Module, Names, near};
+
+/// What a compilation is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Which workflow; may be left out where the file has one.
+    pub workflow: Option<String>,
+    /// Values of parameters as text: `("target", "40 degC")`.
+    pub set: Vec<(String, String)>,
+}
+
+/// Checks a file: everything it declares, and every workflow in its lab.
+pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
+    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (names, found) = Names::new(&modules);
+    diagnostics.extend(found);
+    let (tables, found) = Tables::new(&names);
+    diagnostics.extend(found);
+    let root = modules.len() - 1;
+    let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
+    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let workflows: Vec<DeclId> =
+        names.declared_by(root).filter(|id| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. })).collect();
+    let mut starts = Vec::new();
+    for built in judge(&tables, sources, &workflows) {
+        diagnostics.extend(built.findings);
+        starts.extend(built.starts);
+    }
+    if starts.len() == workflows.len() {
+        diagnostics.extend(checks::never_starts(&tables, root, &starts));
+    }
+    if workflows.is_empty() {
+        for id in names.declared_by(root) {
+            if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
+                diagnostics.extend(checks::lab(&tables, id));
+            }
+        }
+    }
+    finish(diagnostics, sources)
+}
+
+/// Compiles one workflow of a file; no program where there is an error.
+pub fn compile(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+) -> (Option<Program>, Vec<Diagnostic>) {
+    let (mut modules, mut diagnostics) = names::load(sources, file, loader);
+    let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
+    let set = argument_modules(sources, options, &mut modules, &mut diagnostics);
+    let (names, found) = Names::new(&modules);
+    diagnostics.extend(found);
+    let (tables, found) = Tables::new(&names);
+    diagnostics.extend(found);
+    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let Some(id) = choose_workflow(&names, root, file, options, &mut diagnostics) else {
+        return (None, finish(diagnostics, sources));
+    };
+    let arguments = arguments(&names, id, &set, &mut diagnostics);
+    let built = build(&tables, sources, id, &arguments, true);
+    diagnostics.extend(built.findings);
+    // A reaction may be meant for another workflow of the file: `check` looks at them all.
+    if names.declared_by(root).filter(|id| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. })).count() == 1
+    {
+        diagnostics.extend(checks::never_starts(&tables, root, &built.starts.clone().into_iter().collect::<Vec<_>>()));
+    }
+    let diagnostics = finish(diagnostics, sources);
+    let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    (built.program.filter(|_| !failed), diagnostics)
+}
+
+/// Each finding once, in the order of the text, without those that only follow from others.
+fn finish(mut diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic> {
+    let mut out: Vec<Diagnostic> = Vec::new();
+    diagnostics.sort_by_key(Diagnostic::span);
+    for d in diagnostics {
+        let same = |o: &Diagnostic| o.code == d.code && o.span() == d.span() && o.headline == d.headline;
+        if !out.iter().rev().take(64).any(same) {
+            out.push(d);
+        }
+    }
+    checks::without_consequences(out, sources)
+}
+
+/// `--set name=value` as a module of one constant, so that its value is read like any other.
+fn argument_modules(
+    sources: &mut Sources,
+    options: &Options,
+    modules: &mut Vec<Module>,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<(String, usize)> {
+    let mut out = Vec::new();
+    for (name, value) in &options.set {
+        let text = format!("mtx 1\nconst value = {value}\n");
+        let file = sources.add(format!("--set {name}"), text.clone());
+        let (tree, found) = crate::syntax::parse(file, &text);
+        diagnostics.extend(found);
+        out.push((name.clone(), modules.len()));
+        modules.push(Module { name: format!("--set {name}"), file, tree });
+    }
+    out
+}
+
+fn arguments(
+    names: &Names<'_>,
+    workflow: DeclId,
+    set: &[(String, usize)],
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<(String, DeclId)> {
+    let ItemKind::Workflow { params, name, .. } = &names.decl(workflow).item.kind else { return Vec::new() };
+    let mut out = Vec::new();
+    for (key, module) in set {
+        if !params.iter().any(|p| p.name.text == *key) {
+            let near = near::nearest(key, params.iter().map(|p| &p.name.text));
+            let mut d = Diagnostic::error(
+                codes::UNKNOWN_PARAMETER,
+                name.span,
+                format!("`{}` has no parameter `{key}`", name.text),
+                "this workflow",
+            );
+            d.help.extend(near::question(&near));
+            diagnostics.push(d);
+            continue;
+        }
+        out.extend(names.declared_by(*module).next().map(|id| (key.clone(), id)));
+    }
+    out
+}
+
+fn choose_workflow(
+    names: &Names<'_>,
+    root: usize,
+    file: FileId,
+    options: &Options,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<DeclId> {
+    let all: Vec<(String, DeclId, Span)> = names
+        .declared_by(root)
+        .filter_map(|id| match &names.decl(id).item.kind {
+            ItemKind::Workflow { name, .. } => Some((name.text.clone(), id, name.span)),
+            _ => None,
+        })
+        .collect();
+    let top = Span::new(file, 0, 0);
+    match (&options.workflow, all.as_slice()) {
+        (Some(wanted), _) => {
+            if let Some((_, id, _)) = all.iter().find(|w| w.0 == *wanted) {
+                return Some(*id);
+            }
+            let near = near::nearest(wanted, all.iter().map(|w| &w.0));
+            let list: Vec<String> = all.iter().map(|w| format!("`{}`", w.0)).collect();
+            let mut d = Diagnostic::error(
+                codes::NO_WORKFLOW,
+                top,
+                format!("there is no workflow `{wanted}` in this file"),
+                "asked for with `--workflow`",
+            );
+            d.help.extend(near::question(&near));
+            if near.is_empty() && !list.is_empty() {
+                d = d.help(format!("it has {}", list.join(", ")));
+            }
+            diagnostics.push(d);
+            None
+        }
+        (None, [(_, id, _)]) => Some(*id),
+        (None, []) => {
+            let d = Diagnostic::error(codes::NO_WORKFLOW, top, "there is no workflow in this file", "nothing to run");
+            diagnostics.push(d.help("add `workflow NAME in LAB { ... }`"));
+            None
+        }
+        (None, many) => {
+            let list: Vec<String> = many.iter().map(|w| format!("`{}`", w.0)).collect();
+            let mut d = Diagnostic::error(
+                codes::NO_WORKFLOW,
+                many[0].2,
+                format!("this file has {} workflows: which one?", many.len()),
+                "one of them",
+            );
+            for w in &many[1..] {
+                d = d.because(w.2, "another");
+            }
+            diagnostics.push(d.help(format!("say which with `--workflow`: {}", list.join(", "))));
+            None
+        }
+    }
+}
+
+/// The lab a workflow runs in.
+fn lab_of(tables: &Tables<'_>, workflow: DeclId) -> Result<DeclId, Box<Diagnostic>> {
+    let decl = tables.names.decl(workflow);
+    let ItemKind::Workflow { lab, name, .. } = &decl.item.kind else {
+        return Err(Box::new(crate::eval::types::unsupported(decl.item.span, "such items")));
+    };
+    let Some(path) = lab else {
+        return Err(Box::new(crate::eval::types::unsupported(name.span, "workflows `in any lab`")));
+    };
+    let is_lab = |k: &ItemKind| matches!(k, ItemKind::Lab { .. });
+    let Some(word) = path.segments.last() else {
+        return Err(Box::new(crate::eval::types::unsupported(name.span, "workflows without a lab")));
+    };
+    match tables.names.lookup(decl.module, &word.text) {
+        Some(id) if is_lab(&tables.names.decl(id).item.kind) => Ok(id),
+        _ => Err(Box::new(tables.names.unknown(decl.module, word, "lab", is_lab))),
+    }
+}
+
+/// One workflow, built.
+struct Built {
+    program: Option<Program>,
+    findings: Vec<Diagnostic>,
+    starts: Option<checks::Starts>,
+}
+
+/// Findings of each workflow, in their order; workflows do not depend on each other, so all processors share them.
+fn judge(tables: &Tables<'_>, sources: &Sources, workflows: &[DeclId]) -> Vec<Built> {
+    let judge =
+        |ids: &[DeclId]| -> Vec<Built> { ids.iter().map(|id| build(tables, sources, *id, &[], false)).collect() };
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let share = workflows.len().div_ceil(processors).max(1);
+    let (own, others) = workflows.split_at(share.min(workflows.len()));
+    std::thread::scope(|scope| {
+        let start = |ids| {
+            let thread = std::thread::Builder::new().stack_size(names::STACK);
+            (ids, thread.spawn_scoped(scope, move || judge(ids)))
+        };
+        let running: Vec<_> = others.chunks(share).map(start).collect();
+        let mut built = judge(own);
+        for (ids, thread) in running {
+            // Where there is no thread to be had, this one does the work.
+            let done = thread.ok().and_then(|thread| thread.join().ok());
+            built.extend(done.unwrap_or_else(|| judge(ids)));
+        }
+        built
+    })
+}
+
+/// Elaborates the lab and lowers the workflow; first to learn what is moved where, then for good. A program comes
+/// of it only where it is `to_run`.
+fn build(
+    tables: &Tables<'_>,
+    sources: &Sources,
+    workflow: DeclId,
+    arguments: &[(String, DeclId)],
+    to_run: bool,
+) -> Built {
+    let lab = match lab_of(tables, workflow) {
+        Ok(lab) => lab,
+        Err(d) => return Built { program: None, findings: vec![*d], starts: None },
+    };
+    let mut reach = Reach::default();
+    loop {
+        let mut elaborator = Elaborator::new(tables, reach.clone());
+        elaborator.lab(lab);
+        let mut planner = Planner::new(&mut elaborator, sources);
+        planner.to_run = to_run;
+        let plan = planner.workflow(workflow, arguments);
+        elaborator.initialise();
+        elaborator.close_holds();
+        let events = elaborator.events();
+        elaborator.close_holds();
+        elaborator.processes();
+        let next = Reach::compute(&elaborator);
+        if next != reach {
+            reach = next;
+            continue;
+        }
+        let (derivatives, balances) = elaborator.close();
+        let observables = observables(&mut elaborator);
+        let starts = Some(checks::starts(&elaborator, lab));
+        checks::model(&mut elaborator);
+        checks::plan(&mut elaborator, &plan);
+        if !to_run {
+            return Built { program: None, findings: elaborator.diagnostics, starts };
+        }
+        let mixtures = mixtures(&elaborator, &observables);
+        let scene = scene(&mut elaborator, lab);
+        let model = Model {
+            params: elaborator.params,
+            states: elaborator.states,
+            derivatives,
+            processes: elaborator
+                .processes
+                .iter()
+                .map(|p| matterix_ir::model::Process { name: p.name.clone(), guard: p.guard, span: p.span })
+                .collect(),
+            events,
+            readings: elaborator.readings,
+            species: tables.species.iter().map(|(_, s)| species(s)).collect(),
+            mixtures,
+            observables: observables.into_iter().map(|o| o.2).collect(),
+            balances,
+            graph: elaborator.graph,
+        };
+        let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
+        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan };
+        return Built { program: Some(program), findings: elaborator.diagnostics, starts };
+    }
+}
+
+fn species(s: &crate::elaborate::species::SpeciesDef<'_>) -> matterix_ir::model::Species {
+    matterix_ir::model::Species {
+        name: s.name.clone(),
+        formula: s.formula.as_ref().map(ToString::to_string).unwrap_or_default(),
+        elements: s.formula.iter().flat_map(|f| f.elements.iter().map(|(e, n)| (e.to_string(), n.to_f64()))).collect(),
+        charge: s.formula.as_ref().map_or(0, |f| f.charge),
+        molar_mass: s.molar_mass,
+        by_mass: s.by_mass,
+        span: s.span,
+    }
+}
+
+/// What an observable is about: an instance and, for a concentration, the species.
+type Observed = (InstanceId, Option<crate::eval::SpeciesId>, Observable);
+
+/// Derived quantities that change in the run, and the concentrations of every mixture.
+fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
+    let mut out = Vec::new();
+    for i in 0..lab.instances.len() as u32 {
+        let id = InstanceId(i);
+        for m in lab.derived_members(id) {
+            let MemberKind::Value { role: Role::Derived, name, ty, options, .. } = &m.member.kind else { continue };
+            if options.iter().any(|o| o.name.text == "hidden") {
+                continue;
+            }
+            let ty = lab.resolve_type(ty, m.module);
+            let v = lab.member_value(id, m, name.span);
+            let value: Vec<_> = match &v {
+                Value::Num(Num { node, .. }) => vec![*node],
+                Value::Tuple(items) => items
+                    .iter()
+                    .filter_map(|i| match i {
+                        Value::Num(n) => Some(n.node),
+                        _ => None,
+                    })
+                    .collect(),
+                _ => continue,
+            };
+            let changes = value.iter().any(|n| lab.graph.depends(*n, |op| matches!(op, matterix_ir::Op::State(_))));
+            if !changes {
+                continue;
+            }
+            let unit = lab.declared_unit(options, &ty).unwrap_or_else(|| lab.type_unit(&ty));
+            let name = format!("{}.{}", lab.instances[i as usize].name, name.text);
+            out.push((id, None, Observable { name, value, unit }));
+        }
+        for s in lab.mixture_species(id) {
+            out.extend(concentration(lab, id, s).map(|o| (id, Some(s), o)));
+        }
+    }
+    out
+}
+
+/// The library's first concentration of a species: per mass of mixture, or a mass fraction where counted by mass.
+fn concentration(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::eval::SpeciesId) -> Option<Observable> {
+    let by_mass = lab.tables.species.get(s).by_mass;
+    let views = lab.views(id);
+    for (module, _, ty, value, _) in views {
+        let ty = lab.resolve_type(ty, module);
+        let Type::Quantity { dimension, .. } = &ty else { continue };
+        let amount = lab.tables.units.named("Amount");
+        if by_mass && amount.over(dimension).is_free_of(&amount) {
+            continue;
+        }
+        let probe =
+            Num { node: lab.graph.number(1.0), dimension: dimension.clone(), point: false, unit: None, literal: false };
+        let Value::Num(n) = lab.concentration(id, s, &probe, value.span)? else { return None };
+        let name = format!("{}[{}]", lab.instances[id.0 as usize].name, lab.tables.species.get(s).name);
+        return Some(Observable { name, value: vec![n.node], unit: lab.type_unit(&ty) });
+    }
+    None
+}
+
+fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
+    let mut out = Vec::new();
+    for i in 0..lab.instances.len() as u32 {
+        let id = InstanceId(i);
+        if lab.per_species(id).is_none() {
+            continue;
+        }
+        let mut extensive = Vec::new();
+        let mut contents = Vec::new();
+        for (key, state) in lab.extensive.iter().filter(|(k, _)| k.instance == id) {
+            let name = match key.species {
+                Some(s) => {
+                    contents.push(Content { species: s.0, state: *state });
+                    format!("{}[{}#{}]", key.member, lab.tables.species.get(s).name, s.0)
+                }
+                None => key.member.clone(),
+            };
+            extensive.push((name, *state));
+        }
+        extensive.sort();
+        contents.sort_by_key(|c: &Content| c.species);
+        let about = |wanted: bool| {
+            observables
+                .iter()
+                .enumerate()
+                .filter(move |(_, o)| o.0 == id && o.1.is_some() == wanted)
+                .map(|(i, _)| i as u32)
+        };
+        let concentrations = contents
+            .iter()
+            .filter_map(|c| {
+                observables.iter().position(|o| o.0 == id && o.1.map(|s| s.0) == Some(c.species)).map(|i| i as u32)
+            })
+            .collect();
+        out.push(Mixture { instance: id, extensive, contents, properties: about(false).collect(), concentrations });
+    }
+    out
+}
+
+fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
+    let ItemKind::Lab { name, .. } = &lab.tables.names.decl(decl).item.kind else { return Scene::default() };
+    let mut instances = Vec::new();
+    for i in 0..lab.instances.len() {
+        let id = InstanceId(i as u32);
+        let inst = &lab.instances[i];
+        let capabilities = {
+            let all = lab.ancestors_of(id);
+            all.into_iter()
+                .filter(|k| !lab.tables.kinds[k].is_asset)
+                .map(|k| lab.tables.kind_name(k).to_string())
+                .collect()
+        };
+        let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
+        let support = inst.placed.first().map(|p| p.1);
+        let (frames, shape) = geometry(lab, id);
+        instances.push(matterix_ir::scene::Instance {
+            name,
+            kind: lab.kind_names(id),
+            capabilities,
+            owner,
+            support,
+            pose,
+            frames,
+            shape,
+            span,
+        });
+    }
+    Scene { lab: name.text.clone(), instances }
+}
+
+/// Frames and shape of an asset, from its lines.
+fn geometry(lab: &mut Elaborator<'_>, id: InstanceId) -> (Vec<Frame>, Option<Shape>) {
+    let mut frames: Vec<Frame> = Vec::new();
+    let lines: Vec<(usize, &AssetLine)> = lab.instances[id.0 as usize]
+        .kinds
+        .iter()
+        .filter_map(|k| lab.tables.kinds.get(k))
+        .flat_map(|k| k.lines.iter().copied())
+        .collect();
+    for (_, line) in lines {
+        let AssetLine::Frame { name, at } = line else { continue };
+        if frames.iter().any(|f| f.name == name.text) {
+            continue;
+        }
+        if let Some(position) = lengths(lab, at).and_then(|v| <[f64; 3]>::try_from(v).ok()) {
+            frames.push(Frame { name: name.text.clone(), pose: Pose { position, rpy: [0.0; 3] } });
+        }
+    }
+    let shape = lab.instances[id.0 as usize].setting("shape").and_then(|(_, value, _)| match value {
+        FieldValue::Expr(e) => shape(lab, e),
+        _ => None,
+    });
+    (frames, shape)
+}
+
+fn shape(lab: &Elaborator<'_>, e: &Expr) -> Option<Shape> {
+    let ExprKind::Call(callee, args) = &*e.kind else { return None };
+    let ExprKind::Name(name) = &*callee.kind else { return None };
+    let values: Option<Vec<f64>> = args.iter().map(|a| length(lab, &a.value)).collect();
+    match (name.text.as_str(), values?.as_slice()) {
+        ("box", [x, y, z]) => Some(Shape::Box([*x, *y, *z])),
+        ("cylinder", [d, h]) => Some(Shape::Cylinder([*d, *h])),
+        _ => None,
+    }
+}
+
+fn length(lab: &Elaborator<'_>, e: &Expr) -> Option<f64> {
+    match &*e.kind {
+        ExprKind::Quantity(v, unit) => lab.tables.unit(&unit.text).ok().map(|u| u.unit.to_si(*v)),
+        _ => None,
+    }
+}
+
+fn lengths(lab: &Elaborator<'_>, e: &Expr) -> Option<Vec<f64>> {
+    let ExprKind::Tuple(items, Some(unit)) = &*e.kind else { return None };
+    let factor = lab.tables.unit(&unit.text).ok()?.unit.factor;
+    items
+        .iter()
+        .map(|i| match &*i.kind {
+            ExprKind::Number(v) => Some(v * factor),
+            ExprKind::Unary(crate::ast::Unary::Neg, inner) => match &*inner.kind {
+                ExprKind::Number(v) => Some(-v * factor),
+                _ => None,
+            },
+            _ => None,
+        })
+        .collect()
+}
