@@ -1,0 +1,237 @@
+//! What each operation of the graph is for the length of one segment: a constant, or something that varies.
+//!
+//! Within a segment comparisons keep the truth they had at its start. Whatever follows from them, from parameters and
+//! from states at rest is a constant then; the rest is put on a [`Tape`].
+
+use std::collections::BTreeMap;
+
+use matterix_ir::graph::{Env, eval_op};
+use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
+
+use super::tape::{Step, Tape};
+
+/// What one operation is for the length of a segment.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fact {
+    /// Its value at the start of the segment.
+    now: f64,
+    /// Whether its value changes within the segment.
+    varies: bool,
+    /// Whether time stands anywhere below it.
+    feels_time: bool,
+    /// Whether a moving state stands anywhere below it.
+    feels_state: bool,
+    /// The operation whose value it passes on, itself if none.
+    same: u32,
+}
+
+/// A number that follows time and nothing else: `rate * time + offset`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Clock {
+    pub(super) rate: f64,
+    pub(super) offset: f64,
+}
+
+/// The facts about the operations of one schedule.
+#[derive(Debug)]
+pub(super) struct Analysis<'g> {
+    graph: &'g Graph,
+    facts: Vec<Fact>,
+}
+
+impl<'g> Analysis<'g> {
+    /// Looks at `schedule` (operands first) at the instant `env`, when the states marked in `moving` change with time.
+    pub(super) fn new(graph: &'g Graph, schedule: &[NodeId], env: Env<'_>, moving: &[bool]) -> Self {
+        let mut analysis =
+            Analysis { graph, facts: vec![Fact::default(); schedule.last().map_or(0, |n| n.0 as usize + 1)] };
+        for &node in schedule {
+            analysis.facts[node.0 as usize] = analysis.look(node, env, moving);
+        }
+        analysis
+    }
+
+    fn fact(&self, node: NodeId) -> Fact {
+        self.facts[node.0 as usize]
+    }
+
+    fn look(&self, node: NodeId, env: Env<'_>, moving: &[bool]) -> Fact {
+        let op = self.graph.op(node);
+        let mut list = [Fact::default(); 3];
+        let mut count = 0;
+        for operand in op.operands() {
+            list[count] = self.fact(operand);
+            count += 1;
+        }
+        let operands = &list[..count];
+        let mut fact = Fact {
+            now: 0.0,
+            varies: operands.iter().any(|f| f.varies),
+            feels_time: operands.iter().any(|f| f.feels_time),
+            feels_state: operands.iter().any(|f| f.feels_state),
+            same: node.0,
+        };
+        match op {
+            Op::Time => (fact.varies, fact.feels_time) = (true, true),
+            Op::State(s) if moving[s as usize] => (fact.varies, fact.feels_state) = (true, true),
+            _ if op.is_comparison() => fact.varies = false,
+            Op::Binary(kind, ..) if decided(kind, operands) => fact.varies = false,
+            _ => {}
+        }
+        if let Some(other) = self.passes_on(op) {
+            let other = self.fact(other);
+            (fact.now, fact.varies, fact.same) = (other.now, other.varies, other.same);
+            return fact;
+        }
+        fact.now = match (op, operands) {
+            (Op::Unary(..), [a]) => eval_op(renumbered(op), env, &[a.now]),
+            (Op::Binary(BinaryOp::Mul, ..), list) if !fact.varies && list.iter().any(|f| f.varies) => 0.0,
+            (Op::Binary(..), [a, b]) => eval_op(renumbered(op), env, &[a.now, b.now]),
+            (Op::Select(..), [a, b, c]) => eval_op(renumbered(op), env, &[a.now, b.now, c.now]),
+            _ => eval_op(op, env, &[]),
+        };
+        fact
+    }
+
+    /// The operand whose value this operation has throughout the segment.
+    fn passes_on(&self, op: Op) -> Option<NodeId> {
+        let is = |n: NodeId, v: f64| !self.fact(n).varies && self.fact(n).now == v;
+        match op {
+            Op::Select(c, a, b) if !self.fact(c).varies => Some(if self.fact(c).now != 0.0 { a } else { b }),
+            Op::Binary(BinaryOp::Add | BinaryOp::Sub, a, b) if is(b, 0.0) => Some(a),
+            Op::Binary(BinaryOp::Add, a, b) if is(a, 0.0) => Some(b),
+            Op::Binary(BinaryOp::Mul | BinaryOp::Div, a, b) if is(b, 1.0) => Some(a),
+            Op::Binary(BinaryOp::Mul, a, b) if is(a, 1.0) => Some(b),
+            _ => None,
+        }
+    }
+
+    /// The value at the start of the segment.
+    pub(super) fn now(&self, node: NodeId) -> f64 {
+        self.fact(node).now
+    }
+
+    /// Whether the value is 0 throughout the segment.
+    pub(super) fn is_zero(&self, node: NodeId) -> bool {
+        !self.fact(node).varies && self.fact(node).now == 0.0
+    }
+
+    /// Whether a moving state stands below it.
+    pub(super) fn feels_state(&self, node: NodeId) -> bool {
+        self.fact(node).feels_state
+    }
+
+    /// The comparisons that may change and whose change `roots` would notice, in order.
+    pub(super) fn switches(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
+        let mut reached = vec![false; self.facts.len()];
+        let mut todo: Vec<NodeId> = roots.into_iter().collect();
+        while let Some(node) = todo.pop() {
+            let fact = self.fact(node);
+            if reached[node.0 as usize] || !(fact.feels_time || fact.feels_state) {
+                continue;
+            }
+            reached[node.0 as usize] = true;
+            self.influences(node, &mut todo);
+        }
+        let found = (0..reached.len()).filter(|&i| reached[i]).map(|i| NodeId(i as u32));
+        found.filter(|&n| self.graph.op(n).is_comparison()).collect()
+    }
+
+    /// The operands that can change `node` while the others stay: what a false condition hides is left out.
+    fn influences(&self, node: NodeId, out: &mut Vec<NodeId>) {
+        match self.graph.op(node) {
+            Op::Select(c, a, b) if !self.fact(c).varies => out.extend([c, if self.now(c) != 0.0 { a } else { b }]),
+            Op::Binary(kind, a, _) if decided(kind, &[self.fact(a)]) => out.push(a),
+            Op::Binary(kind, _, b) if decided(kind, &[self.fact(b)]) => out.push(b),
+            op => out.extend(op.operands()),
+        }
+    }
+
+    /// The number as a clock, if it is one.
+    pub(super) fn clock(&self, node: NodeId) -> Option<Clock> {
+        if !self.fact(node).varies {
+            return Some(Clock { rate: 0.0, offset: self.now(node) });
+        }
+        let node = NodeId(self.fact(node).same);
+        match self.graph.op(node) {
+            Op::Time => Some(Clock { rate: 1.0, offset: 0.0 }),
+            Op::Unary(UnaryOp::Neg, a) => self.clock(a).map(|c| Clock { rate: -c.rate, offset: -c.offset }),
+            Op::Binary(BinaryOp::Add, a, b) => {
+                let (a, b) = (self.clock(a)?, self.clock(b)?);
+                Some(Clock { rate: a.rate + b.rate, offset: a.offset + b.offset })
+            }
+            Op::Binary(BinaryOp::Sub, a, b) => {
+                let (a, b) = (self.clock(a)?, self.clock(b)?);
+                Some(Clock { rate: a.rate - b.rate, offset: a.offset - b.offset })
+            }
+            _ => None,
+        }
+    }
+
+    /// The tape that computes `outputs`; `moving` lists the moving states in the order of its inputs.
+    pub(super) fn tape(&self, outputs: &[NodeId], moving: &[u32]) -> Tape {
+        let same = |n: NodeId| self.fact(n).same as usize;
+        let mut needed = vec![false; self.facts.len()];
+        for &output in outputs {
+            needed[same(output)] = true;
+        }
+        for i in (0..needed.len()).rev() {
+            if needed[i] && self.facts[i].varies {
+                for operand in self.graph.op(NodeId(i as u32)).operands() {
+                    needed[same(operand)] = true;
+                }
+            }
+        }
+        let mut tape = Tape { inputs: moving.len(), ..Tape::default() };
+        let mut place = vec![0u32; self.facts.len()];
+        let mut known = BTreeMap::new();
+        for i in (0..needed.len()).filter(|&i| needed[i] && !self.facts[i].varies) {
+            place[i] = *known.entry(self.facts[i].now.to_bits()).or_insert_with(|| {
+                tape.constants.push(self.facts[i].now);
+                tape.constants.len() as u32 - 1
+            });
+        }
+        for i in (0..needed.len()).filter(|&i| needed[i] && self.facts[i].varies) {
+            let at = |n: NodeId| place[same(n)];
+            let step = match self.graph.op(NodeId(i as u32)) {
+                Op::Unary(op, a) => Step::Unary(op, at(a)),
+                Op::Binary(op, a, b) => Step::Binary(op, at(a), at(b)),
+                Op::Select(c, a, b) => Step::Select(at(c), at(a), at(b)),
+                Op::State(s) => {
+                    let position = moving.partition_point(|&m| m < s);
+                    place[i] = (tape.time() + 1 + position) as u32;
+                    continue;
+                }
+                _ => {
+                    place[i] = tape.time() as u32;
+                    continue;
+                }
+            };
+            place[i] = (tape.first_result() + tape.steps.len()) as u32;
+            tape.steps.push(step);
+        }
+        tape.outputs = outputs.iter().map(|&n| place[same(n)]).collect();
+        tape
+    }
+}
+
+/// Whether one of the operands alone settles the result for the segment.
+fn decided(kind: BinaryOp, operands: &[Fact]) -> bool {
+    operands.iter().any(|f| {
+        !f.varies
+            && match kind {
+                BinaryOp::And | BinaryOp::Mul => f.now == 0.0,
+                BinaryOp::Or => f.now != 0.0,
+                _ => false,
+            }
+    })
+}
+
+/// The same operation on operands 0, 1, 2.
+fn renumbered(op: Op) -> Op {
+    match op {
+        Op::Unary(o, _) => Op::Unary(o, NodeId(0)),
+        Op::Binary(o, ..) => Op::Binary(o, NodeId(0), NodeId(1)),
+        Op::Select(..) => Op::Select(NodeId(0), NodeId(1), NodeId(2)),
+        leaf => leaf,
+    }
+}

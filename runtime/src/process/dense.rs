@@ -1,0 +1,68 @@
+//! The solution between two times, as a polynomial.
+
+/// Degree of the polynomial: that of the integrator's highest order.
+const DEGREE: usize = 5;
+
+/// Where the polynomial is sampled, as fractions of the interval: Chebyshev points with both ends, `(1 - cos(k pi / 5)) / 2`.
+const POINTS: [f64; DEGREE + 1] =
+    [0.0, 0.095_491_502_812_526_27, 0.345_491_502_812_526_3, 0.654_508_497_187_473_7, 0.904_508_497_187_473_7, 1.0];
+
+/// Barycentric weights of [`POINTS`].
+const WEIGHTS: [f64; DEGREE + 1] = [0.5, -1.0, 1.0, -1.0, 1.0, -0.5];
+
+/// The moving states from `start` to `end`.
+#[derive(Clone, Debug)]
+pub(super) struct Dense {
+    pub(super) start: f64,
+    pub(super) end: f64,
+    values: [Vec<f64>; DEGREE + 1],
+}
+
+impl Dense {
+    /// An empty interval at `time`.
+    pub(super) fn still(time: f64, states: &[f64]) -> Self {
+        Dense { start: time, end: time, values: std::array::from_fn(|_| states.to_vec()) }
+    }
+
+    /// Moves on to the interval from the old end to `end`, filling in the states there by `sample`. The old end stays a
+    /// point of the new polynomial, so that the solution is continuous.
+    pub(super) fn extend<E>(
+        &mut self,
+        end: f64,
+        mut sample: impl FnMut(f64, &mut [f64]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.values.swap(0, DEGREE);
+        (self.start, self.end) = (self.end, end);
+        for k in 1..=DEGREE {
+            sample(self.time(k), &mut self.values[k])?;
+        }
+        Ok(())
+    }
+
+    fn time(&self, k: usize) -> f64 {
+        if k == DEGREE { self.end } else { self.start + POINTS[k] * (self.end - self.start) }
+    }
+
+    /// The inner sampling times, in order.
+    pub(super) fn times(&self) -> impl Iterator<Item = f64> + '_ {
+        (1..DEGREE).map(|k| self.time(k))
+    }
+
+    /// The moving states at `time`, s, within the interval.
+    pub(super) fn at(&self, time: f64, out: &mut [f64]) {
+        if let Some(k) = (0..=DEGREE).rev().find(|&k| self.time(k) == time) {
+            out.copy_from_slice(&self.values[k]);
+            return;
+        }
+        let place = (time - self.start) / (self.end - self.start);
+        let mut shares = [0.0; DEGREE + 1];
+        let mut sum = 0.0;
+        for k in 0..=DEGREE {
+            shares[k] = WEIGHTS[k] / (place - POINTS[k]);
+            sum += shares[k];
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = (0..=DEGREE).map(|k| shares[k] * self.values[k][i]).sum::<f64>() / sum;
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! What happens at one instant: actions, events, processes that begin and cease.
+
+use matterix_ir::model::Action;
+use matterix_ir::{NodeId, Span, codes};
+
+use super::{Engine, Observer};
+use crate::fault::Fault;
+use crate::ledger::{Refusal, transfer};
+
+/// So many crossings within [`CHATTER_TIME`] are a fault.
+const CHATTER: usize = 1000;
+
+/// A lab device does not switch a thousand times in this time, s.
+const CHATTER_TIME: f64 = 1e-3;
+
+impl Engine<'_> {
+    /// Fires the events that became true, each time the first in source order, until none is left; then reports the
+    /// processes that began or ceased. The law is looked at anew afterwards. `cause` is shown where a balance breaks.
+    pub(super) fn settle(&mut self, cause: Option<Span>, observer: &mut dyn Observer) -> Result<(), Fault> {
+        let mut fired = 0;
+        while let Some(event) = self.next_event() {
+            fired += 1;
+            if fired > self.options.max_events_per_instant {
+                return Err(self.cascade(event));
+            }
+            self.show(observer);
+            observer.event(self.time, event);
+            let model = self.model;
+            for action in &model.events[event].actions {
+                self.perform(action)?;
+            }
+        }
+        self.report_processes(observer);
+        self.mode = None;
+        if !self.sampled {
+            self.show(observer);
+            self.check_balances(cause)?;
+        }
+        Ok(())
+    }
+
+    /// The first event whose condition has become true since it was last looked at.
+    fn next_event(&mut self) -> Option<usize> {
+        let model = self.model;
+        let mut next = None;
+        for (i, event) in model.events.iter().enumerate() {
+            let now = self.truth(event.when);
+            if !now {
+                self.armed[i] = false;
+            } else if !self.armed[i] && next.is_none() {
+                next = Some(i);
+            }
+        }
+        if let Some(i) = next {
+            self.armed[i] = true;
+        }
+        next
+    }
+
+    fn cascade(&self, event: usize) -> Fault {
+        let event = &self.model.events[event];
+        let count = self.options.max_events_per_instant;
+        let message = format!("`{}` is one of more than {count} events at one instant", event.name);
+        Fault::new(codes::EVENT_CASCADE, self.time, message)
+            .at(event.span)
+            .help("events that make each other's condition true never come to rest")
+    }
+
+    fn report_processes(&mut self, observer: &mut dyn Observer) {
+        let model = self.model;
+        for (i, process) in model.processes.iter().enumerate() {
+            let running = process.guard.is_none_or(|g| self.truth(g));
+            if running != self.running[i] {
+                self.running[i] = running;
+                observer.process(self.time, i, running);
+            }
+        }
+    }
+
+    /// Performs one action.
+    pub(super) fn perform(&mut self, action: &Action) -> Result<(), Fault> {
+        match *action {
+            Action::Assign { state, value, span } => {
+                let value = self.eval(value);
+                self.write(state, value);
+                self.check_states(Some(&[state])).map_err(|f| f.at(span))
+            }
+            Action::Move { fraction, from, to, span } => self.carry(self.eval(fraction), from, to, span),
+        }
+    }
+
+    fn carry(&mut self, fraction: f64, from: u32, to: u32, span: Span) -> Result<(), Fault> {
+        let model = self.model;
+        let (from, to) = (&model.mixtures[from as usize], &model.mixtures[to as usize]);
+        let mut after = self.states.clone();
+        transfer(&mut after, fraction, from, to).map_err(|refusal| self.refused(refusal).at(span))?;
+        for (_, state) in from.extensive.iter().chain(&to.extensive) {
+            self.write(*state, after[*state as usize]);
+        }
+        Ok(())
+    }
+
+    fn refused(&self, refusal: Refusal) -> Fault {
+        match refusal {
+            Refusal::Fraction(fraction) => {
+                let message =
+                    format!("the transfer takes {} times what there is", matterix_ir::quantity::show_number(fraction));
+                let help =
+                    if fraction > 1.0 { "more is asked for than the source holds" } else { "is the source empty?" };
+                Fault::new(codes::TRANSFER_FRACTION, self.time, message).help(help)
+            }
+            Refusal::NoPlace(key, state) => {
+                let name = &self.model.states[state as usize].name;
+                let message = format!("`{name}` would be lost: the destination has no place for `{key}`");
+                Fault::new(codes::BALANCE_BREACH, self.time, message)
+            }
+        }
+    }
+
+    /// Sets a state from outside the integration.
+    fn write(&mut self, state: u32, value: f64) {
+        let place = &mut self.states[state as usize];
+        if place.to_bits() == value.to_bits() {
+            return;
+        }
+        *place = value;
+        self.sampled = false;
+        self.forget();
+        if self.integrator.as_ref().is_some_and(|i| i.moving.binary_search(&state).is_ok()) {
+            self.integrator = None;
+        }
+    }
+
+    /// Equalities that were true at one instant only are false again.
+    pub(super) fn release(&mut self, observer: &mut dyn Observer) {
+        if self.touches.is_empty() {
+            return;
+        }
+        self.touches.clear();
+        self.forget();
+        let model = self.model;
+        for (i, event) in model.events.iter().enumerate() {
+            self.armed[i] = self.armed[i] && self.truth(event.when);
+        }
+        self.report_processes(observer);
+    }
+
+    /// Counts the crossing of `node`; too many in too short a time are a fault.
+    pub(super) fn count_crossing(&mut self, node: NodeId) -> Result<(), Fault> {
+        self.crossings.push_back(self.time);
+        if self.crossings.len() <= CHATTER {
+            return Ok(());
+        }
+        let first = self.crossings.pop_front().unwrap_or(self.time);
+        if self.time - first > CHATTER_TIME { Ok(()) } else { Err(self.chatters(node)) }
+    }
+
+    /// The fault, named after the event or process whose condition it is.
+    fn chatters(&self, node: NodeId) -> Fault {
+        let graph = &self.model.graph;
+        let uses = |root: NodeId| root.0 >= node.0 && graph.schedule([root]).contains(&node);
+        let event = self.model.events.iter().find(|e| uses(e.when)).map(|e| (&e.name, e.span));
+        let process = self.model.processes.iter().find(|p| p.guard.is_some_and(uses)).map(|p| (&p.name, p.span));
+        let rate = self.model.derivatives.iter().find(|d| uses(d.rate)).map(|d| &self.model.states[d.state as usize]);
+        let place = event.or(process).or(rate.map(|s| (&s.name, s.span)));
+        let name = place.map_or("a condition", |(name, _)| name);
+        let message = format!("`{name}` switches on and off more than {CHATTER} times within {CHATTER_TIME} s");
+        let fault = Fault::new(codes::CHATTERING, self.time, message)
+            .help("give it a hysteresis band: switch on below one value and off above a higher one");
+        match place {
+            Some((_, span)) => fault.at(span),
+            None => fault,
+        }
+    }
+}

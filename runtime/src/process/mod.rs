@@ -1,0 +1,295 @@
+//! The process engine: advances a model through time, from discontinuity to discontinuity.
+//!
+//! Time is cut into *segments*. Within one the truth of every comparison is frozen, so that the law is smooth and a
+//! high-order implicit integrator can follow it with long steps. A segment ends where a comparison changes that the model
+//! or the caller cares about; there events fire, the law is looked at anew, and the next segment begins.
+//!
+//! - `tape`, `tangent`: the law of a segment as a short program, and its derivative.
+//! - `analysis`, `mode`: which part of the graph that is.
+//! - `switch`: the comparisons, and where they change.
+//! - `integrator`, `dense`: steps, and the solution between them.
+//! - `advance`, `instant`: the loop over segments, and what happens between two.
+
+mod advance;
+mod analysis;
+mod dense;
+mod instant;
+mod integrator;
+mod memo;
+mod mode;
+mod switch;
+mod tangent;
+mod tape;
+#[cfg(test)]
+mod tests;
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
+use matterix_ir::graph::Env;
+use matterix_ir::model::{Action, Model};
+use matterix_ir::{NodeId, codes};
+
+use crate::fault::Fault;
+pub use crate::ledger::BalanceReport;
+use crate::ledger::Balances;
+
+use integrator::Integrator;
+use memo::Memo;
+use mode::{Law, Mode};
+
+/// How accurately to integrate, and when to give up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Relative error of a step; the absolute one is this times the scale of the state.
+    pub rtol: f64,
+    /// More events than this at one instant are a fault.
+    pub max_events_per_instant: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { rtol: 1e-8, max_events_per_instant: 1000 }
+    }
+}
+
+/// Is told what happens, in the order in which it happens.
+pub trait Observer {
+    /// After each accepted step and before and after each discontinuity: two samples at one time are possible.
+    fn sample(&mut self, time: f64, engine: &Engine<'_>);
+    /// An event has fired, by its index in the model.
+    fn event(&mut self, time: f64, event: usize);
+    /// A process has begun or ceased to run, by its index in the model.
+    fn process(&mut self, time: f64, process: usize, running: bool);
+}
+
+/// Observes nothing.
+impl Observer for () {
+    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn event(&mut self, _: f64, _: usize) {}
+    fn process(&mut self, _: f64, _: usize, _: bool) {}
+}
+
+/// A condition to stop at: as soon as the truth of `node` is `value`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Watch {
+    /// The condition.
+    pub node: NodeId,
+    /// Whether to stop when it is true or when it is false.
+    pub value: bool,
+}
+
+/// Why an advance ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Advance {
+    /// The time asked for is reached.
+    Reached,
+    /// These watches hold now, by their index.
+    Watch(Vec<usize>),
+}
+
+/// A model on its way through time.
+pub struct Engine<'m> {
+    model: &'m Model,
+    options: Options,
+    params: Vec<f64>,
+    locals: Vec<f64>,
+    readings: Vec<f64>,
+    time: f64,
+    states: Vec<f64>,
+    law: Law,
+    /// What holds now; absent after a discontinuity until it is needed again.
+    mode: Option<Mode>,
+    /// The integration under way, if any state moves.
+    integrator: Option<Integrator>,
+    /// Truth of each event's condition when last looked at.
+    armed: Vec<bool>,
+    /// Which processes run.
+    running: Vec<bool>,
+    /// Equalities that are true at this instant only.
+    touches: Vec<NodeId>,
+    /// Times of the last crossings.
+    crossings: VecDeque<f64>,
+    /// Whether the present state has been shown to the observer.
+    sampled: bool,
+    balances: Balances,
+    memo: RefCell<Memo>,
+}
+
+impl<'m> Engine<'m> {
+    /// The model at time 0, its initial states evaluated. `params` are by parameter index, SI; `locals` is how many values
+    /// the plan keeps. Fails where an initial state is not finite.
+    pub fn new(model: &'m Model, params: Vec<f64>, locals: usize, options: Options) -> Result<Self, Fault> {
+        let mut engine = Engine {
+            model,
+            options,
+            params,
+            locals: vec![f64::NAN; locals],
+            readings: vec![f64::NAN; model.readings.len()],
+            time: 0.0,
+            states: vec![0.0; model.states.len()],
+            law: Law::new(model),
+            mode: None,
+            integrator: None,
+            armed: vec![false; model.events.len()],
+            running: vec![false; model.processes.len()],
+            touches: Vec::new(),
+            crossings: VecDeque::new(),
+            sampled: false,
+            balances: Balances::default(),
+            memo: RefCell::new(Memo::new(&model.graph)),
+        };
+        engine.states = model.states.iter().map(|s| engine.eval(s.initial)).collect();
+        engine.forget();
+        engine.check_states(None)?;
+        engine.readings = model.readings.iter().map(|r| engine.eval(r.value)).collect();
+        engine.forget();
+        engine.balances = Balances::open(model, &engine.states, |n| engine.eval(n));
+        Ok(engine)
+    }
+
+    /// Reports the processes that run, fires the events that are true and takes the first sample.
+    pub fn start(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
+        self.settle(None, observer)?;
+        self.show(observer);
+        Ok(())
+    }
+
+    /// Seconds since the run began.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// By state index, SI.
+    pub fn states(&self) -> &[f64] {
+        &self.states
+    }
+
+    /// What is advanced.
+    pub fn model(&self) -> &'m Model {
+        self.model
+    }
+
+    /// Values of the plan, SI; not a number until set.
+    pub fn locals(&self) -> &[f64] {
+        &self.locals
+    }
+
+    /// Sets a value of the plan; an index the plan does not have is ignored.
+    pub fn set_local(&mut self, index: u32, value: f64) {
+        if let Some(local) = self.locals.get_mut(index as usize) {
+            *local = value;
+            self.heard();
+        }
+    }
+
+    /// What the devices report, by reading index, SI. At the start the exact values.
+    pub fn readings_mut(&mut self) -> &mut [f64] {
+        self.heard();
+        &mut self.readings
+    }
+
+    fn heard(&mut self) {
+        self.forget();
+        if self.law.listens {
+            self.mode = None;
+        }
+    }
+
+    /// The value of `node` now; each operation is computed once between two changes.
+    pub fn eval(&self, node: NodeId) -> f64 {
+        self.memo.borrow_mut().eval(&self.model.graph, node, self.env())
+    }
+
+    /// Whether `node` is not 0 now.
+    pub fn truth(&self, node: NodeId) -> bool {
+        self.eval(node) != 0.0
+    }
+
+    /// Performs `actions` in order, then fires the events that became true. Fails on a transfer that cannot be made, a
+    /// number that is not finite, a cascade without end or a balance that does not close.
+    pub fn apply(&mut self, actions: &[Action], observer: &mut dyn Observer) -> Result<(), Fault> {
+        self.release(observer);
+        self.show(observer);
+        for action in actions {
+            self.perform(action)?;
+        }
+        let last = actions.last().map(|a| match a {
+            Action::Assign { span, .. } | Action::Move { span, .. } => *span,
+        });
+        self.settle(last, observer)
+    }
+
+    /// Takes the last sample and checks that the balances close.
+    pub fn finish(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
+        self.show(observer);
+        self.check_balances(None)
+    }
+
+    /// How every balance stands.
+    pub fn balances(&self) -> Vec<BalanceReport> {
+        self.balances.report(self.model, &self.states, |n| self.eval(n))
+    }
+
+    fn env(&self) -> Env<'_> {
+        Env {
+            time: self.time,
+            states: &self.states,
+            params: &self.params,
+            locals: &self.locals,
+            readings: &self.readings,
+        }
+    }
+
+    /// The leaves have changed.
+    fn forget(&mut self) {
+        let memo = self.memo.get_mut();
+        memo.forget();
+        for &node in &self.touches {
+            memo.pin(node, 1.0);
+        }
+    }
+
+    /// Shows the present state to the observer, once.
+    fn show(&mut self, observer: &mut dyn Observer) {
+        if !self.sampled {
+            self.sampled = true;
+            observer.sample(self.time, self);
+        }
+    }
+
+    /// Fails where a state is not finite; `only` limits the check to some.
+    fn check_states(&self, only: Option<&[u32]>) -> Result<(), Fault> {
+        let all = 0..self.states.len();
+        let broken = match only {
+            Some(list) => list.iter().map(|&s| s as usize).find(|&s| !self.states[s].is_finite()),
+            None => all.into_iter().find(|&s| !self.states[s].is_finite()),
+        };
+        let Some(state) = broken else { return Ok(()) };
+        let declared = &self.model.states[state];
+        let value = self.states[state];
+        let message = format!("`{}` has no finite value: it is {value}", declared.name);
+        Err(Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span))
+    }
+
+    fn check_balances(&self, span: Option<matterix_ir::Span>) -> Result<(), Fault> {
+        for (report, balance) in self.balances().iter().zip(&self.model.balances) {
+            if !report.closes() {
+                let (unit, accounted) = (&balance.unit, report.initial + report.exchanged);
+                let message = format!(
+                    "the balance of {} does not close: there is {}, and {} is accounted for",
+                    report.name,
+                    unit.show(report.now),
+                    unit.show(accounted),
+                );
+                let help = format!("the difference is {}", unit.show(report.error));
+                let fault = Fault::new(codes::BALANCE_BREACH, self.time, message).help(help);
+                return Err(match span {
+                    Some(span) => fault.at(span),
+                    None => fault,
+                });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,73 @@
+//! Derivatives of a tape: how its results change when the moving states change in one direction.
+
+use matterix_ir::{BinaryOp, UnaryOp, math};
+
+use super::tape::{Step, Tape};
+
+/// Pushes `direction` (of the moving states, at constant time) forward through `tape`, whose `registers` hold the values
+/// of a run; `tangents` is another register file. At a kink the derivative is that of the side taken.
+pub(super) fn push(tape: &Tape, registers: &[f64], direction: &[f64], tangents: &mut [f64]) {
+    let first = tape.first_result();
+    tangents[..=tape.time()].fill(0.0);
+    tangents[tape.time() + 1..first].copy_from_slice(direction);
+    for (i, step) in tape.steps.iter().enumerate() {
+        let value = registers[first + i];
+        tangents[first + i] = match *step {
+            Step::Unary(op, a) => match tangents[a as usize] {
+                0.0 => 0.0,
+                slope => unary(op, registers[a as usize], value) * slope,
+            },
+            Step::Binary(op, a, b) => {
+                let (a, b) = (a as usize, b as usize);
+                match (tangents[a], tangents[b]) {
+                    (0.0, 0.0) => 0.0,
+                    slopes => binary(op, (registers[a], registers[b]), value, slopes),
+                }
+            }
+            Step::Select(c, a, b) => tangents[if registers[c as usize] != 0.0 { a } else { b } as usize],
+        };
+    }
+}
+
+/// `d value / d a`.
+fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
+    match op {
+        UnaryOp::Neg => -1.0,
+        UnaryOp::Exp => value,
+        UnaryOp::Ln => 1.0 / a,
+        UnaryOp::Sqrt => 0.5 / value,
+        UnaryOp::Abs => 1f64.copysign(a),
+        UnaryOp::Sin => math::cos(a),
+        UnaryOp::Cos => -math::sin(a),
+        UnaryOp::Not | UnaryOp::Floor => 0.0,
+    }
+}
+
+fn binary(op: BinaryOp, (a, b): (f64, f64), value: f64, (da, db): (f64, f64)) -> f64 {
+    match op {
+        BinaryOp::Add => da + db,
+        BinaryOp::Sub => da - db,
+        BinaryOp::Mul => da * b + a * db,
+        BinaryOp::Div => (da - value * db) / b,
+        BinaryOp::Pow => {
+            let base = if da == 0.0 { 0.0 } else { b * math::pow(a, b - 1.0) * da };
+            let exponent = if db == 0.0 { 0.0 } else { value * math::ln(a) * db };
+            base + exponent
+        }
+        BinaryOp::Min => {
+            if a <= b {
+                da
+            } else {
+                db
+            }
+        }
+        BinaryOp::Max => {
+            if a >= b {
+                da
+            } else {
+                db
+            }
+        }
+        BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq | BinaryOp::And | BinaryOp::Or => 0.0,
+    }
+}
