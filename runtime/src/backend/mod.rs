@@ -1,0 +1,95 @@
+//! What the executor runs a plan on: devices as start, poll and halt, readings as values, time as a clock to advance.
+//!
+//! Sequence, failure and resource handling are the executor's business and never a backend's, so that the simulator,
+//! the dry run and hardware obey the same plan in the same way.
+
+pub mod dry;
+pub mod noise;
+pub mod sim;
+mod unknown;
+mod watch;
+
+use matterix_ir::NodeId;
+use matterix_ir::plan::Operation;
+
+pub use dry::Dry;
+pub use sim::Sim;
+pub use watch::Prepared;
+
+use crate::exec::Listener;
+use crate::fault::Fault;
+use crate::process::{Advance, Watch};
+
+/// A started operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Ticket(pub u64);
+
+/// Where a started operation stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// Still going on.
+    Running {
+        /// Worth asking again at this time, s.
+        until: Option<f64>,
+        /// Worth asking again when this is not 0.
+        watch: Option<NodeId>,
+    },
+    /// Ended; its effects have been applied.
+    Done,
+    /// Ended with one of its declared failures.
+    Failed {
+        /// Its name.
+        name: String,
+        /// In words.
+        text: String,
+    },
+}
+
+/// How a condition is followed while time passes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Follow {
+    /// Watched continuously, by this node.
+    Watch(NodeId),
+    /// Looked at whenever one of its readings reports: the periods, s.
+    Every(Vec<f64>),
+    /// Cannot be known here and is assumed to hold.
+    Assumed,
+}
+
+/// Devices, readings and a clock. Times are seconds since the run began.
+pub trait Backend {
+    /// The time now.
+    fn now(&self) -> f64;
+
+    /// The value now, with readings sampled (and told) now; `None` if it cannot be known here.
+    fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault>;
+
+    /// How to follow a condition from now on.
+    fn follow(&mut self, condition: NodeId) -> Follow;
+
+    /// Sets a value that the plan keeps; `None` if it is not known.
+    fn set_local(&mut self, local: u32, value: Option<f64>);
+
+    /// Starts an operation.
+    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault>;
+
+    /// Asks where an operation stands; one that has ended is forgotten.
+    fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault>;
+
+    /// Abandons an operation.
+    fn halt(&mut self, ticket: Ticket);
+
+    /// Lets time pass until `until` (finite) or until a watch has its value, whichever comes first; at once if one has.
+    fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault>;
+}
+
+/// The first report after `now` of readings with these periods, s.
+pub fn next_report(periods: &[f64], now: f64) -> f64 {
+    periods.iter().map(|&p| next_multiple(p, now)).fold(f64::INFINITY, f64::min)
+}
+
+/// The first multiple of `period` after `now`; the next number after `now` where the period is lost to rounding.
+fn next_multiple(period: f64, now: f64) -> f64 {
+    let turns = (now / period).floor();
+    [1.0, 2.0].into_iter().map(|k| (turns + k) * period).find(|&t| t > now).unwrap_or_else(|| now.next_up())
+}

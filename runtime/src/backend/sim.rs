@@ -1,0 +1,184 @@
+//! The digital twin: operations act on the process engine and take their declared time.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::NodeId;
+use matterix_ir::codes;
+use matterix_ir::model::{Action, Model};
+use matterix_ir::plan::Operation;
+use matterix_ir::quantity::show_number;
+
+use super::{Backend, Follow, Prepared, Status, Ticket, next_report, noise, watch};
+use crate::exec::Listener;
+use crate::fault::Fault;
+use crate::process::{Advance, Engine, Watch};
+
+/// Simulates at `process` fidelity.
+pub struct Sim<'m> {
+    engine: Engine<'m>,
+    prepared: &'m Prepared,
+    seed: u64,
+    running: BTreeMap<Ticket, Running>,
+    started: u64,
+    /// Readings each node depends on, found once.
+    sampled: BTreeMap<NodeId, Vec<u32>>,
+    /// When each reading was last told, s.
+    told: BTreeMap<u32, f64>,
+}
+
+/// An operation that goes on.
+struct Running {
+    ends: Ends,
+    at_end: Vec<Action>,
+}
+
+/// When an operation ends.
+enum Ends {
+    At(f64),
+    When(NodeId),
+    /// Looked at when a reading reports.
+    Polled {
+        condition: NodeId,
+        periods: Vec<f64>,
+        next: f64,
+    },
+}
+
+impl<'m> Sim<'m> {
+    /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
+    pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
+        let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        Sim { engine, prepared, seed, running, started: 0, sampled, told }
+    }
+
+    /// The engine, for its states and balances.
+    pub fn engine(&mut self) -> &mut Engine<'m> {
+        &mut self.engine
+    }
+
+    fn model(&self) -> &'m Model {
+        &self.prepared.model
+    }
+
+    /// Takes a sample of every reading that `node` depends on and evaluates it.
+    fn measure(&mut self, node: NodeId, out: &mut dyn Listener) -> f64 {
+        let (model, now) = (self.model(), self.engine.time());
+        let readings = self.sampled.entry(node).or_insert_with(|| watch::readings(&model.graph, node));
+        for &index in readings.iter() {
+            let Some(reading) = model.readings.get(index as usize) else { continue };
+            let exact = self.engine.eval(reading.value);
+            let shown = noise::measure(reading, index as usize, self.seed, now, exact);
+            if self.told.insert(index, now) != Some(now) {
+                out.reading(now, index as usize, shown);
+            }
+            if let Some(slot) = self.engine.readings_mut().get_mut(index as usize) {
+                *slot = shown;
+            }
+        }
+        self.engine.eval(node)
+    }
+
+    fn end_of(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ends, Fault> {
+        let now = self.engine.time();
+        if let Some(until) = &operation.until {
+            return Ok(match self.prepared.follow(until.node) {
+                Follow::Watch(node) => Ends::When(node),
+                Follow::Every(periods) => Ends::Polled { condition: until.node, periods, next: now },
+                Follow::Assumed => Ends::At(now),
+            });
+        }
+        let Some(takes) = operation.takes else { return Ok(Ends::At(now)) };
+        let nominal = self.measure(takes.nominal, out);
+        if nominal.is_finite() && nominal >= 0.0 {
+            return Ok(Ends::At(now + nominal));
+        }
+        Err(Fault {
+            code: codes::UNUSABLE_NUMBER,
+            span: None,
+            time: now,
+            message: format!("`{}` takes {} s, which is not a duration", operation.verb, show_number(nominal)),
+            help: Vec::new(),
+        })
+    }
+
+    /// Operations that last until `node` holds are over, whatever others then do at this instant.
+    fn end_when(&mut self, node: NodeId) {
+        let now = self.engine.time();
+        for running in self.running.values_mut().filter(|r| matches!(r.ends, Ends::When(n) if n == node)) {
+            running.ends = Ends::At(now);
+        }
+    }
+
+    /// What is worth waiting for, or `None` if the operation is over.
+    fn pending(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Option<Status> {
+        let now = self.engine.time();
+        let (condition, periods) = match &self.running.get(&ticket)?.ends {
+            Ends::At(at) if now >= *at => return None,
+            Ends::At(at) => return Some(Status::Running { until: Some(*at), watch: None }),
+            Ends::When(node) if self.engine.truth(*node) => return None,
+            Ends::When(node) => return Some(Status::Running { until: None, watch: Some(*node) }),
+            Ends::Polled { next, .. } if now < *next => {
+                return Some(Status::Running { until: Some(*next), watch: None });
+            }
+            Ends::Polled { condition, periods, .. } => (*condition, periods.clone()),
+        };
+        if self.measure(condition, out) != 0.0 {
+            return None;
+        }
+        let next = next_report(&periods, now);
+        if let Some(running) = self.running.get_mut(&ticket) {
+            running.ends = Ends::Polled { condition, periods, next };
+        }
+        Some(Status::Running { until: Some(next), watch: None })
+    }
+}
+
+impl Backend for Sim<'_> {
+    fn now(&self) -> f64 {
+        self.engine.time()
+    }
+
+    fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        Ok(Some(self.measure(node, out)))
+    }
+
+    fn follow(&mut self, condition: NodeId) -> Follow {
+        self.prepared.follow(condition)
+    }
+
+    fn set_local(&mut self, local: u32, value: Option<f64>) {
+        self.engine.set_local(local, value.unwrap_or(f64::NAN));
+    }
+
+    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        let ends = self.end_of(operation, out)?;
+        self.engine.apply(&operation.at_start, out)?;
+        let ticket = Ticket(self.started);
+        self.started += 1;
+        self.running.insert(ticket, Running { ends, at_end: operation.at_end.clone() });
+        Ok(ticket)
+    }
+
+    fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+        if let Some(status) = self.pending(ticket, out) {
+            return Ok(status);
+        }
+        if let Some(running) = self.running.remove(&ticket) {
+            self.engine.apply(&running.at_end, out)?;
+        }
+        Ok(Status::Done)
+    }
+
+    fn halt(&mut self, ticket: Ticket) {
+        self.running.remove(&ticket);
+    }
+
+    fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        let advance = self.engine.advance(until, watches, out)?;
+        if let Advance::Watch(indices) = &advance {
+            let fired = indices.iter().filter_map(|&i| watches.get(i)).filter(|w| w.value);
+            fired.for_each(|w| self.end_when(w.node));
+        }
+        Ok(advance)
+    }
+}

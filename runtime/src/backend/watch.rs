@@ -1,0 +1,89 @@
+//! The model made ready for watching: a copy in which conditions on readings can be followed without their imperfection.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::model::Model;
+use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::{Graph, NodeId, Op, Program};
+
+use super::{Follow, noise};
+
+/// The model of a program with, for each condition on readings, how to follow it.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The program's model; its graph has further nodes at the end.
+    pub model: Model,
+    follow: BTreeMap<NodeId, Follow>,
+}
+
+impl Prepared {
+    /// Prepares the model of `program`.
+    pub fn new(program: &Program) -> Self {
+        let mut model = program.model.clone();
+        let mut follow = BTreeMap::new();
+        for condition in followed(&program.plan) {
+            let readings = readings(&model.graph, condition.node);
+            if readings.is_empty() {
+                continue;
+            }
+            let periods: Vec<f64> =
+                readings.iter().filter_map(|&r| model.readings.get(r as usize).and_then(noise::period)).collect();
+            let how = if periods.is_empty() {
+                Follow::Watch(exact(&mut model, condition.node))
+            } else {
+                Follow::Every(periods)
+            };
+            follow.insert(condition.node, how);
+        }
+        Prepared { model, follow }
+    }
+
+    /// How to follow this condition.
+    pub fn follow(&self, condition: NodeId) -> Follow {
+        self.follow.get(&condition).cloned().unwrap_or(Follow::Watch(condition))
+    }
+}
+
+/// The readings a node depends on, ascending.
+pub(super) fn readings(graph: &Graph, node: NodeId) -> Vec<u32> {
+    let mut found: Vec<u32> = graph
+        .schedule([node])
+        .into_iter()
+        .filter_map(|n| match graph.op(n) {
+            Op::Reading(r) => Some(r),
+            _ => None,
+        })
+        .collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// A copy of `node` in which every reading is the quantity it measures.
+fn exact(model: &mut Model, node: NodeId) -> NodeId {
+    let mut copies: BTreeMap<NodeId, NodeId> = BTreeMap::new();
+    for old in model.graph.schedule([node]) {
+        let at = |n: NodeId| copies.get(&n).copied().unwrap_or(n);
+        let new = match model.graph.op(old) {
+            Op::Reading(r) => model.readings.get(r as usize).map_or(old, |reading| reading.value),
+            Op::Unary(o, a) => model.graph.add(Op::Unary(o, at(a))),
+            Op::Binary(o, a, b) => model.graph.add(Op::Binary(o, at(a), at(b))),
+            Op::Select(c, a, b) => model.graph.add(Op::Select(at(c), at(a), at(b))),
+            _ => old,
+        };
+        copies.insert(old, new);
+    }
+    copies.get(&node).copied().unwrap_or(node)
+}
+
+/// The conditions of a plan that are followed over time.
+fn followed(plan: &Plan) -> impl Iterator<Item = &Condition> {
+    plan.steps.iter().flat_map(|s| match &s.step {
+        Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } | Step::Keep { condition, .. } => {
+            std::slice::from_ref(condition)
+        }
+        Step::Skill { invariants, .. } => invariants,
+        Step::Operation(operation) => operation.until.as_slice(),
+        _ => &[],
+    })
+}

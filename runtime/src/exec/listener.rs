@@ -1,0 +1,108 @@
+//! What a run tells the outside while it goes on.
+
+use matterix_ir::plan::{Condition, Operation, StepId};
+use matterix_ir::{Span, Unit};
+use serde::{Deserialize, Serialize};
+
+use super::failure::{FailureTrace, Measured};
+use crate::process::Observer;
+
+/// Where a node of the plan stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StepState {
+    /// Not begun.
+    #[default]
+    Pending,
+    /// Going on.
+    Running,
+    /// Ended well.
+    Done,
+    /// Ended with a failure.
+    Failed,
+    /// Not needed, or stopped before its end.
+    Skipped,
+}
+
+/// Where an operation stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OperationState {
+    /// Its effects at start have been applied.
+    Started,
+    /// Its effects at end have been applied.
+    Ended,
+    /// Abandoned.
+    Halted,
+    /// The device reported a failure.
+    Failed,
+}
+
+/// How an expectation was judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// It holds.
+    Passed,
+    /// It does not.
+    Failed,
+    /// It depends on what cannot be known here.
+    #[serde(rename = "not observed")]
+    NotObserved,
+}
+
+/// One judged expectation.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExpectationResult {
+    /// The node of the plan.
+    pub step: StepId,
+    /// As written.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+    /// When, s.
+    pub time: f64,
+    /// How it was judged.
+    pub verdict: Verdict,
+    /// What was measured.
+    pub compared: Vec<Measured>,
+}
+
+/// A condition that could not be known and was taken to hold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Assumption {
+    /// The node of the plan.
+    pub step: StepId,
+    /// As written.
+    pub text: String,
+    /// Where.
+    pub span: Span,
+    /// When, s.
+    pub time: f64,
+}
+
+/// Receives what happens, in order; times are seconds since the run began. Every method may be left out.
+#[expect(unused_variables, reason = "the defaults ignore their arguments")]
+pub trait Listener: Observer {
+    /// A node of the plan changed its state.
+    fn step(&mut self, time: f64, step: StepId, state: StepState) {}
+    /// An operation changed its state.
+    fn operation(&mut self, time: f64, step: StepId, operation: &Operation, state: OperationState) {}
+    /// An expectation was judged.
+    fn expectation(&mut self, result: &ExpectationResult) {}
+    /// A failure was raised, or a fault occurred; a handler may still take a failure.
+    fn failure(&mut self, failure: &FailureTrace) {}
+    /// A condition could not be known and was taken to hold.
+    fn assumed(&mut self, time: f64, step: StepId, condition: &Condition) {}
+    /// A sample of a `record`, one value or the parts of a tuple, SI.
+    fn record(&mut self, time: f64, step: StepId, name: &str, values: &[f64], unit: &Unit) {}
+    /// What a device reported when it was looked at: the reading's index in the model, SI.
+    fn reading(&mut self, time: f64, reading: usize, value: f64) {}
+    /// A remark.
+    fn note(&mut self, time: f64, step: StepId, text: &str) {}
+    /// A person is asked.
+    fn ask(&mut self, time: f64, step: StepId, text: &str) {}
+}
+
+/// Ignores everything.
+impl Listener for () {}

@@ -1,0 +1,354 @@
+//! The executor: runs a plan on a backend.
+//!
+//! Every node that has begun has a frame with an explicit state; a stack of tasks begins and ends frames without
+//! recursion, so that nesting is bounded by memory only. When no task is left, time advances to the earliest of timers,
+//! ends of operations, watched conditions and reports of readings, and the frames concerned are looked at in the order
+//! in which they began. Nothing depends on a wall clock or on hashing: a run is a function of plan, backend and seed.
+//!
+//! **Stopping.** A failing branch, a breach of an invariant, a cancellation and a fault all mark a subtree. Waits end at
+//! once; running operations end first, or are halted on cancellation and fault; each `finally` on the way runs. A stop
+//! never reaches into a `finally` that runs, except where the backend itself can no longer go on.
+//!
+//! **Jobs** belong to the innermost block that handles failures or holds something (guarded block, alternative, skill,
+//! `keep`, `claim`, the run): they have ended before it goes on. The failure of a job that nobody awaits is the block's.
+
+mod claims;
+mod end;
+mod enter;
+mod failure;
+mod frame;
+mod jobs;
+mod judge;
+mod listener;
+mod monitored;
+mod operate;
+mod stop;
+mod tee;
+mod tree;
+mod wake;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use matterix_ir::codes::{self, Code};
+use matterix_ir::plan::{Plan, StepId};
+use matterix_ir::scene::Scene;
+use matterix_ir::{NodeId, Unit};
+use serde::{Deserialize, Serialize};
+
+pub use failure::{FailureTrace, Measured, TraceStep, diagnostic, expectation_diagnostic};
+pub use listener::{Assumption, ExpectationResult, Listener, OperationState, StepState, Verdict};
+pub use tee::Tee;
+
+use crate::backend::Backend;
+use crate::fault::Fault;
+use claims::Claims;
+use frame::{End, Frame, FrameId, Kind, Stop, Task};
+
+/// Longest horizon, s: time stays exact to better than a millisecond.
+const MAX_HORIZON: f64 = 1e12;
+
+/// Bounds of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'c> {
+    /// Longest run, s of lab time; what waits beyond it waits for ever.
+    pub horizon: f64,
+    /// Steps taken within one instant, at most.
+    pub steps_per_instant: usize,
+    /// Set from outside to end the run early; every `finally` still runs.
+    pub cancel: Option<&'c AtomicBool>,
+}
+
+impl Default for Limits<'_> {
+    /// 30 days, a million steps.
+    fn default() -> Self {
+        Limits { horizon: 30.0 * 86_400.0, steps_per_instant: 100_000, cancel: None }
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunStatus {
+    /// To its end, all expectations met.
+    Passed,
+    /// To its end, but not all expectations met.
+    ExpectationFailed,
+    /// With a failure that nothing handled.
+    Failed,
+    /// From outside.
+    Cancelled,
+    /// The model, the plan or the backend could not go on.
+    Fault,
+}
+
+/// A node of the plan over the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Where it stands.
+    pub state: StepState,
+    /// When it last began, s.
+    pub started: Option<f64>,
+    /// When it last ended, s.
+    pub ended: Option<f64>,
+    /// How often it began.
+    pub runs: u32,
+}
+
+/// What came of a plan.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Execution {
+    /// How it ended.
+    pub status: RunStatus,
+    /// What ended it, if something did.
+    pub failure: Option<FailureTrace>,
+    /// Failures that did not decide the end: in a `finally`, or in branches that were being stopped.
+    pub suppressed: Vec<FailureTrace>,
+    /// In the order of their judgement.
+    pub expectations: Vec<ExpectationResult>,
+    /// Conditions that were taken to hold.
+    pub assumptions: Vec<Assumption>,
+    /// By [`StepId`].
+    pub steps: Vec<StepRecord>,
+    /// s.
+    pub end_time: f64,
+}
+
+/// Runs `plan` on `backend` to its end.
+pub fn execute(
+    plan: &Plan,
+    scene: &Scene,
+    backend: &mut dyn Backend,
+    limits: Limits<'_>,
+    out: &mut dyn Listener,
+) -> Execution {
+    let mut run = Executor::new(plan, scene, backend, limits, out);
+    match tree::check(plan) {
+        Ok(()) => run.drive(),
+        Err(message) => {
+            let fault = Fault { code: codes::RUN_FAILED, span: None, time: 0.0, message, help: Vec::new() };
+            run.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(fault))));
+        }
+    }
+    run.into_execution()
+}
+
+/// Why the whole run ends early.
+#[derive(Debug)]
+enum Abort {
+    Cancelled,
+    Fault(Box<FailureTrace>),
+}
+
+/// A `record` that samples.
+#[derive(Clone, Debug)]
+struct Recording<'p> {
+    name: &'p str,
+    value: &'p [NodeId],
+    unit: &'p Unit,
+    since: f64,
+    every: f64,
+    turn: u64,
+}
+
+impl Recording<'_> {
+    fn due(&self) -> f64 {
+        self.since + self.turn as f64 * self.every
+    }
+}
+
+/// One run.
+struct Executor<'p, 'b> {
+    plan: &'p Plan,
+    scene: &'p Scene,
+    backend: &'b mut dyn Backend,
+    out: &'b mut dyn Listener,
+    limits: Limits<'b>,
+    frames: BTreeMap<FrameId, Frame>,
+    created: FrameId,
+    tasks: Vec<Task>,
+    claims: Claims,
+    recordings: BTreeMap<StepId, Recording<'p>>,
+    job_names: BTreeSet<&'p str>,
+    steps: Vec<StepRecord>,
+    now: f64,
+    /// The end of lab time; moved on when it has been reached and the run unwinds.
+    horizon: f64,
+    /// Steps taken at this instant.
+    taken: usize,
+    abort: Option<Abort>,
+    /// How the whole plan ended.
+    end: Option<End>,
+    suppressed: Vec<FailureTrace>,
+    expectations: Vec<ExpectationResult>,
+    assumptions: Vec<Assumption>,
+}
+
+impl<'p, 'b> Executor<'p, 'b> {
+    fn new(
+        plan: &'p Plan,
+        scene: &'p Scene,
+        backend: &'b mut dyn Backend,
+        limits: Limits<'b>,
+        out: &'b mut dyn Listener,
+    ) -> Self {
+        let now = backend.now();
+        Executor {
+            plan,
+            scene,
+            backend,
+            out,
+            limits,
+            frames: BTreeMap::new(),
+            created: 0,
+            tasks: Vec::new(),
+            claims: Claims::default(),
+            recordings: BTreeMap::new(),
+            job_names: BTreeSet::new(),
+            steps: vec![StepRecord::default(); plan.steps.len()],
+            now,
+            horizon: now + limits.horizon.clamp(0.0, MAX_HORIZON),
+            taken: 0,
+            abort: None,
+            end: None,
+            suppressed: Vec::new(),
+            expectations: Vec::new(),
+            assumptions: Vec::new(),
+        }
+    }
+
+    /// Runs to the end: tasks first, then time.
+    fn drive(&mut self) {
+        let root = self.insert(None, None);
+        self.set_kind(root, Kind::Pass);
+        self.spawn(root, self.plan.root);
+        self.drain();
+        while self.end.is_none() {
+            if self.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+                self.abort = Some(Abort::Cancelled);
+                self.stop_all(Stop::Now, false);
+                self.drain();
+                continue;
+            }
+            self.pass_time();
+        }
+    }
+
+    /// Works off all tasks.
+    fn drain(&mut self) {
+        while let Some(task) = self.tasks.pop() {
+            self.taken += 1;
+            if self.taken > self.limits.steps_per_instant {
+                self.tasks.push(task);
+                self.give_up_instant();
+                continue;
+            }
+            match task {
+                Task::Enter(id) => self.enter(id),
+                Task::Finish(id, end) => self.finish(id, end),
+            }
+        }
+    }
+
+    fn give_up_instant(&mut self) {
+        self.taken = 0;
+        let message = format!("more than {} steps are taken within one instant", self.limits.steps_per_instant);
+        let fault = self.run_fault(codes::ENDLESS_INSTANT, message);
+        self.fault_everywhere(fault);
+    }
+
+    fn run_fault(&self, code: Code, message: String) -> Fault {
+        Fault { code, span: None, time: self.now, message, help: Vec::new() }
+    }
+
+    /// A new frame under `parent`.
+    fn insert(&mut self, parent: Option<FrameId>, step: Option<StepId>) -> FrameId {
+        let id = self.created;
+        self.created += 1;
+        let finally = parent.and_then(|p| self.frames.get(&p)).is_some_and(|p| p.finally || p.shields());
+        let frame = Frame {
+            step,
+            parent,
+            children: Vec::new(),
+            started: self.now,
+            stop: None,
+            job: false,
+            finally,
+            kind: Kind::New,
+            jobs: Vec::new(),
+            joining: None,
+        };
+        self.frames.insert(id, frame);
+        if let Some(parent) = parent.and_then(|p| self.frames.get_mut(&p)) {
+            parent.children.push(id);
+        }
+        id
+    }
+
+    /// A child that begins when its task is reached.
+    fn spawn(&mut self, parent: FrameId, step: StepId) -> FrameId {
+        let id = self.insert(Some(parent), Some(step));
+        self.tasks.push(Task::Enter(id));
+        id
+    }
+
+    fn set_kind(&mut self, id: FrameId, kind: Kind) {
+        if let Some(frame) = self.frames.get_mut(&id) {
+            frame.kind = kind;
+        }
+    }
+
+    fn push_end(&mut self, id: FrameId, end: End) {
+        self.tasks.push(Task::Finish(id, end));
+    }
+
+    /// The frames around `id`, innermost first, without itself.
+    fn ancestors(&self, id: FrameId) -> impl Iterator<Item = FrameId> {
+        std::iter::successors(self.parent(id), |&p| self.parent(p))
+    }
+
+    fn parent(&self, id: FrameId) -> Option<FrameId> {
+        self.frames.get(&id).and_then(|f| f.parent)
+    }
+
+    fn mark(&mut self, step: StepId, state: StepState) {
+        let record = &mut self.steps[step.0 as usize];
+        record.state = state;
+        match state {
+            StepState::Running => {
+                record.started = Some(self.now);
+                record.ended = None;
+                record.runs += 1;
+            }
+            StepState::Done | StepState::Failed => record.ended = Some(self.now),
+            StepState::Skipped if record.started.is_some() && record.ended.is_none() => record.ended = Some(self.now),
+            StepState::Skipped | StepState::Pending => {}
+        }
+        self.out.step(self.now, step, state);
+    }
+
+    fn into_execution(mut self) -> Execution {
+        for index in 0..self.steps.len() {
+            if self.steps[index].state == StepState::Pending {
+                self.mark(StepId(index as u32), StepState::Skipped);
+            }
+        }
+        let unmet = self.expectations.iter().any(|e| e.verdict == Verdict::Failed);
+        let (status, failure) = match (self.abort, self.end) {
+            (Some(Abort::Fault(trace)), _) => (RunStatus::Fault, Some(*trace)),
+            (Some(Abort::Cancelled), _) => (RunStatus::Cancelled, None),
+            (None, Some(End::Failed(trace))) => (RunStatus::Failed, Some(*trace)),
+            (None, _) if unmet => (RunStatus::ExpectationFailed, None),
+            (None, _) => (RunStatus::Passed, None),
+        };
+        Execution {
+            status,
+            failure,
+            suppressed: self.suppressed,
+            expectations: self.expectations,
+            assumptions: self.assumptions,
+            steps: self.steps,
+            end_time: self.now,
+        }
+    }
+}

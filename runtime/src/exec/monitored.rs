@@ -1,0 +1,155 @@
+//! Skills and `keep`: what must hold before, during and after a body.
+
+use matterix_ir::NodeId;
+use matterix_ir::codes;
+use matterix_ir::plan::{Condition, Step, StepId, Takes};
+use matterix_ir::quantity::show_number;
+
+use super::Executor;
+use super::frame::{End, FrameId, Kind, Monitor, Stop};
+use super::judge::Raised;
+use crate::fault::Fault;
+
+impl Executor<'_, '_> {
+    /// Checks needs and invariants, then runs the body under watch.
+    pub(super) fn begin_monitored(&mut self, id: FrameId, step: StepId) -> Result<(), Fault> {
+        let plan = self.plan;
+        let (needs, kept, body): (&[Condition], &[Condition], StepId) = match &plan.get(step).step {
+            Step::Skill { needs, invariants, body, .. } => (needs, invariants, *body),
+            Step::Keep { condition, body } => (&[], std::slice::from_ref(condition), *body),
+            _ => return Ok(()),
+        };
+        if !self.needs_met(id, step, needs)? {
+            return Ok(());
+        }
+        let mut monitors = Vec::new();
+        for (index, condition) in kept.iter().enumerate() {
+            let Some(follower) = self.follower(step, condition) else { continue };
+            if !self.follower_holds(&follower)? {
+                let raised = self.broken(condition);
+                self.fail(id, raised);
+                return Ok(());
+            }
+            monitors.push(Monitor { follower, index });
+        }
+        self.set_kind(id, Kind::Monitored { monitors, breach: None });
+        self.spawn(id, body);
+        Ok(())
+    }
+
+    /// Raises a failure for the first need that is not met; whether all are.
+    pub(super) fn needs_met(&mut self, id: FrameId, step: StepId, needs: &[Condition]) -> Result<bool, Fault> {
+        for need in needs {
+            if !self.judge(step, need)? {
+                let label = &self.plan.get(step).label;
+                let text = format!("`{label}` needs `{}`, which does not hold", need.text);
+                let raised = self.unmet(need, "need", codes::NEED_UNMET, text);
+                self.fail(id, raised);
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// What a breach of an invariant raises.
+    pub(super) fn broken(&mut self, condition: &Condition) -> Raised {
+        let text = format!("`{}` no longer holds", condition.text);
+        self.unmet(condition, "broken", codes::RUN_FAILED, text)
+    }
+
+    pub(super) fn monitored_ended(&mut self, id: FrameId, end: End) -> Result<(), Fault> {
+        let plan = self.plan;
+        let Some(frame) = self.frames.get_mut(&id) else { return Ok(()) };
+        let (Kind::Monitored { breach, .. }, Some(step)) = (&mut frame.kind, frame.step) else { return Ok(()) };
+        let started = frame.started;
+        if let Some(breach) = breach.take() {
+            if let End::Failed(trace) = end {
+                self.suppressed.push(*trace);
+            }
+            self.conclude(id, End::Failed(breach));
+            return Ok(());
+        }
+        if let (End::Done, Step::Skill { promises, takes, .. }) = (&end, &plan.get(step).step)
+            && let Some(raised) = self.unkept(step, promises, *takes, started)?
+        {
+            let trace = self.trace(id, raised);
+            self.out.failure(&trace);
+            self.conclude(id, End::Failed(Box::new(trace)));
+            return Ok(());
+        }
+        self.conclude(id, end);
+        Ok(())
+    }
+
+    /// What a skill promised and did not keep.
+    fn unkept(
+        &mut self,
+        step: StepId,
+        promises: &[Condition],
+        takes: Option<Takes>,
+        started: f64,
+    ) -> Result<Option<Raised>, Fault> {
+        let label = &self.plan.get(step).label;
+        for promise in promises {
+            if !self.judge(step, promise)? {
+                let text = format!("`{label}` promises `{}`, which does not hold at its end", promise.text);
+                return Ok(Some(self.unmet(promise, "promise", codes::PROMISE_BROKEN, text)));
+            }
+        }
+        let Some((low, high)) = takes.and_then(|t| t.bounds) else { return Ok(None) };
+        let (Some(low), Some(high)) = (self.backend.value(low, self.out)?, self.backend.value(high, self.out)?) else {
+            return Ok(None);
+        };
+        let (took, rounding) = (self.now - started, 1e-9 * self.now.abs().max(1.0));
+        if took >= low - rounding && took <= high + rounding {
+            return Ok(None);
+        }
+        let [took, low, high] = [took, low, high].map(show_number);
+        let text = format!("`{label}` took {took} s and promises {low} s .. {high} s");
+        Ok(Some(Raised { code: codes::PROMISE_BROKEN, ..Raised::named("promise", text) }))
+    }
+
+    /// An invariant of a frame no longer holds: its body is stopped, then the frame fails.
+    pub(super) fn breach(&mut self, id: FrameId, index: usize) {
+        let plan = self.plan;
+        let Some(frame) = self.frames.get(&id) else { return };
+        if frame.stop.is_some() || !matches!(frame.kind, Kind::Monitored { breach: None, .. }) {
+            return;
+        }
+        let Some(step) = frame.step else { return };
+        let children = frame.children.clone();
+        let condition = match &plan.get(step).step {
+            Step::Skill { invariants, .. } => invariants.get(index),
+            Step::Keep { condition, .. } => Some(condition),
+            _ => None,
+        };
+        let Some(condition) = condition else { return };
+        let raised = self.broken(condition);
+        let trace = Box::new(self.trace(id, raised));
+        self.out.failure(&trace);
+        if let Some(Kind::Monitored { breach, .. }) = self.frames.get_mut(&id).map(|f| &mut f.kind) {
+            *breach = Some(trace);
+        }
+        for child in children {
+            self.stop(child, Stop::Boundary, false);
+        }
+    }
+
+    pub(super) fn look_at_monitors(&mut self, id: FrameId, fired: &[NodeId]) -> Result<(), Fault> {
+        let Some(Kind::Monitored { monitors, breach: None }) = self.frames.get(&id).map(|f| f.kind.clone()) else {
+            return Ok(());
+        };
+        let mut monitors = monitors;
+        let mut broken = None;
+        for monitor in &mut monitors {
+            if self.news(&mut monitor.follower, false, fired)? == Some(false) && broken.is_none() {
+                broken = Some(monitor.index);
+            }
+        }
+        self.set_kind(id, Kind::Monitored { monitors, breach: None });
+        if let Some(index) = broken {
+            self.breach(id, index);
+        }
+        Ok(())
+    }
+}

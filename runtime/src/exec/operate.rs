@@ -1,0 +1,182 @@
+//! Operations: their claims, their needs, their course on the backend.
+
+use matterix_ir::codes;
+use matterix_ir::plan::{Operation, Step};
+use matterix_ir::scene::InstanceId;
+
+use super::Executor;
+use super::claims::{Request, Use};
+use super::frame::{End, Follower, FrameId, Kind};
+use super::judge::Raised;
+use super::listener::OperationState;
+use crate::backend::{Follow, Status};
+use crate::fault::Fault;
+
+impl<'p> Executor<'p, '_> {
+    /// Starts an operation unless something else uses what it writes; inside a `finally` it waits for that instead.
+    pub(super) fn begin_operation(&mut self, id: FrameId, operation: &'p Operation) -> Result<(), Fault> {
+        let finally = self.frames.get(&id).is_some_and(|f| f.finally);
+        if finally {
+            self.set_kind(id, Kind::Acquire);
+            self.request(id, operation.claims.clone());
+            return Ok(());
+        }
+        match self.conflict(id, operation) {
+            Some(text) => {
+                let raised = Raised { code: codes::CLAIMED_TWICE, ..Raised::named("claimed", text) };
+                self.fail(id, raised);
+                Ok(())
+            }
+            None => self.start_operation(id, operation),
+        }
+    }
+
+    /// Asks for instances; what becomes free is granted in turn.
+    pub(super) fn request(&mut self, id: FrameId, instances: Vec<InstanceId>) {
+        let within = self.ancestors(id).collect();
+        self.claims.request(Request { frame: id, instances, within });
+        self.grant(false);
+    }
+
+    /// Lets every request go on that can be granted; whether there was one.
+    pub(super) fn grant(&mut self, overtake: bool) -> bool {
+        let plan = self.plan;
+        let granted = self.claims.grant(overtake);
+        for &id in granted.iter().rev() {
+            let Some(step) = self.frames.get(&id).filter(|f| f.stop.is_none()).and_then(|f| f.step) else { continue };
+            match &plan.get(step).step {
+                Step::Claim { body, .. } => {
+                    self.set_kind(id, Kind::Claim { granted: true });
+                    self.spawn(id, *body);
+                }
+                Step::Operation(operation) => {
+                    if let Err(fault) = self.start_operation(id, operation) {
+                        self.fault(id, fault);
+                    }
+                }
+                _ => {}
+            }
+        }
+        !granted.is_empty()
+    }
+
+    /// Who else writes what the operation writes at this time, in words.
+    fn conflict(&self, id: FrameId, operation: &Operation) -> Option<String> {
+        let within: Vec<FrameId> = self.ancestors(id).collect();
+        let own = self.label(id);
+        operation.claims.iter().find_map(|&instance| {
+            let name = self.instance(instance);
+            if let Some(holder) = self.claims.foreign_holder(instance, &within) {
+                return Some(format!("`{own}` uses `{name}` while `{}` holds it", self.label(holder)));
+            }
+            let exclusive = self.claims.own_holder(instance, &within);
+            let mut others = self.claims.uses(instance, self.now).filter(|u| u.frame != id);
+            let other = others
+                .find(|u| u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u)))?;
+            let other = &self.plan.get(other.step).label;
+            Some(format!("`{own}` and `{other}` use `{name}` at the same time"))
+        })
+    }
+
+    /// Whether the frames `within` run beside an earlier use, not after it.
+    fn beside(&self, within: &[FrameId], earlier: &Use) -> bool {
+        let Some(position) = within.iter().position(|f| earlier.within.contains(f)) else { return false };
+        let parallel = self.frames.get(&within[position]).is_some_and(|f| matches!(f.kind, Kind::Parallel { .. }));
+        let is_job = |f: &FrameId| self.frames.get(f).is_some_and(|f| f.job);
+        let jobs = within[..position].iter().any(is_job)
+            || earlier.within.iter().take_while(|f| !within.contains(f)).any(is_job);
+        parallel || jobs
+    }
+
+    fn start_operation(&mut self, id: FrameId, operation: &'p Operation) -> Result<(), Fault> {
+        let Some(step) = self.frames.get(&id).and_then(|f| f.step) else { return Ok(()) };
+        if !self.needs_met(id, step, &operation.needs)? {
+            return Ok(());
+        }
+        if let Some(until) = &operation.until
+            && self.backend.follow(until.node) == Follow::Assumed
+        {
+            self.assume(step, until);
+        }
+        let within: Vec<FrameId> = self.ancestors(id).collect();
+        for &instance in &operation.claims {
+            let new = Use { frame: id, step, within: within.clone(), running: true, time: self.now };
+            self.claims.begin(instance, new);
+        }
+        let ticket = self.backend.start(operation, self.out)?;
+        self.set_kind(id, Kind::Operation { ticket, until: None, watch: None });
+        self.out.operation(self.now, step, operation, OperationState::Started);
+        self.changed();
+        self.poll(id)
+    }
+
+    /// Asks the backend how an operation stands.
+    pub(super) fn poll(&mut self, id: FrameId) -> Result<(), Fault> {
+        let plan = self.plan;
+        let Some(frame) = self.frames.get(&id) else { return Ok(()) };
+        let (Kind::Operation { ticket, .. }, Some(step)) = (&frame.kind, frame.step) else { return Ok(()) };
+        let Step::Operation(operation) = &plan.get(step).step else { return Ok(()) };
+        let ticket = *ticket;
+        match self.backend.poll(ticket, self.out)? {
+            Status::Running { until, watch } => self.set_kind(id, Kind::Operation { ticket, until, watch }),
+            Status::Done => {
+                self.set_kind(id, Kind::Pass);
+                self.out.operation(self.now, step, operation, OperationState::Ended);
+                self.changed();
+                self.push_end(id, End::Done);
+            }
+            Status::Failed { name, text } => {
+                self.set_kind(id, Kind::Pass);
+                self.out.operation(self.now, step, operation, OperationState::Failed);
+                self.changed();
+                self.fail(id, Raised::named(&name, text));
+            }
+        }
+        Ok(())
+    }
+
+    /// The world changed within this instant: invariants are looked at before anything else happens.
+    fn changed(&mut self) {
+        let watched: Vec<(FrameId, usize, Follower)> = self
+            .frames
+            .iter()
+            .filter(|(_, f)| f.stop.is_none())
+            .filter_map(|(&id, f)| match &f.kind {
+                Kind::Monitored { monitors, breach: None } => Some((id, monitors)),
+                _ => None,
+            })
+            .flat_map(|(id, monitors)| monitors.iter().map(move |m| (id, m.index, m.follower.clone())))
+            .filter(|(_, _, follower)| matches!(follower.follow, Follow::Watch(_)))
+            .collect();
+        for (id, index, follower) in watched {
+            match self.follower_holds(&follower) {
+                Ok(true) => {}
+                Ok(false) => self.breach(id, index),
+                Err(fault) => self.fault(id, fault),
+            }
+        }
+    }
+
+    fn label(&self, id: FrameId) -> &str {
+        self.frames.get(&id).and_then(|f| f.step).map_or("", |s| &self.plan.get(s).label)
+    }
+
+    pub(super) fn instance(&self, id: InstanceId) -> &str {
+        self.scene.instances.get(id.0 as usize).map_or("?", |i| &i.name)
+    }
+
+    /// Who waits for what, in words.
+    pub(super) fn standstill(&self) -> String {
+        let claims = self.claims.waiting().iter().filter_map(|request| {
+            let (instance, holder) = self.claims.blocker(request)?;
+            let (waiter, holder, name) = (self.label(request.frame), self.label(holder), self.instance(instance));
+            Some(format!("`{waiter}` waits for `{name}`, which `{holder}` has"))
+        });
+        let jobs = self.frames.iter().filter_map(|(&id, f)| match f.kind {
+            Kind::Await { job } => Some(format!("`{}` waits for `{}`", self.label(id), self.label(job))),
+            _ => None,
+        });
+        let all: Vec<String> = claims.chain(jobs).collect();
+        format!("nothing can go on any more: {}", if all.is_empty() { "no step waits".into() } else { all.join("; ") })
+    }
+}

@@ -1,0 +1,42 @@
+//! Two listeners as one.
+
+use matterix_ir::Unit;
+use matterix_ir::plan::{Condition, Operation, StepId};
+
+use super::failure::FailureTrace;
+use super::listener::{ExpectationResult, Listener, OperationState, StepState};
+use crate::process::{Engine, Observer};
+
+/// Tells both, the first one first.
+pub struct Tee<'a>(pub &'a mut dyn Listener, pub &'a mut dyn Listener);
+
+macro_rules! both {
+    ($($name:ident($($arg:ident: $ty:ty),*);)*) => {
+        $(fn $name(&mut self, $($arg: $ty),*) {
+            self.0.$name($($arg),*);
+            self.1.$name($($arg),*);
+        })*
+    };
+}
+
+impl Observer for Tee<'_> {
+    both! {
+        sample(time: f64, engine: &Engine<'_>);
+        event(time: f64, event: usize);
+        process(time: f64, process: usize, running: bool);
+    }
+}
+
+impl Listener for Tee<'_> {
+    both! {
+        step(time: f64, step: StepId, state: StepState);
+        operation(time: f64, step: StepId, operation: &Operation, state: OperationState);
+        expectation(result: &ExpectationResult);
+        failure(failure: &FailureTrace);
+        assumed(time: f64, step: StepId, condition: &Condition);
+        record(time: f64, step: StepId, name: &str, values: &[f64], unit: &Unit);
+        reading(time: f64, reading: usize, value: f64);
+        note(time: f64, step: StepId, text: &str);
+        ask(time: f64, step: StepId, text: &str);
+    }
+}

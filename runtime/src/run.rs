@@ -1,0 +1,138 @@
+//! A program from its initial state to its outcome.
+
+use matterix_ir::{Program, codes};
+use serde::Serialize;
+
+use crate::backend::{Dry, Prepared, Sim};
+use crate::exec::{
+    self, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
+};
+use crate::fault::Fault;
+use crate::process::{BalanceReport, Engine, Options};
+
+/// How closely the world is simulated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fidelity {
+    /// Motions take their declared time.
+    #[default]
+    Process,
+    /// Nothing moves: the plan is walked with nominal durations.
+    Dry,
+}
+
+/// How to run a program.
+#[derive(Clone, Debug, Default)]
+pub struct RunOptions<'c> {
+    /// Noise of readings follows from it.
+    pub seed: u64,
+    /// Which backend.
+    pub fidelity: Fidelity,
+    /// Parameters that differ from the program's, by name, SI.
+    pub params: Vec<(String, f64)>,
+    /// Longest run, steps per instant, cancellation.
+    pub limits: Limits<'c>,
+    /// Accuracy of the process engine.
+    pub process: Options,
+}
+
+/// What came of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outcome {
+    /// How it ended.
+    pub status: RunStatus,
+    /// What ended it, if something did.
+    pub failure: Option<FailureTrace>,
+    /// Failures that did not decide the end: in a `finally`, or in branches that were being stopped.
+    pub suppressed: Vec<FailureTrace>,
+    /// In the order of their judgement.
+    pub expectations: Vec<ExpectationResult>,
+    /// Conditions that were taken to hold.
+    pub assumptions: Vec<Assumption>,
+    /// Nodes of the plan, by their id.
+    pub steps: Vec<StepRecord>,
+    /// s.
+    pub end_time: f64,
+    /// Parameters as used, by index, SI.
+    pub params: Vec<f64>,
+    /// States at the end, by index, SI; absent where a dry run cannot know them.
+    pub states: Vec<Option<f64>>,
+    /// How the sums over the lab closed; none in a dry run.
+    #[serde(skip)]
+    pub balances: Vec<BalanceReport>,
+}
+
+/// Runs `program` to its end and tells `out` what happens. A run never panics and always ends within its limits.
+pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) -> Outcome {
+    let params = match params(program, &options.params) {
+        Ok(params) => params,
+        Err(fault) => return refused(program, fault),
+    };
+    match options.fidelity {
+        Fidelity::Process => simulate(program, options, params, out),
+        Fidelity::Dry => {
+            let mut dry = Dry::new(&program.model, &program.plan, params.clone());
+            let execution = exec::execute(&program.plan, &program.scene, &mut dry, options.limits, out);
+            outcome(execution, params, dry.states().to_vec())
+        }
+    }
+}
+
+fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: &mut dyn Listener) -> Outcome {
+    let prepared = Prepared::new(program);
+    let engine = Engine::new(&prepared.model, params.clone(), program.plan.locals.len(), options.process);
+    let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
+    let engine = match started {
+        Ok(engine) => engine,
+        Err(fault) => return refused(program, fault),
+    };
+    let mut sim = Sim::new(engine, &prepared, options.seed);
+    let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
+    let engine = sim.engine();
+    let finished = engine.finish(out);
+    let mut outcome = outcome(execution, params, engine.states().iter().copied().map(Some).collect());
+    outcome.balances = engine.balances();
+    if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
+        let trace = FailureTrace::of_fault(fault);
+        out.failure(&trace);
+        outcome.status = RunStatus::Fault;
+        outcome.suppressed.extend(outcome.failure.replace(trace));
+    }
+    outcome
+}
+
+/// The program's parameters with those that differ.
+fn params(program: &Program, changed: &[(String, f64)]) -> Result<Vec<f64>, Fault> {
+    let mut values: Vec<f64> = program.model.params.iter().map(|p| p.value).collect();
+    for (name, value) in changed {
+        let index = program.model.params.iter().position(|p| p.name == *name);
+        match index.and_then(|i| values.get_mut(i)) {
+            Some(slot) => *slot = *value,
+            None => {
+                let message = format!("the program has no parameter `{name}`");
+                return Err(Fault::new(codes::UNKNOWN_PARAMETER, 0.0, message));
+            }
+        }
+    }
+    Ok(values)
+}
+
+/// A run that could not begin.
+fn refused(program: &Program, fault: Fault) -> Outcome {
+    let execution = Execution {
+        status: RunStatus::Fault,
+        failure: Some(FailureTrace::of_fault(fault)),
+        suppressed: Vec::new(),
+        expectations: Vec::new(),
+        assumptions: Vec::new(),
+        steps: vec![StepRecord::default(); program.plan.steps.len()],
+        end_time: 0.0,
+    };
+    outcome(execution, Vec::new(), Vec::new())
+}
+
+fn outcome(execution: Execution, params: Vec<f64>, states: Vec<Option<f64>>) -> Outcome {
+    let Execution { status, failure, suppressed, expectations, assumptions, steps, end_time } = execution;
+    let balances = Vec::new();
+    Outcome { status, failure, suppressed, expectations, assumptions, steps, end_time, params, states, balances }
+}
