@@ -1,1 +1,12 @@
 //! Executes a `Program` on a backend.
+
+// A fault ends the run: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
+pub mod backend;
+pub mod exec;
+pub mod fault;
+pub mod ledger;
+pub mod process;
+pub mod record;
+pub mod run;

@@ -1,0 +1,171 @@
+//! The bench in three dimensions: `/scene` with a primitive per instance, `/tf` with its frames.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use matterix_ir::model::Domain;
+use matterix_ir::scene::{InstanceId, Shape};
+use mcap::McapResult;
+
+use super::Sink;
+use super::foxglove::{
+    self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, pose,
+    quaternion, vector,
+};
+use crate::record::column::Column;
+use crate::record::pose::{self, Stand, Transform, height};
+use crate::record::run::Run;
+
+/// The frame everything stands in.
+const LAB: &str = "lab";
+/// Of things that have no colour of their own.
+const GREY: [f64; 3] = [0.62, 0.66, 0.70];
+
+/// Writes the scene at the start, then what changed its place or its colour.
+pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
+    let scene = &run.program.scene;
+    let units = BTreeMap::new();
+    let entities = sink.channel("/scene", "foxglove.SceneUpdate", &foxglove::scene_schema(), &units)?;
+    let frames = sink.channel("/tf", "foxglove.FrameTransforms", &foxglove::transforms_schema(), &units)?;
+    let tints = tints(run);
+    let mut stands = pose::initial(scene);
+    let mut shown: Vec<Option<(Transform, Tint)>> = vec![None; scene.instances.len()];
+    let supports = supports(run);
+    let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
+    let samples = run.recording.times.len().max(1);
+    for sample in 0..samples {
+        let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
+        let mut moved = sample == 0;
+        for (&(id, values), current) in supports.iter().zip(&mut supported) {
+            let Some(&value) = values.get(sample) else { continue };
+            if value != *current {
+                *current = value;
+                moved = true;
+                // Nothing below: it is held, and stays where it was until it is put down.
+                if value >= 0.0 {
+                    stands[id] = Stand::On(InstanceId(value as u32), Transform::IDENTITY);
+                }
+            }
+        }
+        if !moved && tints.is_empty() {
+            continue;
+        }
+        let poses = pose::in_lab(scene, &stands);
+        let mut changed = Vec::new();
+        for (i, &at) in poses.iter().enumerate() {
+            let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));
+            if now != shown[i] {
+                let displaced = shown[i].map(|(before, _)| before) != Some(at);
+                shown[i] = now;
+                changed.push((i, displaced));
+            }
+        }
+        let drawn: Vec<Entity<'_>> = changed.iter().filter_map(|&(i, _)| entity(run, i, time, shown[i]?)).collect();
+        if !drawn.is_empty() {
+            sink.push(entities, time, &SceneUpdate { deletions: [], entities: drawn })?;
+        }
+        let displaced = changed.iter().filter(|(_, displaced)| *displaced);
+        let transforms: Vec<FrameTransform> =
+            displaced.flat_map(|&(i, _)| transforms(run, i, time, poses[i])).collect();
+        if !transforms.is_empty() {
+            sink.push(frames, time, &FrameTransforms { transforms })?;
+        }
+    }
+    Ok(())
+}
+
+/// The samples of each instance's `support`.
+fn supports<'a>(run: &Run<'a>) -> Vec<(usize, &'a [f64])> {
+    let model = &run.program.model;
+    let of = |(i, state): (usize, &matterix_ir::model::State)| {
+        let owner = state.name.strip_suffix(".support").filter(|_| state.domain == Domain::Instance)?;
+        let id = run.program.scene.find(owner)?;
+        Some((id.0 as usize, run.recording.states.get(i)?.as_slice()))
+    };
+    model.states.iter().enumerate().filter_map(of).collect()
+}
+
+fn initial_support(run: &Run<'_>, instance: usize) -> f64 {
+    let support = run.program.scene.instances.get(instance).and_then(|i| i.support);
+    support.map_or(-1.0, |id| f64::from(id.0))
+}
+
+/// A vessel has the colour of what is in it: the first property of a mixture that can be a colour.
+fn tints<'a>(run: &Run<'a>) -> BTreeMap<usize, Column<'a>> {
+    let mut tints = BTreeMap::new();
+    for mixture in &run.program.model.mixtures {
+        let columns = mixture.properties.iter().filter_map(|&i| Column::observable(run, i as usize));
+        let Some(column) = columns.into_iter().find(|c| c.is_colour()) else { continue };
+        let part = mixture.instance.0 as usize;
+        let owner = run.program.scene.instances.get(part).and_then(|i| i.owner);
+        tints.insert(owner.map_or(part, |id| id.0 as usize), column);
+    }
+    tints
+}
+
+/// A colour in so few shades that a slow change gives few messages.
+type Tint = [u8; 3];
+
+/// Number of the last shade.
+const SHADES: f64 = 63.0;
+
+fn tint(colour: [f64; 3]) -> Tint {
+    colour.map(|v| (v * SHADES).round() as u8)
+}
+
+fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Transform, Tint)) -> Option<Entity<'a>> {
+    let instance = run.program.scene.instances.get(index)?;
+    let shape = instance.shape?;
+    let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
+    let color = Color { r, g, b, a: 0.85 };
+    let middle = pose(at.then(Transform::up(height(shape) / 2.0)));
+    let (mut cubes, mut cylinders) = (Vec::new(), Vec::new());
+    match shape {
+        Shape::Box(size) => cubes.push(Cube { pose: middle, size: vector(size), color }),
+        Shape::Cylinder([d, h]) => {
+            cylinders.push(Cylinder { pose: middle, size: vector([d, d, h]), bottom_scale: 1.0, top_scale: 1.0, color })
+        }
+    }
+    let label = Text {
+        pose: pose(at.then(Transform::up(height(shape) + 0.03))),
+        billboard: true,
+        font_size: 0.025,
+        scale_invariant: false,
+        color: Color { r: 0.1, g: 0.1, b: 0.1, a: 1.0 },
+        text: &instance.name,
+    };
+    Some(Entity {
+        timestamp: Time::new(time),
+        frame_id: LAB,
+        id: &instance.name,
+        lifetime: Time::new(0.0),
+        frame_locked: true,
+        metadata: vec![KeyValue { key: "kind", value: &instance.kind }],
+        arrows: [],
+        cubes,
+        spheres: [],
+        cylinders,
+        lines: [],
+        triangles: [],
+        texts: vec![label],
+        models: [],
+    })
+}
+
+/// The instance in the lab, and its named points in the instance.
+fn transforms(run: &Run<'_>, index: usize, time: f64, at: Transform) -> Vec<FrameTransform> {
+    let Some(instance) = run.program.scene.instances.get(index) else { return Vec::new() };
+    let transform = |parent: &str, child: String, at: Transform| FrameTransform {
+        timestamp: Time::new(time),
+        parent_frame_id: parent.to_owned(),
+        child_frame_id: child,
+        translation: vector(at.position),
+        rotation: quaternion(at.rotation),
+    };
+    let own = transform(LAB, instance.name.clone(), at);
+    let points = instance
+        .frames
+        .iter()
+        .map(|f| transform(&instance.name, format!("{}.{}", instance.name, f.name), Transform::of(f.pose)));
+    std::iter::once(own).chain(points).collect()
+}

@@ -1,0 +1,94 @@
+//! What a run leaves behind: a recording, tables, a page of plots and a report.
+//!
+//! [`Recording`] takes what the engine and the executor report; the writers read a finished [`Run`]. All output is a
+//! function of the run alone: no clock, no order of hash maps.
+
+mod column;
+mod files;
+mod history;
+mod pose;
+mod recording;
+mod run;
+
+pub mod mcap;
+pub mod plot;
+pub mod report;
+pub mod table;
+
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::thread;
+
+pub use files::RecordError;
+pub use recording::{
+    EventMark, Expectation, Level, LogLine, Measured, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
+    StepState,
+};
+pub use report::{REPORT_SCHEMA, Report, human};
+pub use run::{Failure, Place, Run, RunInfo, Status};
+
+/// Which files [`write_all`] writes besides `report.json`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outputs {
+    /// `recording.mcap`.
+    pub recording: bool,
+    /// `states.csv`, and `records.csv` if anything was recorded.
+    pub tables: bool,
+    /// `plot.svg`.
+    pub plot: bool,
+}
+
+impl Outputs {
+    /// All of them.
+    pub const ALL: Outputs = Outputs { recording: true, tables: true, plot: true };
+}
+
+/// Writes the files of a run into `dir`, which is made if need be, each whole or not at all; gives their paths.
+pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -> Result<Vec<PathBuf>, RecordError> {
+    fs::create_dir_all(dir).map_err(|e| RecordError::new(dir, e))?;
+    let mut written = Vec::new();
+    let mut put = |name: &str, bytes: Result<Vec<u8>, String>| {
+        let path = dir.join(name);
+        let bytes = bytes.map_err(|reason| RecordError::new(&path, reason))?;
+        files::write_whole(&path, &bytes)?;
+        written.push(path);
+        Ok(())
+    };
+    // The recording and the tables are the large ones: they are made side by side.
+    let recording = || outputs.recording.then(|| mcap_bytes(run));
+    let tables = || outputs.tables.then(|| bytes_of(|out| table::states(run, out)));
+    let (recording, tables) = thread::scope(|scope| {
+        let beside = thread::Builder::new().spawn_scoped(scope, recording);
+        let tables = tables();
+        // Where there is no thread to be had, this one does the work.
+        let made = beside.ok().and_then(|thread| thread.join().ok());
+        (made.unwrap_or_else(recording), tables)
+    });
+    if let Some(bytes) = recording {
+        put("recording.mcap", bytes)?;
+    }
+    if let Some(bytes) = tables {
+        put("states.csv", bytes)?;
+        if !run.recording.values.is_empty() {
+            put("records.csv", bytes_of(|out| table::records(run, out)))?;
+        }
+    }
+    if outputs.plot {
+        put("plot.svg", plot::page(run).map(String::into_bytes).map_err(|e| e.to_string()))?;
+    }
+    put("report.json", report.json().map(String::into_bytes).map_err(|e| e.to_string()))?;
+    Ok(written)
+}
+
+fn mcap_bytes(run: &Run<'_>) -> Result<Vec<u8>, String> {
+    let mut out = Cursor::new(Vec::new());
+    mcap::write(run, &mut out).map_err(|e| e.to_string())?;
+    Ok(out.into_inner())
+}
+
+fn bytes_of(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> Result<Vec<u8>, String> {
+    let mut out = Vec::new();
+    write(&mut out).map_err(|e| e.to_string())?;
+    Ok(out)
+}

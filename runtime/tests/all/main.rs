@@ -1,0 +1,19 @@
+//! Tests of the runtime.
+
+mod analytic;
+mod analytic_sn1;
+mod engine_events;
+mod engine_faults;
+mod engine_model;
+mod engine_segments;
+mod exec_build;
+mod exec_claims;
+mod exec_dry;
+mod exec_failure;
+mod exec_flow;
+mod exec_random;
+mod exec_readings;
+mod exec_stop;
+mod ledger;
+
+mod record;

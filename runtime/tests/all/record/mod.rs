@@ -1,0 +1,8 @@
+//! What a run leaves behind.
+
+mod contents;
+mod docs;
+mod fixture;
+mod mcap;
+mod plot;
+mod report;
