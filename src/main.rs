@@ -1,2 +1,68 @@
-//! The matterix command.
-fn main() {}
+//! The matterix command: arguments, files, and findings on a terminal. All meaning is in the crates below.
+
+mod args;
+mod cancel;
+mod command;
+mod files;
+mod pipeline;
+mod progress;
+mod report;
+mod terminal;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Cli, Command};
+
+/// How a command ended; a worse end is greater.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Exit {
+    /// Nothing wrong.
+    Fine,
+    /// Findings, a failed run or a failed expectation.
+    Findings,
+    /// Usage or files.
+    Usage,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> ExitCode {
+        ExitCode::from(match exit {
+            Exit::Fine => 0,
+            Exit::Findings => 1,
+            Exit::Usage => 2,
+        })
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(message) => {
+            // A reader that has gone away is no reason to fail.
+            let _ = message.print();
+            return if message.use_stderr() { Exit::Usage } else { Exit::Fine }.into();
+        }
+    };
+    // Every pass over a text goes as deep as its brackets; the deepest that are read need more than a thread's usual stack.
+    let worker = std::thread::Builder::new().stack_size(STACK).spawn(move || obey(cli));
+    match worker.map(std::thread::JoinHandle::join) {
+        Ok(Ok(exit)) => exit.into(),
+        _ => ExitCode::from(101),
+    }
+}
+
+/// Bytes; only what is used of it is ever taken.
+const STACK: usize = 512 << 20;
+
+fn obey(cli: Cli) -> Exit {
+    match cli.command {
+        Command::Check(args) => command::check(&args, cli.color),
+        Command::Fmt(args) => command::fmt(&args, cli.color),
+        Command::Run(args) => command::run(&args, cli.color),
+        Command::Explain(args) => command::explain(&args),
+        Command::New(args) => command::new(&args),
+        Command::Version => command::version(),
+    }
+}

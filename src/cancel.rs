@@ -1,0 +1,25 @@
+//! Ctrl-C: the first asks the run to stop, so that every `finally` runs; the second ends the command at once.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::terminal::{Stream, print};
+
+static PRESSED: AtomicBool = AtomicBool::new(false);
+static ASKED: AtomicBool = AtomicBool::new(false);
+
+/// Exit status of a command that was interrupted twice, as shells count it.
+const INTERRUPTED: i32 = 130;
+
+/// From here on Ctrl-C and a request to terminate set the flag returned.
+pub fn on_interrupt() -> Result<&'static AtomicBool, String> {
+    let handler = || {
+        if PRESSED.swap(true, Ordering::SeqCst) {
+            std::process::exit(INTERRUPTED);
+        }
+        print(Stream::Err, "\nstopping: what `finally` says is done first; Ctrl-C again ends at once\n");
+        // Said before it is asked for: what `finally` does comes after it in the text.
+        ASKED.store(true, Ordering::SeqCst);
+    };
+    ctrlc::set_handler(handler).map_err(|e| format!("cannot listen for Ctrl-C: {e}"))?;
+    Ok(&ASKED)
+}

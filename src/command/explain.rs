@@ -1,0 +1,93 @@
+//! `matterixc explain`.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::{Code, codes};
+
+use crate::Exit;
+use crate::args::ExplainArgs;
+use crate::terminal::{Stream, complain, print};
+
+/// Text above the table of the index.
+const INDEX_HEAD: &str = include_str!("../template/codes.md");
+
+/// Prints the page of a code, the codes of a family, or the list of all.
+pub fn explain(args: &ExplainArgs) -> Exit {
+    if args.index {
+        print(Stream::Out, &index());
+        return Exit::Fine;
+    }
+    let Some(given) = &args.code else {
+        print(Stream::Out, &list(codes::ALL));
+        return Exit::Fine;
+    };
+    let name = bare(given);
+    if let Some(code) = codes::find(&name) {
+        print(Stream::Out, &format!("{}\n", code.page.trim_end()));
+        return Exit::Fine;
+    }
+    let family: Vec<Code> = codes::ALL.iter().copied().filter(|c| c.family.eq_ignore_ascii_case(&name)).collect();
+    if !family.is_empty() {
+        print(Stream::Out, &list(&family));
+        return Exit::Fine;
+    }
+    complain(&format!("there is no diagnostic code `{given}`"));
+    let hint = match nearest(&name) {
+        Some(code) => format!("help: did you mean `{code}`?\n"),
+        None => "help: `matterixc explain` lists all codes\n".to_string(),
+    };
+    print(Stream::Err, &hint);
+    Exit::Usage
+}
+
+/// The code in what was pasted: `error[unit-mismatch]:` is `unit-mismatch`.
+fn bare(given: &str) -> String {
+    let inner = given.split_once('[').map_or(given, |(_, rest)| rest);
+    inner.split(']').next().unwrap_or_default().trim().to_lowercase()
+}
+
+fn nearest(name: &str) -> Option<&'static str> {
+    let distance = |code: &Code| strsim::damerau_levenshtein(name, code.name);
+    let best = codes::ALL.iter().min_by_key(|code| distance(code))?;
+    (distance(best) <= 1 + best.name.len() / 3).then_some(best.name)
+}
+
+fn by_family(codes: &[Code]) -> BTreeMap<(u8, &'static str), Vec<Code>> {
+    let mut families: BTreeMap<(u8, &'static str), Vec<Code>> = BTreeMap::new();
+    for code in codes {
+        families.entry((rank(code.family), code.family)).or_default().push(*code);
+    }
+    families
+}
+
+/// Parsing, names, checks, runs: the order in which they are met.
+fn rank(family: &str) -> u8 {
+    match family.as_bytes().first() {
+        Some(b'P') => 0,
+        Some(b'N') => 1,
+        Some(b'X') => 3,
+        _ => 2,
+    }
+}
+
+fn list(codes: &[Code]) -> String {
+    let width = codes.iter().map(|c| c.name.len()).max().unwrap_or(0);
+    let mut out = String::new();
+    for ((_, family), codes) in by_family(codes) {
+        out.push_str(&format!("{family}\n"));
+        codes.iter().for_each(|c| out.push_str(&format!("  {:width$}  {}\n", c.name, c.summary)));
+    }
+    out
+}
+
+fn index() -> String {
+    let mut out = INDEX_HEAD.to_string();
+    out.push_str("\n| family | code | meaning |\n| --- | --- | --- |\n");
+    for ((_, family), codes) in by_family(codes::ALL) {
+        for code in codes {
+            let summary = code.summary.replace('|', "\\|");
+            out.push_str(&format!("| {family} | [{0}]({0}.md) | {summary} |\n", code.name));
+        }
+    }
+    out
+}

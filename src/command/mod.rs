@@ -1,0 +1,23 @@
+//! One file per subcommand.
+
+mod check;
+mod explain;
+mod fmt;
+mod new;
+mod run;
+
+pub use check::check;
+pub use explain::explain;
+pub use fmt::fmt;
+pub use new::new;
+pub use run::run;
+
+use crate::Exit;
+use crate::terminal::{Stream, print};
+
+/// Prints the versions of the command, the language and the compiled program.
+pub fn version() -> Exit {
+    let version = env!("CARGO_PKG_VERSION");
+    print(Stream::Out, &format!("matterixc {version} (mtx 1, program {})\n", matterix_ir::program::PROGRAM_VERSION));
+    Exit::Fine
+}

@@ -1,0 +1,92 @@
+//! Reading and writing files.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// What a file holds, or in words why it cannot be read.
+pub fn read(path: &Path) -> Result<Vec<u8>, String> {
+    // Asked first, since what opening a folder says differs between systems.
+    if path.is_dir() {
+        return Err(format!("`{}` is a directory, not a file", path.display()));
+    }
+    fs::read(path).map_err(|e| format!("cannot read `{}`: {}", path.display(), reason(&e)))
+}
+
+/// What standard input holds, or in words why it cannot be read.
+pub fn read_stdin() -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    match io::stdin().lock().read_to_end(&mut bytes) {
+        Ok(_) => Ok(bytes),
+        Err(e) => Err(format!("cannot read standard input: {}", reason(&e))),
+    }
+}
+
+/// Replaces what a file holds in one step, keeping its permissions; a link stays a link.
+pub fn replace(path: &Path, text: &str) -> Result<(), String> {
+    let failed = |e: io::Error| format!("cannot write `{}`: {}", path.display(), reason(&e));
+    let target = fs::canonicalize(path).map_err(failed)?;
+    let permissions = fs::metadata(&target).map_err(failed)?.permissions();
+    if permissions.readonly() {
+        return Err(format!("cannot write `{}`: it is read-only", path.display()));
+    }
+    let beside = beside(&target);
+    let written = fill(&beside, text)
+        .and_then(|()| fs::set_permissions(&beside, permissions))
+        .and_then(|()| fs::rename(&beside, &target));
+    written.map_err(|e| {
+        // What is left of a failed attempt is of no use; that it cannot be removed either changes nothing.
+        let _ = fs::remove_file(&beside);
+        failed(e)
+    })
+}
+
+/// Creates a folder with these files, all or none; a folder that exists must be empty.
+pub fn create_folder(dir: &Path, files: &[(&str, &str)]) -> Result<(), String> {
+    let failed = |e: io::Error| format!("cannot create `{}`: {}", dir.display(), reason(&e));
+    let exists = match fs::read_dir(dir).map(|mut entries| entries.next().is_none()) {
+        Ok(true) => true,
+        Ok(false) => return Err(format!("`{}` exists and is not empty", dir.display())),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => false,
+        Err(e) => return Err(failed(e)),
+    };
+    // The final name is taken only by a rename, so whoever looks sees the whole folder or none.
+    let dir = if exists { fs::canonicalize(dir).map_err(failed)? } else { std::path::absolute(dir).map_err(failed)? };
+    if let Some(parent) = dir.parent() {
+        fs::create_dir_all(parent).map_err(failed)?;
+    }
+    let beside = beside(&dir);
+    let created = fs::create_dir(&beside)
+        .and_then(|()| files.iter().try_for_each(|(name, text)| fill(&beside.join(name), text)))
+        .and_then(|()| if exists { fs::remove_dir(&dir) } else { Ok(()) })
+        .and_then(|()| fs::rename(&beside, &dir));
+    created.map_err(|e| {
+        let _ = fs::remove_dir_all(&beside);
+        failed(e)
+    })
+}
+
+/// Why an operation on a file failed, without the number of the system's error.
+pub fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_string(),
+        io::ErrorKind::PermissionDenied => "permission denied".to_string(),
+        io::ErrorKind::NotADirectory => "part of the path is not a directory".to_string(),
+        _ => {
+            let text = error.to_string();
+            text.split(" (os error").next().unwrap_or_default().to_lowercase()
+        }
+    }
+}
+
+fn fill(path: &Path, text: &str) -> io::Result<()> {
+    let mut file: File = OpenOptions::new().write(true).create_new(true).open(path)?;
+    file.write_all(text.as_bytes())?;
+    file.sync_all()
+}
+
+/// A name next to `path` that nobody else uses.
+fn beside(path: &Path) -> PathBuf {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+}

@@ -1,0 +1,94 @@
+//! Every call into the compiler and the runtime.
+
+mod neighbours;
+mod run;
+
+use std::path::{Path, PathBuf};
+
+use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
+
+use neighbours::Neighbours;
+
+pub use run::{Choices, run};
+
+/// A text to compile, and where its neighbours are.
+pub struct Input {
+    /// As shown in findings: the path as typed.
+    pub name: String,
+    /// What was read.
+    pub bytes: Vec<u8>,
+    /// Folder of the modules it imports.
+    dir: PathBuf,
+}
+
+impl Input {
+    /// What a file holds.
+    pub fn file(path: &Path, bytes: Vec<u8>) -> Self {
+        let dir = path.parent().map(Path::to_path_buf).unwrap_or_default();
+        Input { name: path.display().to_string(), bytes, dir }
+    }
+
+    /// What was typed or piped in; its neighbours are in the current folder.
+    pub fn stdin(bytes: Vec<u8>) -> Self {
+        Input { name: "<stdin>".to_string(), bytes, dir: PathBuf::new() }
+    }
+
+    /// The text as the first file of a compilation; an error where it is not text.
+    fn source(&self) -> (Sources, Result<FileId, Diagnostic>) {
+        let mut sources = Sources::default();
+        match std::str::from_utf8(&self.bytes) {
+            Ok(text) => {
+                let file = sources.add(&self.name, text);
+                (sources, Ok(file))
+            }
+            Err(e) => {
+                let file = sources.add(&self.name, String::from_utf8_lossy(&self.bytes));
+                let place = Span::new(file, e.valid_up_to(), e.valid_up_to());
+                let headline = "the file is not text in UTF-8";
+                let found = Diagnostic::error(codes::SYNTAX, place, headline, "the first byte that is not UTF-8");
+                (sources, Err(found.help("save the file with the encoding UTF-8")))
+            }
+        }
+    }
+
+    fn neighbours(&self) -> Neighbours {
+        Neighbours::of(&self.dir)
+    }
+}
+
+/// Findings of a file.
+pub fn check(input: &Input) -> (Sources, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let found = match file {
+        Ok(file) => matterix_lang::check(&mut sources, file, &input.neighbours()),
+        Err(found) => vec![found],
+    };
+    (sources, found)
+}
+
+/// A file as a program, with findings; no program where there is an error.
+pub fn compile(
+    input: &Input,
+    workflow: Option<&str>,
+    set: &[(String, String)],
+) -> (Sources, Option<Program>, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let (program, found) = match file {
+        Ok(file) => {
+            let options = matterix_lang::Options { workflow: workflow.map(str::to_string), set: set.to_vec() };
+            matterix_lang::compile(&mut sources, file, &input.neighbours(), &options)
+        }
+        Err(found) => (None, vec![found]),
+    };
+    (sources, program, found)
+}
+
+/// A file in the one style, or why it has none.
+pub fn format(input: &Input) -> Result<String, (Sources, Vec<Diagnostic>)> {
+    let (sources, file) = input.source();
+    let formatted = file.map_err(|found| vec![found]).and_then(|file| {
+        let text = sources.get(file).map_or("", |s| s.text.as_str());
+        matterix_lang::fmt::format(file, text)
+    });
+    formatted.map_err(|found| (sources, found))
+}

@@ -1,0 +1,225 @@
+//! A program on the digital twin: executed, followed, recorded and reported.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use matterix_ir::plan::{Condition, StepId};
+use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
+use matterix_runtime::exec::{self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Verdict};
+use matterix_runtime::process::{Engine, Observer};
+use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo};
+use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
+
+use crate::args;
+use crate::progress::Progress;
+
+/// Version of the language that programs are written in, as in `mtx 1`.
+const LANGUAGE: u32 = 1;
+
+/// What a run may choose.
+pub struct Choices {
+    /// Where all randomness starts.
+    pub seed: u64,
+    /// How closely motions are simulated.
+    pub fidelity: args::Fidelity,
+    /// Steps without what they cause.
+    pub dry: bool,
+}
+
+impl Choices {
+    fn fidelity(&self) -> Fidelity {
+        match self.fidelity {
+            _ if self.dry => Fidelity::Dry,
+            args::Fidelity::Process => Fidelity::Process,
+        }
+    }
+}
+
+/// Executes a program until it ends or `cancel` is set.
+pub fn run<'a>(
+    program: &'a Program,
+    sources: &'a Sources,
+    choices: &Choices,
+    cancel: &AtomicBool,
+    progress: &mut Progress<'_>,
+) -> Ran<'a> {
+    let fidelity = choices.fidelity();
+    let limits = Limits { cancel: Some(cancel), ..Limits::default() };
+    let options = RunOptions { seed: choices.seed, fidelity, limits, ..RunOptions::default() };
+    let mut follower = Follower { recording: Recording::new(program), progress };
+    let outcome = matterix_runtime::run::run(program, &options, &mut follower);
+    let mut recording = follower.recording;
+    recording.reach(outcome.end_time);
+    let info = info(&outcome, choices);
+    let report = Report::new(&Run { program, recording: &recording, sources, info: &info });
+    let passed = outcome.status == RunStatus::Passed;
+    Ran { program, sources, recording, info, report, diagnostics: findings(&outcome, sources), passed }
+}
+
+/// A finished run.
+pub struct Ran<'a> {
+    program: &'a Program,
+    sources: &'a Sources,
+    recording: Recording,
+    info: RunInfo,
+    report: Report,
+    /// What ended it, what else failed on the way, and expectations that did not hold, each on its line of the source.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Whether it came to its end and every expectation held.
+    pub passed: bool,
+}
+
+impl Ran<'_> {
+    /// The report to read.
+    pub fn page(&self) -> String {
+        record::human(&self.report)
+    }
+
+    /// The contents of `report.json`.
+    pub fn json(&self) -> Result<String, String> {
+        self.report.json().map_err(|e| format!("cannot write the report: {e}"))
+    }
+
+    /// Writes recording, tables, plots and report into a folder.
+    pub fn write(&self, dir: &Path) -> Result<(), String> {
+        let run = Run { program: self.program, recording: &self.recording, sources: self.sources, info: &self.info };
+        record::write_all(dir, &run, &self.report, Outputs::ALL).map(|_| ()).map_err(|e| e.to_string())
+    }
+}
+
+/// Hands on what happens to the recording and to whoever watches.
+struct Follower<'a, 'p> {
+    recording: Recording,
+    progress: &'a mut Progress<'p>,
+}
+
+impl Observer for Follower<'_, '_> {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+        let observables = engine.model().observables.iter();
+        let values: Vec<Vec<f64>> = observables.map(|o| o.value.iter().map(|n| engine.eval(*n)).collect()).collect();
+        self.recording.sample(time, engine.states(), &values);
+        self.progress.moved(time);
+    }
+
+    fn event(&mut self, time: f64, event: usize) {
+        self.recording.event(time, event);
+    }
+
+    fn process(&mut self, time: f64, process: usize, running: bool) {
+        self.recording.process(time, process, running);
+    }
+}
+
+impl Listener for Follower<'_, '_> {
+    fn step(&mut self, time: f64, step: StepId, state: StepState) {
+        self.recording.step(time, step, recorded(state));
+        match state {
+            StepState::Running => self.progress.started(step, time),
+            _ => self.progress.ended(step, time),
+        }
+    }
+
+    fn expectation(&mut self, result: &ExpectationResult) {
+        if result.verdict == Verdict::NotObserved {
+            let text = format!("not observed: {}", result.text);
+            self.recording.log(result.time, Level::Warning, text, Some(result.span));
+            return;
+        }
+        let measured = result.compared.iter().filter_map(|m| {
+            let value = m.value?;
+            Some(record::Measured { text: m.text.clone(), value, low: m.low, high: m.high, unit: m.unit.clone() })
+        });
+        self.recording.expectation(record::Expectation {
+            time: result.time,
+            text: result.text.clone(),
+            span: result.span,
+            passed: result.verdict == Verdict::Passed,
+            measured: measured.collect(),
+        });
+    }
+
+    fn failure(&mut self, failure: &FailureTrace) {
+        let text = format!("{}: {}", failure.name, failure.text);
+        self.recording.log(failure.time, Level::Error, text, Some(failure.span));
+    }
+
+    fn assumed(&mut self, time: f64, _: StepId, condition: &Condition) {
+        let text = format!("taken to hold: {}", condition.text);
+        self.recording.log(time, Level::Warning, text, Some(condition.span));
+    }
+
+    fn record(&mut self, time: f64, _: StepId, name: &str, values: &[f64], _: &Unit) {
+        self.recording.value(time, name, values);
+    }
+
+    fn note(&mut self, time: f64, _: StepId, text: &str) {
+        self.recording.log(time, Level::Info, text, None);
+    }
+
+    fn ask(&mut self, time: f64, _: StepId, text: &str) {
+        self.recording.log(time, Level::Info, format!("asked: {text}"), None);
+    }
+}
+
+fn recorded(state: StepState) -> record::StepState {
+    match state {
+        StepState::Pending => record::StepState::Pending,
+        StepState::Running => record::StepState::Running,
+        StepState::Done => record::StepState::Done,
+        StepState::Failed => record::StepState::Failed,
+        StepState::Skipped => record::StepState::Skipped,
+    }
+}
+
+fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
+    let failure = outcome.failure.as_ref().map(|f| record::Failure {
+        name: f.name.clone(),
+        text: f.text.clone(),
+        time: f.time,
+        span: Some(f.span).filter(|s| !s.is_empty()),
+        trace: f.steps.iter().map(|s| s.step).collect(),
+    });
+    let status = match outcome.status {
+        RunStatus::Passed => record::Status::Passed,
+        RunStatus::ExpectationFailed => record::Status::Missed,
+        RunStatus::Failed | RunStatus::Fault => record::Status::Failed,
+        RunStatus::Cancelled => record::Status::Cancelled,
+    };
+    let fidelity = match choices.fidelity() {
+        Fidelity::Process => "process",
+        Fidelity::Dry => "dry",
+    };
+    RunInfo {
+        language: LANGUAGE,
+        seed: choices.seed,
+        fidelity: fidelity.to_string(),
+        status,
+        failure,
+        ..RunInfo::default()
+    }
+}
+
+/// What ended the run is an error, and so is an expectation that did not hold; what else failed is a warning.
+fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> {
+    let missed = outcome.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
+    let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
+    found.extend(outcome.failure.iter().map(exec::diagnostic));
+    let others = outcome.suppressed.iter().map(exec::diagnostic);
+    found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
+    found.into_iter().map(|d| led_by_the_user(d, sources)).collect()
+}
+
+/// A fault inside the library is shown at the user's own line first, then where the library stands.
+fn led_by_the_user(mut d: Diagnostic, sources: &Sources) -> Diagnostic {
+    let library = |l: &Label| sources.get(l.span.file).is_some_and(|f| f.name.contains("::"));
+    if !d.labels.iter().any(|l| l.primary && library(l)) {
+        return d;
+    }
+    let Some(own) = d.labels.iter().position(|l| !library(l)) else { return d };
+    for (i, label) in d.labels.iter_mut().enumerate() {
+        label.primary = i == own;
+    }
+    let own = d.labels.remove(own);
+    d.labels.insert(0, own);
+    d
+}

@@ -1,0 +1,46 @@
+//! One JSON object per line, for editors and scripts; the shape is promised in `docs/diagnostics-json.md`.
+
+use matterix_ir::{Diagnostic, Span};
+use serde_json::{Value, json};
+
+use super::text::{Text, Texts};
+use super::word;
+
+/// Appends the object and a line end.
+pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut String) {
+    let labels: Vec<Value> = diagnostic
+        .labels
+        .iter()
+        .map(|l| json!({ "span": span(l.span, texts), "text": l.text, "primary": l.primary }))
+        .collect();
+    let fixes: Vec<Value> = diagnostic
+        .fixes
+        .iter()
+        .map(|f| {
+            let edits: Vec<Value> =
+                f.edits.iter().map(|e| json!({ "span": span(e.span, texts), "text": e.text })).collect();
+            json!({ "title": f.title, "edits": edits })
+        })
+        .collect();
+    let primary = diagnostic.labels.iter().find(|l| l.primary).map(|l| span(l.span, texts));
+    let object = json!({
+        "code": diagnostic.code.name,
+        "severity": word(diagnostic.severity),
+        "headline": diagnostic.headline,
+        "span": primary,
+        "labels": labels,
+        "help": diagnostic.help,
+        "fixes": fixes,
+    });
+    out.push_str(&format!("{object}\n"));
+}
+
+fn span(span: Span, texts: &mut Texts<'_>) -> Value {
+    let Some(text) = texts.get(span.file) else { return Value::Null };
+    json!({ "file": text.name(), "start": position(span.start, text), "end": position(span.end, text) })
+}
+
+fn position(byte: u32, text: &Text) -> Value {
+    let (line, column) = text.position(byte as usize);
+    json!({ "line": line, "column": column, "byte": byte })
+}

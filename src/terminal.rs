@@ -1,0 +1,72 @@
+//! Standard output and standard error: written as far as somebody reads, coloured only for people.
+
+use std::io::{self, IsTerminal, Write};
+
+use crate::args::Color;
+use crate::report::Look;
+
+/// Width where no terminal tells one.
+const WIDTH: usize = 100;
+
+/// The narrowest and widest running text that reads well.
+const READABLE: std::ops::RangeInclusive<usize> = 40..=120;
+
+/// A standard stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// Results.
+    Out,
+    /// Everything else.
+    Err,
+}
+
+/// Writes text; a reader that has gone away ends the writing, not the command.
+pub fn print(stream: Stream, text: &str) {
+    let _ = match stream {
+        Stream::Out => write(io::stdout().lock(), text),
+        Stream::Err => write(io::stderr().lock(), text),
+    };
+}
+
+/// Writes one `error: ` line to standard error.
+pub fn complain(message: &str) {
+    print(Stream::Err, &format!("error: {message}\n"));
+}
+
+/// How to lay out findings on a stream.
+pub fn look(stream: Stream, color: Color) -> Look {
+    let color = match color {
+        Color::Always => true,
+        Color::Never => false,
+        Color::Auto => {
+            is_terminal(stream) && !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|t| t != "dumb")
+        }
+    };
+    Look { color, width: width(stream) }
+}
+
+/// Whether a person is at the other end.
+pub fn is_terminal(stream: Stream) -> bool {
+    match stream {
+        Stream::Out => io::stdout().is_terminal(),
+        Stream::Err => io::stderr().is_terminal(),
+    }
+}
+
+/// Columns of the terminal at the other end, or 100.
+pub fn width(stream: Stream) -> usize {
+    let size = match stream {
+        Stream::Out => terminal_size::terminal_size_of(io::stdout()),
+        Stream::Err => terminal_size::terminal_size_of(io::stderr()),
+    };
+    size.map_or(WIDTH, |(width, _)| usize::from(width.0)).clamp(*READABLE.start(), *READABLE.end())
+}
+
+fn is_set(name: &str) -> bool {
+    std::env::var_os(name).is_some_and(|value| !value.is_empty())
+}
+
+fn write(mut to: impl Write, text: &str) -> io::Result<()> {
+    to.write_all(text.as_bytes())?;
+    to.flush()
+}
