@@ -1,0 +1,134 @@
+//! One mistake, one message.
+
+use crate::harness::{folder, matterixc, write};
+
+/// Codes and headlines that `check` reports for a file.
+fn findings(name: &str, text: &str) -> Vec<(String, String)> {
+    let path = write(&folder(&format!("findings_{name}")), "bench.mtx", text);
+    let lines = matterixc(&["check", &path, "--format", "json"]).out_lines();
+    let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
+    lines.iter().map(|l| (text(&l["code"]), text(&l["headline"]))).collect()
+}
+
+/// The only finding of a file.
+fn only(name: &str, text: &str) -> (String, String) {
+    let found = findings(name, text);
+    let [one] = found.as_slice() else { panic!("{name}: {found:?}") };
+    one.clone()
+}
+
+const BENCH: &str = "mtx 1
+
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+
+lab bench {
+    ambient: 25 degC
+    table = OpticalTable at (0, 0, 0) m
+    plate = IkaRetControl on table at (300, 0) mm
+    beaker = Beaker250mL on plate holding 100 g of water
+}
+
+workflow warm in bench {
+    heat plate to 60 degC
+    wait until beaker.contents.temperature > 40 degC timeout 4 h
+    stop heating plate
+}
+";
+
+#[test]
+fn a_bench_without_mistakes_yields_nothing() {
+    assert_eq!(findings("none", BENCH), []);
+}
+
+#[test]
+fn names_of_an_import_that_failed_are_not_missed_again() {
+    let (code, headline) = only("module", &BENCH.replace("glassware", "glasware"));
+    assert_eq!((code.as_str(), headline.as_str()), ("unknown-module", "there is no module `std::glasware`"));
+    let wrong = BENCH.replace("glassware::Beaker250mL", "glassware::{Beaker250mL, Beaker25mL}");
+    let wrong = wrong.replace("beaker = Beaker250mL", "beaker = Beaker25mL");
+    assert_eq!(only("item", &wrong).1, "`std::glassware` declares no `Beaker25mL`");
+    let wrong = BENCH.replace("use std::heating", "use std::skils::weigh\nuse std::heating");
+    assert_eq!(only("verb", &wrong.replace("stop heating plate", "weigh beaker")).0, "unknown-module");
+}
+
+#[test]
+fn an_instance_of_an_unknown_asset_is_not_missed_again() {
+    assert_eq!(only("asset", &BENCH.replace("= Beaker250mL", "= Beaker205mL")).0, "unknown-name");
+    assert_eq!(only("device", &BENCH.replace("= IkaRetControl", "= IkaRetCtrl")).0, "unknown-name");
+    assert_eq!(only("capability", &BENCH.replace("= IkaRetControl", "= Heater")).0, "wrong-kind");
+}
+
+#[test]
+fn a_line_that_cannot_be_read_is_not_judged() {
+    assert_eq!(only("line", &BENCH.replace("100 g of water", "100 g water")).0, "syntax");
+}
+
+#[test]
+fn an_independent_mistake_on_another_line_is_reported_too() {
+    let wrong = BENCH.replace("100 g of water", "100 g water").replace("stop heating plate", "stop heating plaet");
+    let codes: Vec<String> = findings("two", &wrong).into_iter().map(|f| f.0).collect();
+    assert_eq!(codes, ["syntax", "unknown-name"]);
+}
+
+#[test]
+fn a_preposition_for_another_is_one_slip() {
+    assert_eq!(only("preposition", &BENCH.replace("plate to 60", "plate at 60")).1, "`heat` does not take `at`");
+}
+
+#[test]
+fn a_ring_is_reported_once() {
+    for (name, ring) in [
+        ("solutions", "solution a { b: 1 g, water: 9 g }\nsolution b { a: 1 g, water: 9 g }\n"),
+        ("constants", "const a = 2 * b\nconst b = a / 2\n"),
+        ("functions", "fn f(x: Ratio) = g(x)\nfn g(x: Ratio) = f(x)\n"),
+        ("capabilities", "capability A: B {\n}\ncapability B: A {\n}\n"),
+        ("members", "capability A {\n    derived p: Ratio = q + 1\n    derived q: Ratio = p - 1\n}\n"),
+        ("skills", "skill warm up(p: Heater) {\n    cool off p\n}\nskill cool off(p: Heater) {\n    warm up p\n}\n"),
+    ] {
+        assert_eq!(only(name, &format!("mtx 1\n\n{ring}")).0, "circular", "{name}");
+    }
+}
+
+#[test]
+fn a_capability_means_its_own_members() {
+    let own = "mtx 1
+
+capability Chiller {
+    state active: Bool = false
+    command cool down
+        effect active = true
+}
+asset Bath: Heater, Chiller, Surface {
+    mass: 12 kg
+    capacity: 20 kJ/K
+    air: 1 W/K
+    gain: 100 W/K
+    power: 2 kW
+    limits: 0 degC .. 150 degC
+}
+lab bench {
+    ambient: 25 degC
+    bath = Bath at (0, 0, 0) m
+}
+workflow freeze in bench {
+    cool down bath
+    expect bath.Chiller.active and not bath.Heater.active
+}
+";
+    assert_eq!(findings("own", own), []);
+    let short = own.replace("bath.Heater.active", "bath.active");
+    assert_eq!(only("short", &short).0, "ambiguous-name");
+}
+
+#[test]
+fn a_rate_is_checked_where_no_lab_uses_its_reaction() {
+    let text = "mtx 1\n\nreaction r: EtOH + HI -> EtI + H2O {\n    rate: 3 1/s\n    order: { EtOH: 1, HI: 1 }\n}\n";
+    assert_eq!(only("rate", text).0, "rate-unit");
+}
+
+#[test]
+fn a_word_cut_short_is_completed() {
+    let path = write(&folder("findings_short"), "bench.mtx", BENCH.replace("contents.temperature", "contents.temp"));
+    assert!(matterixc(&["check", &path]).out.contains("did you mean `temperature`?"));
+}

@@ -1,0 +1,98 @@
+//! Runs the command in a folder of its own.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+/// What a command left behind.
+pub struct Ended {
+    /// Exit status.
+    pub code: i32,
+    /// Standard output.
+    pub out: String,
+    /// Standard error.
+    pub err: String,
+}
+
+impl Ended {
+    /// The objects on the lines of standard output.
+    pub fn out_lines(&self) -> Vec<serde_json::Value> {
+        self.out.lines().map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{e}: {l}"))).collect()
+    }
+
+    /// The objects on the lines of standard error.
+    pub fn err_lines(&self) -> Vec<serde_json::Value> {
+        self.err.lines().map(|l| serde_json::from_str(l).unwrap_or_else(|e| panic!("{e}: {l}"))).collect()
+    }
+}
+
+/// The command with nothing in its environment that changes its output.
+pub fn command() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
+    command.env_remove("NO_COLOR").stdin(Stdio::null());
+    command
+}
+
+/// Runs the command with these arguments.
+pub fn matterixc(args: &[&str]) -> Ended {
+    ended(command().args(args).output().expect("the command starts"))
+}
+
+/// Runs the command with these arguments in a folder.
+pub fn matterixc_in(dir: &Path, args: &[&str]) -> Ended {
+    ended(command().args(args).current_dir(dir).output().expect("the command starts"))
+}
+
+/// Runs the command with these arguments and this standard input.
+pub fn matterixc_with(args: &[&str], input: &[u8]) -> Ended {
+    let mut child = command().args(args).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let child = child.as_mut().expect("the command starts");
+    let mut stdin = child.stdin.take().expect("standard input is piped");
+    stdin.write_all(input).expect("the command reads");
+    drop(stdin);
+    let mut out = String::new();
+    let mut err = String::new();
+    std::io::Read::read_to_string(&mut child.stdout.take().expect("piped"), &mut out).expect("text");
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut err).expect("text");
+    let code = child.wait().expect("the command ends").code().unwrap_or(-1);
+    Ended { code, out, err }
+}
+
+/// An empty folder for one test.
+pub fn folder(name: &str) -> PathBuf {
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(name);
+    if dir.exists() {
+        fs::remove_dir_all(&dir).expect("the folder of an earlier run can be removed");
+    }
+    fs::create_dir_all(&dir).expect("a folder can be created");
+    dir
+}
+
+/// A file in a folder, and its path as text.
+pub fn write(dir: &Path, name: &str, text: impl AsRef<[u8]>) -> String {
+    let path = dir.join(name);
+    fs::write(&path, text).expect("a file can be written");
+    path.to_str().expect("the path is text").to_string()
+}
+
+/// Names in a folder, sorted.
+pub fn names(dir: &Path) -> Vec<String> {
+    let entries = fs::read_dir(dir).expect("the folder can be read");
+    let mut names: Vec<String> = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Top of the repository.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn ended(output: Output) -> Ended {
+    Ended {
+        code: output.status.code().unwrap_or(-1),
+        out: String::from_utf8(output.stdout).expect("standard output is text"),
+        err: String::from_utf8(output.stderr).expect("standard error is text"),
+    }
+}
