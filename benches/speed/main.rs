@@ -1,0 +1,177 @@
+//! How long things take: `cargo bench`. A table of medians; docs/performance.md says what is meant by each line.
+//!
+//! The comparison with scipy needs a Python that has it, `python3` or the one `MATTERIX_PYTHON` names.
+
+#![allow(clippy::unwrap_used)]
+
+mod generate;
+mod models;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use matterix_ir::model::Model;
+use matterix_ir::{Program, Sources};
+use matterix_lang::LibraryOnly;
+use matterix_runtime::process::{Engine, Options};
+use matterix_runtime::run::RunOptions;
+
+fn main() {
+    if let [flag, lines] = std::env::args().skip(1).collect::<Vec<_>>().as_slice()
+        && flag == "generate"
+    {
+        print!("{}", generate::program(lines.parse().unwrap()));
+        return;
+    }
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
+    fs::create_dir_all(&dir).unwrap();
+    println!("median of the times of several runs; the fastest in brackets\n");
+    check(&dir);
+    run(&dir);
+    robertson();
+    match lsoda() {
+        Ok(()) => {}
+        Err(why) => println!("\ncomparison with scipy skipped: {why}"),
+    }
+}
+
+/// Times of a piece of work.
+struct Times {
+    median: Duration,
+    fastest: Duration,
+}
+
+fn time(repeats: usize, mut work: impl FnMut()) -> Times {
+    work();
+    let mut times: Vec<Duration> = (0..repeats)
+        .map(|_| {
+            #[expect(clippy::disallowed_methods, reason = "to measure is what a benchmark is for")]
+            let began = Instant::now();
+            work();
+            began.elapsed()
+        })
+        .collect();
+    times.sort();
+    Times { median: times[repeats / 2], fastest: times[0] }
+}
+
+fn show(what: &str, times: &Times) {
+    let ms = |d: Duration| d.as_secs_f64() * 1e3;
+    println!("{what:<64} {:>9.2} ms  [{:.2}]", ms(times.median), ms(times.fastest));
+}
+
+/// The command, which must succeed.
+fn command(args: &[&str]) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
+    let status = command.args(args).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
+    assert!(status.success(), "matterixc {args:?}: {status}");
+}
+
+fn check(dir: &Path) {
+    for (lines, repeats) in [(200, 31), (20_000, 5)] {
+        let file = dir.join(format!("generated_{lines}.mtx"));
+        let text = generate::program(lines);
+        fs::write(&file, &text).unwrap();
+        let what = format!("matterixc check, {} generated lines", text.lines().count());
+        show(&what, &time(repeats, || command(&["check", file.to_str().unwrap()])));
+    }
+}
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
+}
+
+fn run(dir: &Path) {
+    let file = example("sn1.mtx");
+    let file = file.to_str().unwrap();
+    let out = dir.join("out");
+    show("matterixc run sn1.mtx, report only", &time(31, || command(&["run", file])));
+    let all = time(31, || command(&["run", file, "--out", out.to_str().unwrap()]));
+    show("matterixc run sn1.mtx --out, with recording, tables and plot", &all);
+    let program = compile(file);
+    let recording = models::Recorded::new(&program);
+    show("  of which the plot", &time(31, || recording.plot(&program)));
+    show("  of which recording and tables", &time(31, || recording.tables(&program)));
+    show("SN1, execution and integration alone", &time(31, || assert!(made(&program, Options::default().rtol) > 0.0)));
+}
+
+fn compile(file: &str) -> Program {
+    let mut sources = Sources::default();
+    let file = sources.add("sn1.mtx", fs::read_to_string(file).unwrap());
+    let (program, found) = matterix_lang::compile(&mut sources, file, &LibraryOnly, &matterix_lang::Options::default());
+    program.unwrap_or_else(|| panic!("{found:?}"))
+}
+
+/// The product of SN1 at the end, mmol.
+fn made(program: &Program, rtol: f64) -> f64 {
+    let process = Options { rtol, ..Options::default() };
+    let options = RunOptions { process, ..RunOptions::default() };
+    let outcome = matterix_runtime::run::run(program, &options, &mut ());
+    let state = program.model.states.iter().position(|s| s.name == "beaker.contents.amount[EtI]").unwrap();
+    1e3 * outcome.states[state].unwrap()
+}
+
+fn robertson() {
+    let model: Model = models::robertson();
+    let integrate = || {
+        let mut engine = Engine::new(&model, Vec::new(), 0, Options::default()).unwrap();
+        engine.start(&mut ()).unwrap();
+        engine.advance(1e11, &[], &mut ()).unwrap();
+        assert!((engine.states()[0] / 0.208_334_014_970_125_5e-7 - 1.0).abs() < 1e-6);
+    };
+    show("Robertson's reactions to 1e11 s, to 1e-6", &time(31, integrate));
+}
+
+/// One tolerance of one integrator.
+struct Point {
+    rtol: f64,
+    error: f64,
+    seconds: f64,
+}
+
+/// SN1 by this engine and by LSODA, each against its own tight solution.
+fn lsoda() -> Result<(), String> {
+    let program = compile(example("sn1.mtx").to_str().unwrap());
+    let molar = |name: &str| program.model.species.iter().find(|s| s.name == name).unwrap().molar_mass;
+    let mass = 0.010 + 0.012 * (molar("EtOH") + molar("HI"));
+    let python = std::env::var("MATTERIX_PYTHON").unwrap_or_else(|_| "python3".into());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/speed/lsoda.py");
+    let output = Command::new(&python).arg(script).arg(mass.to_string()).output();
+    let output = output.map_err(|e| format!("`{python}` does not start: {e}"))?;
+    if !output.status.success() {
+        let why = String::from_utf8_lossy(&output.stderr).lines().last().unwrap_or_default().to_string();
+        return Err(format!("`{python}`: {why}"));
+    }
+    let lines: Vec<serde_json::Value> =
+        String::from_utf8_lossy(&output.stdout).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let number = |v: &serde_json::Value, key: &str| v[key].as_f64().unwrap();
+    let theirs: Vec<Point> = lines[1..]
+        .iter()
+        .map(|v| Point { rtol: number(v, "rtol"), error: number(v, "error"), seconds: number(v, "seconds") })
+        .collect();
+    let reference = made(&program, 1e-12);
+    let apart = (reference / number(&lines[0], "reference") - 1.0).abs();
+    println!("\nSN1 against scipy's LSODA; the tight solutions of both differ by {apart:.0e}");
+    println!(
+        "{:>9} {:>9} {:>10}   {:>10} {:>9} {:>10}   {:>6}",
+        "rtol", "error", "ms", "LSODA rtol", "error", "ms", "ratio"
+    );
+    for power in 4..=8 {
+        let rtol = 10f64.powi(-power);
+        let error = (made(&program, rtol) / reference - 1.0).abs();
+        let seconds = time(15, || assert!(made(&program, rtol) > 0.0)).median.as_secs_f64();
+        // The cheapest that is at least as accurate.
+        let equal = theirs.iter().filter(|p| p.error <= error).min_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        print!("{rtol:>9.0e} {error:>9.0e} {:>10.3}   ", seconds * 1e3);
+        match equal {
+            Some(p) => {
+                let ratio = p.seconds / seconds;
+                println!("{:>10.0e} {:>9.0e} {:>10.3}   {ratio:>6.1}", p.rtol, p.error, p.seconds * 1e3);
+            }
+            None => println!("none is as accurate"),
+        }
+    }
+    Ok(())
+}
