@@ -1,4 +1,4 @@
-//! How long things take: `cargo bench`. A table of medians; docs/performance.md says what is meant by each line.
+//! How long things take: `cargo bench --bench speed`. A table of medians; docs/performance.md says what is meant by each line.
 //!
 //! The comparison with scipy needs a Python that has it, `python3` or the one `MATTERIX_PYTHON` names.
 
@@ -19,7 +19,9 @@ use matterix_runtime::process::{Engine, Options};
 use matterix_runtime::run::RunOptions;
 
 fn main() {
-    if let [flag, lines] = std::env::args().skip(1).collect::<Vec<_>>().as_slice()
+    // Cargo adds `--bench`.
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    if let [flag, lines] = arguments.as_slice()
         && flag == "generate"
     {
         print!("{}", generate::program(lines.parse().unwrap()));
