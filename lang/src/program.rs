@@ -33,8 +33,7 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
     diagnostics.extend(checks::declarations(&tables, sources, root));
-    let workflows: Vec<DeclId> =
-        names.declared_by(root).filter(|id| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. })).collect();
+    let workflows = workflows(&names, root);
     let mut starts = Vec::new();
     for built in judge(&tables, sources, &workflows) {
         diagnostics.extend(built.findings);
@@ -75,13 +74,18 @@ pub fn compile(
     let built = build(&tables, sources, id, &arguments, true);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
-    if names.declared_by(root).filter(|id| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. })).count() == 1
-    {
-        diagnostics.extend(checks::never_starts(&tables, root, &built.starts.clone().into_iter().collect::<Vec<_>>()));
+    if workflows(&names, root).len() == 1 {
+        diagnostics.extend(checks::never_starts(&tables, root, built.starts.as_slice()));
     }
     let diagnostics = finish(diagnostics, sources);
     let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
     (built.program.filter(|_| !failed), diagnostics)
+}
+
+/// The workflows that a module declares.
+fn workflows(names: &Names<'_>, module: usize) -> Vec<DeclId> {
+    let is_workflow = |id: &DeclId| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. });
+    names.declared_by(module).filter(is_workflow).collect()
 }
 
 /// Each finding once, in the order of the text, without those that only follow from others.

@@ -121,10 +121,9 @@ impl<'a> Elaborator<'a> {
     /// The unit a type is shown in where nothing says otherwise.
     pub fn type_unit(&self, ty: &Type) -> Unit {
         match ty {
-            Type::Quantity { dimension, point: true, .. } => match self.tables.units.preferred_point(dimension) {
-                Some((symbol, def)) => Unit { symbol, factor: def.factor, offset: def.offset.unwrap_or(0.0) },
-                None => self.tables.si(dimension),
-            },
+            Type::Quantity { dimension, point: true, .. } => {
+                self.tables.units.preferred_point(dimension).unwrap_or_else(|| self.tables.si(dimension))
+            }
             Type::Quantity { dimension, .. } => {
                 self.tables.units.percent(dimension).unwrap_or_else(|| self.tables.si(dimension))
             }

@@ -1,8 +1,8 @@
 //! Declares the dimensions and units of all modules.
 
-use matterix_ir::{Diagnostic, codes};
+use matterix_ir::{Diagnostic, Span, codes};
 
-use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, UnitText};
+use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, UnitText};
 use crate::names::{Names, near};
 use crate::units::text::UnitError;
 use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units};
@@ -15,15 +15,7 @@ pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
             match &item.kind {
                 ItemKind::Dimension { name, point, definition } => {
                     if let Some(first) = units.dimension(&name.text).map(|d| d.span) {
-                        diagnostics.push(
-                            Diagnostic::error(
-                                codes::DUPLICATE_NAME,
-                                name.span,
-                                format!("the dimension `{}` is declared twice", name.text),
-                                "declared again here",
-                            )
-                            .because(first, "first declared here"),
-                        );
+                        diagnostics.push(declared_twice(&format!("dimension `{}`", name.text), name.span, first));
                         continue;
                     }
                     match definition {
@@ -42,20 +34,25 @@ pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
     units
 }
 
+fn declared_twice(what: &str, again: Span, first: Span) -> Diagnostic {
+    Diagnostic::error(codes::DUPLICATE_NAME, again, format!("the {what} is declared twice"), "declared again here")
+        .because(first, "first declared here")
+}
+
+fn unknown_dimension(units: &Units, n: &Name) -> Diagnostic {
+    let headline = format!("there is no dimension `{}`", n.text);
+    let mut d = Diagnostic::error(codes::UNKNOWN_NAME, n.span, headline, "not declared above");
+    d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
+    d
+}
+
 fn dimension(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Dimension {
     match &*e.kind {
         ExprKind::Number(1.0) => Dimension::one(),
         ExprKind::Name(n) => match units.dimension(&n.text) {
             Some(def) => def.dimension.clone(),
             None => {
-                let mut d = Diagnostic::error(
-                    codes::UNKNOWN_NAME,
-                    n.span,
-                    format!("there is no dimension `{}`", n.text),
-                    "not declared above",
-                );
-                d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
-                diagnostics.push(d);
+                diagnostics.push(unknown_dimension(units, n));
                 Dimension::any()
             }
         },
@@ -103,14 +100,7 @@ fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
     let declared = dimension.as_ref().and_then(|n| {
         let found = units.dimension(&n.text).cloned();
         if found.is_none() {
-            let mut d = Diagnostic::error(
-                codes::UNKNOWN_NAME,
-                n.span,
-                format!("there is no dimension `{}`", n.text),
-                "not declared above",
-            );
-            d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
-            diagnostics.push(d);
+            diagnostics.push(unknown_dimension(units, n));
         }
         found
     });
@@ -142,15 +132,7 @@ fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
     let def = UnitDef { dimension: value, factor, offset, prefixes: *prefixes, span: name.span };
     for spelling in std::iter::once(name).chain(aliases) {
         if let Some(first) = units.declared(&spelling.text).map(|u| u.span) {
-            diagnostics.push(
-                Diagnostic::error(
-                    codes::DUPLICATE_NAME,
-                    spelling.span,
-                    format!("the unit `{}` is declared twice", spelling.text),
-                    "declared again here",
-                )
-                .because(first, "first declared here"),
-            );
+            diagnostics.push(declared_twice(&format!("unit `{}`", spelling.text), spelling.span, first));
             continue;
         }
         units.add_unit(&spelling.text, def.clone());

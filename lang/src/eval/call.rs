@@ -248,16 +248,19 @@ impl<'a> Elaborator<'a> {
                 self.number(count, Dimension::one(), false)
             }
             (Value::Instance(_), "basis", _) => Value::Error,
-            _ => {
-                self.report(Diagnostic::error(
-                    codes::WRONG_ARGUMENTS,
-                    span,
-                    format!("`{name}` cannot be called with these arguments"),
-                    "wrong arguments",
-                ));
-                Value::Error
-            }
+            _ => self.wrong_arguments(name, span),
         }
+    }
+
+    /// Reports arguments that fit no form of a function.
+    pub fn wrong_arguments(&mut self, name: &str, span: Span) -> Value {
+        self.report(Diagnostic::error(
+            codes::WRONG_ARGUMENTS,
+            span,
+            format!("`{name}` cannot be called with these arguments"),
+            "wrong arguments",
+        ));
+        Value::Error
     }
 
     /// A stand-in for a value of a type, for checking a declaration by itself.

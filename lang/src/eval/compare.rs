@@ -100,9 +100,9 @@ impl<'a> Elaborator<'a> {
     /// The unit a quantity is shown in where the user gave none.
     pub fn shown(&self, n: &Num) -> Unit {
         if n.point
-            && let Some((symbol, def)) = self.tables.units.preferred_point(&n.dimension)
+            && let Some(unit) = self.tables.units.preferred_point(&n.dimension)
         {
-            return Unit { symbol, factor: def.factor, offset: def.offset.unwrap_or(0.0) };
+            return unit;
         }
         self.tables.si(&n.dimension)
     }

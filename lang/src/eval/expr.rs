@@ -94,13 +94,7 @@ impl<'a> Elaborator<'a> {
             Ok(r) => {
                 let si = r.unit.to_si(value);
                 if r.point && si < 0.0 {
-                    self.report(Diagnostic::error(
-                        codes::TEMPERATURE_POINT,
-                        unit.span,
-                        "this temperature is below absolute zero",
-                        "there is none so low",
-                    ));
-                    return Value::Error;
+                    return self.too_cold(unit.span);
                 }
                 let node = self.graph.number(si);
                 let unit = Some(r.unit);
@@ -111,6 +105,16 @@ impl<'a> Elaborator<'a> {
                 Value::Error
             }
         }
+    }
+
+    fn too_cold(&mut self, span: Span) -> Value {
+        self.report(Diagnostic::error(
+            codes::TEMPERATURE_POINT,
+            span,
+            "this temperature is below absolute zero",
+            "there is none so low",
+        ));
+        Value::Error
     }
 
     /// What a bare word stands for.
@@ -264,13 +268,7 @@ impl<'a> Elaborator<'a> {
                 let (Some(unit), Some(si)) = (&n.unit, self.graph.constant(n.node)) else { return Value::Error };
                 let si = unit.to_si(-unit.of_si(si));
                 if si < 0.0 {
-                    self.report(Diagnostic::error(
-                        codes::TEMPERATURE_POINT,
-                        inner.span,
-                        "this temperature is below absolute zero",
-                        "there is none so low",
-                    ));
-                    return Value::Error;
+                    return self.too_cold(inner.span);
                 }
                 let node = self.graph.number(si);
                 Value::Num(Num { node, ..n })

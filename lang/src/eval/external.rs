@@ -104,15 +104,7 @@ impl Elaborator<'_> {
             }
             (Bound::Placed, [Value::Instance(i), Value::Text(word)]) => self.placed(*i, word),
             (_, values) if values.contains(&Value::Error) => Value::Error,
-            _ => {
-                self.report(Diagnostic::error(
-                    codes::WRONG_ARGUMENTS,
-                    at,
-                    format!("`{name}` cannot be called with these arguments"),
-                    "wrong arguments",
-                ));
-                Value::Error
-            }
+            _ => self.wrong_arguments(name, at),
         };
         match result {
             Some(ty) => self.coerce(computed, &ty, at, name),

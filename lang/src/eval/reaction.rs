@@ -160,15 +160,7 @@ impl<'a> Elaborator<'a> {
                 self.number(n, Dimension::one(), false)
             }
             ("basis", [Value::Instance(m)]) => self.basis(r, *m, span, scope),
-            _ => {
-                self.report(Diagnostic::error(
-                    codes::WRONG_ARGUMENTS,
-                    span,
-                    format!("`{name}` cannot be called with these arguments"),
-                    "wrong arguments",
-                ));
-                Value::Error
-            }
+            _ => self.wrong_arguments(name, span),
         }
     }
 

@@ -207,7 +207,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// The device a command is for: the object where the verb takes no first argument, else the one after `by`.
-    fn device(
+    pub(super) fn device(
         &mut self,
         sig: &Sig,
         object: &Option<(Value, Span)>,

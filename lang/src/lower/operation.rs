@@ -26,19 +26,7 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<StepId> {
         let MemberKind::Command { sig, clauses } = &m.member.kind else { return None };
-        let device = if sig.params.is_empty() {
-            match object {
-                Some((Value::Instance(i) | Value::Qualified(i, _), _)) => Some(i),
-                _ => None,
-            }
-        } else {
-            let by = call.labelled.iter().find(|(l, _)| l.text == "by").map(|(_, e)| self.lab.expr(e, scope));
-            match by {
-                Some(Value::Instance(i) | Value::Qualified(i, _)) => Some(i),
-                _ => None,
-            }
-        };
-        let device = device?;
+        let device = self.device(sig, &object, call, scope)?;
         let bound = self.bind_arguments(sig, clauses, m.module, call, object, true, scope)?;
         let mut inner = Scope::of_member(device, m);
         for (name, v) in &bound.values {

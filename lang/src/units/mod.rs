@@ -205,11 +205,11 @@ impl Units {
 
 impl Units {
     /// A declared point unit of a dimension to show points in: the one with an offset, by name.
-    pub fn preferred_point(&self, dimension: &Dimension) -> Option<(String, UnitDef)> {
+    pub fn preferred_point(&self, dimension: &Dimension) -> Option<Unit> {
         self.units
             .iter()
             .find(|(_, u)| u.dimension == *dimension && u.factor == 1.0 && u.offset.is_some_and(|o| o != 0.0))
-            .map(|(n, u)| (n.clone(), u.clone()))
+            .map(|(n, u)| Unit { symbol: n.clone(), factor: u.factor, offset: u.offset.unwrap_or(0.0) })
     }
 
     /// How a found dimension differs from the expected one, where one named quantity makes the difference.
