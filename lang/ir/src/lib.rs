@@ -18,6 +18,8 @@ pub mod program;
 pub mod quantity;
 pub mod scene;
 pub mod span;
+pub mod stock;
+pub mod text;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};
@@ -25,3 +27,4 @@ pub use graph::{BinaryOp, Env, Graph, NodeId, Op, UnaryOp};
 pub use program::Program;
 pub use quantity::Unit;
 pub use span::{FileId, Sources, Span};
+pub use text::{Text, TextPart};

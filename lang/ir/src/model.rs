@@ -14,6 +14,8 @@ pub enum Domain {
     Bool,
     /// An instance by index, or -1 for nothing.
     Instance,
+    /// One of these words by index.
+    Enum(Vec<String>),
 }
 
 /// One entry of the state vector.

@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::Action;
+use crate::codes::{self, Code};
+use crate::model::{Action, Domain};
 use crate::scene::InstanceId;
-use crate::{NodeId, Span, Unit};
+use crate::{NodeId, Span, Text, Unit};
 
 /// A node of the plan, by its index in [`Plan::steps`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -21,6 +22,55 @@ pub struct Condition {
     pub span: Span,
     /// What it compares, for reports; empty where it compares no quantities.
     pub compared: Vec<Comparison>,
+    /// The members of instances it reads, for the history of a finding.
+    pub terms: Vec<Term>,
+    /// The failure raised where it does not hold, if it names one.
+    pub refusal: Option<Refusal>,
+}
+
+/// A member that a condition reads.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Term {
+    /// `plate.target`, `beaker.volume`.
+    pub name: String,
+    /// Its value.
+    pub node: NodeId,
+    /// What the value means and how it is shown.
+    pub domain: Domain,
+}
+
+/// What a thing keeps at all times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limit {
+    /// The thing.
+    pub instance: InstanceId,
+    /// What must hold.
+    pub condition: Condition,
+}
+
+/// `else overflow "use a larger vessel"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// What handlers know it by.
+    pub failure: String,
+    /// How to mend it.
+    pub help: Option<String>,
+}
+
+impl Refusal {
+    /// The registered code of this name, `volume-overflow` for `volume_overflow`; `need-unmet` without one.
+    pub fn code(&self) -> Code {
+        codes::find(&self.failure.replace('_', "-")).unwrap_or(codes::NEED_UNMET)
+    }
+}
+
+/// `presumes ever active else never_started`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Presumption {
+    /// What is presumed.
+    pub condition: Condition,
+    /// Whether it is enough that it held at some moment before.
+    pub ever: bool,
 }
 
 /// One comparison inside a condition: `value` against limits, with the unit to show them in.
@@ -56,6 +106,8 @@ pub enum Argument {
     Instance(InstanceId),
     /// A text.
     Text(String),
+    /// One of these words, by its index.
+    Word(NodeId, Vec<String>),
 }
 
 /// A leaf: a command of a device or a primitive skill.
@@ -71,6 +123,8 @@ pub struct Operation {
     pub arguments: Vec<(String, Argument)>,
     /// Must hold when it starts.
     pub needs: Vec<Condition>,
+    /// Looked at before the run only: what holds on no way through the plan is a mistake in it.
+    pub presumes: Vec<Presumption>,
     /// Applied when it starts (commands).
     pub at_start: Vec<Action>,
     /// Applied when it ends (extern skills).
@@ -83,6 +137,8 @@ pub struct Operation {
     pub claims: Vec<InstanceId>,
     /// Failures it may report.
     pub fails: Vec<String>,
+    /// Limits that its effects may pass, by index into [`Plan::limits`].
+    pub limits: Vec<u32>,
 }
 
 /// Which failures a handler takes.
@@ -180,6 +236,13 @@ pub enum Step {
         /// What it does.
         body: StepId,
     },
+    /// What must hold while an operation lasts; it is halted where that breaks, with the failure `broken`.
+    During {
+        /// All of them, looked at from its start on.
+        invariants: Vec<Condition>,
+        /// The operation.
+        body: StepId,
+    },
     /// Its body must start at most `limit` after `since`; else the failure `late`.
     Within {
         /// s.
@@ -238,7 +301,7 @@ pub enum Step {
         /// Its name.
         name: String,
         /// In words.
-        text: String,
+        text: Text,
     },
     /// Judges; a failed expectation does not stop the run but makes its result a failure.
     Expect(Vec<Condition>),
@@ -254,9 +317,9 @@ pub enum Step {
         every: NodeId,
     },
     /// A remark in the recording.
-    Note(String),
+    Note(Text),
     /// A person confirms; in simulation at once.
-    Ask(String),
+    Ask(Text),
 }
 
 impl Step {
@@ -271,6 +334,7 @@ impl Step {
             Step::Skill { body, .. }
             | Step::Named { body, .. }
             | Step::Keep { body, .. }
+            | Step::During { body, .. }
             | Step::Within { body, .. }
             | Step::Repeat { body, .. }
             | Step::RepeatWhile { body, .. }
@@ -314,6 +378,11 @@ pub struct Plan {
     pub root: StepId,
     /// By the index used in `Op::Local`; not a number until set.
     pub locals: Vec<Local>,
+    /// What must hold at the start and after every operation.
+    pub limits: Vec<Limit>,
+    /// What should hold when it has ended: nothing is left on or in hand.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ends: Vec<Limit>,
 }
 
 impl Plan {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::Model;
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::stock::Stock;
 
 /// Version of the serialised form; a reader refuses any other.
 pub const PROGRAM_VERSION: u32 = 1;
@@ -22,4 +23,7 @@ pub struct Program {
     pub model: Model,
     /// What is done.
     pub plan: Plan,
+    /// What was brought in, and how to count what becomes of it.
+    #[serde(default)]
+    pub stock: Stock,
 }

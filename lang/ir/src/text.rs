@@ -1,0 +1,92 @@
+//! Texts with values in them, put together when the step runs.
+
+use serde::{Deserialize, Serialize};
+
+use crate::quantity::show_number;
+use crate::{NodeId, Unit};
+
+/// A text of a note, a question or a failure.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Text {
+    /// In order.
+    pub parts: Vec<TextPart>,
+}
+
+/// A piece of a [`Text`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TextPart {
+    /// As written.
+    Plain(String),
+    /// A quantity.
+    Quantity {
+        /// SI.
+        value: NodeId,
+        /// As shown.
+        unit: Unit,
+        /// Digits after the point; six significant ones at most where absent.
+        digits: Option<u8>,
+    },
+    /// `true` or `false`.
+    Bool(NodeId),
+    /// The name of an instance, or `nothing`.
+    Instance(NodeId),
+    /// One of these words, by its index.
+    Word(NodeId, Vec<String>),
+}
+
+impl Text {
+    /// The text with its values: `value` gives that of a node, or nothing where it cannot be known (shown as `?`),
+    /// `instance` the name of one by its number in the graph.
+    pub fn show<E>(
+        &self,
+        mut value: impl FnMut(NodeId) -> Result<Option<f64>, E>,
+        instance: impl Fn(f64) -> String,
+    ) -> Result<String, E> {
+        let mut out = String::new();
+        for part in &self.parts {
+            let (TextPart::Quantity { value: node, .. }
+            | TextPart::Bool(node)
+            | TextPart::Instance(node)
+            | TextPart::Word(node, _)) = part
+            else {
+                if let TextPart::Plain(text) = part {
+                    out.push_str(text);
+                }
+                continue;
+            };
+            let Some(v) = value(*node)? else {
+                out.push('?');
+                continue;
+            };
+            match part {
+                TextPart::Quantity { unit, digits, .. } => out.push_str(&quantity(unit, v, *digits)),
+                TextPart::Bool(_) => out.push_str(if v == 0.0 { "false" } else { "true" }),
+                TextPart::Word(_, words) => out.push_str(words.get(v as usize).map_or("?", String::as_str)),
+                _ => out.push_str(&instance(v)),
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// A value in a unit, with so many digits after the point.
+fn quantity(unit: &Unit, si: f64, digits: Option<u8>) -> String {
+    let value = unit.of_si(si);
+    let number = match digits {
+        // Rounded to nothing, a small negative number is no longer negative.
+        Some(digits) => match format!("{value:.*}", usize::from(digits)) {
+            text if text.starts_with('-') && !text.bytes().any(|b| b.is_ascii_digit() && b != b'0') => {
+                text[1..].to_owned()
+            }
+            text => text,
+        },
+        None => show_number(value),
+    };
+    if unit.symbol.is_empty() { number } else { format!("{number} {}", unit.symbol) }
+}
+
+impl From<&str> for Text {
+    fn from(text: &str) -> Self {
+        Text { parts: vec![TextPart::Plain(text.to_owned())] }
+    }
+}
