@@ -116,6 +116,51 @@ pub enum ItemKind {
         /// Rate, order, window, template, enthalpy.
         fields: Vec<Field>,
     },
+    /// `reactive_group ketone { smarts: ["[#6][CX3](=O)[#6]"], source: "..." }`.
+    ReactiveGroup {
+        /// Its name.
+        name: Name,
+        /// Who belongs to it, and where that is published.
+        fields: Vec<Field>,
+    },
+    /// `material polystyrene { source: "..." }`: what a vessel is made of.
+    Material {
+        /// Its name.
+        name: Name,
+        /// What is known of it.
+        fields: Vec<Field>,
+    },
+    /// `incompatible ketone with oxidising_acid { consequence: [heat, fire], source: "..." }`.
+    Incompatible {
+        /// A reactive group, a material or a species.
+        a: Name,
+        /// The other one.
+        b: Name,
+        /// What happens, from which content on, and where that is published.
+        fields: Vec<Field>,
+    },
+    /// `allow incompatible acetone with HNO3 "why"`.
+    Allow {
+        /// A reactive group, a material or a species.
+        a: Name,
+        /// The other one.
+        b: Name,
+        /// Why it is meant.
+        reason: String,
+    },
+    /// `hazard closed_vessel_heated(h: Heater & Body, v: Capped) when ... "open it first"`.
+    Hazard {
+        /// `hazard`, not `caution`: it is an error.
+        grave: bool,
+        /// Its name.
+        name: Name,
+        /// Over what.
+        params: Vec<Param>,
+        /// When it is there.
+        when: Expr,
+        /// How to mend it.
+        help: Option<String>,
+    },
     /// `capability Heater: Thermal { ... }`.
     Capability {
         /// Its name.
@@ -132,7 +177,7 @@ pub enum ItemKind {
         /// Capabilities, or assets it builds on.
         extends: Vec<Path>,
         /// `urdf "file"` and the like after `from`.
-        source: Option<(Name, String)>,
+        source: Option<(Name, Name)>,
         /// In order.
         lines: Vec<AssetLine>,
     },
@@ -163,6 +208,8 @@ pub enum ItemKind {
         result: Option<Type>,
         /// Its body.
         body: Option<Expr>,
+        /// `{ at_least: 0 W/K }`: what a lab may give instead.
+        options: Vec<NamedExpr>,
     },
     /// `const R: MolarHeatCapacity = 8.314462618 J/(mol*K)`.
     Const {
@@ -239,12 +286,16 @@ pub enum ItemKind {
         /// In order.
         lines: Vec<FitLine>,
     },
-    /// `test name { ... }`.
+    /// `test name { run workflow ... }`, `test name in lab { ... }`.
     Test {
         /// Its name.
         name: Name,
+        /// Where its own steps are done; none for a test of a workflow.
+        lab: Option<Path>,
         /// Its steps.
         body: Block,
+        /// Failure handlers and `finally`.
+        handlers: Handlers,
     },
 }
 
@@ -328,6 +379,27 @@ pub enum AssetLine {
         /// Its type.
         literal: AssetLiteral,
     },
+    /// `wells[A1 .. H12] = Well { ... } at (14.38, 74.24) mm pitch (9, 9) mm`: child assets in rows and columns.
+    Grid(Grid),
+}
+
+/// A grid of child assets, or a part of one: lines with the same name make one grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Its name.
+    pub name: Name,
+    /// The first place: `A1`, `1`.
+    pub from: Name,
+    /// The last place, if there are several.
+    pub to: Option<Name>,
+    /// What stands at each place.
+    pub literal: AssetLiteral,
+    /// Where the first place is on the asset.
+    pub at: Option<Expr>,
+    /// From column to column and from row to row.
+    pub pitch: Option<Expr>,
+    /// For numbered places: how many stand in a row.
+    pub row: Option<Expr>,
 }
 
 /// A member of a capability.
@@ -381,6 +453,17 @@ pub enum MemberKind {
     Process(Process),
     /// An instantaneous change on the instance itself.
     Event(Event),
+    /// `keeps volume <= max_volume else volume_overflow "use a larger vessel"`, `ends not active else left_on`.
+    Limit {
+        /// `ends`, not `keeps`: it is looked at when a workflow has ended, and not before.
+        at_end: bool,
+        /// What must hold.
+        cond: Expr,
+        /// The failure raised where it does not.
+        failure: Option<Name>,
+        /// How to mend it.
+        help: Option<String>,
+    },
     /// `frame place at (0, 0, 1) mm`; `frame grasp` without `at` is one that every asset must give.
     Frame {
         /// Its name.
@@ -498,11 +581,36 @@ pub enum AssignOp {
     Sub,
 }
 
+/// A text with values in braces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// In order.
+    pub parts: Vec<TextPart>,
+    /// All of it, with its quotes.
+    pub span: Span,
+}
+
+/// A piece of a [`Text`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum TextPart {
+    /// As written.
+    Plain(String),
+    /// `{t as degC :.1}`.
+    Value {
+        /// What is shown.
+        value: Expr,
+        /// Digits after the point.
+        digits: Option<u8>,
+    },
+}
+
 /// A type.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Type {
     /// `Heater & Surface`: one or more.
     pub paths: Vec<Path>,
+    /// `open | closed`: its words; there are no paths then.
+    pub words: Vec<Name>,
     /// `Range<Temperature>`.
     pub argument: Option<Box<Type>>,
     /// `?`: may be `nothing`; a limit may be `unlimited`.
@@ -551,8 +659,26 @@ pub struct Clause {
 /// What a clause says.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ClauseKind {
-    /// `needs t in limits`.
-    Needs(Expr),
+    /// `needs t in limits`, with `else too_hot "cool it first"` a failure of its own.
+    Needs {
+        /// What must hold.
+        cond: Expr,
+        /// The failure raised where it does not.
+        failure: Option<Name>,
+        /// How to mend it.
+        help: Option<String>,
+    },
+    /// `presumes ever active else never_started`: looked at before the run only.
+    Presumes {
+        /// Whether it is enough that it held at some moment before.
+        ever: bool,
+        /// What must hold on some way at least.
+        cond: Expr,
+        /// What its finding is called.
+        failure: Option<Name>,
+        /// How to mend it.
+        help: Option<String>,
+    },
     /// `while v.temperature < 80 degC`.
     While(Expr),
     /// `fails slip, unreachable`.
@@ -570,6 +696,13 @@ pub enum ClauseKind {
     Until(Expr),
     /// `option within: Mass = 1 g`: what a call may give in braces.
     Option(Param),
+    /// `says "put {item} on {target}"`, `says "with a fresh tip each" when tips == each`: a phrase of a protocol.
+    Says {
+        /// With parameters in braces.
+        text: Text,
+        /// When it is said; always without it.
+        when: Option<Expr>,
+    },
 }
 
 /// One effect.
@@ -667,6 +800,8 @@ pub enum LabLineKind {
         name: Name,
         /// `at (...)`.
         relations: Vec<(Name, Expr)>,
+        /// `{ offset: 5 mm }`: values of its parameters.
+        options: Vec<NamedExpr>,
     },
     /// `between hotplate and beaker { conductance: 12.77 W/K }`.
     Between {
@@ -684,8 +819,19 @@ pub enum LabLineKind {
 pub enum Holding {
     /// `10 g of water + 12 mmol of EtOH`: an `of` sum, shaped as a binary expression.
     Expr(Expr),
-    /// `{ A1: 20 mL of buffer }`.
-    Fields(Vec<Field>),
+    /// `{ A1: 20 mL of buffer, A2 .. A12: 5 mL of dye }`.
+    Places(Vec<Fill>),
+}
+
+/// What some places of a grid hold at the start.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fill {
+    /// The first place.
+    pub from: Name,
+    /// The last place, if there are several.
+    pub to: Option<Name>,
+    /// What each of them holds.
+    pub value: Expr,
 }
 
 /// A line of a study.
@@ -928,7 +1074,7 @@ pub enum StmtKind {
         /// Its name; absent where only a text is given.
         name: Option<Name>,
         /// In words.
-        text: Option<String>,
+        text: Option<Text>,
     },
     /// `expect C`.
     Expect {
@@ -943,9 +1089,9 @@ pub enum StmtKind {
         every: Expr,
     },
     /// `note "..."`.
-    Note(String),
+    Note(Text),
     /// `ask "..."`.
-    Ask(String),
+    Ask(Text),
     /// `return e`: the result of a skill.
     Return {
         /// Its value.

@@ -371,6 +371,9 @@ const BLOCK_WORDS: &[&str] = &[
     "species",
     "solution",
     "reaction",
+    "reactive_group",
+    "material",
+    "incompatible",
     "capability",
     "asset",
     "driver",
@@ -387,7 +390,7 @@ const BLOCK_WORDS: &[&str] = &[
 ];
 
 /// The words that start a clause.
-const CLAUSE_WORDS: &[&str] = &["needs", "while", "fails", "effect", "takes", "until", "option"];
+const CLAUSE_WORDS: &[&str] = &["needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says"];
 
 /// The head of a line: what stands before its bracket.
 fn title(code: &str) -> &str {

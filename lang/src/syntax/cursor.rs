@@ -26,6 +26,12 @@ impl<'i> Kids<'i> {
         self.pairs.peek().map(Pair::as_rule)
     }
 
+    /// Where the next part begins and ends.
+    pub(super) fn peek_span(&mut self) -> Option<(usize, usize)> {
+        self.peek()?;
+        self.pairs.peek().map(|p| (p.as_span().start(), p.as_span().end()))
+    }
+
     /// The next part.
     pub(super) fn take(&mut self) -> Option<Node<'i>> {
         self.peek()?;
@@ -79,6 +85,7 @@ fn is_noise(rule: Rule) -> bool {
             | eq
             | rangle
             | amp
+            | bar
             | larrow
             | plus
             | pm
@@ -91,6 +98,11 @@ fn is_noise(rule: Rule) -> bool {
             | kw_species
             | kw_solution
             | kw_reaction
+            | kw_reactive_group
+            | kw_material
+            | kw_incompatible
+            | kw_allow
+            | kw_caution
             | kw_capability
             | kw_asset
             | kw_process
@@ -132,6 +144,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_timeout
             | kw_after
             | kw_needs
+            | kw_presumes
             | kw_effect
             | kw_takes
             | kw_fails
@@ -146,12 +159,14 @@ fn is_noise(rule: Rule) -> bool {
             | kw_command
             | kw_frame
             | kw_option
+            | kw_says
             | kw_per
             | kw_also
             | kw_prefixes
             | kw_labelled
             | kw_over
             | kw_where
+            | kw_pitch
             | kw_open
             | kw_reply
             | kw_reading

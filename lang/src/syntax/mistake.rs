@@ -101,6 +101,12 @@ impl<'a> Mistakes<'a> {
         self.explain(only, start, end, &own);
     }
 
+    /// A range of the text that should be one form and is not.
+    pub(super) fn piece(&mut self, only: Rule, start: usize, end: usize) {
+        let failure = self.reread(only, start, end);
+        self.explain(only, start, end, &failure);
+    }
+
     fn reread(&self, only: Rule, start: usize, end: usize) -> Failure {
         let nowhere = Failure { at: start, expected: Vec::new() };
         if end - start > MAX_PIECE || self.found.len() >= MAX_MISTAKES {

@@ -22,7 +22,7 @@ use pest::Parser;
 pub use decode::{NotText, decode};
 pub use dump::dump;
 
-use crate::ast::File;
+use crate::ast::{Expr, ExprKind, File};
 use grammar::{Grammar, Rule};
 use repair::{Change, Offsets};
 
@@ -69,6 +69,17 @@ pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
     }
     found.extend(mistakes);
     (tree, shown(file, text, found, hidden))
+}
+
+/// The value that stands alone in a text from `start` on, and what is wrong with it.
+pub fn parse_value(file: FileId, text: &str, start: usize) -> (Expr, Vec<Diagnostic>) {
+    let value = text.get(start..).unwrap_or_default();
+    let (depth, _) = scan::depth(&scan::scan(value));
+    let span = Span::new(file, start, text.len());
+    if depth >= MAX_NESTING {
+        return (Expr { kind: Box::new(ExprKind::Error), span }, vec![too_deep(span)]);
+    }
+    with_stack(depth, || lower::Lower::new(file, text, &Offsets::default()).value(start, text.len()))
 }
 
 /// Reads a text whose brackets match.

@@ -11,7 +11,8 @@ fn describe(rule: Rule) -> Option<&'static str> {
         string => "a text in quotes",
         unit => "a unit",
         uname => "the name of a unit",
-        ident | word | arg_name | well | bare_word | verb => "a name",
+        ident | word | arg_name | bare_word | verb => "a name",
+        well | place => "a place such as `A1`",
         key => "a field",
         path => "a name",
         species | charged | side | side_term => "a species",
@@ -24,7 +25,9 @@ fn describe(rule: Rule) -> Option<&'static str> {
         rparen => "`)`",
         lbracket | index => "`[`",
         rbracket => "`]`",
-        lbrace | block | laws | fields | members | lab_body | wires | study_body | fit_body | asset_body => "`{`",
+        lbrace | block | laws | fields | fills | members | lab_body | wires | study_body | fit_body | asset_body => {
+            "`{`"
+        }
         rbrace => "`}`",
         langle => "`<`",
         comma => "`,`",

@@ -1,6 +1,7 @@
 //! Tests of the whole crate.
 
 mod fmt_spec;
+mod screen;
 mod syntax_generator;
 mod syntax_limits;
 mod syntax_nested;

@@ -29,7 +29,7 @@ fn quantity() -> Text {
 }
 
 fn quoted() -> Text {
-    one_of(&["\"\"", "\"text\"", "\"a \\\" b\\n\"", "\"{t as degC :.0} // no { comment\"", "\"µ°\""])
+    one_of(&["\"\"", "\"text\"", "\"a \\\" b\\n\"", "\"{t as degC :.0} // no {{ comment\"", "\"µ°\""])
 }
 
 /// A blank or a line end where one may stand.
@@ -195,13 +195,19 @@ fn item() -> Text {
         cond().prop_map(|c| format!("fn f(x: T = 1,\ny: T) -> T = {c}")),
         cond().prop_map(|c| format!("relation r(a: A, b: B) symmetric = {c}")),
         (species(), cond()).prop_map(|(s, c)| format!("species {s} {{ smiles: \"C\", {s}: {{ a: {c}, }},\n dissolves: K+ + 2 I- }}")),
+        (species(), quoted()).prop_map(|(s, t)| format!("allow incompatible {s} with\n {s} {t}")),
+        (species(), quantity()).prop_map(|(s, q)| format!("incompatible {s}\n with {s} {{ consequence: [heat, fire], above: {q} }}")),
+        (name(), quantity(), quoted()).prop_map(|(n, q, t)| format!("reactive_group {n} {{ members: {{ K+: {q}, OH-: any }}; smarts: [{t}]\n}}")),
+        (name(), quoted()).prop_map(|(n, t)| format!("material {n} {{ title: {t} }}")),
+        (name(), cond(), quoted()).prop_map(|(n, c, t)| format!("hazard {n}(a: T)\n when {c}\n {t}")),
+        (name(), cond()).prop_map(|(n, c)| format!("caution {n}(a: T) when {c}")),
         (species(), quantity()).prop_map(|(s, q)| format!("solution S {{ {s}: {q}; water: rest }} labelled {q} of {s} +- 1 %")),
         (species(), cond()).prop_map(|(s, c)| format!("reaction r: {s} + 2 {s} <-> {s} {{\n rate: {c},\n order: {{}}\n}}")),
         members,
-        (cond(), operand()).prop_map(|(c, o)| format!("asset P: A from urdf \"f\" {{ a: {c}, frame f at {o}\n lid = Lid {{ b: {c} }}\n}}")),
+        (cond(), operand()).prop_map(|(c, o)| format!("asset P: A from urdf \"f\" {{ a: {c}, frame f at {o}\n lid = Lid {{ b: {c} }}\nwells[A1 .. H12] = Well {{ v: {c} }} at {o} pitch {o}\nslot[1 .. 11] = Slot\npitch {o} by {o}, one[A1] = Tip\n}}")),
         laws.prop_map(|l| format!("process p(a: A)\n{l}")),
         (quoted(), operand()).prop_map(|(t, o)| format!("driver D for P over serial(baud: {o}) {{\nheat to(t) sends {t},\n{t} expects {t}\nreading a.b asks {t}\nexpects {t}; reply {t} fails slip\nopen sends {t}\n}}")),
-        (operand(), cond(), species()).prop_map(|(o, c, s)| format!("lab l(a: T) {{\nambient: {c}\nb = B {{ c: {c} }} on {o}\n holding {{\nA1: 2 g of {s}\n}}\ninclude x as y at {o}, include x as y; include z as y\nbetween {o} and {o} {{ k: {c} }}\n}}")),
+        (operand(), cond(), species()).prop_map(|(o, c, s)| format!("lab l(a: T) {{\nambient: {c}\nb = B {{ c: {c} }} on {o}\n holding {{\nA1: 2 g of {s}, B1 .. C12: {o}\n3: {o}\n}}\ninclude x as y at {o}, include x as y; include z as y\nbetween {o} and {o} {{ k: {c} }}\n}}")),
         (cond(), block.clone()).prop_map(|(c, b)| format!("skill do it(x: T) on(y: A & B) -> T\n needs {c} // why\n fails a, b\n{b} on slip {b}\nfinally {b}")),
         (cond(), operand()).prop_map(|(c, o)| format!("extern skill f(x: T) effect a.b = {c}, move({o}) option in: T = {c}")),
         (cond(), block.clone()).prop_map(|(c, b)| format!("workflow w(x: T = {c}) in any lab {b}")),

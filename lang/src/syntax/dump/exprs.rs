@@ -89,6 +89,7 @@ pub(super) fn maybe(word: &str, part: Option<&Expr>) -> Option<Sexp> {
 pub(super) fn ty(of: &Type) -> Sexp {
     node("type")
         .with(of.paths.iter().map(path))
+        .with((!of.words.is_empty()).then(|| node("words").with(names(&of.words))))
         .with(of.argument.as_deref().map(ty))
         .with(of.optional.then(|| leaf("?")))
         .with(maybe("where", of.condition.as_ref()))

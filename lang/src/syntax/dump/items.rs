@@ -7,9 +7,9 @@ use super::{
     steps::{block, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, Clause, ClauseKind, Effect, Event, Field, FieldValue, FitLine, Holding, Item,
-    ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Process, Role, StudyLine, Term, Wire,
-    WireKind,
+    AssetLine, AssetLiteral, AssignOp, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine, Holding,
+    Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Name, Process, Role, StudyLine,
+    Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -49,13 +49,26 @@ fn item_kind(kind: &ItemKind) -> Sexp {
         ItemKind::Reaction { name: word, reactants, reversible, products, fields: list } => node("reaction")
             .with([name(word), side(reactants), leaf(if *reversible { "<->" } else { "->" }), side(products)])
             .with(fields(list)),
+        ItemKind::ReactiveGroup { name: word, fields: list } => {
+            node("reactive-group").with([name(word)]).with(fields(list))
+        }
+        ItemKind::Material { name: word, fields: list } => node("material").with([name(word)]).with(fields(list)),
+        ItemKind::Incompatible { a, b, fields: list } => {
+            node("incompatible").with([name(a), name(b)]).with(fields(list))
+        }
+        ItemKind::Allow { a, b, reason } => node("allow").with([name(a), name(b), quoted(reason)]),
+        ItemKind::Hazard { grave, name: word, params, when, help } => node(if *grave { "hazard" } else { "caution" })
+            .with([name(word)])
+            .with(params.iter().map(param))
+            .with([node("when").with([expr(when)])])
+            .with(help.iter().map(|h| quoted(h))),
         ItemKind::Capability { name: word, extends, members } => {
             node("capability").with([name(word)]).with(extends.iter().map(path)).with(members.iter().map(member))
         }
         ItemKind::Asset { name: word, extends, source, lines } => node("asset")
             .with([name(word)])
             .with(extends.iter().map(path))
-            .with(source.as_ref().map(|(kind, file)| node("from").with([name(kind), quoted(file)])))
+            .with(source.as_ref().map(|(kind, file)| node("from").with([name(kind), quoted(&file.text)])))
             .with(lines.iter().map(asset_line)),
         ItemKind::Process(of) => process(of),
         ItemKind::Event(of) => event(of),
@@ -64,12 +77,13 @@ fn item_kind(kind: &ItemKind) -> Sexp {
             .with(params.iter().map(param))
             .with(flag(*symmetric, "symmetric"))
             .with(definition.as_ref().map(expr)),
-        ItemKind::Fn { external, name: word, params, result, body } => node("fn")
+        ItemKind::Fn { external, name: word, params, result, body, options } => node("fn")
             .with(flag(*external, "extern"))
             .with([name(word)])
             .with(params.iter().map(param))
             .with(result.as_ref().map(|r| node("result").with([ty(r)])))
-            .with(body.as_ref().map(expr)),
+            .with(body.as_ref().map(expr))
+            .with(named(options)),
         ItemKind::Const { name: word, ty: of, value } => {
             node("const").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
         }
@@ -96,7 +110,9 @@ fn item_kind(kind: &ItemKind) -> Sexp {
         ItemKind::Fit { name: word, of, lines } => {
             node("fit").with([name(word), path(of)]).with(lines.iter().map(fit_line))
         }
-        ItemKind::Test { name: word, body } => node("test").with([name(word), block(body)]),
+        ItemKind::Test { name: word, lab, body, handlers: on } => {
+            node("test").with([name(word)]).with(lab.as_ref().map(path)).with([block(body)]).with(handlers(on))
+        }
     }
 }
 
@@ -132,6 +148,13 @@ fn asset_line(line: &AssetLine) -> Sexp {
         AssetLine::Error(_) => leaf("error"),
         AssetLine::Field(of) => field(of),
         AssetLine::Frame { name: word, at } => node("frame").with([name(word), expr(at)]),
+        AssetLine::Grid(of) => node("grid")
+            .with([name(&of.name), name(&of.from)])
+            .with(of.to.as_ref().map(|to| node("to").with([name(to)])))
+            .with([literal(&of.literal)])
+            .with(maybe("at", of.at.as_ref()))
+            .with(maybe("pitch", of.pitch.as_ref()))
+            .with(maybe("by", of.row.as_ref())),
         AssetLine::Part { name: word, literal: of } => node("part").with([name(word), literal(of)]),
     }
 }
@@ -147,6 +170,9 @@ fn member(of: &Member) -> Sexp {
         MemberKind::View { param: index, ty: kind, value } => node("view").with([param(index), ty(kind), expr(value)]),
         MemberKind::Command { sig: of, clauses } => node("command").with([sig(of)]).with(clauses.iter().map(clause)),
         MemberKind::Process(of) => process(of),
+        MemberKind::Limit { at_end, cond, failure, help } => {
+            demand(if *at_end { "ends" } else { "keeps" }, cond, failure.as_ref(), help.as_deref())
+        }
         MemberKind::Event(of) => event(of),
         MemberKind::Frame { name: word, at } => node("frame").with([name(word)]).with(at.as_ref().map(expr)),
     };
@@ -165,9 +191,18 @@ fn role_word(role: Role) -> &'static str {
     }
 }
 
+fn demand(word: &str, cond: &Expr, failure: Option<&Name>, help: Option<&str>) -> Sexp {
+    let named = failure.map(|f| node("else").with([name(f)]).with(help.map(quoted)));
+    node(word).with([expr(cond)]).with(named)
+}
+
 fn clause(clause: &Clause) -> Sexp {
     match &clause.kind {
-        ClauseKind::Needs(cond) => node("needs").with([expr(cond)]),
+        ClauseKind::Needs { cond, failure, help } => demand("needs", cond, failure.as_ref(), help.as_deref()),
+        ClauseKind::Presumes { ever, cond, failure, help } => {
+            let word = if *ever { "presumes ever" } else { "presumes" };
+            demand(word, cond, failure.as_ref(), help.as_deref())
+        }
         ClauseKind::While(cond) => node("while").with([expr(cond)]),
         ClauseKind::Fails(all) => node("fails").with(names(all)),
         ClauseKind::Effect(effects) => node("effect").with(effects.iter().map(|effect| match effect {
@@ -176,6 +211,9 @@ fn clause(clause: &Clause) -> Sexp {
         })),
         ClauseKind::Takes { nominal, bounds } => node("takes").with([expr(nominal)]).with(maybe("in", bounds.as_ref())),
         ClauseKind::Until(cond) => node("until").with([expr(cond)]),
+        ClauseKind::Says { text, when } => {
+            node("says").with([super::steps::filled(text)]).with(maybe("when", when.as_ref()))
+        }
         ClauseKind::Option(of) => node("option").with([param(of)]),
     }
 }
@@ -244,10 +282,15 @@ fn lab_line(line: &LabLine) -> Sexp {
             .with(labelled(relations))
             .with(holding.as_ref().map(|holding| match holding {
                 Holding::Expr(value) => node("holding").with([expr(value)]),
-                Holding::Fields(list) => node("holding").with([node("fields").with(fields(list))]),
+                Holding::Places(list) => node("holding").with(list.iter().map(|fill| {
+                    node("places")
+                        .with([name(&fill.from)])
+                        .with(fill.to.as_ref().map(|to| node("to").with([name(to)])))
+                        .with([expr(&fill.value)])
+                })),
             })),
-        LabLineKind::Include { lab, name: word, relations } => {
-            node("include").with([path(lab), name(word)]).with(labelled(relations))
+        LabLineKind::Include { lab, name: word, relations, options } => {
+            node("include").with([path(lab), name(word)]).with(labelled(relations)).with(named(options))
         }
         LabLineKind::Between { a, b, fields: list } => node("between").with([expr(a), expr(b)]).with(fields(list)),
     }

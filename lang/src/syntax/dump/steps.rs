@@ -5,7 +5,7 @@ use super::{
     exprs::{expr, maybe, named, path, ty},
     leaf, name, names, node, quoted,
 };
-use crate::ast::{Block, Call, Expr, Handlers, Name, Stmt, StmtKind};
+use crate::ast::{Block, Call, Expr, Handlers, Name, Stmt, StmtKind, Text, TextPart};
 
 pub(super) fn block(block: &Block) -> Sexp {
     node("block").with(block.stmts.iter().map(stmt))
@@ -26,6 +26,21 @@ fn call(call: &Call) -> Sexp {
 
 pub(super) fn labelled(labelled: &[(Name, Expr)]) -> Vec<Sexp> {
     labelled.iter().map(|(label, value)| node(&label.text).with([expr(value)])).collect()
+}
+
+/// A plain text as such, another one with its parts.
+pub(super) fn filled(text: &Text) -> Sexp {
+    let part = |part: &TextPart| match part {
+        TextPart::Plain(text) => quoted(text),
+        TextPart::Value { value, digits } => {
+            node("value").with([expr(value)]).with(digits.map(|d| leaf(format!(".{d}"))))
+        }
+    };
+    match text.parts.as_slice() {
+        [] => quoted(""),
+        [TextPart::Plain(text)] => quoted(text),
+        parts => node("text").with(parts.iter().map(part)),
+    }
 }
 
 fn stmt(stmt: &Stmt) -> Sexp {
@@ -67,12 +82,12 @@ fn stmt(stmt: &Stmt) -> Sexp {
         StmtKind::Start { name: word, body } => node("start").with([name(word), block(body)]),
         StmtKind::Await { name: word } => node("await").with([name(word)]),
         StmtKind::Fail { name: word, text } => {
-            node("fail").with(word.as_ref().map(name)).with(text.as_deref().map(quoted))
+            node("fail").with(word.as_ref().map(name)).with(text.as_ref().map(filled))
         }
         StmtKind::Expect { cond } => node("expect").with([expr(cond)]),
         StmtKind::Record { value, every } => node("record").with([expr(value), expr(every)]),
-        StmtKind::Note(text) => node("note").with([quoted(text)]),
-        StmtKind::Ask(text) => node("ask").with([quoted(text)]),
+        StmtKind::Note(text) => node("note").with([filled(text)]),
+        StmtKind::Ask(text) => node("ask").with([filled(text)]),
         StmtKind::Return { value } => node("return").with([expr(value)]),
         StmtKind::Run { workflow, options } => node("run").with([path(workflow)]).with(named(options)),
         StmtKind::Call(step) => call(step),

@@ -8,8 +8,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, Clause, ClauseKind, Effect, Field, FieldValue, ItemKind, Member, MemberKind, Path, Role,
-    Term,
+    AssetLine, AssetLiteral, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Member, MemberKind,
+    Name, Path, Role, Term,
 };
 
 impl Lower<'_> {
@@ -49,6 +49,12 @@ impl Lower<'_> {
                 MemberKind::View { param, ty: self.ty(ty), value: self.expr_in(kids) }
             }
             Rule::command => MemberKind::Command { sig: self.sig_in(kids), clauses: self.clauses_in(kids) },
+            Rule::limit => {
+                kids.has(Rule::kw_keeps);
+                let at_end = kids.has(Rule::kw_ends);
+                let (cond, failure, help) = self.demand(kids);
+                MemberKind::Limit { at_end, cond, failure, help }
+            }
             Rule::frame_member => {
                 MemberKind::Frame { name: self.name_in(kids), at: kids.eat(Rule::operand).map(|o| self.expr(o)) }
             }
@@ -96,12 +102,27 @@ impl Lower<'_> {
         clauses
     }
 
+    /// `COND else NAME "help"`.
+    fn demand(&mut self, kids: &mut Kids) -> (Expr, Option<Name>, Option<String>) {
+        let cond = self.expr_in(kids);
+        let failure = kids.eat(Rule::word).map(|n| self.name(&n));
+        (cond, failure, kids.eat(Rule::string).map(|n| self.text(&n)))
+    }
+
     fn clause(&mut self, node: Node) -> Option<ClauseKind> {
         let rule = node.as_rule();
         let mut inner = Kids::of(node);
         let kids = &mut inner;
         Some(match rule {
-            Rule::needs => ClauseKind::Needs(self.expr_in(kids)),
+            Rule::needs => {
+                let (cond, failure, help) = self.demand(kids);
+                ClauseKind::Needs { cond, failure, help }
+            }
+            Rule::presumes => {
+                let ever = kids.has(Rule::kw_ever);
+                let (cond, failure, help) = self.demand(kids);
+                ClauseKind::Presumes { ever, cond, failure, help }
+            }
             Rule::while_ => {
                 kids.has(Rule::kw_while);
                 ClauseKind::While(self.expr_in(kids))
@@ -117,6 +138,9 @@ impl Lower<'_> {
             }
             Rule::takes => {
                 ClauseKind::Takes { nominal: self.expr_in(kids), bounds: kids.eat(Rule::operand).map(|b| self.expr(b)) }
+            }
+            Rule::says => {
+                ClauseKind::Says { text: self.filled_in(kids)?, when: kids.eat(Rule::cond).map(|c| self.expr(c)) }
             }
             Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
             _ => return None,
@@ -137,7 +161,9 @@ impl Lower<'_> {
         let extends = self.extends_in(kids);
         let source = kids.eat(Rule::source).map(|node| {
             let kids = &mut Kids::of(node);
-            (self.name_in(kids), self.text_in(kids))
+            let format = self.name_in(kids);
+            let span = kids.peek_span().map_or(format.span, |(start, end)| self.place(start, end));
+            (format, Name { text: self.text_in(kids), span })
         });
         let lines = self.asset_lines(kids.eat(Rule::asset_body));
         ItemKind::Asset { name, extends, source, lines }
@@ -158,6 +184,7 @@ impl Lower<'_> {
                     lines.push(field.map_or(AssetLine::Error(span), AssetLine::Field));
                 }
                 Rule::field => lines.push(AssetLine::Field(self.field(part))),
+                Rule::grid => lines.push(AssetLine::Grid(self.grid(part))),
                 _ => {
                     let kids = &mut Kids::of(part);
                     let name = self.name_in(kids);
@@ -170,6 +197,23 @@ impl Lower<'_> {
             before = Some(start);
         }
         lines
+    }
+
+    fn grid(&mut self, node: Node) -> Grid {
+        let kids = &mut Kids::of(node);
+        let name = self.name_in(kids);
+        let places = kids.eat(Rule::places).map_or_else(Vec::new, |n| Kids::of(n).all(Rule::place));
+        let mut places = self.names(places).into_iter();
+        let nowhere = Name { text: String::new(), span: name.span };
+        let (from, to) = (places.next().unwrap_or(nowhere), places.next());
+        let literal = self.literal_in(kids);
+        let at = kids.eat(Rule::grid_at).map(|n| self.expr_in(&mut Kids::of(n)));
+        let mut pitch = kids.eat(Rule::pitch).map(Kids::of);
+        let (step, row) = match &mut pitch {
+            Some(kids) => (Some(self.expr_in(kids)), kids.eat(Rule::operand).map(|row| self.expr(row))),
+            None => (None, None),
+        };
+        Grid { name, from, to, literal, at, pitch: step, row }
     }
 
     pub(super) fn literal_in(&mut self, kids: &mut Kids) -> AssetLiteral {

@@ -33,7 +33,7 @@ impl Lower<'_> {
                 let parts = Kids::of(node).all(Rule::cond);
                 ExprKind::List(parts.into_iter().map(|part| self.expr(part)).collect())
             }
-            Rule::ident | Rule::charged | Rule::species => ExprKind::Name(self.name(&node)),
+            Rule::ident | Rule::charged | Rule::species | Rule::state_word => ExprKind::Name(self.name(&node)),
             _ => ExprKind::Error,
         };
         Expr { kind: Box::new(kind), span }
@@ -88,8 +88,13 @@ impl Lower<'_> {
     pub(super) fn text(&mut self, node: &Node) -> String {
         let inner = node.as_str().trim_start_matches('"');
         let inner = inner.strip_suffix('"').unwrap_or(inner);
-        let start = node.as_span().start() + 1;
         let mut text = String::with_capacity(inner.len());
+        self.unescape(inner, node.as_span().start() + 1, &mut text);
+        text
+    }
+
+    /// Adds a piece of a text that starts at `start`, with what its escapes stand for.
+    pub(super) fn unescape(&mut self, inner: &str, start: usize, text: &mut String) {
         let mut chars = inner.char_indices();
         while let Some((_, c)) = chars.next() {
             if c != '\\' {
@@ -114,7 +119,6 @@ impl Lower<'_> {
                 None => text.push('\\'),
             }
         }
-        text
     }
 
     fn tuple(&mut self, node: Node) -> Expr {

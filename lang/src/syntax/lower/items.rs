@@ -39,6 +39,22 @@ impl Lower<'_> {
                 products: self.side_in(kids),
                 fields: self.fields_in(kids),
             },
+            Rule::reactive_group => ItemKind::ReactiveGroup { name: self.name_in(kids), fields: self.fields_in(kids) },
+            Rule::material => ItemKind::Material { name: self.name_in(kids), fields: self.fields_in(kids) },
+            Rule::incompatible => {
+                ItemKind::Incompatible { a: self.name_in(kids), b: self.name_in(kids), fields: self.fields_in(kids) }
+            }
+            Rule::allow => {
+                let (a, b) = (self.name_in(kids), self.name_in(kids));
+                ItemKind::Allow { a, b, reason: self.text_in(kids) }
+            }
+            Rule::hazard => ItemKind::Hazard {
+                grave: kids.has(Rule::kw_hazard),
+                name: self.name_in(kids),
+                params: self.params_in(kids),
+                when: self.expr_in(kids),
+                help: kids.eat(Rule::string).map(|t| self.text(&t)),
+            },
             Rule::capability => self.capability(kids),
             Rule::asset => self.asset(kids),
             Rule::relation => ItemKind::Relation {
@@ -53,6 +69,7 @@ impl Lower<'_> {
                 params: self.params_in(kids),
                 result: kids.eat(Rule::ty).map(|t| self.ty(t)),
                 body: kids.eat(Rule::cond).map(|b| self.expr(b)),
+                options: self.options_in(kids),
             },
             Rule::const_ => ItemKind::Const {
                 name: self.name_in(kids),
@@ -79,7 +96,8 @@ impl Lower<'_> {
             Rule::fit => self.fit(kids),
             Rule::test => {
                 let name = self.name_in(kids);
-                ItemKind::Test { name, body: self.test_body(kids) }
+                let lab = kids.eat(Rule::path).map(|p| self.path(&p));
+                ItemKind::Test { name, lab, body: self.test_body(kids), handlers: self.handlers_in(kids) }
             }
             _ => ItemKind::Error,
         }

@@ -10,7 +10,7 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Expr, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Wire, WireKind,
+    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Wire, WireKind,
 };
 
 impl Lower<'_> {
@@ -71,6 +71,7 @@ impl Lower<'_> {
                 lab: self.path_in(kids),
                 name: self.name_in(kids),
                 relations: self.labelled_in(kids),
+                options: self.options_in(kids),
             },
             Rule::between => {
                 LabLineKind::Between { a: self.expr_in(kids), b: self.expr_in(kids), fields: self.fields_in(kids) }
@@ -109,9 +110,23 @@ impl Lower<'_> {
     fn holding_in(&mut self, kids: &mut Kids) -> Option<Holding> {
         let mut kids = Kids::of(kids.eat(Rule::holding)?);
         Some(match kids.peek() {
-            Some(Rule::fields) => Holding::Fields(self.fields_in(&mut kids)),
+            Some(Rule::fills) => Holding::Places(self.fills(kids.take())),
             _ => Holding::Expr(self.expr_in(&mut kids)),
         })
+    }
+
+    fn fills(&mut self, body: Option<Node>) -> Vec<Fill> {
+        self.lines(
+            body,
+            Rule::only_fill,
+            |this, node, _| {
+                let kids = &mut Kids::of(node);
+                let from = this.name_in(kids);
+                let to = kids.eat(Rule::place).map(|n| this.name(&n));
+                Fill { from, to, value: this.expr_in(kids) }
+            },
+            |_, _, _| None,
+        )
     }
 
     pub(super) fn study(&mut self, kids: &mut Kids) -> ItemKind {

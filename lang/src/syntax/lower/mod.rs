@@ -7,13 +7,15 @@ mod labs;
 mod laws;
 mod precedence;
 mod steps;
+mod texts;
 mod types;
 
 use matterix_ir::{Diagnostic, FileId, Span, codes};
+use pest::Parser;
 
 use super::{
     cursor::{Kids, Node, token_end},
-    grammar::Rule,
+    grammar::{Grammar, Rule},
     mistake::Mistakes,
     repair::Offsets,
     scan::first_word,
@@ -35,13 +37,15 @@ pub(super) struct Lower<'a> {
     mistakes: Mistakes<'a>,
     /// Levels of the expression tree above the current place, at most.
     depth: usize,
+    /// Where the piece that is read begins in the file; 0 but inside a text.
+    base: usize,
     /// Inside a `test`, where `run` is a statement.
     in_test: bool,
 }
 
 impl<'a> Lower<'a> {
     pub(super) fn new(file: FileId, text: &'a str, offsets: &'a Offsets) -> Self {
-        Lower { file, text, offsets, mistakes: Mistakes::new(file, text, offsets), depth: 0, in_test: false }
+        Lower { file, text, offsets, mistakes: Mistakes::new(file, text, offsets), depth: 0, base: 0, in_test: false }
     }
 
     /// The tree, and what is wrong with the text in the order of the text.
@@ -51,6 +55,26 @@ impl<'a> Lower<'a> {
         let file = self.file(root);
         let (found, hidden) = self.mistakes.finish();
         (file, found, hidden)
+    }
+
+    /// The one value in a range of the text.
+    pub(super) fn value(mut self, start: usize, end: usize) -> (Expr, Vec<Diagnostic>) {
+        let value = self.piece(start, end).unwrap_or_else(|| self.error_expr(self.place(start, end)));
+        (value, self.mistakes.finish().0)
+    }
+
+    /// The value in a range of the text; what is wrong with it is noted.
+    fn piece(&mut self, start: usize, end: usize) -> Option<Expr> {
+        let text = self.text.get(start..end).unwrap_or_default();
+        let Some(node) = Grammar::parse(Rule::only_value, text).ok().and_then(|mut pairs| pairs.next()) else {
+            self.mistakes.piece(Rule::only_value, start, end);
+            return None;
+        };
+        // Reading a piece counts from its own beginning.
+        self.base = start;
+        let value = self.expr_in(&mut Kids::of(node));
+        self.base = 0;
+        Some(value)
     }
 
     fn file(&mut self, root: Node) -> File {
@@ -101,7 +125,7 @@ impl<'a> Lower<'a> {
 
     /// The span of a range of the parsed text in the user's text.
     fn place(&self, start: usize, end: usize) -> Span {
-        self.offsets.span(self.file, start, end)
+        self.offsets.span(self.file, self.base + start, self.base + end)
     }
 
     fn report(&mut self, diagnostic: Diagnostic) {

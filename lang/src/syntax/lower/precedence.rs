@@ -72,7 +72,7 @@ impl Lower<'_> {
         let links = node
             .clone()
             .into_inner()
-            .filter(|p| !matches!(p.as_rule(), Rule::atom | Rule::species | Rule::missing_value))
+            .filter(|p| !matches!(p.as_rule(), Rule::atom | Rule::species | Rule::state_word | Rule::missing_value))
             .count();
         self.deeper(links, &node.clone(), |this| {
             let span = this.span(&node);

@@ -131,12 +131,12 @@ impl Lower<'_> {
             Rule::await_ => StmtKind::Await { name: self.name_in(kids) },
             Rule::fail => {
                 let name = kids.eat(Rule::word).map(|w| self.name(&w));
-                StmtKind::Fail { name, text: kids.eat(Rule::string).map(|s| self.text(&s)) }
+                StmtKind::Fail { name, text: self.filled_in(kids) }
             }
             Rule::expect => StmtKind::Expect { cond: self.expr_in(kids) },
             Rule::record => StmtKind::Record { value: self.expr_in(kids), every: self.expr_in(kids) },
-            Rule::note => StmtKind::Note(self.text_in(kids)),
-            Rule::ask => StmtKind::Ask(self.text_in(kids)),
+            Rule::note => self.filled_in(kids).map_or(StmtKind::Error, StmtKind::Note),
+            Rule::ask => self.filled_in(kids).map_or(StmtKind::Error, StmtKind::Ask),
             Rule::return_ => StmtKind::Return { value: self.expr_in(kids) },
             _ => StmtKind::Error,
         }

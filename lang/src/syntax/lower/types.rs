@@ -33,6 +33,10 @@ impl Lower<'_> {
         let span = self.span(&node);
         let closing = node.clone().into_inner().filter(|p| p.as_rule() == Rule::rangle).count();
         let mut kids = Kids::of(node);
+        if let Some(words) = kids.eat(Rule::words) {
+            let words = self.names(Kids::of(words).all(Rule::state_name));
+            return Type { paths: Vec::new(), words, argument: None, optional: false, condition: None, span };
+        }
         let mut paths = self.paths(kids.all(Rule::path));
         let mut arguments = Vec::new();
         while kids.has(Rule::langle) {
@@ -50,9 +54,16 @@ impl Lower<'_> {
         let condition = kids.eat(Rule::cond).map(|c| self.expr(c));
         let argument = arguments.into_iter().rev().fold(None, |inner, path| {
             let span = path.span;
-            Some(Box::new(Type { paths: vec![path], argument: inner, optional: false, condition: None, span }))
+            Some(Box::new(Type {
+                paths: vec![path],
+                words: Vec::new(),
+                argument: inner,
+                optional: false,
+                condition: None,
+                span,
+            }))
         });
-        Type { paths, argument, optional, condition, span }
+        Type { paths, words: Vec::new(), argument, optional, condition, span }
     }
 
     /// The parameters of the group that stands next; none where there is no group.
@@ -81,7 +92,12 @@ impl Lower<'_> {
         };
         let span = self.span(&node);
         let mut kids = Kids::of(node);
-        let verb = kids.eat(Rule::verb).map_or_else(Vec::new, |v| self.names(Kids::of(v).all(Rule::ident)));
+        let verb = kids.eat(Rule::verb).map_or_else(Vec::new, |verb| {
+            let mut words = Kids::of(verb);
+            let mut nodes = words.all(Rule::returning);
+            nodes.extend(words.all(Rule::ident));
+            self.names(nodes)
+        });
         let params = self.params_in(&mut kids);
         let labelled = kids
             .all(Rule::sig_group)

@@ -184,7 +184,7 @@ fn is_word(text: &str) -> bool {
 const RESERVED: &[&str] = &[
     "let", "wait", "sequence", "parallel", "start", "await", "repeat", "for", "if", "else", "while", "retry", "try",
     "finally", "hold", "holding", "keep", "within", "expect", "expects", "record", "note", "ask", "asks", "step",
-    "claim", "fail", "fails", "return", "and", "or", "not", "is", "of", "timeout", "after", "needs", "effect", "takes",
-    "every", "times", "sends", "until", "to", "from", "into", "onto", "on", "in", "with", "by", "at", "using",
-    "through", "as", "max",
+    "claim", "fail", "fails", "return", "and", "or", "not", "is", "of", "timeout", "after", "needs", "presumes",
+    "effect", "takes", "every", "sends", "until", "to", "from", "into", "onto", "on", "in", "with", "by", "at",
+    "using", "through", "as", "max",
 ];

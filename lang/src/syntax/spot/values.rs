@@ -43,7 +43,7 @@ pub(super) fn split_unit(spot: &Spot) -> Option<Mistake> {
 }
 
 fn is_field(only: Rule) -> bool {
-    matches!(only, Rule::only_field | Rule::only_named | Rule::only_asset_line | Rule::only_lab_line)
+    matches!(only, Rule::only_field | Rule::only_fill | Rule::only_named | Rule::only_asset_line | Rule::only_lab_line)
 }
 
 /// `gain 70 W/K` for `gain: 70 W/K`.

@@ -1,0 +1,71 @@
+//! To which reactive groups the species of the library belong.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::Sources;
+use matterix_lang::LibraryOnly;
+use matterix_lang::elaborate::Tables;
+use matterix_lang::names::{self, Names};
+use matterix_lang::screen::Party;
+
+/// Groups of a species in words.
+fn groups(tables: &Tables<'_>, name: &str) -> BTreeSet<String> {
+    let (id, _) = tables.species.iter().find(|(_, s)| s.name == name).expect(name);
+    let seats = tables.screen.seats(&tables.species, id);
+    let groups = seats.iter().filter(|s| matches!(s.party, Party::Group(_)));
+    groups.filter_map(|s| tables.screen.title(s.party)).map(str::to_string).collect()
+}
+
+#[test]
+fn common_species_belong_to_their_groups() {
+    let mut sources = Sources::default();
+    let file = sources.add("bench.mtx", "mtx 1\n");
+    let (modules, found) = names::load(&mut sources, file, &LibraryOnly);
+    assert_eq!(found, []);
+    let (names, found) = Names::new(&modules);
+    assert_eq!(found, []);
+    let (tables, found) = Tables::new(&names);
+    assert_eq!(found, []);
+    for (species, expected) in [
+        ("water", &[][..]),
+        ("EtOH", &["alcohols"]),
+        ("acetone", &["ketones"]),
+        ("MeCN", &["nitriles"]),
+        ("DMSO", &[]),
+        ("DMF", &["amides"]),
+        ("THF", &["ethers"]),
+        ("toluene", &["aromatic hydrocarbons"]),
+        ("hexane", &["saturated hydrocarbons"]),
+        ("EtOAc", &["esters"]),
+        ("CHCl3", &["halogenated organics"]),
+        ("pyridine", &["amines"]),
+        ("Et3N", &["amines"]),
+        ("aniline", &["amines"]),
+        ("acetaldehyde", &["aldehydes"]),
+        ("acetyl_chloride", &["acid halides"]),
+        ("formic_acid", &["organic acids"]),
+        ("acetic_acid", &["organic acids"]),
+        ("HCl", &["mineral acids"]),
+        ("HNO3", &["mineral acids", "oxidising mineral acids"]),
+        ("H2SO4", &["mineral acids"]),
+        ("H2O2", &["strong oxidising agents"]),
+        ("KMnO4", &["strong oxidising agents"]),
+        ("NaOCl", &["hypochlorites", "strong oxidising agents"]),
+        ("KNO3", &["strong oxidising agents"]),
+        ("NaOH", &["caustics"]),
+        ("NH3", &["caustics"]),
+        ("NaCl", &[]),
+        ("NaHCO3", &[]),
+        ("NaCN", &["cyanides"]),
+        ("Na2S", &["inorganic sulfides"]),
+        ("NaBH4", &["strong reducing agents"]),
+        ("Na", &["alkali metals"]),
+        ("urea", &[]),
+        ("aspirin", &["esters", "organic acids"]),
+        ("paracetamol", &["amides", "phenols"]),
+        ("air", &[]),
+    ] {
+        let expected: BTreeSet<String> = expected.iter().map(|s| (*s).to_string()).collect();
+        assert_eq!(groups(&tables, species), expected, "{species}");
+    }
+}
