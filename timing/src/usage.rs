@@ -1,0 +1,94 @@
+//! Who uses and who claims which instance.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::scene::InstanceId;
+
+use crate::walk::Timing;
+
+/// A step that uses an instance from its beginning to its end without a pause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Use {
+    /// The instance.
+    pub instance: InstanceId,
+    /// The step.
+    pub step: StepId,
+}
+
+/// The uses of a plan, outermost steps: a skill whose every step uses the arm is one use of it. Handlers and `finally`
+/// are left out: there, what is in use is waited for.
+pub fn uses(plan: &Plan, timing: &Timing) -> Vec<Use> {
+    let mut below: BTreeMap<StepId, BTreeSet<InstanceId>> = BTreeMap::new();
+    gather(plan, plan.root, &mut below);
+    let mut out = Vec::new();
+    let mut open = vec![(plan.root, BTreeSet::new())];
+    while let Some((step, covered)) = open.pop() {
+        let aside = timing.visit(step).is_none_or(|v| v.aside);
+        let Some(instances) = below.get(&step).filter(|_| !aside) else { continue };
+        let node = &plan.get(step).step;
+        let whole =
+            |i: &InstanceId| !matches!(node, Step::Sequence(_) | Step::Parallel(_)) && all_along(plan, step, *i);
+        let (own, other): (BTreeSet<InstanceId>, BTreeSet<InstanceId>) =
+            instances.difference(&covered).partition(|i| whole(i));
+        out.extend(own.iter().map(|&instance| Use { instance, step }));
+        if !other.is_empty() {
+            // What this step is a use of is not one again below.
+            let covered: BTreeSet<InstanceId> = covered.union(&own).copied().collect();
+            open.extend(node.children().into_iter().map(|child| (child, covered.clone())));
+        }
+    }
+    out.sort_unstable();
+    out
+}
+
+fn gather(plan: &Plan, step: StepId, below: &mut BTreeMap<StepId, BTreeSet<InstanceId>>) -> BTreeSet<InstanceId> {
+    let node = &plan.get(step).step;
+    let mut all: BTreeSet<InstanceId> = match node {
+        Step::Operation(operation) => operation.claims.iter().copied().collect(),
+        _ => BTreeSet::new(),
+    };
+    for child in node.children() {
+        all.extend(gather(plan, child, below));
+    }
+    below.insert(step, all.clone());
+    all
+}
+
+/// Whether every way through a step uses an instance all the time.
+fn all_along(plan: &Plan, step: StepId, instance: InstanceId) -> bool {
+    let node = &plan.get(step).step;
+    match node {
+        Step::Operation(operation) => operation.claims.contains(&instance),
+        Step::Wait { .. } | Step::WaitUntil { .. } | Step::Hold { .. } | Step::Await { .. } => false,
+        Step::Claim { .. } | Step::Start { .. } | Step::Parallel(_) => false,
+        Step::Guarded { body, .. } => all_along(plan, *body, instance),
+        _ => node.children().iter().all(|c| all_along(plan, *c, instance)),
+    }
+}
+
+/// A block that claims instances, with those held around it in its own line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Claim {
+    /// The `claim`.
+    pub step: StepId,
+    /// What it waits for.
+    pub wants: Vec<InstanceId>,
+    /// The claims around it.
+    pub around: Vec<StepId>,
+}
+
+/// The blocks of a plan that claim.
+pub fn claims(plan: &Plan, timing: &Timing) -> Vec<Claim> {
+    let is_claim = |s: &StepId| matches!(plan.get(*s).step, Step::Claim { .. });
+    (0..plan.steps.len() as u32)
+        .map(StepId)
+        .filter_map(|step| match &plan.get(step).step {
+            Step::Claim { claims, .. } if timing.visit(step).is_some() => {
+                let around = timing.around(step).filter(is_claim).collect();
+                Some(Claim { step, wants: claims.clone(), around })
+            }
+            _ => None,
+        })
+        .collect()
+}
