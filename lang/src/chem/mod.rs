@@ -3,6 +3,7 @@
 pub mod balance;
 pub mod elements;
 pub mod formula;
+pub mod pattern;
 pub mod rational;
 pub mod species_name;
 pub mod structure;
@@ -15,6 +16,7 @@ mod stdlib_tests;
 pub use balance::{Imbalance, check as check_balance};
 pub use elements::Element;
 pub use formula::{Formula, FormulaError};
+pub use pattern::Pattern;
 pub use rational::Rational;
 pub use species_name::{Phase, SpeciesName};
 pub use structure::{Structure, StructureError};

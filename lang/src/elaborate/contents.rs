@@ -6,6 +6,7 @@ use super::{Elaborator, SpeciesId};
 use crate::ast::{Binary, Expr, ExprKind, Name};
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
+use crate::stock::Held;
 
 /// What a name in a recipe or after `of` stands for.
 pub enum Substance {
@@ -13,6 +14,31 @@ pub enum Substance {
     Species(SpeciesId),
     /// A recipe.
     Solution(DeclId),
+}
+
+/// What contents are called as a reagent: the substance, or the whole recipe where there are several.
+pub fn origin(e: &Expr) -> String {
+    fn terms<'e>(e: &'e Expr, out: &mut Vec<(&'e Expr, &'e Name)>) {
+        match &*e.kind {
+            ExprKind::Binary(Binary::Add, a, b) => {
+                terms(a, out);
+                terms(b, out);
+            }
+            ExprKind::Tuple(items, None) if items.len() == 1 => terms(&items[0], out),
+            ExprKind::Of(quantity, name) => out.push((quantity, name)),
+            _ => {}
+        }
+    }
+    let mut all = Vec::new();
+    terms(e, &mut all);
+    if let [(_, one)] = all.as_slice() {
+        return one.text.clone();
+    }
+    let shown = all.iter().map(|(quantity, name)| match &*quantity.kind {
+        ExprKind::Quantity(v, unit) => format!("{v} {} of {}", unit.text, name.text),
+        _ => name.text.clone(),
+    });
+    shown.collect::<Vec<_>>().join(" + ")
 }
 
 impl<'a> Elaborator<'a> {
@@ -48,7 +74,20 @@ impl<'a> Elaborator<'a> {
                     return;
                 }
                 let n = self.name_param(&format!("{owner}.initial[{}]", name.text), n, quantity.span);
-                for (s, node) in self.amounts_of(&substance, n, quantity.span, name) {
+                let amounts = self.amounts_of(&substance, n.clone(), quantity.span, name);
+                self.held.push(Held {
+                    mixture: None,
+                    substance: name.text.clone(),
+                    solution: match substance {
+                        Substance::Solution(id) => Some(id),
+                        Substance::Species(_) => None,
+                    },
+                    quantity: n,
+                    amounts: amounts.clone(),
+                    span: e.span,
+                });
+                for (s, node) in amounts {
+                    self.held_at.entry((owner.to_string(), s)).or_insert(e.span);
                     match out.iter().position(|(o, _)| *o == s) {
                         Some(i) => out[i].1 = self.plus(out[i].1, node),
                         None => out.push((s, node)),

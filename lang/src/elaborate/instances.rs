@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{NodeId, Span};
 
+use super::grids::Grid;
 use super::tables::MemberRef;
 use super::{Elaborator, MemberKey, SpeciesId};
 use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
-use crate::eval::{Type, Value};
+use crate::eval::{Scope, Type, Value};
 use crate::names::DeclId;
 
 /// A field given for an instance: where its names are looked up, and whether it stands in the lab.
@@ -20,6 +21,23 @@ pub struct Setting<'a> {
     pub field: &'a Field,
     /// It stands in a lab, so the lab's names are seen, not the instance's.
     pub lab: bool,
+    /// The instance of the asset whose text it is; its names are seen.
+    pub of: Option<InstanceId>,
+}
+
+impl<'a> Setting<'a> {
+    /// The names its value sees.
+    pub fn scope(&self) -> Scope {
+        match self.of {
+            Some(of) if !self.lab => Scope::of(of, self.module),
+            _ => Scope { lab: self.lab, ..Scope::module(self.module) },
+        }
+    }
+
+    /// Its value.
+    pub fn value(&self) -> &'a FieldValue {
+        &self.field.value
+    }
 }
 
 /// An asset in the lab, or a part of one.
@@ -29,18 +47,24 @@ pub struct Instance<'a> {
     pub name: String,
     /// Its asset type; for a part its capability; for a prototype all capabilities asked for.
     pub kinds: Vec<DeclId>,
+    /// The included lab it stands in: empty, or `left.`.
+    pub within: String,
     /// What it is a part of.
     pub owner: Option<InstanceId>,
     /// Fields given for it, the strongest first.
     pub settings: Vec<Setting<'a>>,
     /// Its parts by name.
     pub parts: BTreeMap<String, InstanceId>,
+    /// Its grids of child assets.
+    pub grids: Vec<Grid>,
     /// Values of its members, as far as they were asked for.
     pub values: BTreeMap<MemberKey, Value>,
     /// State of each amount per species.
     pub amounts: BTreeMap<(String, SpeciesId), u32>,
     /// What it holds at the start: mol (or kg where counted by mass).
     pub contents: Vec<(SpeciesId, NodeId)>,
+    /// What its contents are called as a reagent.
+    pub origin: Option<String>,
     /// `on table`, `in rack`: preposition and instance.
     pub placed: Vec<(String, InstanceId)>,
     /// Where.
@@ -50,9 +74,9 @@ pub struct Instance<'a> {
 }
 
 impl<'a> Instance<'a> {
-    /// The strongest field of a name: module, value, whether it stands in the lab.
-    pub fn setting(&self, name: &str) -> Option<(usize, &'a FieldValue, bool)> {
-        self.settings.iter().find(|s| s.field.key.text == name).map(|s| (s.module, &s.field.value, s.lab))
+    /// The strongest field of a name.
+    pub fn setting(&self, name: &str) -> Option<Setting<'a>> {
+        self.settings.iter().find(|s| s.field.key.text == name).copied()
     }
 }
 
@@ -70,26 +94,43 @@ impl<'a> Elaborator<'a> {
         for kind in &kinds {
             let Some(info) = self.tables.kinds.get(kind) else { continue };
             settings.extend(info.lines.iter().filter_map(|(module, line)| match line {
-                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false }),
+                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false, of: Some(id) }),
                 _ => None,
             }));
         }
-        self.instances.push(Instance { name, kinds, owner, settings, span, ..Instance::default() });
+        let within = self.within.clone();
+        self.instances.push(Instance { name, kinds, within, owner, settings, span, ..Instance::default() });
+        self.count_mixture(id);
         self.make_parts(id);
         id
     }
 
+    fn count_mixture(&mut self, id: InstanceId) {
+        if self.per_species(id).is_some() {
+            self.mixtures.push(id);
+        }
+    }
+
     fn make_parts(&mut self, id: InstanceId) {
+        let mut wanted = Vec::new();
         for m in self.all_members(id) {
             let MemberKind::Value { role: Role::Part, name, ty, .. } = &m.member.kind else { continue };
             if self.instances[id.0 as usize].parts.contains_key(&name.text) {
                 continue;
             }
-            let Type::Instance { kinds, optional } = self.resolve_type(ty, m.module) else { continue };
+            let (kinds, optional) = match self.resolve_type(ty, m.module) {
+                Type::Instance { kinds, optional } => (kinds, optional),
+                Type::List(inner) => {
+                    if let Type::Instance { kinds, .. } = *inner {
+                        wanted.push((name, kinds));
+                    }
+                    continue;
+                }
+                _ => continue,
+            };
             let given = self.instances[id.0 as usize].setting(&name.text);
-            let literal = given.and_then(|(module, v, lab)| self.part_kind(v, module).map(|k| (k, module, v, lab)));
-            let kinds = match literal {
-                Some((kind, ..)) => {
+            let kinds = match given.and_then(|s| self.part_kind(s.value(), s.module)) {
+                Some(kind) => {
                     self.check_part(kind, &kinds, &name.text, id);
                     vec![kind]
                 }
@@ -97,7 +138,7 @@ impl<'a> Elaborator<'a> {
                 None => kinds,
             };
             let mut nested = Vec::new();
-            for s in &self.instances[id.0 as usize].settings {
+            for s in self.instances[id.0 as usize].settings.clone() {
                 if s.field.key.text != name.text {
                     continue;
                 }
@@ -106,7 +147,10 @@ impl<'a> Elaborator<'a> {
                     FieldValue::Literal(AssetLiteral { fields, .. }) => fields,
                     _ => &[],
                 };
-                nested.extend(fields.iter().map(|field| Setting { field, ..*s }));
+                if let [kind] = kinds.as_slice() {
+                    self.check_fields(*kind, fields);
+                }
+                nested.extend(fields.iter().map(|field| Setting { field, ..s }));
             }
             let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
             let span = self.instances[id.0 as usize].span;
@@ -114,6 +158,9 @@ impl<'a> Elaborator<'a> {
             self.instances[id.0 as usize].parts.insert(name.text.clone(), part);
         }
         self.make_children(id);
+        for (name, kinds) in wanted {
+            self.check_grid(id, name, &kinds);
+        }
     }
 
     fn make_children(&mut self, id: InstanceId) {
@@ -122,9 +169,20 @@ impl<'a> Elaborator<'a> {
             let Some(info) = self.tables.kinds.get(&kind) else { continue };
             let lines = info.lines.clone();
             for (module, line) in lines {
-                let AssetLine::Part { name, literal } = line else { continue };
+                let (name, literal) = match line {
+                    AssetLine::Part { name, literal } => (name, literal),
+                    AssetLine::Grid(grid) => {
+                        self.make_grid(id, module, grid);
+                        continue;
+                    }
+                    _ => continue,
+                };
                 let Some(kind) = self.kind_named(&literal.ty, module) else { continue };
-                let settings = literal.fields.iter().map(|field| Setting { module, field, lab: false }).collect();
+                if self.leads_back(id, kind, literal.ty.span) {
+                    continue;
+                }
+                let of = Some(id);
+                let settings = literal.fields.iter().map(|field| Setting { module, field, lab: false, of }).collect();
                 let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
                 let part = self.instantiate(full, vec![kind], settings, Some(id), literal.span);
                 self.instances[id.0 as usize].parts.insert(name.text.clone(), part);
@@ -188,6 +246,7 @@ impl<'a> Elaborator<'a> {
         let depth = name.matches('.').count();
         let id = InstanceId(self.instances.len() as u32);
         self.instances.push(Instance { name: name.to_string(), kinds: kinds.clone(), ..Instance::default() });
+        self.count_mixture(id);
         if depth < 3 {
             self.make_parts(id);
             self.declare_states(id);
@@ -200,9 +259,20 @@ impl<'a> Elaborator<'a> {
         self.instances.iter().position(|i| i.owner.is_none() && i.name == name).map(|i| InstanceId(i as u32))
     }
 
+    /// Whether there is an instance with this full name.
+    pub fn find_part(&self, name: &str) -> bool {
+        self.instances.iter().any(|i| i.name == name)
+    }
+
     /// All instances that have a kind.
     pub fn instances_of(&self, kind: DeclId) -> Vec<InstanceId> {
-        (0..self.instances.len() as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect()
+        let count = self.instances.len();
+        if let Some((_, found)) = self.by_kind.borrow().get(&kind).filter(|(then, _)| *then == count) {
+            return found.clone();
+        }
+        let found: Vec<_> = (0..count as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect();
+        self.by_kind.borrow_mut().insert(kind, (count, found.clone()));
+        found
     }
 
     /// Whether an instance has a kind.
@@ -266,7 +336,7 @@ impl<'a> Elaborator<'a> {
         for kind in self.instances[id.0 as usize].kinds.clone() {
             let Some(info) = self.tables.kinds.get(&kind) else { continue };
             let settings = info.lines.iter().filter_map(|(module, line)| match line {
-                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false }),
+                AssetLine::Field(field) => Some(Setting { module: *module, field, lab: false, of: Some(id) }),
                 _ => None,
             });
             self.instances[id.0 as usize].settings.extend(settings);

@@ -1,11 +1,13 @@
 //! A lab: its settings, instances, places, contents and pair parameters.
 
+use std::collections::BTreeMap;
+
 use matterix_ir::scene::{InstanceId, Pose};
-use matterix_ir::{Diagnostic, codes};
+use matterix_ir::{Diagnostic, Span, codes};
 
 use super::instances::Setting;
 use super::{Elaborator, Pair};
-use crate::ast::{AssetLine, AssetLiteral, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path};
+use crate::ast::{self, AssetLine, AssetLiteral, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path};
 use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
@@ -17,49 +19,35 @@ impl<'a> Elaborator<'a> {
     /// Builds the instances of a lab, then their states.
     pub fn lab(&mut self, id: DeclId) {
         let decl = self.tables.names.decl(id);
-        let ItemKind::Lab { params, lines, name } = &decl.item.kind else { return };
+        let ItemKind::Lab { name, .. } = &decl.item.kind else { return };
         self.lab_name = name.span;
-        if let Some(p) = params.first() {
-            self.report(unsupported(p.name.span, "parameters of a lab"));
-        }
-        for line in lines {
-            if let LabLineKind::Setting { name, value } = &line.kind {
-                self.lab_setting(name, value, decl.module);
-            }
-        }
-        let mut made = Vec::new();
-        for line in lines {
-            match &line.kind {
-                LabLineKind::Instance { name, literal, relations, holding } => {
-                    match self.lab_instance(name, literal, decl.module) {
-                        Some(id) => made.push((id, relations, holding)),
-                        // What is wrong with it is said; its uses are fine.
-                        None => {
-                            self.settings.entry(name.text.clone()).or_insert(Value::Error);
-                        }
+        let benches = self.open_labs(id);
+        for bench in &benches {
+            self.within_lab(&bench.within, |this| {
+                for (id, relations, holding) in &bench.made {
+                    this.place(*id, relations, bench.module);
+                    if let Some(holding) = holding {
+                        this.hold(*id, holding, bench.module);
                     }
                 }
-                LabLineKind::Include { .. } => self.report(unsupported(line.span, "labs that include labs")),
-                _ => {}
-            }
+            });
         }
-        for (id, relations, holding) in made {
-            self.place(id, relations, decl.module);
-            if let Some(holding) = holding {
-                self.hold(id, holding, decl.module);
-            }
-        }
-        for line in lines {
-            if let LabLineKind::Between { a, b, fields } = &line.kind {
-                self.between(a, b, fields, decl.module);
-            }
+        self.place_labs();
+        for bench in &benches {
+            self.within_lab(&bench.within, |this| {
+                for line in bench.lines {
+                    if let LabLineKind::Between { a, b, fields } = &line.kind {
+                        this.between(a, b, fields, bench.module);
+                    }
+                }
+            });
         }
         for i in 0..self.instances.len() as u32 {
             self.declare_states(InstanceId(i));
         }
     }
 
-    fn lab_setting(&mut self, name: &'a Name, value: &'a Expr, module: usize) {
+    pub(super) fn lab_setting(&mut self, name: &'a Name, value: &'a Expr, module: usize) {
         let v = self.expr(value, &mut Scope { lab: true, ..Scope::module(module) });
         let v = match self.tables.units.dimension("Temperature") {
             Some(def) if name.text == "ambient" => {
@@ -72,18 +60,22 @@ impl<'a> Elaborator<'a> {
             Value::Num(n) => Value::Num(self.name_param(&name.text, n, value.span)),
             other => other,
         };
-        if self.settings.insert(name.text.clone(), v).is_some() {
-            self.report(Diagnostic::error(
-                codes::DUPLICATE_NAME,
-                name.span,
-                format!("`{}` is given twice", name.text),
-                "given again here",
-            ));
+        match self.settings.get(&name.text).cloned() {
+            Some(first) => self.same_setting(name, &first, &v),
+            None => {
+                self.settings.insert(name.text.clone(), v);
+            }
         }
     }
 
-    fn lab_instance(&mut self, name: &'a Name, literal: &'a AssetLiteral, module: usize) -> Option<InstanceId> {
-        if let Some(first) = self.find_instance(&name.text) {
+    pub(super) fn lab_instance(
+        &mut self,
+        name: &'a Name,
+        literal: &'a AssetLiteral,
+        module: usize,
+    ) -> Option<InstanceId> {
+        let full = format!("{}{}", self.within, name.text);
+        if let Some(first) = self.find_instance(&full) {
             let span = self.instances[first.0 as usize].span;
             self.report(
                 Diagnostic::error(
@@ -117,9 +109,13 @@ impl<'a> Elaborator<'a> {
             self.report(d);
             return None;
         }
+        // What is wrong with the asset is said where it is declared.
+        if self.tables.kinds[&kind].lines.iter().any(|(_, line)| matches!(line, AssetLine::Error(_))) {
+            return None;
+        }
         self.check_fields(kind, &literal.fields);
-        let settings = literal.fields.iter().map(|field| Setting { module, field, lab: true }).collect();
-        Some(self.instantiate(name.text.clone(), vec![kind], settings, None, name.span))
+        let settings = literal.fields.iter().map(|field| Setting { module, field, lab: true, of: None }).collect();
+        Some(self.instantiate(full, vec![kind], settings, None, name.span))
     }
 
     /// The capability or asset a path names.
@@ -141,7 +137,7 @@ impl<'a> Elaborator<'a> {
             info.members.iter().filter_map(|m| super::tables::member_name(m.member)).map(|n| n.text.clone()).collect();
         known.extend(GEOMETRY.iter().map(|s| (*s).to_string()));
         known.extend(info.lines.iter().filter_map(|(_, l)| match l {
-            AssetLine::Part { name, .. } => Some(name.text.clone()),
+            AssetLine::Part { name, .. } | AssetLine::Grid(ast::Grid { name, .. }) => Some(name.text.clone()),
             _ => None,
         }));
         let keys: Vec<&str> = known.iter().map(String::as_str).collect();
@@ -185,7 +181,8 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    fn position(&mut self, items: &[Value], at: &Expr) -> Option<[f64; 3]> {
+    /// Two or three lengths, m.
+    pub fn position(&mut self, items: &[Value], at: &Expr) -> Option<[f64; 3]> {
         let length = self.tables.units.named("Length");
         let mut out = [0.0; 3];
         if items.len() < 2 || items.len() > 3 {
@@ -200,7 +197,7 @@ impl<'a> Elaborator<'a> {
         for (slot, item) in out.iter_mut().zip(items) {
             let ty = Type::Quantity { dimension: length.clone(), point: false, optional: false };
             let Value::Num(n) = self.coerce(item.clone(), &ty, at.span, "at") else { return None };
-            *slot = self.graph.constant(n.node)?;
+            *slot = self.known(n.node)?;
         }
         Some(out)
     }
@@ -208,12 +205,45 @@ impl<'a> Elaborator<'a> {
     fn hold(&mut self, id: InstanceId, holding: &'a Holding, module: usize) {
         let e = match holding {
             Holding::Expr(e) => e,
-            Holding::Fields(fields) => {
-                let span = fields.first().map_or(self.instances[id.0 as usize].span, |f| f.span);
-                self.report(unsupported(span, "contents of wells"));
-                return;
-            }
+            Holding::Places(fills) => return self.fill(id, fills, module),
         };
+        self.hold_in(id, e, module);
+    }
+
+    /// What the places of a grid hold.
+    fn fill(&mut self, id: InstanceId, fills: &'a [ast::Fill], module: usize) {
+        let mut filled: BTreeMap<InstanceId, Span> = BTreeMap::new();
+        for fill in fills {
+            let span = fill.to.as_ref().map_or(fill.from.span, |to| fill.from.span.to(to.span));
+            let Some((_, grid)) = self.grid_of(&Value::Instance(id)) else {
+                let (name, kind) = (self.instances[id.0 as usize].name.clone(), self.kind_names(id));
+                self.report(
+                    Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        span,
+                        format!("`{name}` ({kind}) has no places to fill one by one"),
+                        "not a place of it",
+                    )
+                    .help("write what it holds without braces: `holding 10 g of water`"),
+                );
+                return;
+            };
+            for child in self.children_at(id, grid, &fill.from, fill.to.as_ref()).unwrap_or_default() {
+                if let Some(first) = filled.insert(child, span) {
+                    let name = self.instances[child.0 as usize].name.clone();
+                    let headline = format!("`{name}` is filled twice");
+                    self.report(
+                        Diagnostic::error(codes::DUPLICATE_NAME, span, headline, "filled again here")
+                            .because(first, "filled here"),
+                    );
+                    return;
+                }
+                self.hold_in(child, &fill.value, module);
+            }
+        }
+    }
+
+    fn hold_in(&mut self, id: InstanceId, e: &'a Expr, module: usize) {
         let inst = &self.instances[id.0 as usize];
         let (name, declared) = (inst.name.clone(), inst.span);
         let own = self.per_species(id).map(|_| id);
@@ -221,19 +251,25 @@ impl<'a> Elaborator<'a> {
             .or_else(|| self.instances[id.0 as usize].parts.values().copied().find(|p| self.per_species(*p).is_some()));
         let Some(target) = target else {
             let kind = self.kind_names(id);
-            self.report(
-                Diagnostic::error(
-                    codes::TYPE_MISMATCH,
-                    e.span,
-                    format!("`{name}` ({kind}) cannot hold anything"),
-                    "has no contents",
-                )
-                .because(declared, "declared here"),
-            );
+            let mut d = Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                e.span,
+                format!("`{name}` ({kind}) cannot hold anything"),
+                "has no contents",
+            )
+            .because(declared, "declared here");
+            let first = self.grid_of(&Value::Instance(id)).and_then(|(id, grid)| self.first_place(id, grid));
+            if let Some((place, _)) = first {
+                d = d.help(format!("say which place holds it: `holding {{ {place}: ... }}`"));
+            }
+            self.report(d);
             return;
         };
+        let before = self.held.len();
         let contents = self.contents(e, &name, module);
+        self.held[before..].iter_mut().for_each(|held| held.mixture = Some(target));
         self.instances[target.0 as usize].contents = contents;
+        self.instances[target.0 as usize].origin = Some(super::contents::origin(e));
     }
 
     fn between(&mut self, a: &'a Expr, b: &'a Expr, fields: &'a [Field], module: usize) {
@@ -247,15 +283,20 @@ impl<'a> Elaborator<'a> {
         let (Some(a), Some(b)) = (side(a), side(b)) else { return };
         for f in fields {
             let FieldValue::Expr(value) = &f.value else { continue };
-            let is_pair = |k: &ItemKind| matches!(k, ItemKind::Fn { params, .. } if params.len() == 2);
+            let is_pair = |k: &ItemKind| match k {
+                ItemKind::Fn { params, .. } => params.len() == 2,
+                ItemKind::Relation { params, definition, .. } => params.len() == 2 && definition.is_none(),
+                _ => false,
+            };
             let known = self.tables.names.lookup(module, &f.key.text);
             if !known.is_some_and(|id| is_pair(&self.tables.names.decl(id).item.kind)) {
                 let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
-                d.help.push("pair parameters are functions of two bodies, such as `conductance`".into());
+                d.help.push("pair parameters are functions of two bodies, such as `conductance`, and relations without a definition".into());
                 self.report(d);
                 continue;
             }
-            self.pairs.push(Pair { a, b, name: f.key.text.clone(), value, module, resolved: None });
+            let within = self.within.clone();
+            self.pairs.push(Pair { a, b, name: f.key.text.clone(), value, module, within, resolved: None });
         }
     }
 }

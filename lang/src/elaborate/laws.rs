@@ -62,7 +62,7 @@ impl<'a> Elaborator<'a> {
 
     /// Every tuple of instances, species and reactions that fits the parameters, as scopes; once per unordered pair
     /// where the condition asks for a symmetric relation of the two.
-    fn tuples(
+    pub(super) fn tuples(
         &mut self,
         params: &'a [Param],
         module: usize,
@@ -171,11 +171,17 @@ impl<'a> Elaborator<'a> {
             None => None,
         };
         let index = self.processes.len();
-        self.processes.push(ProcessInstance { name: job.name.clone(), guard, span: job.process.name.span });
+        let reaction = job.scope.vars.iter().find_map(|(_, v)| match v {
+            Value::Reaction(r) => Some(*r),
+            _ => None,
+        });
+        let span = job.process.name.span;
+        self.processes.push(ProcessInstance { name: job.name.clone(), guard, reaction, span });
         let mut found = Vec::new();
         self.law_body(&job.process.laws, &mut scope, &mut found);
         if self.touched_flow && !self.flows_sealed {
             self.processes.truncate(index);
+            self.streams.retain(|s| s.0 < index);
             self.touched_flow = false;
             return false;
         }
@@ -353,6 +359,7 @@ impl<'a> Elaborator<'a> {
     fn law_move(&mut self, call: &'a Expr, scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
         let Some((rate, from, to)) = self.move_call(call, true, scope) else { return };
         self.moves.insert((from, to));
+        self.streams.insert((self.processes.len().saturating_sub(1), from, to));
         let keys: Vec<_> =
             self.extensive.iter().filter(|(k, _)| k.instance == from).map(|(k, i)| (k.clone(), *i)).collect();
         for (key, index) in keys {
@@ -365,6 +372,43 @@ impl<'a> Elaborator<'a> {
                 out.push((Target::Derivative(*target), flow));
             }
         }
+    }
+
+    /// `move(...)` or `rinse(...)` as what it does in an instant.
+    pub fn call_actions(&mut self, call: &'a Expr, span: Span, scope: &mut Scope) -> Vec<Action> {
+        if let ExprKind::Call(callee, args) = &*call.kind
+            && matches!(&*callee.kind, ExprKind::Name(n) if n.text == "rinse")
+        {
+            let [arg] = args.as_slice() else {
+                self.report(
+                    Diagnostic::error(codes::WRONG_ARGUMENTS, call.span, "`rinse` needs one vessel", "rinse what?")
+                        .help("write `rinse(vessel)`"),
+                );
+                return Vec::new();
+            };
+            return match self.expr(&arg.value, scope) {
+                Value::Instance(i) => {
+                    let mixture = self.mixture_in(i, arg.value.span);
+                    mixture.map(|m| self.rinse(m, span)).unwrap_or_default()
+                }
+                Value::Error => Vec::new(),
+                other => {
+                    self.expected("a vessel", &other, arg.value.span);
+                    Vec::new()
+                }
+            };
+        }
+        match self.move_call(call, false, scope) {
+            Some((fraction, from, to)) => self.transfer_actions(fraction, from, to, span),
+            None => Vec::new(),
+        }
+    }
+
+    /// A transfer with what it does to the lineage of its destination.
+    fn transfer_actions(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Vec<Action> {
+        let mut out = vec![self.move_action(fraction, from, to, span)];
+        out.extend(self.inherit(from, to, span));
+        out
     }
 
     /// `move(q, from: a, to: b)`: the fraction (per second if `rate`) and the mixtures.
@@ -535,15 +579,8 @@ impl<'a> Elaborator<'a> {
                     out.extend(self.assignment(target, value, guard, scope));
                 }
                 LawKind::Call(call) => {
-                    if let Some((fraction, from, to)) = self.move_call(call, false, scope) {
-                        let fraction = match guard {
-                            Some(g) => {
-                                let zero = self.graph.number(0.0);
-                                self.graph.select(g, fraction, zero)
-                            }
-                            None => fraction,
-                        };
-                        out.push(self.move_action(fraction, from, to, law.span));
+                    for action in self.call_actions(call, law.span, scope) {
+                        out.push(self.guarded_action(action, guard));
                     }
                 }
             }
@@ -551,8 +588,23 @@ impl<'a> Elaborator<'a> {
         scope.vars.truncate(depth);
     }
 
+    /// An action that does nothing where a condition does not hold.
+    fn guarded_action(&mut self, action: Action, guard: Option<NodeId>) -> Action {
+        let Some(g) = guard else { return action };
+        match action {
+            Action::Move { fraction, from, to, span } => {
+                let zero = self.graph.number(0.0);
+                Action::Move { fraction: self.graph.select(g, fraction, zero), from, to, span }
+            }
+            Action::Assign { state, value, span } => {
+                let old = self.graph.add(Op::State(state));
+                Action::Assign { state, value: self.graph.select(g, value, old), span }
+            }
+        }
+    }
+
     /// A transfer; mixtures are numbered in the order of the instances.
-    pub fn move_action(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Action {
+    fn move_action(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Action {
         self.moves.insert((from, to));
         let (from, to) = (self.mixture_index(from), self.mixture_index(to));
         Action::Move { fraction, from, to, span }
@@ -560,7 +612,7 @@ impl<'a> Elaborator<'a> {
 
     /// Index of a mixture in the model.
     pub fn mixture_index(&self, id: InstanceId) -> u32 {
-        (0..id.0).filter(|i| self.per_species(InstanceId(*i)).is_some()).count() as u32
+        self.mixtures.partition_point(|m| *m < id) as u32
     }
 
     /// `place = value` as an action; with a condition the place keeps its value where it does not hold.
@@ -578,6 +630,7 @@ impl<'a> Elaborator<'a> {
             }
             Value::Bool(n) => (Type::Bool, *n),
             Value::InstanceNode(n) => (Type::Instance { kinds: Vec::new(), optional: true }, *n),
+            Value::Enum(n, words) => (Type::Enum(words.clone()), *n),
             Value::Error => return None,
             other => {
                 self.expected("a state", other, target.span);
@@ -593,8 +646,7 @@ impl<'a> Elaborator<'a> {
             }
             return None;
         };
-        let v = self.expr(value, scope);
-        let v = self.coerce(v, &ty, value.span, "value");
+        let v = self.typed(value, &ty, scope, "value");
         let mut new = self.value_node(&v)?;
         self.note_held(state, new);
         if let Some(g) = guard {
@@ -615,7 +667,10 @@ impl<'a> Elaborator<'a> {
             Op::State(from) => {
                 self.copies.insert((state, from));
             }
-            _ => {}
+            _ => {
+                let picked = self.picks.get(&value).into_iter().flatten();
+                self.holds.entry(state).or_default().extend(picked.map(|i| i64::from(i.0)));
+            }
         }
     }
 }

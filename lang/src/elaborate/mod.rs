@@ -3,9 +3,13 @@
 pub mod balances;
 pub mod contents;
 pub mod fields;
+pub mod grids;
+pub mod hazards;
+pub mod include;
 pub mod instances;
 pub mod lab;
 pub mod laws;
+mod lineage;
 pub mod prune;
 pub mod reach;
 pub mod reactions;
@@ -15,16 +19,18 @@ pub mod states;
 pub mod tables;
 pub mod units;
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model;
-use matterix_ir::plan::Comparison;
+use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Env, Graph, NodeId, Op, Span};
 
 use crate::ast::{self, Expr, FieldValue};
 pub use crate::eval::SpeciesId;
-use crate::eval::{Type, Value};
+use crate::eval::call::KnownCall;
+use crate::eval::{ReactionId, Type, Value};
 use crate::names::DeclId;
 use crate::units::Dimension;
 
@@ -47,6 +53,8 @@ pub struct Pair<'a> {
     pub value: &'a Expr,
     /// The lab's module.
     pub module: usize,
+    /// The included lab it is of: empty, or `left.`.
+    pub within: String,
     /// Its value once evaluated.
     pub resolved: Option<Value>,
 }
@@ -67,6 +75,8 @@ pub struct ProcessInstance {
     pub name: String,
     /// When it runs; absent for always.
     pub guard: Option<NodeId>,
+    /// The reaction it is about, if it is about one.
+    pub reaction: Option<ReactionId>,
     /// Its declaration.
     pub span: Span,
 }
@@ -92,10 +102,33 @@ pub struct Elaborator<'a> {
     pub diagnostics: Vec<Diagnostic>,
     /// Instances; parts after owners.
     pub instances: Vec<Instance<'a>>,
+    /// Those of them that count amounts per species, in order.
+    pub mixtures: Vec<InstanceId>,
     /// Where the lab's name stands.
     pub lab_name: Span,
     /// Settings of the lab, such as `ambient`.
     pub settings: BTreeMap<String, Value>,
+    /// Which states say what has touched a mixture, by mixture and reagent.
+    pub lineage: BTreeMap<(InstanceId, String), u32>,
+    /// Terms of what vessels hold at the start, in the order of the text.
+    pub held: Vec<crate::stock::Held>,
+    /// What the verbs of calls were found to mean, by the place of the call.
+    pub verbs: BTreeMap<Span, crate::lower::Verb<'a>>,
+    /// Something asks for lineage.
+    pub follows_lineage: bool,
+    /// What names of the lab begin with while the text of an included one is read: empty, or `left.`.
+    pub within: String,
+    /// Full names of included labs.
+    pub included: BTreeSet<String>,
+    /// Parameters of labs, by what the lab's names begin with and their own name.
+    pub lab_values: BTreeMap<(String, String), Value>,
+    /// Where included labs stand: their names' beginning, their places, the beginning and the module of those.
+    #[allow(clippy::type_complexity)]
+    pub places: Vec<(String, &'a [(ast::Name, Expr)], String, usize)>,
+    /// A lab is checked by itself: its parameters may have any value.
+    pub open_parameters: bool,
+    /// Parameters of the workflow that have only their default, by index.
+    pub defaulted: BTreeSet<u32>,
     /// Pair parameters.
     pub pairs: Vec<Pair<'a>>,
     /// Parameters of the model.
@@ -114,6 +147,10 @@ pub struct Elaborator<'a> {
     pub reach: reach::Reach,
     /// Transfers found between mixtures.
     pub moves: BTreeSet<(InstanceId, InstanceId)>,
+    /// Transfers that processes make: the process, from, to.
+    pub streams: BTreeSet<(usize, InstanceId, InstanceId)>,
+    /// Where each substance that something holds at the start is written, by the name of what holds it.
+    pub held_at: BTreeMap<(String, SpeciesId), Span>,
     /// The instance each state belongs to.
     pub state_owner: Vec<InstanceId>,
     /// What each complete flow is made of, by the node of its sum.
@@ -132,6 +169,8 @@ pub struct Elaborator<'a> {
     pub view_values: BTreeMap<(InstanceId, SpeciesId, DeclId, Dimension), Value>,
     /// What the expression evaluated last compared.
     pub comparisons: Vec<(Span, Comparison)>,
+    /// The members that the expression evaluated last names.
+    pub terms: Vec<Term>,
     /// Values are those at the start of the run.
     pub initial_mode: bool,
     /// Readings are what the device reports, not the true values behind them.
@@ -140,6 +179,14 @@ pub struct Elaborator<'a> {
     pub prototype: bool,
     /// While a rate is evaluated: the name its arguments get as parameters.
     pub rate_prefix: Option<String>,
+    /// Calls of skills being written out, outermost first.
+    pub calls: Vec<Span>,
+    /// What a node that picks an instance may give.
+    pub picks: BTreeMap<NodeId, Vec<InstanceId>>,
+    /// Values of functions of instances, as far as they were asked for.
+    pub known_calls: BTreeMap<KnownCall, Value>,
+    /// Instances by kind, and how many there were when they were looked for.
+    pub by_kind: RefCell<BTreeMap<DeclId, (usize, Vec<InstanceId>)>>,
     /// Members being evaluated.
     pub open_members: Vec<(InstanceId, MemberKey)>,
     /// Functions being evaluated.
@@ -156,8 +203,19 @@ impl<'a> Elaborator<'a> {
             graph: Graph::default(),
             diagnostics: Vec::new(),
             instances: Vec::new(),
+            mixtures: Vec::new(),
             lab_name: Span::default(),
             settings: BTreeMap::new(),
+            lineage: BTreeMap::new(),
+            held: Vec::new(),
+            verbs: BTreeMap::new(),
+            follows_lineage: false,
+            within: String::new(),
+            included: BTreeSet::new(),
+            lab_values: BTreeMap::new(),
+            places: Vec::new(),
+            open_parameters: false,
+            defaulted: BTreeSet::new(),
             pairs: Vec::new(),
             params: Vec::new(),
             states: Vec::new(),
@@ -167,6 +225,8 @@ impl<'a> Elaborator<'a> {
             readings: Vec::new(),
             reach,
             moves: BTreeSet::new(),
+            streams: BTreeSet::new(),
+            held_at: BTreeMap::new(),
             state_owner: Vec::new(),
             flow_sums: BTreeMap::new(),
             flows: BTreeMap::new(),
@@ -176,10 +236,15 @@ impl<'a> Elaborator<'a> {
             touched_flow: false,
             view_values: BTreeMap::new(),
             comparisons: Vec::new(),
+            terms: Vec::new(),
             initial_mode: false,
             readings_live: false,
             prototype: false,
             rate_prefix: None,
+            calls: Vec::new(),
+            picks: BTreeMap::new(),
+            known_calls: BTreeMap::new(),
+            by_kind: RefCell::default(),
             open_members: Vec::new(),
             open_calls: Vec::new(),
             open_consts: Vec::new(),
@@ -197,6 +262,16 @@ impl<'a> Elaborator<'a> {
     pub fn resolve_type(&mut self, ty: &ast::Type, module: usize) -> Type {
         let mut found = Vec::new();
         let ty = self.tables.resolve_type(ty, module, &mut found);
+        for d in found {
+            self.report(d);
+        }
+        ty
+    }
+
+    /// Resolves the type of a parameter, without its `where`.
+    pub fn resolve_parameter_type(&mut self, ty: &ast::Type, module: usize) -> Type {
+        let mut found = Vec::new();
+        let ty = self.tables.resolve_parameter_type(ty, module, &mut found);
         for d in found {
             self.report(d);
         }

@@ -10,6 +10,7 @@ use super::{Elaborator, SpeciesId, Tables};
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reach {
     sets: BTreeMap<String, BTreeSet<SpeciesId>>,
+    origins: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl Reach {
@@ -21,6 +22,11 @@ impl Reach {
     /// The species that can get into a mixture, if any can.
     pub fn set(&self, mixture: &str) -> Option<&BTreeSet<SpeciesId>> {
         self.sets.get(mixture)
+    }
+
+    /// The reagents that can get into a mixture; known only where something asks for lineage.
+    pub fn origins(&self, mixture: &str) -> impl Iterator<Item = &str> {
+        self.origins.get(mixture).into_iter().flatten().map(String::as_str)
     }
 
     /// Everything that can get into any mixture.
@@ -52,7 +58,34 @@ impl Reach {
             }
         }
         let name = |id: InstanceId| lab.instances[id.0 as usize].name.clone();
-        Reach { sets: sets.into_iter().map(|(id, set)| (name(id), set)).collect() }
+        let origins = if lab.follows_lineage { origins(lab) } else { BTreeMap::new() };
+        Reach {
+            sets: sets.into_iter().map(|(id, set)| (name(id), set)).collect(),
+            origins: origins.into_iter().map(|(id, set)| (name(id), set)).collect(),
+        }
+    }
+}
+
+/// The reagents that transfers can bring into each mixture.
+fn origins(lab: &Elaborator<'_>) -> BTreeMap<InstanceId, BTreeSet<String>> {
+    let mut sets: BTreeMap<InstanceId, BTreeSet<String>> = BTreeMap::new();
+    for (i, inst) in lab.instances.iter().enumerate() {
+        if let Some(origin) = &inst.origin {
+            sets.entry(InstanceId(i as u32)).or_default().insert(origin.clone());
+        }
+    }
+    loop {
+        let mut changed = false;
+        for (from, to) in &lab.moves {
+            let moved = sets.get(from).cloned().unwrap_or_default();
+            let there = sets.entry(*to).or_default();
+            let before = there.len();
+            there.extend(moved);
+            changed |= there.len() != before;
+        }
+        if !changed {
+            return sets;
+        }
     }
 }
 

@@ -36,6 +36,13 @@ pub struct SpeciesDef<'a> {
     pub span: Span,
 }
 
+impl SpeciesDef<'_> {
+    /// The phase it states: `solid`, `liquid`, `gas`.
+    pub fn phase(&self) -> Option<&str> {
+        text(self.fields, "phase").map(|t| t.0)
+    }
+}
+
 /// All species, and which one a declaration means (aliases share one).
 #[derive(Debug, Default)]
 pub struct SpeciesTable<'a> {
@@ -60,6 +67,7 @@ const FIELDS: &[&str] = &[
     "flash_point",
     "phase",
     "hazards",
+    "reactive_groups",
     "absorbs",
     "color",
     "solubility",

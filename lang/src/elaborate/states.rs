@@ -59,6 +59,7 @@ impl<'a> Elaborator<'a> {
         let domain = match ty {
             Type::Bool => Domain::Bool,
             Type::Instance { .. } => Domain::Instance,
+            Type::Enum(words) => Domain::Enum(words.to_vec()),
             _ => Domain::Quantity(self.declared_unit(options, ty).unwrap_or_else(|| self.type_unit(ty))),
         };
         let initial = self.graph.number(f64::NAN);
@@ -73,6 +74,8 @@ impl<'a> Elaborator<'a> {
         match ty {
             Type::Bool => Value::Bool(node),
             Type::Instance { .. } => Value::InstanceNode(node),
+            Type::Int => self.num(node, crate::units::Dimension::one()),
+            Type::Enum(words) => Value::Enum(node, words.clone()),
             Type::Quantity { dimension, point, .. } => {
                 let Domain::Quantity(unit) = &self.states[index as usize].domain else { return Value::Error };
                 let unit = Some(unit.clone());
@@ -144,12 +147,11 @@ impl<'a> Elaborator<'a> {
             // States of an instance are declared before they are read; here is only what could not be.
             return Value::Error;
         }
-        if let Some((module, field, lab)) = self.instances[id.0 as usize].setting(name)
-            && let Some(e) = Self::field_expr(field)
+        if let Some(setting) = self.instances[id.0 as usize].setting(name)
+            && let Some(e) = Self::field_expr(setting.value())
         {
-            let mut scope = if lab { Scope { lab: true, ..Scope::module(module) } } else { Scope::of(id, module) };
-            let v = self.expr(e, &mut scope);
-            let v = self.coerce(v, ty, e.span, name);
+            let within = self.within_of(id, setting.lab);
+            let v = self.within_lab(&within, |this| this.typed(e, ty, &mut setting.scope(), name));
             return match v {
                 Value::Num(n) => {
                     let full = format!("{}.{name}", self.instances[id.0 as usize].name);
@@ -159,10 +161,7 @@ impl<'a> Elaborator<'a> {
             };
         }
         match initial {
-            Some(e) => {
-                let v = self.expr(e, &mut Scope::of_member(id, m));
-                self.coerce(v, ty, e.span, name)
-            }
+            Some(e) => self.typed(e, ty, &mut Scope::of_member(id, m), name),
             None if matches!(ty, Type::Instance { optional: true, .. }) => Value::Nothing,
             None if self.prototype => self.placeholder(ty, name),
             None => {
@@ -213,12 +212,15 @@ impl<'a> Elaborator<'a> {
                 let value = self.member_value(id, m, name.span);
                 let current = self.instances[i as usize].values.get(&(m.owner, name.text.clone(), false, false));
                 let index = match current {
-                    Some(Value::Num(Num { node, .. }) | Value::Bool(node) | Value::InstanceNode(node)) => {
-                        match self.graph.op(*node) {
-                            Op::State(index) => index,
-                            _ => continue,
-                        }
-                    }
+                    Some(
+                        Value::Num(Num { node, .. })
+                        | Value::Bool(node)
+                        | Value::InstanceNode(node)
+                        | Value::Enum(node, _),
+                    ) => match self.graph.op(*node) {
+                        Op::State(index) => index,
+                        _ => continue,
+                    },
                     _ => continue,
                 };
                 let Some(node) = self.value_node(&value) else { continue };
@@ -237,7 +239,7 @@ impl<'a> Elaborator<'a> {
     pub fn value_node(&mut self, value: &Value) -> Option<NodeId> {
         match value {
             Value::Num(n) => Some(n.node),
-            Value::Bool(n) | Value::InstanceNode(n) => Some(*n),
+            Value::Bool(n) | Value::InstanceNode(n) | Value::Enum(n, _) => Some(*n),
             Value::Instance(i) | Value::Qualified(i, _) => Some(self.graph.number(f64::from(i.0))),
             Value::Nothing => Some(self.graph.number(-1.0)),
             Value::Unlimited => Some(self.graph.number(f64::INFINITY)),

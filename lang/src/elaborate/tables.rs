@@ -9,6 +9,7 @@ use super::species::SpeciesTable;
 use super::units;
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
 use crate::names::{DeclId, Names};
+use crate::screen::Screen;
 use crate::units::text::UnitError;
 use crate::units::{Dimension, Resolved, Units};
 
@@ -93,6 +94,8 @@ pub struct Tables<'a> {
     pub species: SpeciesTable<'a>,
     /// Reactions whose species are all known.
     pub reactions: Vec<ReactionDef<'a>>,
+    /// Reactive groups, materials and what must not meet.
+    pub screen: Screen,
     /// Processes over instances, from all modules.
     pub processes: Vec<(DeclId, &'a Process)>,
 }
@@ -110,6 +113,7 @@ impl<'a> Tables<'a> {
             kinds: BTreeMap::new(),
             species: SpeciesTable::default(),
             reactions: Vec::new(),
+            screen: Screen::default(),
             processes: Vec::new(),
         };
         for index in 0..names.decls.len() as u32 {
@@ -119,6 +123,7 @@ impl<'a> Tables<'a> {
             }
         }
         tables.species = SpeciesTable::new(names, &tables.units, &mut diagnostics);
+        tables.screen = Screen::new(names, &tables.units, &tables.species, &mut diagnostics);
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
         (tables, diagnostics)
     }
@@ -267,6 +272,6 @@ pub fn member_name(member: &Member) -> Option<&Name> {
         MemberKind::Value { name, .. } | MemberKind::Frame { name, .. } => Some(name),
         MemberKind::Process(p) => Some(&p.name),
         MemberKind::Event(e) => Some(&e.name),
-        MemberKind::View { .. } | MemberKind::Command { .. } | MemberKind::Error => None,
+        MemberKind::View { .. } | MemberKind::Command { .. } | MemberKind::Limit { .. } | MemberKind::Error => None,
     }
 }

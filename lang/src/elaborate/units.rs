@@ -1,5 +1,7 @@
 //! Declares the dimensions and units of all modules.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, UnitText};
@@ -7,9 +9,10 @@ use crate::names::{Names, near};
 use crate::units::text::UnitError;
 use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units};
 
-/// Reads every `dimension` and `unit` item, in the order of the modules.
+/// Reads every `dimension` item in the order of the modules, then every `unit`.
 pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
     let mut units = Units::default();
+    let mut open = Vec::new();
     for module in names.modules {
         for item in &module.tree.items {
             match &item.kind {
@@ -26,12 +29,98 @@ pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
                         }
                     }
                 }
-                ItemKind::Unit { .. } => unit(&mut units, item, diagnostics),
+                ItemKind::Unit { .. } => open.push(item),
                 _ => {}
             }
         }
     }
+    in_order(&mut units, &open, diagnostics);
     units
+}
+
+/// Declares units after those that they are defined by, else in the order of the text.
+fn in_order(units: &mut Units, items: &[&Item], diagnostics: &mut Vec<Diagnostic>) {
+    let mut named: BTreeMap<&str, usize> = BTreeMap::new();
+    for (i, item) in items.iter().enumerate() {
+        let ItemKind::Unit { name, aliases, .. } = &item.kind else { continue };
+        for spelling in std::iter::once(name).chain(aliases) {
+            named.entry(&spelling.text).or_insert(i);
+        }
+    }
+    let needs: Vec<BTreeSet<usize>> = items.iter().map(|item| needed(item, &named)).collect();
+    let mut users: Vec<Vec<usize>> = vec![Vec::new(); items.len()];
+    for (i, of) in needs.iter().enumerate() {
+        of.iter().for_each(|n| users[*n].push(i));
+    }
+    let mut waiting: Vec<usize> = needs.iter().map(BTreeSet::len).collect();
+    let mut ready: BTreeSet<usize> = (0..items.len()).filter(|i| waiting[*i] == 0).collect();
+    while let Some(i) = ready.pop_first() {
+        unit(units, items[i], diagnostics);
+        for user in &users[i] {
+            waiting[*user] -= 1;
+            if waiting[*user] == 0 {
+                ready.insert(*user);
+            }
+        }
+    }
+    rings(units, items, &needs, &waiting, diagnostics);
+}
+
+/// Reports each ring among the units that still wait; each of these leads into one.
+fn rings(
+    units: &mut Units,
+    items: &[&Item],
+    needs: &[BTreeSet<usize>],
+    waiting: &[usize],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    // The walk that came by, from 1.
+    let mut walked = vec![0; items.len()];
+    for start in (0..items.len()).filter(|i| waiting[*i] > 0) {
+        let mut at = start;
+        while walked[at] == 0 {
+            walked[at] = start + 1;
+            at = needs[at].iter().copied().find(|n| waiting[*n] > 0).unwrap_or(at);
+        }
+        let ItemKind::Unit { name, dimension, prefixes, .. } = &items[start].kind else { continue };
+        // What a unit of a ring measures is known all the same.
+        let dimension = dimension.as_ref().and_then(|n| units.dimension(&n.text)).map(|d| d.dimension.clone());
+        let dimension = dimension.unwrap_or_else(Dimension::any);
+        let def = UnitDef { dimension, factor: 1.0, offset: None, prefixes: *prefixes, span: name.span };
+        units.add_unit(&name.text, def);
+        if walked[at] == start + 1
+            && let ItemKind::Unit { name, .. } = &items[at].kind
+        {
+            let headline = format!("the unit `{}` is defined by itself", name.text);
+            let d = Diagnostic::error(codes::CIRCULAR, name.span, headline, "leads back to its own size");
+            diagnostics.push(d.help("give one of the units a size in other ones"));
+        }
+    }
+}
+
+/// The units that the definition of another one names.
+fn needed(item: &Item, named: &BTreeMap<&str, usize>) -> BTreeSet<usize> {
+    fn texts<'e>(e: &'e Expr, out: &mut Vec<&'e str>) {
+        match &*e.kind {
+            ExprKind::Quantity(_, u) => out.push(&u.text),
+            ExprKind::Binary(_, a, b) => {
+                texts(a, out);
+                texts(b, out);
+            }
+            ExprKind::Tuple(items, _) => items.iter().for_each(|i| texts(i, out)),
+            _ => {}
+        }
+    }
+    let ItemKind::Unit { definition, origin, .. } = &item.kind else { return BTreeSet::new() };
+    let mut used = Vec::new();
+    definition.iter().chain(origin).for_each(|e| texts(e, &mut used));
+    let words = used.iter().flat_map(|text| text.split(['*', '/', '(', ')', '^', '-']));
+    // A word that is no unit by itself may be one with a prefix of one or two letters.
+    let find = |word: &str| {
+        let shorter = word.char_indices().skip(1).take(2).map(|(at, _)| &word[at..]);
+        std::iter::once(word).chain(shorter).find_map(|w| named.get(w).copied())
+    };
+    words.filter_map(find).collect()
 }
 
 fn declared_twice(what: &str, again: Span, first: Span) -> Diagnostic {

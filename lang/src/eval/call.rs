@@ -1,5 +1,6 @@
 //! Calls of functions, relations and methods.
 
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
 
 use super::{Num, Scope, Type, Value};
@@ -7,6 +8,9 @@ use crate::ast::{Arg, Expr, ExprKind, ItemKind, Param};
 use crate::elaborate::Elaborator;
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
+
+/// A function, the instances it was called with, how many instances there were, and how members are read.
+pub type KnownCall = (DeclId, Vec<InstanceId>, usize, bool, bool);
 
 impl<'a> Elaborator<'a> {
     /// `f(a, b: c)`.
@@ -58,31 +62,21 @@ impl<'a> Elaborator<'a> {
             }
             ItemKind::Fn { body, result, .. } => match body {
                 Some(body) => {
-                    let v = self.call_body(id, params, values, body, decl.module);
-                    match result {
-                        Some(ty) => {
-                            let ty = self.resolve_type(ty, decl.module);
-                            self.coerce(v, &ty, body.span, name)
-                        }
-                        None => v,
-                    }
+                    let ty = result.as_ref().map_or(Type::Any, |ty| self.resolve_type(ty, decl.module));
+                    let v = self.call_body(id, params, values, body, &ty, decl.module);
+                    self.coerce(v, &ty, body.span, name)
                 }
                 None => Value::Error,
             },
             ItemKind::Relation { definition: Some(body), .. } => {
-                match self.call_body(id, params, values, body, decl.module) {
+                match self.call_body(id, params, values, body, &Type::Bool, decl.module) {
                     v @ (Value::Bool(_) | Value::Error) => v,
                     other => self.expected("a condition", &other, body.span),
                 }
             }
             ItemKind::Relation { .. } if self.prototype => Value::Bool(self.graph.number(1.0)),
-            _ => {
-                self.report(
-                    super::types::unsupported(span, "relations that follow from geometry")
-                        .because(decl.item.span, "declared without a definition here"),
-                );
-                Value::Error
-            }
+            // Without a definition it holds where a lab says so with `between`.
+            _ => Value::Bool(self.graph.number(0.0)),
         }
     }
 
@@ -92,6 +86,7 @@ impl<'a> Elaborator<'a> {
         params: &'a [Param],
         values: Vec<Value>,
         body: &'a Expr,
+        ty: &Type,
         module: usize,
     ) -> Value {
         if let Some((name, at)) = self.ring(&self.open_calls, id) {
@@ -106,16 +101,38 @@ impl<'a> Elaborator<'a> {
             );
             return Value::Error;
         }
+        let key = self.remembered_call(id, &values);
+        if let Some(v) = key.as_ref().and_then(|k| self.known_calls.get(k)) {
+            return v.clone();
+        }
+        let flow_before = std::mem::take(&mut self.touched_flow);
         self.open_calls.push(id);
         let mut inner = Scope::module(module);
         for (p, v) in params.iter().zip(values) {
             inner.bind(p.name.text.clone(), v);
         }
         let compared = std::mem::take(&mut self.comparisons);
-        let v = self.expr(body, &mut inner);
+        let v = self.hinted(body, ty, &mut inner);
         self.comparisons = compared;
         self.open_calls.pop();
+        if let Some(key) = key.filter(|_| !self.touched_flow && v != Value::Error) {
+            self.known_calls.insert(key, v.clone());
+        }
+        self.touched_flow |= flow_before;
         v
+    }
+
+    /// What a call is remembered by: a function of instances alone always gives the same node.
+    fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
+        let instance = |v: &Value| match v {
+            Value::Instance(i) => Some(*i),
+            _ => None,
+        };
+        if self.prototype || values.is_empty() || self.rate_prefix.is_some() {
+            return None;
+        }
+        let instances: Option<Vec<InstanceId>> = values.iter().map(instance).collect();
+        Some((id, instances?, self.instances.len(), self.initial_mode, self.readings_live))
     }
 
     /// Arguments by position and name, in the order of the parameters. A parameter that is not given takes its default
@@ -136,8 +153,8 @@ impl<'a> Elaborator<'a> {
                 Some(n) => params.iter().position(|p| p.name.text == n.text),
                 None => Some(position).filter(|i| *i < params.len()),
             };
-            let value = self.expr(&arg.value, scope);
             let Some(index) = index else {
+                self.expr(&arg.value, scope);
                 good = false;
                 let at = arg.name.as_ref().map_or(arg.value.span, |n| n.span);
                 let near = arg
@@ -161,9 +178,9 @@ impl<'a> Elaborator<'a> {
             let value = match &param.ty {
                 Some(ty) => {
                     let ty = self.resolve_type(ty, module);
-                    self.coerce(value, &ty, arg.value.span, &param.name.text)
+                    self.typed(&arg.value, &ty, scope, &param.name.text)
                 }
-                None => value,
+                None => self.expr(&arg.value, scope),
             };
             let value = match (value, &self.rate_prefix) {
                 (Value::Num(n), Some(prefix)) => {
@@ -178,7 +195,10 @@ impl<'a> Elaborator<'a> {
         for (param, value) in params.iter().zip(given) {
             let value = match (value, &param.default) {
                 (Some(v), _) => v,
-                (None, Some(default)) => self.expr(default, &mut Scope::module(module)),
+                (None, Some(default)) => {
+                    let ty = param.ty.as_ref().map_or(Type::Any, |ty| self.resolve_type(ty, module));
+                    self.hinted(default, &ty, &mut Scope::module(module))
+                }
                 (None, None) => match scope.var(&param.name.text) {
                     Some(v) => v.clone(),
                     // A parameter that is not known may be meant for the one that is missing.
@@ -215,18 +235,24 @@ impl<'a> Elaborator<'a> {
             return Some(v.clone());
         }
         let (value, module) = (self.pairs[found].value, self.pairs[found].module);
-        let v = self.expr(value, &mut Scope { lab: true, ..Scope::module(module) });
+        let within = self.pairs[found].within.clone();
+        let v = self.within_lab(&within, |this| this.expr(value, &mut Scope { lab: true, ..Scope::module(module) }));
         let result =
             self.tables.names.lookup(module, name).and_then(|id| match &self.tables.names.decl(id).item.kind {
-                ItemKind::Fn { result: Some(ty), .. } => Some((ty, self.tables.names.decl(id).module)),
+                ItemKind::Fn { result: Some(ty), options, .. } => {
+                    Some((ty, options, self.tables.names.decl(id).module))
+                }
                 _ => None,
             });
         let v = match result {
-            Some((ty, m)) => {
+            Some((ty, options, m)) => {
                 let ty = self.resolve_type(ty, m);
-                self.coerce(v, &ty, value.span, name)
+                let v = self.coerce(v, &ty, value.span, name);
+                self.check_limits(&v, value.span, name, &ty, options, m);
+                v
             }
-            None => v,
+            // A relation that a lab declares.
+            None => self.coerce(v, &Type::Bool, value.span, name),
         };
         let (x, y) = (self.instances[a.0 as usize].name.clone(), self.instances[b.0 as usize].name.clone());
         let v = match v {
@@ -248,6 +274,16 @@ impl<'a> Elaborator<'a> {
                 self.number(count, Dimension::one(), false)
             }
             (Value::Instance(_), "basis", _) => Value::Error,
+            (Value::Grid(id, grid), _, [Value::Num(n)]) => {
+                let at = args.first().map_or(span, |a| a.value.span);
+                match self.known(n.node) {
+                    Some(number) => self.grid_call(id, grid, name, number, at),
+                    None => {
+                        self.report(super::types::unsupported(at, "places known only when running"));
+                        Value::Error
+                    }
+                }
+            }
             _ => self.wrong_arguments(name, span),
         }
     }
@@ -266,7 +302,8 @@ impl<'a> Elaborator<'a> {
     /// A stand-in for a value of a type, for checking a declaration by itself.
     pub fn placeholder(&mut self, ty: &Type, name: &str) -> Value {
         match ty {
-            Type::Any | Type::Reaction => Value::Error,
+            Type::Any | Type::Reaction | Type::Material { .. } => Value::Error,
+            Type::Int => self.placeholder(&Type::ratio(), name),
             Type::Quantity { dimension, point, .. } => {
                 let index = self.params.len() as u32;
                 self.params.push(matterix_ir::model::Param {
@@ -284,6 +321,10 @@ impl<'a> Elaborator<'a> {
                 Value::Bool(self.graph.binary(BinaryOp::Lt, zero, n.node))
             }
             Type::Text => Value::Text(String::new()),
+            Type::Enum(words) => match self.placeholder(&Type::ratio(), name) {
+                Value::Num(n) => Value::Enum(n.node, words.clone()),
+                _ => Value::Error,
+            },
             Type::Species => {
                 if self.tables.species.iter().next().is_some() {
                     Value::Species(super::SpeciesId(0))

@@ -12,6 +12,7 @@ impl Elaborator<'_> {
         match (value, ty) {
             (Value::Error, _) => Value::Error,
             (value, Type::Any) => value,
+            (Value::Num(n), Type::Int) => self.coerce_whole(n, span, what),
             (Value::Num(n), Type::Quantity { .. }) => self.coerce_quantity(n, ty, span, what),
             (Value::Concentration(m, s), Type::Quantity { dimension, .. }) => {
                 let probe = Num {
@@ -23,6 +24,7 @@ impl Elaborator<'_> {
                 };
                 self.concentration(m, s, &probe, span).unwrap_or(Value::Error)
             }
+            (Value::Enum(node, words), Type::Enum(wanted)) if words == *wanted => Value::Enum(node, words),
             (Value::Unlimited, Type::Quantity { dimension, point, optional: true }) => {
                 let node = self.graph.number(f64::INFINITY);
                 Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit: None, literal: false })
@@ -31,6 +33,8 @@ impl Elaborator<'_> {
             | (v @ Value::Text(_), Type::Text)
             | (v @ Value::Species(_), Type::Species)
             | (v @ Value::Reaction(_), Type::Reaction)
+            | (v @ Value::Material(_), Type::Material { .. })
+            | (v @ Value::Nothing, Type::Material { optional: true })
             | (v @ Value::Frame(..), Type::Frame)
             | (v @ Value::Nothing, Type::Instance { optional: true, .. })
             | (v @ Value::InstanceNode(_), Type::Instance { .. }) => v,
@@ -47,8 +51,20 @@ impl Elaborator<'_> {
                     _ => Value::Error,
                 }
             }
+            (value @ Value::Grid(..), Type::List(_)) => {
+                let value = self.listed(value);
+                self.coerce(value, ty, span, what)
+            }
+            // One thing is a list of one.
+            (value @ (Value::Instance(_) | Value::Qualified(..)), Type::List(inner)) => {
+                match self.coerce(value, inner, span, what) {
+                    Value::Error => Value::Error,
+                    one => Value::List(vec![one]),
+                }
+            }
             (Value::List(items), Type::List(inner)) => {
-                Value::List(items.into_iter().map(|i| self.coerce(i, inner, span, what)).collect())
+                let items: Vec<Value> = items.into_iter().map(|i| self.coerce(i, inner, span, what)).collect();
+                if items.contains(&Value::Error) { Value::Error } else { Value::List(items) }
             }
             (Value::Tuple(items), Type::Color) if items.len() == 3 => {
                 Value::Tuple(items.into_iter().map(|i| self.coerce(i, &Type::ratio(), span, what)).collect())
@@ -57,6 +73,7 @@ impl Elaborator<'_> {
                 let expected = self.tables.type_name(ty);
                 let found = match &other {
                     Value::Num(n) => self.describe(n),
+                    Value::Enum(_, words) => format!("one of {}", super::words::list(words)),
                     v => v.what().to_string(),
                 };
                 self.report(Diagnostic::error(
@@ -68,6 +85,23 @@ impl Elaborator<'_> {
                 Value::Error
             }
         }
+    }
+
+    fn coerce_whole(&mut self, n: Num, span: Span, what: &str) -> Value {
+        let value = self.coerce_quantity(n, &Type::ratio(), span, what);
+        if let Value::Num(n) = &value
+            && let Some(v) = self.known(n.node).filter(|v| v.is_finite() && v.fract() != 0.0)
+        {
+            let found = matterix_ir::quantity::show_number(v);
+            self.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                span,
+                format!("`{what}` expects a whole number, found {found}"),
+                "not a whole number",
+            ));
+            return Value::Error;
+        }
+        value
     }
 
     fn coerce_quantity(&mut self, n: Num, ty: &Type, span: Span, what: &str) -> Value {
@@ -145,7 +179,12 @@ impl Elaborator<'_> {
             format!("`{name}` is no {}", self.tables.kind_name(missing)),
         )
         .because(declared, format!("`{name}` is declared here"));
-        if !fitting.is_empty() {
+        let places = self.grid_of(&Value::Instance(id)).and_then(|(id, grid)| self.first_place(id, grid));
+        if let Some((place, child)) = places
+            && kinds.iter().all(|k| self.instance_is(child, *k))
+        {
+            d = d.help(format!("say which of its places: `{name}[{place}]`"));
+        } else if !fitting.is_empty() {
             d.help.extend(near::question(&fitting));
         }
         self.report(d);

@@ -34,6 +34,12 @@ impl<'a> Elaborator<'a> {
             let node = self.graph.number(f64::from(u8::from(x == y)));
             return self.equality(op, node, at_a);
         }
+        if let (Value::Enum(..), Value::Enum(..)) = (&a, &b) {
+            return match self.same_word(&a, &b, at_a, at_b) {
+                Some(node) => self.equality(op, node, at_a),
+                None => Value::Error,
+            };
+        }
         // `x == 5 g +- 0.1 g`.
         if let (Binary::Eq | Binary::Ne, Value::Range(..)) = (op, &b) {
             return match self.inside(a, b, at_a, at_b) {
@@ -224,7 +230,7 @@ impl<'a> Elaborator<'a> {
 
     /// `x in range` or `x in list`.
     pub fn inside(&mut self, x: Value, set: Value, at_x: Span, at_set: Span) -> Value {
-        match set {
+        match self.listed(set) {
             Value::Range(low, high) => {
                 let Some((value, low)) = self.comparable(x.clone(), Value::Num(*low), at_x, at_set) else {
                     return Value::Error;
@@ -253,6 +259,10 @@ impl<'a> Elaborator<'a> {
     /// `x is word`: a truth value among the members of x.
     pub fn is(&mut self, a: &'a Expr, b: &'a Expr, scope: &mut Scope) -> Value {
         let value = self.expr(a, scope);
+        if let Value::Enum(..) = value {
+            let word = self.like(b, &value, scope);
+            return self.compare(Binary::Eq, value, word, a.span, b.span);
+        }
         let (base, word) = match (&value, &*b.kind) {
             (Value::Error, _) => return Value::Error,
             (Value::Instance(i) | Value::Qualified(i, _), ExprKind::Name(word)) => (*i, word),
@@ -261,6 +271,11 @@ impl<'a> Elaborator<'a> {
                 return Value::Error;
             }
         };
+        if !self.has_member(base, &word.text)
+            && let Some(value) = self.is_word(base, word)
+        {
+            return value;
+        }
         match self.member(Value::Instance(base), word) {
             v @ (Value::Bool(_) | Value::Error) => v,
             other => self.expected("a truth value", &other, b.span),

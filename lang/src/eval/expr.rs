@@ -30,9 +30,12 @@ impl<'a> Elaborator<'a> {
                 let base = self.expr(base, scope);
                 self.index(base, word, scope)
             }
-            ExprKind::IndexRange(_, a, b) => {
-                self.report(super::types::unsupported(a.span.to(b.span), "ranges of wells"));
-                Value::Error
+            ExprKind::IndexRange(base, a, b) => {
+                let base = self.expr(base, scope);
+                match self.grid_index(&base, a, Some(b)) {
+                    Some(found) => found,
+                    None => self.expected("a plate or another grid", &base, a.span.to(b.span)),
+                }
             }
             ExprKind::Index(base, index) => {
                 let base = self.expr(base, scope);
@@ -72,9 +75,48 @@ impl<'a> Elaborator<'a> {
             }
             ExprKind::Tuple(items, unit) => self.tuple(items, unit.as_ref(), scope),
             ExprKind::List(items) => {
-                let values = items.iter().map(|i| self.expr(i, scope)).collect();
+                let values: Vec<Value> = items.iter().map(|i| self.expr(i, scope)).collect();
+                self.alike(&values, items);
                 Value::List(values)
             }
+        }
+    }
+
+    /// Reports the first element of a list that is of another kind than those before it.
+    fn alike(&mut self, values: &[Value], items: &[Expr]) {
+        let mut first: Option<(&Value, Span)> = None;
+        for (value, item) in values.iter().zip(items) {
+            let Some((one, at)) = first else {
+                first = (*value != Value::Error).then_some((value, item.span));
+                continue;
+            };
+            let alike = match (one, value) {
+                (_, Value::Error) => true,
+                (Value::Num(a), Value::Num(b)) => {
+                    let kelvin = |a: &Num, b: &Num| a.point && b.literal;
+                    a.dimension.agrees(&b.dimension) && (a.point == b.point || kelvin(a, b) || kelvin(b, a))
+                }
+                (Value::Enum(_, a), Value::Enum(_, b)) => a == b,
+                (Value::Nothing, _) | (_, Value::Nothing) => true,
+                (a, b) => a.what() == b.what(),
+            };
+            if alike {
+                continue;
+            }
+            let show = |this: &Self, v: &Value| match v {
+                Value::Num(n) => this.describe(n),
+                other => other.what().to_string(),
+            };
+            let (a, b) = (show(self, one), show(self, value));
+            let code = if matches!((one, value), (Value::Num(_), Value::Num(_))) {
+                codes::UNIT_MISMATCH
+            } else {
+                codes::TYPE_MISMATCH
+            };
+            let d =
+                Diagnostic::error(code, item.span, format!("a list of {a} cannot hold {b}"), format!("this is {b}"));
+            self.report(d.because(at, format!("this is {a}")));
+            return;
         }
     }
 
@@ -148,18 +190,32 @@ impl<'a> Elaborator<'a> {
                 None => self.member(Value::Instance(this), n),
             };
         }
-        if let Some(value) = self.setting(&n.text) {
+        if let Some(value) = self.of_lab(&n.text, scope) {
             return value;
         }
-        if scope.lab
-            && let Some(id) = self.find_instance(&n.text)
-        {
-            return Value::Instance(id);
+        if let Some(value) = self.setting(&n.text) {
+            return value;
         }
         if let Some(id) = self.tables.names.lookup(scope.module, &n.text) {
             return self.declared(id, n);
         }
         self.unknown_name(n, scope)
+    }
+
+    /// What a name of the lab's text stands for: a parameter of the lab, an instance or an included lab.
+    pub fn of_lab(&self, name: &str, scope: &Scope) -> Option<Value> {
+        if !scope.lab {
+            return None;
+        }
+        if !self.lab_values.is_empty()
+            && let Some(value) = self.lab_values.get(&(self.within.clone(), name.to_string()))
+        {
+            return Some(value.clone());
+        }
+        if self.within.is_empty() {
+            return self.lab_name_of(name);
+        }
+        self.lab_name_of(&format!("{}{name}", self.within))
     }
 
     fn declared(&mut self, id: crate::names::DeclId, n: &Name) -> Value {
@@ -176,15 +232,16 @@ impl<'a> Elaborator<'a> {
                     return Value::Error;
                 }
                 self.open_consts.push(id);
-                let v = self.expr(value, &mut Scope::module(decl.module));
-                self.open_consts.pop();
-                match ty {
+                let mut scope = Scope::module(decl.module);
+                let v = match ty {
                     Some(ty) => {
                         let ty = self.resolve_type(ty, decl.module);
-                        self.coerce(v, &ty, value.span, &n.text)
+                        self.typed(value, &ty, &mut scope, &n.text)
                     }
-                    None => v,
-                }
+                    None => self.expr(value, &mut scope),
+                };
+                self.open_consts.pop();
+                v
             }
             ItemKind::Species { .. } => self.tables.species.of_decl(id).map_or(Value::Error, Value::Species),
             ItemKind::Reaction { name, .. } => {
@@ -193,6 +250,7 @@ impl<'a> Elaborator<'a> {
                 position.map_or(Value::Error, |i| Value::Reaction(super::ReactionId(i as u32)))
             }
             ItemKind::Solution { .. } => Value::Solution(id),
+            ItemKind::Material { .. } => Value::Material(id),
             ItemKind::Capability { .. } | ItemKind::Asset { .. } => Value::Kind(id),
             ItemKind::Fn { .. } | ItemKind::Relation { .. } => Value::Function(id),
             _ => {
@@ -214,12 +272,18 @@ impl<'a> Elaborator<'a> {
             candidates.extend(self.member_names(this));
         }
         if scope.lab {
-            candidates.extend(self.instances.iter().filter(|i| i.owner.is_none()).map(|i| i.name.clone()));
+            let inner = |n: &String| n.strip_prefix(self.within.as_str()).map(str::to_string);
+            candidates.extend(self.instances.iter().filter(|i| i.owner.is_none()).filter_map(|i| inner(&i.name)));
+            candidates.extend(self.included.iter().filter_map(inner));
         }
         let is_value = |k: &ItemKind| {
             matches!(
                 k,
-                ItemKind::Const { .. } | ItemKind::Species { .. } | ItemKind::Fn { .. } | ItemKind::Solution { .. }
+                ItemKind::Const { .. }
+                    | ItemKind::Species { .. }
+                    | ItemKind::Fn { .. }
+                    | ItemKind::Solution { .. }
+                    | ItemKind::Material { .. }
             )
         };
         let names = self.tables.names;
@@ -295,11 +359,12 @@ impl<'a> Elaborator<'a> {
             }
             Binary::Is => self.is(a, b, scope),
             Binary::In => {
-                let (x, range) = (self.expr(a, scope), self.expr(b, scope));
+                let x = self.expr(a, scope);
+                let range = self.like(b, &x, scope);
                 self.inside(x, range, a.span, b.span)
             }
             Binary::Eq | Binary::Ne | Binary::Lt | Binary::Le | Binary::Gt | Binary::Ge => {
-                let (x, y) = (self.expr(a, scope), self.expr(b, scope));
+                let (x, y) = self.sides(a, b, scope);
                 self.compare(op, x, y, a.span, b.span)
             }
             Binary::PlusMinus => {
@@ -413,7 +478,8 @@ impl<'a> Elaborator<'a> {
 
     /// The members of a finite set: a list, or all instances of a type.
     pub fn set(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<Value>> {
-        match self.expr(e, scope) {
+        let value = self.expr(e, scope);
+        match self.listed(value) {
             Value::List(items) => Some(items),
             Value::Kind(kind) => Some(self.instances_of(kind).into_iter().map(Value::Instance).collect()),
             Value::Error => None,

@@ -5,6 +5,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
 use super::{Num, Type, Value};
 use crate::elaborate::Elaborator;
+use crate::names::DeclId;
 use crate::units::Dimension;
 
 /// How an external function is computed.
@@ -26,8 +27,22 @@ enum Bound {
     Choose,
     /// The species of a set that state a property.
     Having,
-    /// What the lab placed the instance on, by the preposition used there.
+    /// The parts of an instance, and theirs, that are of a kind.
+    Parts,
+    /// An instance and what it is a part of, as far as they are of a kind.
+    Wholes,
+    /// What an instance is a part of.
+    Owner,
+    /// The number of an element of a list, from 1.
+    Position,
+    /// The element of a list with a number from 1 that may be known only when running.
+    Nth,
+    /// Each of one list with each of another.
+    Paired,
+    /// What the lab placed the instance on, by one of these prepositions.
     Placed,
+    /// Whether one mixture has touched something that another has not.
+    Soils,
 }
 
 const TABLE: &[(&str, Bound)] = &[
@@ -44,7 +59,14 @@ const TABLE: &[(&str, Bound)] = &[
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
     ("having", Bound::Having),
+    ("nth", Bound::Nth),
+    ("owner", Bound::Owner),
+    ("paired", Bound::Paired),
+    ("parts", Bound::Parts),
+    ("position", Bound::Position),
     ("placed", Bound::Placed),
+    ("soils", Bound::Soils),
+    ("wholes", Bound::Wholes),
 ];
 
 /// Whether the compiler provides an external function of this name.
@@ -102,7 +124,28 @@ impl Elaborator<'_> {
                 };
                 Value::List(set.iter().filter(|v| states(v)).cloned().collect())
             }
-            (Bound::Placed, [Value::Instance(i), Value::Text(word)]) => self.placed(*i, word),
+            (Bound::Parts, [Value::Instance(i), Value::Kind(kind)]) => {
+                let mut found = Vec::new();
+                self.parts_below(*i, *kind, &mut found);
+                Value::List(found.into_iter().map(Value::Instance).collect())
+            }
+            (Bound::Wholes, [Value::Instance(i), Value::Kind(kind)]) => {
+                let all = std::iter::successors(Some(*i), |i| self.instances[i.0 as usize].owner);
+                Value::List(all.filter(|i| self.instance_is(*i, *kind)).map(Value::Instance).collect())
+            }
+            (Bound::Owner, [Value::Instance(i)]) => match (self.instances[i.0 as usize].owner, &result) {
+                (None, Some(ty)) if self.prototype => self.placeholder(ty, name),
+                (owner, _) => owner.map_or(Value::Nothing, Value::Instance),
+            },
+            (Bound::Position, [Value::List(items), item]) => match items.iter().position(|i| i == item) {
+                Some(at) => self.number(at as f64 + 1.0, Dimension::one(), false),
+                None if self.prototype => self.number(1.0, Dimension::one(), false),
+                None => self.expected("an element of the list", item, at),
+            },
+            (Bound::Nth, [Value::List(items), Value::Num(n)]) => self.nth(items, n.node, at),
+            (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
+            (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
+            (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
             (_, values) if values.contains(&Value::Error) => Value::Error,
             _ => self.wrong_arguments(name, at),
         };
@@ -141,8 +184,22 @@ impl Elaborator<'_> {
         }
     }
 
-    fn placed(&self, id: InstanceId, word: &str) -> Value {
+    fn parts_below(&self, id: InstanceId, kind: DeclId, out: &mut Vec<InstanceId>) {
+        let instance = &self.instances[id.0 as usize];
+        let parts = instance.parts.values().chain(instance.grids.iter().flat_map(|g| g.children.values()));
+        for part in parts {
+            if self.instance_is(*part, kind) {
+                out.push(*part);
+            }
+            self.parts_below(*part, kind, out);
+        }
+    }
+
+    fn placed(&self, id: InstanceId, words: &str) -> Value {
         let inst = &self.instances[id.0 as usize];
-        inst.placed.iter().find(|(label, _)| label == word).map_or(Value::Nothing, |(_, on)| Value::Instance(*on))
+        inst.placed
+            .iter()
+            .find(|(label, _)| words.split(' ').any(|w| w == label))
+            .map_or(Value::Nothing, |(_, on)| Value::Instance(*on))
     }
 }

@@ -1,11 +1,14 @@
 //! Members of instances: parameters, states, derived quantities, flows, parts; and what stands in `[ ]`.
 
-use matterix_ir::model::Reading;
+use matterix_ir::model::{Domain, Reading};
+use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
 
 use super::{Num, Scope, SpeciesId, Type, Value};
-use crate::ast::{Expr, FieldValue, MemberKind, Name, NamedExpr, Role};
+use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
+use crate::elaborate::grids::Place;
+use crate::elaborate::instances::Setting;
 use crate::elaborate::tables::MemberRef;
 use crate::elaborate::{Elaborator, MemberKey};
 use crate::names::{DeclId, near};
@@ -21,6 +24,7 @@ impl<'a> Elaborator<'a> {
                 let found = self.tables.members(kind, &name.text);
                 self.pick(id, found, name)
             }
+            Value::Included(lab) => self.included_member(&lab, name),
             Value::Species(s) => self.species_property(s, name),
             Value::Reaction(r) => self.reaction_member(r, name),
             Value::Step(start, end) => self.step_member(start, end, name),
@@ -33,8 +37,41 @@ impl<'a> Elaborator<'a> {
                 self.report(super::types::unsupported(name.span, "members of an instance known only when running"));
                 Value::Error
             }
+            Value::Grid(id, grid) => match self.grid_member(id, grid, &name.text) {
+                Some(value) => value,
+                None => {
+                    let children = self.listed(Value::Grid(id, grid));
+                    self.member(children, name)
+                }
+            },
+            Value::List(items) => self.list_member(items, name),
+            Value::Tuple(items) if items.len() == 2 => match name.text.as_str() {
+                "first" => items[0].clone(),
+                "second" => items[1].clone(),
+                _ => self.no_member(&Value::Tuple(items), name, vec!["first".into(), "second".into()]),
+            },
             other => self.no_member(&other, name, Vec::new()),
         }
+    }
+
+    /// `.count`, `.first`, `.last` and `.pairs` of a list: each with the next.
+    fn list_member(&mut self, items: Vec<Value>, name: &Name) -> Value {
+        let end = match name.text.as_str() {
+            "count" => return self.number(items.len() as f64, Dimension::one(), false),
+            "pairs" => return Value::List(items.windows(2).map(|two| Value::Tuple(two.to_vec())).collect()),
+            "first" => items.first(),
+            "last" => items.last(),
+            _ => {
+                let known = ["count", "first", "last", "pairs"].map(String::from).to_vec();
+                return self.no_member(&Value::List(items), name, known);
+            }
+        };
+        if let Some(value) = end {
+            return value.clone();
+        }
+        let headline = format!("an empty list has no `{}`", name.text);
+        self.report(Diagnostic::error(codes::EMPTY_RANGE, name.span, headline, "there is nothing in it"));
+        Value::Error
     }
 
     fn no_member(&mut self, base: &Value, name: &Name, known: Vec<String>) -> Value {
@@ -83,6 +120,9 @@ impl<'a> Elaborator<'a> {
         if let Some(part) = self.instances[id.0 as usize].parts.get(&name.text) {
             return Value::Instance(*part);
         }
+        if let Some(grid) = self.instances[id.0 as usize].grids.iter().position(|g| g.name == name.text) {
+            return Value::Grid(id, grid);
+        }
         if let Some(frame) = self.frame(id, &name.text) {
             return frame;
         }
@@ -96,6 +136,11 @@ impl<'a> Elaborator<'a> {
         }
         if name.text == "basis" && self.per_species(id).is_some() {
             return Value::Method(Box::new(Value::Instance(id)), "basis".into());
+        }
+        if let Some((id, grid)) = self.grid_of(&Value::Instance(id))
+            && let Some(value) = self.grid_member(id, grid, &name.text)
+        {
+            return value;
         }
         // A vessel answers for its contents: `beaker.color`, `beaker.volume`.
         let parts: Vec<InstanceId> = self.instances[id.0 as usize].parts.values().copied().collect();
@@ -138,7 +183,7 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        found
+        if found.len() > 1 { self.tables.visible(found) } else { found }
     }
 
     /// Of several members with one name, the one that the text of a capability means: its own or an inherited one.
@@ -161,6 +206,7 @@ impl<'a> Elaborator<'a> {
     pub fn has_member(&self, id: InstanceId, name: &str) -> bool {
         let inst = &self.instances[id.0 as usize];
         inst.parts.contains_key(name)
+            || inst.grids.iter().any(|g| g.name == name)
             || !self.members_of(id, name).is_empty()
             || (matches!(name, "species" | "basis") && self.per_species(id).is_some())
     }
@@ -169,6 +215,7 @@ impl<'a> Elaborator<'a> {
     pub fn member_names(&self, id: InstanceId) -> Vec<String> {
         let inst = &self.instances[id.0 as usize];
         let mut names: Vec<String> = inst.parts.keys().cloned().collect();
+        names.extend(inst.grids.iter().map(|g| g.name.clone()));
         for kind in &inst.kinds {
             let Some(info) = self.tables.kinds.get(kind) else { continue };
             names.extend(
@@ -216,7 +263,9 @@ impl<'a> Elaborator<'a> {
         }
         let key: MemberKey = (m.owner, name.text.clone(), self.initial_mode, self.readings_live);
         if let Some(v) = self.instances[id.0 as usize].values.get(&key) {
-            return v.clone();
+            let v = v.clone();
+            self.note_term(id, m, &v);
+            return v;
         }
         let open = (id, key.clone());
         if self.open_members.contains(&open) {
@@ -240,7 +289,41 @@ impl<'a> Elaborator<'a> {
         if cache {
             self.instances[id.0 as usize].values.insert(key, value.clone());
         }
+        self.note_term(id, m, &value);
         value
+    }
+
+    /// Notes a member that a condition names itself, not inside a definition it uses.
+    fn note_term(&mut self, id: InstanceId, m: MemberRef<'a>, value: &Value) {
+        if !self.open_members.is_empty() || !self.open_calls.is_empty() {
+            return;
+        }
+        let MemberKind::Value { name, ty, options, .. } = &m.member.kind else { return };
+        let (node, domain) = match value {
+            Value::Num(n) => {
+                let ty = self.resolve_type(ty, m.module);
+                let unit = self.declared_unit(options, &ty).unwrap_or_else(|| self.type_unit(&ty));
+                (n.node, Domain::Quantity(unit))
+            }
+            Value::Bool(n) => (*n, Domain::Bool),
+            Value::InstanceNode(n) => (*n, Domain::Instance),
+            Value::Enum(n, words) => (*n, Domain::Enum(words.to_vec())),
+            _ => return,
+        };
+        if self.terms.iter().any(|t| t.node == node) || !self.graph.depends(node, |op| matches!(op, Op::State(_))) {
+            return;
+        }
+        let name = format!("{}.{}", self.spoken_name(id), name.text);
+        self.terms.push(Term { name, node, domain });
+    }
+
+    /// The name of the thing that answers for an instance: the vessel for its only part.
+    pub fn spoken_name(&self, id: InstanceId) -> String {
+        let inst = &self.instances[id.0 as usize];
+        match inst.owner.map(|o| &self.instances[o.0 as usize]) {
+            Some(owner) if owner.parts.len() == 1 => owner.name.clone(),
+            _ => inst.name.clone(),
+        }
     }
 
     fn make_member(&mut self, id: InstanceId, m: MemberRef<'a>) -> Value {
@@ -248,9 +331,11 @@ impl<'a> Elaborator<'a> {
         let ty = self.resolve_type(ty, m.module);
         if *role == Role::Param || *role == Role::Derived {
             let setting = self.instances[id.0 as usize].setting(&name.text);
-            if let Some((module, field, lab)) = setting {
-                let value = self.param(id, &name.text, &ty, module, field, lab);
-                self.check_limits(&value, field, &name.text, &ty, options, m.module);
+            if let Some(setting) = setting {
+                let value = self.param(id, &name.text, &ty, setting);
+                if let FieldValue::Expr(at) = setting.value() {
+                    self.check_limits(&value, at.span, &name.text, &ty, options, m.module);
+                }
                 return value;
             }
         }
@@ -265,10 +350,7 @@ impl<'a> Elaborator<'a> {
                 }
             },
             Role::Derived => match value {
-                Some(e) => {
-                    let v = self.expr(e, &mut Scope::of_member(id, m));
-                    self.coerce(v, &ty, e.span, &name.text)
-                }
+                Some(e) => self.typed(e, &ty, &mut Scope::of_member(id, m), &name.text),
                 None => Value::Error,
             },
             Role::State => self.state_value(id, m, &name.text, &ty, value.as_ref()),
@@ -284,16 +366,16 @@ impl<'a> Elaborator<'a> {
     }
 
     /// `{ above: 0 J/K }`, `{ at_least: 0 W }`: what a parameter may be.
-    fn check_limits(
+    pub fn check_limits(
         &mut self,
         value: &Value,
-        field: &'a FieldValue,
+        at: Span,
         name: &str,
         ty: &Type,
         options: &'a [NamedExpr],
         module: usize,
     ) {
-        let (Value::Num(n), FieldValue::Expr(at)) = (value, field) else { return };
+        let Value::Num(n) = value else { return };
         let Some(given) = self.known(n.node) else { return };
         for o in options.iter().filter(|o| matches!(o.name.text.as_str(), "above" | "at_least")) {
             let v = self.expr(&o.value, &mut Scope::module(module));
@@ -308,7 +390,7 @@ impl<'a> Elaborator<'a> {
             self.report(
                 Diagnostic::error(
                     codes::OUT_OF_RANGE,
-                    at.span,
+                    at,
                     format!("`{name}` cannot be {}", unit.show(given)),
                     if strict { format!("must be above {least}") } else { format!("must be at least {least}") },
                 )
@@ -333,20 +415,11 @@ impl<'a> Elaborator<'a> {
         );
     }
 
-    fn param(
-        &mut self,
-        id: InstanceId,
-        name: &str,
-        ty: &Type,
-        module: usize,
-        field: &'a FieldValue,
-        lab: bool,
-    ) -> Value {
-        match field {
+    fn param(&mut self, id: InstanceId, name: &str, ty: &Type, setting: Setting<'a>) -> Value {
+        match setting.value() {
             FieldValue::Expr(e) => {
-                let mut scope = if lab { Scope { lab: true, ..Scope::module(module) } } else { Scope::of(id, module) };
-                let v = self.expr(e, &mut scope);
-                let v = self.coerce(v, ty, e.span, name);
+                let within = self.within_of(id, setting.lab);
+                let v = self.within_lab(&within, |this| this.typed(e, ty, &mut setting.scope(), name));
                 self.as_param(id, name, v, e.span)
             }
             FieldValue::Fields(_) | FieldValue::Literal(_) | FieldValue::Species(_) => Value::Error,
@@ -354,8 +427,7 @@ impl<'a> Elaborator<'a> {
     }
 
     fn param_default(&mut self, id: InstanceId, name: &str, ty: &Type, e: &'a Expr, module: usize) -> Value {
-        let v = self.expr(e, &mut Scope::of(id, module));
-        let v = self.coerce(v, ty, e.span, name);
+        let v = self.typed(e, ty, &mut Scope::of(id, module), name);
         self.as_param(id, name, v, e.span)
     }
 
@@ -440,6 +512,9 @@ impl<'a> Elaborator<'a> {
             Some(Value::Error) => return Value::Error,
             _ => None,
         };
+        if let Some(found) = self.grid_index(&base, word, None) {
+            return found;
+        }
         match base {
             Value::Error => Value::Error,
             Value::Instance(id) | Value::Qualified(id, _) => {
@@ -483,8 +558,39 @@ impl<'a> Elaborator<'a> {
 
     /// `list[2]`, counted from 0.
     pub fn index_number(&mut self, base: Value, index: &'a Expr, scope: &mut Scope) -> Value {
+        if self.grid_of(&base).is_some() {
+            return self.numbered(base, index, scope);
+        }
         let at = self.expr(index, scope);
         self.element(base, at, index.span)
+    }
+
+    /// `ot2.slot[3]`, `ot2.slot[1 .. 3]`: places that are numbers.
+    fn numbered(&mut self, base: Value, index: &'a Expr, scope: &mut Scope) -> Value {
+        let mut place = |this: &mut Self, e: &'a Expr| {
+            if let ExprKind::Name(n) = &*e.kind
+                && Place::parse(&n.text).is_some()
+            {
+                return Some(n.clone());
+            }
+            let v = this.expr(e, scope);
+            match this.coerce(v, &Type::ratio(), e.span, "place") {
+                Value::Num(n) => {
+                    let number = this.graph.constant(n.node).map_or_else(|| "?".into(), |v| v.to_string());
+                    Some(Name { text: number, span: e.span })
+                }
+                _ => None,
+            }
+        };
+        let (from, to) = match &*index.kind {
+            ExprKind::Range(a, b) => (place(self, a), Some(place(self, b))),
+            _ => (place(self, index), None),
+        };
+        match (from, to) {
+            (Some(from), None) => self.grid_index(&base, &from, None).unwrap_or(Value::Error),
+            (Some(from), Some(Some(to))) => self.grid_index(&base, &from, Some(&to)).unwrap_or(Value::Error),
+            _ => Value::Error,
+        }
     }
 
     fn element(&mut self, base: Value, at: Value, span: Span) -> Value {

@@ -9,10 +9,12 @@ pub mod coerce;
 pub mod compare;
 pub mod expr;
 pub mod external;
+pub mod lists;
 pub mod member;
 pub mod reaction;
 pub mod types;
 pub mod value;
+pub mod words;
 
 use matterix_ir::scene::InstanceId;
 

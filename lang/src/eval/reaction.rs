@@ -37,7 +37,7 @@ impl<'a> Elaborator<'a> {
             }
             "valid" => self.window(r),
             "enthalpy" => self.reaction_enthalpy(r),
-            "rate" | "order" | "coefficient" | "basis" => {
+            "rate" | "order" | "coefficient" | "basis" | "requires" => {
                 Value::Method(Box::new(Value::Reaction(r)), name.text.clone())
             }
             _ => {
@@ -53,6 +53,7 @@ impl<'a> Elaborator<'a> {
                     "order",
                     "coefficient",
                     "basis",
+                    "requires",
                 ];
                 let near = crate::names::near::nearest(&name.text, known);
                 let mut d = Diagnostic::error(
@@ -129,6 +130,13 @@ impl<'a> Elaborator<'a> {
                     continue;
                 }
             };
+            let def = &self.tables.reactions[r.0 as usize];
+            if !def.reactants.iter().chain(&def.products).any(|(s, _)| *s == species) {
+                let headline = format!("`{}` is not in the equation of `{}`", line.key.text, def.name);
+                let d = Diagnostic::error(codes::UNKNOWN_FIELD, line.key.span, headline, "not one of its species");
+                self.report(d.help("a catalyst stands on both sides: `A + C -> B + C`"));
+                continue;
+            }
             let FieldValue::Expr(e) = &line.value else { continue };
             let v = self.expr(e, &mut Scope::module(module));
             if let Value::Num(n) = self.coerce(v, &Type::ratio(), e.span, "order")
@@ -159,8 +167,21 @@ impl<'a> Elaborator<'a> {
                 let n = self.coefficient(r, *s);
                 self.number(n, Dimension::one(), false)
             }
+            ("requires", [Value::Instance(m)]) => self.requires(r, *m),
             ("basis", [Value::Instance(m)]) => self.basis(r, *m, span, scope),
             _ => self.wrong_arguments(name, span),
+        }
+    }
+
+    /// The condition on a mixture, whose members it names, under which the reaction goes on; always where none is given.
+    pub fn requires(&mut self, r: ReactionId, m: matterix_ir::scene::InstanceId) -> Value {
+        let def = &self.tables.reactions[r.0 as usize];
+        let module = def.module;
+        match field(def.fields, "requires") {
+            Some(Field { value: FieldValue::Expr(e), .. }) => {
+                self.truth(e, &mut Scope::of(m, module)).map_or(Value::Error, Value::Bool)
+            }
+            _ => Value::Bool(self.graph.number(1.0)),
         }
     }
 
@@ -257,6 +278,11 @@ impl<'a> Elaborator<'a> {
                     .help(format!("say on what the rate depends: `{order_key}: {{ A: 1, B: 1 }}`; orders are measured, not read from the equation")),
             );
             return;
+        }
+        let mixture = self.tables.kinds.values().find(|k| k.per_species.is_some()).map(|k| k.id);
+        if let (true, Some(mixture)) = (self.prototype, mixture) {
+            let stand_in = self.prototype_of(vec![mixture], "mixture");
+            self.requires(r, stand_in);
         }
         let t = self.placeholder_kelvin();
         let Value::Num(k) = self.rate(r, t) else { return };

@@ -1,5 +1,7 @@
 //! Types of parameters, members and results.
 
+use std::sync::Arc;
+
 use matterix_ir::{Diagnostic, codes};
 
 use crate::ast;
@@ -22,14 +24,23 @@ pub enum Type {
         /// May be `unlimited`.
         optional: bool,
     },
+    /// A whole number.
+    Int,
     /// A truth value.
     Bool,
     /// A text.
     Text,
+    /// One of these words.
+    Enum(Arc<[String]>),
     /// A species.
     Species,
     /// A reaction.
     Reaction,
+    /// What a vessel is made of.
+    Material {
+        /// May be `nothing`.
+        optional: bool,
+    },
     /// A named point of an instance.
     Frame,
     /// `Range<T>`.
@@ -55,13 +66,30 @@ impl Type {
 }
 
 /// Names of types that are not dimensions, capabilities or assets.
-const BUILT_IN: &[&str] = &["Bool", "Text", "Int", "Species", "Reaction", "Frame", "Range", "List", "Color", "Any"];
+const BUILT_IN: &[&str] =
+    &["Bool", "Text", "Int", "Species", "Reaction", "Material", "Frame", "Range", "List", "Color", "Any"];
 
 impl Tables<'_> {
-    /// Resolves a type as written in a module.
+    /// Resolves a type as written in a module, where no `where` can be looked at.
     pub fn resolve_type(&self, ty: &ast::Type, module: usize, diagnostics: &mut Vec<Diagnostic>) -> Type {
         if let Some(condition) = &ty.condition {
-            diagnostics.push(unsupported(condition.span, "`where` conditions on a type"));
+            diagnostics.push(
+                Diagnostic::error(
+                    codes::MISPLACED,
+                    condition.span,
+                    "`where` belongs to a parameter of a workflow, skill or command",
+                    "not looked at here",
+                )
+                .help("a process has `while`, an event `when`; what an instance may be given is said with `at_least`"),
+            );
+        }
+        self.resolve_parameter_type(ty, module, diagnostics)
+    }
+
+    /// Resolves the type of a parameter; its `where` is the business of whoever binds it.
+    pub fn resolve_parameter_type(&self, ty: &ast::Type, module: usize, diagnostics: &mut Vec<Diagnostic>) -> Type {
+        if !ty.words.is_empty() {
+            return enumeration(&ty.words, diagnostics);
         }
         if ty.paths.len() == 1 && ty.paths[0].segments.len() == 1 {
             let name = &ty.paths[0].segments[0];
@@ -71,9 +99,10 @@ impl Tables<'_> {
             match name.text.as_str() {
                 "Bool" => return Type::Bool,
                 "Text" => return Type::Text,
-                "Int" => return Type::ratio(),
+                "Int" => return Type::Int,
                 "Species" => return Type::Species,
                 "Reaction" => return Type::Reaction,
+                "Material" => return Type::Material { optional: ty.optional },
                 "Frame" => return Type::Frame,
                 "Color" => return Type::Color,
                 "Any" => return Type::Any,
@@ -122,10 +151,13 @@ impl Tables<'_> {
         match ty {
             Type::Any => "anything".into(),
             Type::Quantity { dimension, point, .. } => self.units.describe(dimension, *point),
+            Type::Int => "a whole number".into(),
             Type::Bool => "a truth value".into(),
             Type::Text => "a text".into(),
+            Type::Enum(words) => format!("one of {}", super::words::list(words)),
             Type::Species => "a species".into(),
             Type::Reaction => "a reaction".into(),
+            Type::Material { .. } => "a material".into(),
             Type::Frame => "a frame".into(),
             Type::Color => "a colour".into(),
             Type::Range(inner) => format!("a range of {}", self.type_name(inner)),
@@ -135,6 +167,18 @@ impl Tables<'_> {
             }
         }
     }
+}
+
+/// `open | closed` as a type; a word given twice is reported.
+fn enumeration(words: &[ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Type {
+    for (i, word) in words.iter().enumerate() {
+        if let Some(first) = words[..i].iter().find(|w| w.text == word.text) {
+            let headline = format!("`{}` is given twice", word.text);
+            let d = Diagnostic::error(codes::DUPLICATE_NAME, word.span, headline, "given again here");
+            diagnostics.push(d.because(first.span, "first given here"));
+        }
+    }
+    Type::Enum(words.iter().map(|w| w.text.clone()).collect())
 }
 
 /// "not supported yet" at a span.

@@ -1,5 +1,7 @@
 //! What an expression stands for once names are resolved.
 
+use std::sync::Arc;
+
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Unit};
 
@@ -40,6 +42,8 @@ pub enum Value {
     Bool(NodeId),
     /// A text.
     Text(String),
+    /// One of some words, by its index.
+    Enum(NodeId, Arc<[String]>),
     /// `a .. b`, closed.
     Range(Box<Num>, Box<Num>),
     /// `(a, b, c)`.
@@ -54,10 +58,14 @@ pub enum Value {
     Nothing,
     /// A limit that never limits.
     Unlimited,
+    /// A grid of child assets of an instance, by its position.
+    Grid(InstanceId, usize),
     /// An instance seen as one of its capabilities: `plate.Heater`.
     Qualified(InstanceId, DeclId),
     /// A species.
     Species(SpeciesId),
+    /// A lab included in this one, by its full name.
+    Included(String),
     /// A reaction.
     Reaction(ReactionId),
     /// `v[S]` before a unit says which concentration is meant.
@@ -68,6 +76,8 @@ pub enum Value {
     Kind(DeclId),
     /// A solution.
     Solution(DeclId),
+    /// What a vessel is made of.
+    Material(DeclId),
     /// A function or relation, called by name.
     Function(DeclId),
     /// A named step of the plan: locals of its start and end time.
@@ -85,18 +95,21 @@ impl Value {
             Value::Num(_) => "a quantity",
             Value::Bool(_) => "a truth value",
             Value::Text(_) => "a text",
+            Value::Enum(..) => "a word",
             Value::Range(..) => "a range",
             Value::Tuple(_) => "a tuple",
-            Value::List(_) => "a list",
+            Value::List(_) | Value::Grid(..) => "a list",
             Value::Instance(_) | Value::InstanceNode(_) | Value::Qualified(..) => "an instance",
             Value::Nothing => "nothing",
             Value::Unlimited => "`unlimited`",
             Value::Species(_) => "a species",
+            Value::Included(_) => "an included lab",
             Value::Reaction(_) => "a reaction",
             Value::Concentration(..) => "a concentration",
             Value::Frame(..) => "a frame",
             Value::Kind(_) => "a type",
             Value::Solution(_) => "a solution",
+            Value::Material(_) => "a material",
             Value::Step(..) => "a step",
             Value::Function(_) | Value::Method(..) => "a function",
         }

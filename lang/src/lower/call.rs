@@ -6,11 +6,11 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::{Planner, ResultSlot};
 use crate::ast::{Block, Call, Clause, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
 use crate::elaborate::tables::MemberRef;
-use crate::eval::{Num, Scope, Value};
+use crate::eval::{Num, Scope, Type, Value};
 use crate::names::{DeclId, near, verb_text};
 
 /// What a verb can mean.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub enum Verb<'a> {
     /// A skill in scope.
     Skill(DeclId),
@@ -46,6 +46,7 @@ impl<'a> Planner<'a, '_> {
         }
         let verb_span = call.words.first().map_or(call.span, |w| w.span.to(call.words[count - 1].span));
         let verb = self.choose(&verbs, &object, call, verb_span, scope)?;
+        self.lab.verbs.insert(call.span, verb.clone());
         match verb {
             Verb::Skill(id) => self.skill(id, call, object, span, scope),
             Verb::Command(owner, m) => self.command(owner, m, call, object, span, scope).map(|s| (s, None)),
@@ -147,12 +148,15 @@ impl<'a> Planner<'a, '_> {
             match verb {
                 Verb::Skill(id) => {
                     let ItemKind::Skill { sig, .. } = &self.lab.tables.names.decl(*id).item.kind else { continue };
-                    fitting.push((verb.clone(), misfit(sig, call)));
+                    fitting.push((verb.clone(), misfit(sig, call, false)));
                 }
                 Verb::Command(owner, m) => {
                     let MemberKind::Command { sig, .. } = &m.member.kind else { continue };
                     match self.device(sig, object, call, scope) {
-                        Some(id) if self.lab.instance_is(id, *owner) => fitting.push((verb.clone(), misfit(sig, call))),
+                        Some(id) if self.lab.instance_is(id, *owner) => {
+                            let by = !sig.params.is_empty() || object.is_none();
+                            fitting.push((verb.clone(), misfit(sig, call, by)));
+                        }
                         device => lacking.push((*owner, device)),
                     }
                 }
@@ -206,7 +210,8 @@ impl<'a> Planner<'a, '_> {
         self.lab.report(d);
     }
 
-    /// The device a command is for: the object where the verb takes no first argument, else the one after `by`.
+    /// The device a command is for: the object where the verb takes no first argument and there is one, else the one
+    /// after `by`.
     pub(super) fn device(
         &mut self,
         sig: &Sig,
@@ -214,7 +219,7 @@ impl<'a> Planner<'a, '_> {
         call: &'a Call,
         scope: &mut Scope,
     ) -> Option<matterix_ir::scene::InstanceId> {
-        let value = if sig.params.is_empty() {
+        let value = if sig.params.is_empty() && object.is_some() {
             object.as_ref().map(|o| o.0.clone())
         } else {
             let by = call.labelled.iter().find(|(l, _)| l.text == "by")?;
@@ -241,10 +246,11 @@ impl<'a> Planner<'a, '_> {
         let mut values = Vec::new();
         let mut good = true;
         let what = verb_text(&sig.verb);
+        let by = !sig.params.is_empty() || object.is_none();
         match (sig.params.first(), object) {
-            (Some(p), Some((v, span))) => good &= self.argument(p, v, span, module, &mut values),
+            (Some(_), Some((v, span))) => good &= self.group(&what, &sig.params, v, span, module, &mut values),
             (Some(p), None) => {
-                let ty = p.ty.as_ref().map(|t| self.lab.resolve_type(t, module));
+                let ty = p.ty.as_ref().map(|t| self.lab.resolve_parameter_type(t, module));
                 let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
                 self.lab.report(Diagnostic::error(
                     codes::WRONG_ARGUMENTS,
@@ -278,12 +284,20 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             let group = sig.labelled.iter().find(|(l, _)| l.text == label.text);
-            match group.and_then(|(_, params)| params.first()) {
-                Some(p) => {
-                    let v = self.lab.expr(e, scope);
-                    good &= self.argument(p, v, e.span, module, &mut values);
-                }
-                None if device && label.text == "by" && !sig.params.is_empty() => {}
+            match group.map(|(_, params)| params.as_slice()) {
+                Some([p]) => good &= self.argument_of(p, e, module, scope, &mut values),
+                Some(params) => match &*e.kind {
+                    ExprKind::Tuple(items, None) if items.len() == params.len() => {
+                        for (p, e) in params.iter().zip(items) {
+                            good &= self.argument_of(p, e, module, scope, &mut values);
+                        }
+                    }
+                    _ => {
+                        let v = self.lab.expr(e, scope);
+                        good &= self.group(&what, params, v, e.span, module, &mut values);
+                    }
+                },
+                None if device && label.text == "by" && by => {}
                 None => {
                     let v = self.lab.expr(e, scope);
                     unknown = true;
@@ -301,12 +315,13 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             match &p.default {
-                Some(e) => {
-                    let v = self.lab.expr(e, &mut Scope::module(module));
-                    good &= self.argument(p, v, e.span, module, &mut values);
+                Some(_) if params.iter().all(|p| p.default.is_some()) => {
+                    for (p, e) in params.iter().filter_map(|p| Some((p, p.default.as_ref()?))) {
+                        good &= self.argument_of(p, e, module, &mut Scope::module(module), &mut values);
+                    }
                 }
-                None => {
-                    let ty = p.ty.as_ref().map(|t| self.lab.resolve_type(t, module));
+                _ => {
+                    let ty = p.ty.as_ref().map(|t| self.lab.resolve_parameter_type(t, module));
                     let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
                     self.lab.report(
                         Diagnostic::error(
@@ -325,10 +340,44 @@ impl<'a> Planner<'a, '_> {
         good.then_some(Bound { values })
     }
 
+    /// The value of a pair of brackets of a signature: for several parameters a tuple of as many.
+    fn group(
+        &mut self,
+        what: &str,
+        params: &'a [Param],
+        v: Value,
+        span: Span,
+        module: usize,
+        out: &mut Vec<(String, Value)>,
+    ) -> bool {
+        match (params, v) {
+            ([p], v) => self.argument(p, v, span, module, out),
+            (_, Value::Error) => false,
+            (many, Value::Tuple(items)) if items.len() == many.len() => {
+                let mut good = true;
+                for (p, v) in many.iter().zip(items) {
+                    good &= self.argument(p, v, span, module, out);
+                }
+                good
+            }
+            (many, v) => {
+                let names: Vec<&str> = many.iter().map(|p| p.name.text.as_str()).collect();
+                let found = match &v {
+                    Value::Tuple(items) => format!("{} values", items.len()),
+                    other => other.what().to_string(),
+                };
+                let headline = format!("`{what}` takes {} values here, found {found}", many.len());
+                let d = Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, format!("this is {found}"));
+                self.lab.report(d.help(format!("write them in brackets: `({})`", names.join(", "))));
+                false
+            }
+        }
+    }
+
     fn argument(&mut self, p: &'a Param, v: Value, span: Span, module: usize, out: &mut Vec<(String, Value)>) -> bool {
         let v = match &p.ty {
             Some(ty) => {
-                let ty = self.lab.resolve_type(ty, module);
+                let ty = self.lab.resolve_parameter_type(ty, module);
                 self.lab.coerce(v, &ty, span, &p.name.text)
             }
             None => v,
@@ -336,6 +385,20 @@ impl<'a> Planner<'a, '_> {
         let good = v != Value::Error;
         out.push((p.name.text.clone(), v));
         good
+    }
+
+    /// An argument as it is written in the call or in the declaration.
+    fn argument_of(
+        &mut self,
+        p: &'a Param,
+        e: &'a Expr,
+        module: usize,
+        scope: &mut Scope,
+        out: &mut Vec<(String, Value)>,
+    ) -> bool {
+        let ty = p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, module));
+        let v = self.lab.hinted(e, &ty, scope);
+        self.argument(p, v, e.span, module, out)
     }
 
     fn unknown_label(&mut self, sig: &Sig, label: &Name, span: Span) {
@@ -358,14 +421,16 @@ impl<'a> Planner<'a, '_> {
             out.push(' ');
             out.push_str(&text);
         };
-        if let Some(p) = sig.params.first() {
-            add(p.name.text.to_uppercase());
+        let shown = |params: &[Param]| {
+            let names: Vec<String> = params.iter().map(|p| p.name.text.to_uppercase()).collect();
+            if names.len() > 1 { format!("({})", names.join(", ")) } else { names.concat() }
+        };
+        if !sig.params.is_empty() {
+            add(shown(&sig.params));
         }
         for (label, params) in &sig.labelled {
             add(label.text.clone());
-            if let Some(p) = params.first() {
-                add(p.name.text.to_uppercase());
-            }
+            add(shown(params));
         }
         out
     }
@@ -391,10 +456,7 @@ impl<'a> Planner<'a, '_> {
         let mut good = true;
         for o in given {
             match declared.iter().find(|p| p.name.text == o.name.text) {
-                Some(p) => {
-                    let v = self.lab.expr(&o.value, scope);
-                    good &= self.argument(p, v, o.value.span, module, out);
-                }
+                Some(p) => good &= self.argument_of(p, &o.value, module, scope, out),
                 None => {
                     let near = near::nearest(&o.name.text, declared.iter().map(|p| &p.name.text));
                     let mut d = Diagnostic::error(
@@ -415,10 +477,7 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             match &p.default {
-                Some(e) => {
-                    let v = self.lab.expr(e, &mut Scope::module(module));
-                    good &= self.argument(p, v, e.span, module, out);
-                }
+                Some(e) => good &= self.argument_of(p, e, module, &mut Scope::module(module), out),
                 None => {
                     self.lab.report(
                         Diagnostic::error(
@@ -451,7 +510,7 @@ impl<'a> Planner<'a, '_> {
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
         }
-        let label = self.text(span);
+        let label = self.call_label(sig, &bound, None).unwrap_or_else(|| self.text(span));
         let Some(body) = body else {
             let step = self.primitive(sig, clauses, &bound, &label, span, &mut inner);
             return step.map(|s| (s, None));
@@ -469,7 +528,9 @@ impl<'a> Planner<'a, '_> {
             return None;
         }
         self.open.push(id);
+        self.lab.calls.push(call.span);
         let result = self.skill_body(sig, clauses, body, handlers, &label, span, &mut inner);
+        self.lab.calls.pop();
         self.open.pop();
         result
     }
@@ -494,9 +555,15 @@ impl<'a> Planner<'a, '_> {
         let declares = slot.is_some();
         self.results.push(slot);
         let outer_handlers = std::mem::take(&mut self.handlers);
-        let contract = self.contract(clauses, inner);
-        let steps = self.block(body, inner);
-        let (needs, invariants, promises, takes) = contract;
+        let asked = self.asked(sig, clauses, inner);
+        let (needs, invariants, promises, takes) = self.contract(clauses, inner);
+        let needs: Vec<_> = asked.into_iter().chain(needs).collect();
+        // What can never begin is not written out: its steps may make no sense.
+        let never = !self.lab.prototype && needs.iter().any(|n| self.lab.graph.constant(n.node) == Some(0.0));
+        let steps = match never {
+            true => self.add("sequence", body.span, Step::Sequence(Vec::new())),
+            false => self.block(body, inner),
+        };
         let verb = verb_text(&sig.verb);
         let step = Step::Skill { verb: verb.clone(), needs, invariants, promises, takes, body: steps };
         let id = self.add(label, span, step);
@@ -536,6 +603,7 @@ impl<'a> Planner<'a, '_> {
                         Argument::Text(format!("{}.{frame}", self.lab.instances[i.0 as usize].name))
                     }
                     Value::Text(t) => Argument::Text(t.clone()),
+                    Value::Enum(node, words) => Argument::Word(*node, words.to_vec()),
                     _ => return None,
                 };
                 Some((name.clone(), argument))
@@ -544,9 +612,10 @@ impl<'a> Planner<'a, '_> {
     }
 }
 
-/// How badly a call's labels fit a signature.
-fn misfit(sig: &Sig, call: &Call) -> usize {
-    let unknown = call.labelled.iter().filter(|(l, _)| !sig.labelled.iter().any(|(s, _)| s.text == l.text)).count();
+/// How badly a call's labels fit a signature; `by` may name the device.
+fn misfit(sig: &Sig, call: &Call, by: bool) -> usize {
+    let named = |l: &str| sig.labelled.iter().any(|(s, _)| s.text == l) || (by && l == "by");
+    let unknown = call.labelled.iter().filter(|(l, _)| !named(&l.text)).count();
     let missing = sig
         .labelled
         .iter()

@@ -1,9 +1,13 @@
 //! Lowering: a workflow becomes the plan, skills written out where they are called.
 
 mod call;
+mod limits;
 mod operation;
+pub mod roles;
 mod stmt;
 mod text;
+
+pub use call::Verb;
 
 use std::collections::BTreeSet;
 
@@ -14,6 +18,7 @@ use crate::ast::{Block, Handlers, ItemKind};
 use crate::elaborate::Elaborator;
 use crate::eval::{Scope, Type, Value};
 use crate::names::DeclId;
+use crate::task::{self, Given, Task};
 
 /// Working state of the lowering of one workflow.
 pub struct Planner<'a, 'e> {
@@ -74,25 +79,58 @@ impl<'a, 'e> Planner<'a, 'e> {
         }
     }
 
-    /// Lowers a workflow; `arguments` are values of its parameters, by name, that were given from outside.
-    pub fn workflow(mut self, id: DeclId, arguments: &[(String, DeclId)]) -> Plan {
-        let decl = self.lab.tables.names.decl(id);
-        let ItemKind::Workflow { name, params, body, handlers, .. } = &decl.item.kind else {
-            let root = self.add("nothing", Span::default(), Step::Sequence(Vec::new()));
-            return Plan {
-                workflow: String::new(),
-                arguments: Vec::new(),
-                steps: self.steps,
-                root,
-                locals: self.locals,
-            };
-        };
+    /// Lowers a workflow or a test.
+    pub fn task(mut self, task: &Task<'a>) -> Plan {
+        let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
-        let shown = self.workflow_parameters(params, arguments, &mut scope);
-        self.lab.readings_live = true;
-        let root = self.guarded(&name.text, name.span, body, handlers, &mut scope);
+        let mut arguments = Vec::new();
+        let root = match &decl.item.kind {
+            ItemKind::Test { name, lab: Some(_), body, handlers } => {
+                self.lab.readings_live = true;
+                self.guarded(&name.text, name.span, body, handlers, &mut scope)
+            }
+            ItemKind::Test { name, .. } => {
+                let tested = match task::tested(self.lab.tables, task.item) {
+                    Ok(tested) => tested,
+                    Err(d) => {
+                        self.lab.report(*d);
+                        None
+                    }
+                };
+                let mut steps = Vec::new();
+                if let Some(tested) = tested {
+                    scope.module = self.lab.tables.names.decl(tested.workflow).module;
+                    steps.push(self.workflow(tested.workflow, &task.given, &mut scope, &mut arguments));
+                    scope.module = decl.module;
+                    steps.extend(tested.rest.iter().filter_map(|s| self.stmt(s, &mut scope)));
+                }
+                self.add(format!("test {}", name.text), name.span, Step::Sequence(steps))
+            }
+            _ => self.workflow(task.item, &task.given, &mut scope, &mut arguments),
+        };
         self.lab.readings_live = false;
-        Plan { workflow: name.text.clone(), arguments: shown, steps: self.steps, root, locals: self.locals }
+        let name = crate::names::item_name(decl.item).map(|n| n.0).unwrap_or_default();
+        let limits = self.limits(false);
+        self.note_limits(&limits);
+        // A test may leave things as it likes.
+        let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
+        Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
+    }
+
+    /// The steps of a workflow; what its parameters are bound to goes into `shown`.
+    fn workflow(
+        &mut self,
+        id: DeclId,
+        given: &[Given<'a>],
+        scope: &mut Scope,
+        shown: &mut Vec<(String, String)>,
+    ) -> StepId {
+        let ItemKind::Workflow { name, params, body, handlers, .. } = &self.lab.tables.names.decl(id).item.kind else {
+            return self.add("nothing", Span::default(), Step::Sequence(Vec::new()));
+        };
+        *shown = self.workflow_parameters(params, given, scope);
+        self.lab.readings_live = true;
+        self.guarded(&name.text, name.span, body, handlers, scope)
     }
 
     /// Adds a node.

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::model::Action;
-use matterix_ir::plan::{Condition, Operation, Step, StepId, Takes};
+use matterix_ir::plan::{Condition, Operation, Presumption, Step, StepId, Takes};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Planner;
 use super::call::Bound;
-use crate::ast::{Call, Clause, ClauseKind, Effect, MemberKind, Sig};
+use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, MemberKind, Sig};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, verb_text};
@@ -27,20 +27,27 @@ impl<'a> Planner<'a, '_> {
     ) -> Option<StepId> {
         let MemberKind::Command { sig, clauses } = &m.member.kind else { return None };
         let device = self.device(sig, &object, call, scope)?;
+        let object_is_device = sig.params.is_empty() && object.is_some();
         let bound = self.bind_arguments(sig, clauses, m.module, call, object, true, scope)?;
         let mut inner = Scope::of_member(device, m);
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
         }
-        let label = self.text(span);
-        let mut operation = self.operation(sig, clauses, &bound, &mut inner)?;
+        let label = self.call_label(sig, &bound, Some((device, object_is_device))).unwrap_or_else(|| self.text(span));
+        let (mut operation, invariants) = self.operation(sig, clauses, &bound, &mut inner)?;
         operation.capability = Some(self.lab.tables.kind_name(owner).to_string());
         operation.device = Some(device);
         if !operation.claims.contains(&device) {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        Some(self.add(label, span, Step::Operation(Box::new(operation))))
+        Some(self.during(label, span, operation, invariants))
+    }
+
+    /// An operation with what must hold while it lasts.
+    fn during(&mut self, label: String, span: Span, operation: Operation, invariants: Vec<Condition>) -> StepId {
+        let body = self.add(label.clone(), span, Step::Operation(Box::new(operation)));
+        if invariants.is_empty() { body } else { self.add(label, span, Step::During { invariants, body }) }
     }
 
     /// A skill without a body.
@@ -53,12 +60,12 @@ impl<'a> Planner<'a, '_> {
         span: Span,
         inner: &mut Scope,
     ) -> Option<StepId> {
-        let mut operation = self.operation(sig, clauses, bound, inner)?;
+        let (mut operation, invariants) = self.operation(sig, clauses, bound, inner)?;
         operation.device = bound.values.iter().find_map(|(_, v)| match v {
             Value::Instance(i) => Some(*i),
             _ => None,
         });
-        Some(self.add(label, span, Step::Operation(Box::new(operation))))
+        Some(self.during(label.to_string(), span, operation, invariants))
     }
 
     fn operation(
@@ -67,27 +74,31 @@ impl<'a> Planner<'a, '_> {
         clauses: &'a [Clause],
         bound: &Bound,
         inner: &mut Scope,
-    ) -> Option<Operation> {
+    ) -> Option<(Operation, Vec<Condition>)> {
+        let mut invariants = Vec::new();
         let mut operation = Operation {
             verb: verb_text(&sig.verb),
             capability: None,
             device: None,
             arguments: self.driver_arguments(bound),
-            needs: Vec::new(),
+            needs: self.asked(sig, clauses, inner),
+            presumes: Vec::new(),
             at_start: Vec::new(),
             at_end: Vec::new(),
             takes: None,
             until: None,
             claims: Vec::new(),
             fails: Vec::new(),
+            limits: Vec::new(),
         };
         for clause in clauses {
             match &clause.kind {
-                ClauseKind::Needs(e) => operation.needs.push(self.condition(e, inner)?),
-                ClauseKind::While(e) => {
-                    let d = crate::eval::types::unsupported(e.span, "`while` conditions of a command");
-                    self.lab.report(d);
+                ClauseKind::Needs { .. } => operation.needs.push(self.need(clause, inner)?),
+                ClauseKind::Presumes { ever, .. } => {
+                    let condition = self.need(clause, inner)?;
+                    operation.presumes.push(Presumption { condition, ever: *ever });
                 }
+                ClauseKind::While(e) => invariants.push(self.condition(e, inner)?),
                 ClauseKind::Fails(names) => operation.fails.extend(names.iter().map(|n| n.text.clone())),
                 ClauseKind::Until(e) => operation.until = Some(self.condition(e, inner)?),
                 ClauseKind::Takes { nominal, bounds } => {
@@ -98,20 +109,27 @@ impl<'a> Planner<'a, '_> {
                         operation.at_end.extend(self.effect(effect, clause.span, inner));
                     }
                 }
-                ClauseKind::Option(_) => {}
+                ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
             }
         }
         operation.claims = self.claims(&operation.at_end);
-        Some(operation)
+        Some((operation, invariants))
     }
 
-    fn effect(&mut self, effect: &'a Effect, span: Span, inner: &mut Scope) -> Option<Action> {
+    /// What the types of the parameters ask for with `where`.
+    pub fn asked(&mut self, sig: &'a Sig, clauses: &'a [Clause], inner: &mut Scope) -> Vec<Condition> {
+        let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
+        let options = clauses.iter().filter_map(|c| match &c.kind {
+            ClauseKind::Option(p) => Some(p),
+            _ => None,
+        });
+        groups.chain(options).filter_map(super::roles::condition_of).filter_map(|e| self.condition(e, inner)).collect()
+    }
+
+    fn effect(&mut self, effect: &'a Effect, span: Span, inner: &mut Scope) -> Vec<Action> {
         match effect {
-            Effect::Assign(target, value) => self.lab.assignment(target, value, None, inner),
-            Effect::Call(call) => {
-                let (fraction, from, to) = self.lab.move_call(call, false, inner)?;
-                Some(self.lab.move_action(fraction, from, to, span))
-            }
+            Effect::Assign(target, value) => self.lab.assignment(target, value, None, inner).into_iter().collect(),
+            Effect::Call(call) => self.lab.call_actions(call, span, inner),
         }
     }
 
@@ -147,11 +165,7 @@ impl<'a> Planner<'a, '_> {
                 }
                 Action::Move { from, to, .. } => {
                     for mixture in [from, to] {
-                        let id = (0..self.lab.instances.len() as u32)
-                            .map(InstanceId)
-                            .filter(|i| self.lab.per_species(*i).is_some())
-                            .nth(*mixture as usize);
-                        out.extend(id.map(|i| self.top(i)));
+                        out.extend(self.lab.mixtures.get(*mixture as usize).map(|i| self.top(*i)));
                     }
                 }
             }
@@ -176,7 +190,13 @@ impl<'a> Planner<'a, '_> {
         let (mut needs, mut invariants, mut promises, mut takes) = (Vec::new(), Vec::new(), Vec::new(), None);
         for clause in clauses {
             match &clause.kind {
-                ClauseKind::Needs(e) => needs.extend(self.condition(e, inner)),
+                ClauseKind::Needs { .. } => needs.extend(self.need(clause, inner)),
+                ClauseKind::Presumes { .. } => self.lab.report(Diagnostic::error(
+                    codes::MISPLACED,
+                    clause.span,
+                    "only what is done by itself presumes something",
+                    "`presumes` belongs to a command or an `extern skill`",
+                )),
                 ClauseKind::While(e) => invariants.extend(self.condition(e, inner)),
                 ClauseKind::Effect(effects) => {
                     for effect in effects {
@@ -190,7 +210,7 @@ impl<'a> Planner<'a, '_> {
                     "a skill with a body lasts as long as its steps",
                     "`until` belongs to a command",
                 )),
-                ClauseKind::Fails(_) | ClauseKind::Option(_) => {}
+                ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
             }
         }
         (needs, invariants, promises, takes)
@@ -205,11 +225,10 @@ impl<'a> Planner<'a, '_> {
             }
             return None;
         };
-        let (a, b) = (self.lab.expr(target, inner), self.lab.expr(value, inner));
-        let (x, y) = (self.lab.value_node(&a)?, self.lab.value_node(&b)?);
-        let node = self.lab.graph.binary(BinaryOp::Eq, x, y);
+        let (a, b) = self.lab.sides(target, value, inner);
+        let Value::Bool(node) = self.lab.compare(Binary::Eq, a, b, target.span, value.span) else { return None };
         let span = target.span.to(value.span);
-        Some(Condition { node, text: self.text(span), span, compared: Vec::new() })
+        Some(Condition { node, text: self.text(span), span, compared: Vec::new(), terms: Vec::new(), refusal: None })
     }
 }
 
@@ -218,7 +237,23 @@ impl<'a> Planner<'a, '_> {
     pub fn check_command(&mut self, device: InstanceId, sig: &'a Sig, clauses: &'a [Clause], m: MemberRef<'a>) {
         let mut scope = Scope::of_member(device, m);
         let bound = self.stand_ins(sig, clauses, m.module, &mut scope);
+        self.check_phrases(clauses, &mut scope);
         self.operation(sig, clauses, &bound, &mut scope);
+    }
+
+    /// What a `says` clause names must be there.
+    fn check_phrases(&mut self, clauses: &'a [Clause], scope: &mut Scope) {
+        for clause in clauses {
+            let ClauseKind::Says { text, when } = &clause.kind else { continue };
+            for part in &text.parts {
+                if let crate::ast::TextPart::Value { value, .. } = part {
+                    self.lab.expr(value, scope);
+                }
+            }
+            if let Some(when) = when {
+                self.lab.truth(when, scope);
+            }
+        }
     }
 
     /// Checks a skill by itself, on stand-ins for its parameters.
@@ -227,6 +262,7 @@ impl<'a> Planner<'a, '_> {
         let crate::ast::ItemKind::Skill { sig, clauses, body, handlers, .. } = &decl.item.kind else { return };
         let mut scope = Scope::module(decl.module);
         let bound = self.stand_ins(sig, clauses, decl.module, &mut scope);
+        self.check_phrases(clauses, &mut scope);
         match body {
             None => {
                 self.operation(sig, clauses, &bound, &mut scope);
@@ -240,14 +276,15 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
-        crate::check::bind(self.lab, &sig.params, module, scope);
-        for (_, params) in &sig.labelled {
-            crate::check::bind(self.lab, params, module, scope);
-        }
-        for clause in clauses {
-            if let ClauseKind::Option(p) = &clause.kind {
-                crate::check::bind(self.lab, std::slice::from_ref(p), module, scope);
-            }
+        let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
+        let options = clauses.iter().filter_map(|c| match &c.kind {
+            ClauseKind::Option(p) => Some(p),
+            _ => None,
+        });
+        for p in groups.chain(options) {
+            let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, module));
+            let value = ty.map_or(Value::Error, |ty| self.lab.placeholder(&ty, &p.name.text));
+            scope.bind(p.name.text.clone(), value);
         }
         Bound { values: scope.vars.clone() }
     }

@@ -1,13 +1,12 @@
 //! Statements, one construct at a time.
 
 use matterix_ir::plan::{Caught, Step, StepId};
-use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
+use matterix_ir::{Diagnostic, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
-use crate::eval::types::unsupported;
 use crate::eval::{Num, Scope, Type, Value};
-use crate::names::DeclId;
+use crate::task::Given;
 
 impl<'a> Planner<'a, '_> {
     /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
@@ -19,6 +18,7 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Let { name, ty, value } => return self.bind(name, ty.as_ref(), value, s.span, scope),
             StmtKind::LetDo { name, call } => {
                 let (step, value) = self.call(call, s.span, scope)?;
+                self.unshadowed(name, scope);
                 match value {
                     Some(v) => scope.bind(name.text.clone(), v),
                     None => {
@@ -87,6 +87,14 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::If { cond, then, otherwise } => {
                 let condition = self.condition(cond, scope)?;
+                // In a skill the arguments may decide it: the other branch need not make sense then.
+                if !self.open.is_empty()
+                    && !self.lab.prototype
+                    && let Some(truth) = self.lab.graph.constant(condition.node)
+                {
+                    let chosen = if truth != 0.0 { Some(then) } else { otherwise.as_ref() };
+                    return chosen.map(|block| self.block(block, scope));
+                }
                 let then = self.block(then, scope);
                 let otherwise = otherwise.as_ref().map(|b| self.block(b, scope));
                 Step::If { condition, then, otherwise }
@@ -109,11 +117,17 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::For { var, set, body } => {
                 let items = self.lab.set(set, scope)?;
+                self.unshadowed(var, scope);
                 let mut turns = Vec::new();
                 for item in items {
                     let depth = scope.vars.len();
+                    let shown = self.lab.spoken(&item);
                     scope.bind(var.text.clone(), item);
-                    turns.push(self.block(body, scope));
+                    let turn = self.block(body, scope);
+                    if let Some(shown) = shown {
+                        self.steps[turn.0 as usize].label = format!("{} = {shown}", var.text);
+                    }
+                    turns.push(turn);
                     super::leave(scope, depth);
                 }
                 Step::Sequence(turns)
@@ -179,10 +193,13 @@ impl<'a> Planner<'a, '_> {
                 Step::Await { job: name.text.clone() }
             }
             StmtKind::Fail { name, text } => {
-                self.plain(text.as_deref().unwrap_or(""), s.span)?;
+                let text = match text {
+                    Some(text) => self.filled(text, scope)?,
+                    None => Text::default(),
+                };
                 let name = name.as_ref().map_or("failure", |n| n.text.as_str()).to_string();
                 self.failures.insert(name.clone());
-                Step::Fail { name, text: text.clone().unwrap_or_default() }
+                Step::Fail { name, text }
             }
             StmtKind::Expect { cond } => {
                 let mut parts = Vec::new();
@@ -194,17 +211,19 @@ impl<'a> Planner<'a, '_> {
                 Step::Expect(conditions)
             }
             StmtKind::Record { value, every } => return self.record(value, every, s.span, scope),
-            StmtKind::Note(text) => {
-                self.plain(text, s.span)?;
-                Step::Note(text.clone())
-            }
-            StmtKind::Ask(text) => {
-                self.plain(text, s.span)?;
-                Step::Ask(text.clone())
-            }
+            StmtKind::Note(text) => Step::Note(self.filled(text, scope)?),
+            StmtKind::Ask(text) => Step::Ask(self.filled(text, scope)?),
             StmtKind::Return { value } => return self.give(value, s.span, scope),
             StmtKind::Run { .. } => {
-                self.lab.report(unsupported(s.span, "`run` statements"));
+                self.lab.report(
+                    Diagnostic::error(
+                        codes::MISPLACED,
+                        s.span,
+                        "`run` begins a test of a workflow",
+                        "not the first statement of such a test",
+                    )
+                    .help("a test with steps of its own, `test NAME in LAB { }`, runs no workflow"),
+                );
                 return None;
             }
         };
@@ -224,8 +243,13 @@ impl<'a> Planner<'a, '_> {
             return body;
         }
         let mut caught = Vec::new();
-        for (name, block) in &handlers.on {
+        for (i, (name, block)) in handlers.on.iter().enumerate() {
             self.check_failure(name);
+            if let Some((first, _)) = handlers.on[..i].iter().find(|(n, _)| n.text == name.text) {
+                let headline = format!("`{}` is handled twice here", name.text);
+                let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "never gets its turn");
+                self.lab.report(d.because(first.span, "the first handler takes it"));
+            }
             self.handlers += 1;
             let step = self.block(block, scope);
             self.handlers -= 1;
@@ -236,6 +260,17 @@ impl<'a> Planner<'a, '_> {
         self.add(label, span, Step::Guarded { body, handlers: caught, finally })
     }
 
+    /// A name that would hide an instance of the lab is reported.
+    fn unshadowed(&mut self, name: &Name, scope: &Scope) {
+        let Some(hidden) = self.lab.of_lab(&name.text, scope) else { return };
+        let headline = format!("`{}` is a name of the lab already", name.text);
+        let mut d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "would hide it");
+        if let Value::Instance(id) = hidden {
+            d = d.because(self.lab.instances[id.0 as usize].span, "declared here");
+        }
+        self.lab.report(d.help("choose another name"));
+    }
+
     /// A value that only a run will have.
     fn unknown_value(&mut self, ty: &Type, name: &str) -> Value {
         let before = self.lab.params.len();
@@ -244,15 +279,6 @@ impl<'a> Planner<'a, '_> {
             p.value = f64::NAN;
         }
         value
-    }
-
-    /// Reports braces in a text: values in texts have no meaning yet.
-    fn plain(&mut self, text: &str, span: Span) -> Option<()> {
-        if text.contains('{') {
-            self.lab.report(unsupported(span, "values inside texts"));
-            return None;
-        }
-        Some(())
     }
 
     fn seconds(&self) -> Unit {
@@ -317,15 +343,13 @@ impl<'a> Planner<'a, '_> {
         span: Span,
         scope: &mut Scope,
     ) -> Option<StepId> {
-        let mut v = self.lab.expr(value, scope);
-        if let Some(ty) = ty {
-            let ty = self.lab.resolve_type(ty, scope.module);
-            v = self.lab.coerce(v, &ty, value.span, &name.text);
-        }
+        let ty = ty.map_or(Type::Any, |ty| self.lab.resolve_type(ty, scope.module));
+        let mut v = self.lab.typed(value, &ty, scope, &name.text);
         if let Value::Concentration(..) = v {
             self.lab.kindless(value.span);
             v = Value::Error;
         }
+        self.unshadowed(name, scope);
         let (kept, steps) = self.keep(&name.text, v, span);
         scope.bind(name.text.clone(), kept);
         match steps.as_slice() {
@@ -353,6 +377,10 @@ impl<'a> Planner<'a, '_> {
             Value::InstanceNode(n) => {
                 let (node, step) = self.keep_node(name, n, Unit::one(), span);
                 (Value::InstanceNode(node), vec![step])
+            }
+            Value::Enum(n, words) if self.depends_on_run(n) => {
+                let (node, step) = self.keep_node(name, n, Unit::one(), span);
+                (Value::Enum(node, words), vec![step])
             }
             Value::Tuple(items) => {
                 let mut steps = Vec::new();
@@ -449,28 +477,21 @@ impl<'a> Planner<'a, '_> {
     pub fn workflow_parameters(
         &mut self,
         params: &'a [Param],
-        arguments: &[(String, DeclId)],
+        given: &[Given<'a>],
         scope: &mut Scope,
     ) -> Vec<(String, String)> {
         let mut shown = Vec::new();
         for p in params {
-            let ty = match &p.ty {
-                Some(ty) => self.lab.resolve_type(ty, scope.module),
-                None => Type::Any,
-            };
-            if let Type::Instance { .. } = ty {
-                self.lab.report(unsupported(p.name.span, "roles: parameters that a lab binds"));
-                scope.bind(p.name.text.clone(), Value::Error);
-                continue;
-            }
-            let given = arguments.iter().find(|(n, _)| *n == p.name.text).map(|(_, id)| *id);
+            let ty = p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, scope.module));
+            let given = given.iter().find(|g| g.name.text == p.name.text);
+            let role = matches!(ty, Type::Instance { .. });
             let (value, span) = match (given, &p.default) {
-                (Some(id), _) => {
-                    let decl = self.lab.tables.names.decl(id);
-                    let crate::ast::ItemKind::Const { value, .. } = &decl.item.kind else { continue };
-                    (self.lab.expr(value, &mut Scope::module(decl.module)), value.span)
+                (Some(g), _) => {
+                    let mut scope = Scope { lab: true, ..Scope::module(g.module) };
+                    (self.lab.hinted(g.value, &ty, &mut scope), g.value.span)
                 }
-                (None, Some(e)) => (self.lab.expr(e, scope), e.span),
+                (None, Some(e)) => (self.lab.hinted(e, &ty, scope), e.span),
+                (None, None) if role => (self.choose_role(p, &ty, scope), p.name.span),
                 // Checked by itself, a workflow may have any value; a run needs one.
                 (None, None) if !self.to_run => (self.unknown_value(&ty, &p.name.text), p.name.span),
                 (None, None) => {
@@ -494,7 +515,21 @@ impl<'a> Planner<'a, '_> {
                     } else if let Some(si) = self.lab.graph.constant(n.node) {
                         shown.push((p.name.text.clone(), matterix_ir::quantity::show_number(si)));
                     }
-                    Value::Num(self.lab.name_param(&p.name.text, n, span))
+                    let named = self.lab.name_param(&p.name.text, n, span);
+                    if let (None, Op::Param(i)) = (given, self.lab.graph.op(named.node)) {
+                        self.lab.defaulted.insert(i);
+                    }
+                    Value::Num(named)
+                }
+                Value::Enum(node, words) => {
+                    let word = self.lab.graph.constant(node).and_then(|v| words.get(v as usize));
+                    shown.extend(word.map(|w| (p.name.text.clone(), w.clone())));
+                    Value::Enum(node, words)
+                }
+                Value::Instance(id) => {
+                    let v = self.check_role(p, Value::Instance(id), span, scope);
+                    shown.push((p.name.text.clone(), self.lab.instances[id.0 as usize].name.clone()));
+                    v
                 }
                 other => other,
             };

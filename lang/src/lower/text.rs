@@ -2,13 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::plan::Condition;
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::plan::{Condition, Refusal};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Span, Text, TextPart, codes};
 
 use super::Planner;
-use crate::ast::{Clause, ClauseKind, Expr, ItemKind, MemberKind, Name};
-use crate::eval::Scope;
-use crate::names::{Names, near};
+use super::call::Bound;
+use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
+use crate::eval::{Scope, Value};
+use crate::names::{Names, near, verb_text};
 
 /// Failures the executor itself raises, and `failure`, which stands for all.
 const BUILT_IN: &[&str] = &["timeout", "broken", "late", "max", "need", "promise", "claimed", "job", "failure"];
@@ -16,20 +18,26 @@ const BUILT_IN: &[&str] = &["timeout", "broken", "late", "max", "need", "promise
 /// Every failure that a `fails` clause declares.
 pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BUILT_IN.iter().map(|s| (*s).to_string()).collect();
-    let mut add = |clauses: &[Clause]| {
+    let add = |clauses: &[Clause], out: &mut BTreeSet<String>| {
         for c in clauses {
-            if let ClauseKind::Fails(names) = &c.kind {
-                out.extend(names.iter().map(|n| n.text.clone()));
+            match &c.kind {
+                ClauseKind::Fails(names) => out.extend(names.iter().map(|n| n.text.clone())),
+                ClauseKind::Needs { failure, .. } => out.extend(failure.iter().map(|n| n.text.clone())),
+                _ => {}
             }
         }
     };
     for decl in &names.decls {
         match &decl.item.kind {
-            ItemKind::Skill { clauses, .. } => add(clauses),
+            ItemKind::Skill { clauses, .. } => add(clauses, &mut out),
             ItemKind::Capability { members, .. } => {
                 for m in members {
-                    if let MemberKind::Command { clauses, .. } = &m.kind {
-                        add(clauses);
+                    match &m.kind {
+                        MemberKind::Command { clauses, .. } => add(clauses, &mut out),
+                        MemberKind::Limit { at_end: false, failure, .. } => {
+                            out.extend(failure.iter().map(|n| n.text.clone()))
+                        }
+                        _ => {}
                     }
                 }
             }
@@ -46,9 +54,48 @@ impl<'a> Planner<'a, '_> {
         if text.chars().count() <= 100 { text } else { text.chars().take(97).chain("...".chars()).collect() }
     }
 
+    /// A call in a skill with its arguments in place of the parameters' names; none where that cannot be said before
+    /// the run, and outside skills, where the text says it.
+    pub fn call_label(&self, sig: &Sig, bound: &Bound, device: Option<(InstanceId, bool)>) -> Option<String> {
+        if self.open.is_empty() || self.lab.prototype {
+            return None;
+        }
+        let shown = |p: &Param| {
+            let (_, value) = bound.values.iter().find(|(name, _)| *name == p.name.text)?;
+            match value {
+                Value::Num(n) => {
+                    let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
+                    Some(unit.show(self.lab.known(n.node)?))
+                }
+                Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
+                Value::Frame(id, frame) => Some(format!("{}.{frame}", self.lab.spoken(&Value::Instance(*id))?)),
+                other => self.lab.spoken(other),
+            }
+        };
+        let mut words = vec![verb_text(&sig.verb)];
+        for p in &sig.params {
+            words.push(shown(p)?);
+        }
+        for (label, params) in &sig.labelled {
+            let p = params.first()?;
+            // What is left out is not said.
+            if !bound.values.iter().any(|(name, v)| *name == p.name.text && *v == Value::Nothing) {
+                words.push(label.text.clone());
+                words.push(shown(p)?);
+            }
+        }
+        match device.map(|(id, object)| (self.lab.instances[id.0 as usize].name.clone(), object)) {
+            Some((name, true)) => words.insert(1, name),
+            Some((name, false)) => words.extend(["by".to_string(), name]),
+            None => {}
+        }
+        Some(words.join(" "))
+    }
+
     /// A condition with what it compares.
     pub fn condition(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Condition> {
         self.lab.comparisons.clear();
+        self.lab.terms.clear();
         let node = self.lab.truth(e, scope)?;
         let compared = std::mem::take(&mut self.lab.comparisons);
         let compared = compared
@@ -58,7 +105,88 @@ impl<'a> Planner<'a, '_> {
                 c
             })
             .collect();
-        Some(Condition { node, text: self.text(e.span), span: e.span, compared })
+        let terms = std::mem::take(&mut self.lab.terms);
+        Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None })
+    }
+
+    /// What a `needs` or `presumes` clause asks, with the failure and the help it names.
+    pub fn need(&mut self, clause: &'a Clause, scope: &mut Scope) -> Option<Condition> {
+        let (ClauseKind::Needs { cond, failure, help } | ClauseKind::Presumes { cond, failure, help, .. }) =
+            &clause.kind
+        else {
+            return None;
+        };
+        let refusal = failure.as_ref().map(|f| Refusal { failure: f.text.clone(), help: help.clone() });
+        Some(Condition { refusal, ..self.condition(cond, scope)? })
+    }
+
+    /// A text with its values as parts.
+    pub fn filled(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Text> {
+        let mut parts = Vec::new();
+        let mut good = true;
+        for part in &text.parts {
+            match part {
+                ast::TextPart::Plain(text) => parts.push(TextPart::Plain(text.clone())),
+                ast::TextPart::Value { value, digits } => {
+                    let v = self.lab.expr(value, scope);
+                    good &= self.shown(v, *digits, value.span, &mut parts);
+                }
+            }
+        }
+        good.then_some(Text { parts })
+    }
+
+    /// Adds a value as a text shows it; false where it has none.
+    fn shown(&mut self, value: Value, digits: Option<u8>, span: Span, out: &mut Vec<TextPart>) -> bool {
+        let plain = |text: &str| TextPart::Plain(text.to_owned());
+        if digits.is_some() && !matches!(value, Value::Num(_) | Value::Error) {
+            self.lab.expected("a quantity, of which digits can be shown", &value, span);
+            return false;
+        }
+        match value {
+            Value::Error => return false,
+            Value::Num(n) => {
+                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                out.push(TextPart::Quantity { value: n.node, unit, digits });
+            }
+            Value::Bool(n) => out.push(TextPart::Bool(n)),
+            Value::Enum(n, words) => out.push(TextPart::Word(n, words.to_vec())),
+            Value::InstanceNode(n) => out.push(TextPart::Instance(n)),
+            Value::Instance(i) | Value::Qualified(i, _) => {
+                out.push(plain(&self.lab.instances[i.0 as usize].name));
+            }
+            Value::Text(text) => out.push(plain(&text)),
+            Value::Nothing => out.push(plain("nothing")),
+            Value::Unlimited => out.push(plain("unlimited")),
+            Value::Species(s) => out.push(plain(&self.lab.tables.species.get(s).name)),
+            Value::Reaction(r) => out.push(plain(&self.lab.tables.reactions[r.0 as usize].name)),
+            Value::Range(low, high) => {
+                self.shown(Value::Num(*low), None, span, out);
+                out.push(plain(" .. "));
+                self.shown(Value::Num(*high), None, span, out);
+            }
+            Value::Tuple(items) | Value::List(items) => {
+                out.push(plain("("));
+                for (i, item) in items.into_iter().enumerate() {
+                    if i > 0 {
+                        out.push(plain(", "));
+                    }
+                    if !self.shown(item, None, span, out) {
+                        return false;
+                    }
+                }
+                out.push(plain(")"));
+            }
+            Value::Concentration(..) => {
+                self.lab.kindless(span);
+                return false;
+            }
+            other => {
+                self.lab.expected("a value that a text can show", &other, span);
+                return false;
+            }
+        }
+        true
     }
 
     /// A failure name in a handler must be one that something can raise.

@@ -97,7 +97,28 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
         }
         modules.push(Module { name, file, tree });
     }
+    let used = used(&modules);
+    for (module, _) in modules.iter_mut().zip(used).filter(|(_, used)| *used) {
+        diagnostics.extend(crate::labware::import(&mut module.tree, module.file, loader));
+    }
     (modules, diagnostics)
+}
+
+/// Which modules the user's files import, directly or through others: data files of the others are not read.
+fn used(modules: &[Module]) -> Vec<bool> {
+    let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
+    let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
+    while let Some(index) = todo.pop() {
+        for item in &modules[index].tree.items {
+            let ItemKind::Use { path, names } = &item.kind else { continue };
+            let candidates = module_candidates(path, names.is_some());
+            let found = candidates.iter().find_map(|c| modules.iter().position(|m| m.name == *c));
+            if let Some(found) = found.filter(|f| !std::mem::replace(&mut used[*f], true)) {
+                todo.push(found);
+            }
+        }
+    }
+    used
 }
 
 /// A tree and what is wrong with its text.
@@ -162,6 +183,9 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         ItemKind::Species { name, .. }
         | ItemKind::Solution { name, .. }
         | ItemKind::Reaction { name, .. }
+        | ItemKind::ReactiveGroup { name, .. }
+        | ItemKind::Material { name, .. }
+        | ItemKind::Hazard { name, .. }
         | ItemKind::Capability { name, .. }
         | ItemKind::Asset { name, .. }
         | ItemKind::Relation { name, .. }
@@ -176,7 +200,12 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         ItemKind::Process(p) => of(&p.name),
         ItemKind::Event(e) => of(&e.name),
         ItemKind::Skill { sig, .. } => Some((verb_text(&sig.verb), sig.span)),
-        ItemKind::Error | ItemKind::Use { .. } | ItemKind::Dimension { .. } | ItemKind::Unit { .. } => None,
+        ItemKind::Error
+        | ItemKind::Use { .. }
+        | ItemKind::Dimension { .. }
+        | ItemKind::Unit { .. }
+        | ItemKind::Incompatible { .. }
+        | ItemKind::Allow { .. } => None,
     }
 }
 

@@ -1,0 +1,65 @@
+//! Hazards on the instances of a lab: conditions that must not come about.
+
+use matterix_ir::plan::Term;
+use matterix_ir::{NodeId, Op, Span};
+
+use super::Elaborator;
+use crate::ast::ItemKind;
+use crate::names::DeclId;
+
+/// A hazard over instances of the lab.
+#[derive(Clone, Debug)]
+pub struct Hazard {
+    /// `above_boiling_point`.
+    pub name: String,
+    /// `above_boiling_point(plate, beaker)`.
+    pub shown: String,
+    /// An error, not a warning.
+    pub grave: bool,
+    /// When it is there.
+    pub when: NodeId,
+    /// The states it depends on.
+    pub states: Vec<u32>,
+    /// The members it names.
+    pub terms: Vec<Term>,
+    /// How to mend it.
+    pub help: Option<String>,
+    /// Its declaration.
+    pub span: Span,
+}
+
+impl Elaborator<'_> {
+    /// Every hazard on every fitting combination of instances, but for those that cannot come about.
+    pub fn hazards(&mut self) -> Vec<Hazard> {
+        let mut out = Vec::new();
+        let names = self.tables.names;
+        for index in 0..names.decls.len() as u32 {
+            let decl = names.decl(DeclId(index));
+            let ItemKind::Hazard { grave, name, params, when, help } = &decl.item.kind else { continue };
+            for (mut scope, shown) in self.tuples(params, decl.module, Some(when), name) {
+                self.terms.clear();
+                let Some(node) = self.truth(when, &mut scope) else { continue };
+                let terms = std::mem::take(&mut self.terms);
+                if self.never(node) {
+                    continue;
+                }
+                let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
+                    Op::State(s) => Some(s),
+                    _ => None,
+                });
+                let states: Vec<u32> = states.collect();
+                out.push(Hazard {
+                    name: name.text.clone(),
+                    shown,
+                    grave: *grave,
+                    when: node,
+                    states,
+                    terms,
+                    help: help.clone(),
+                    span: name.span,
+                });
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,77 @@
+//! Lineage: which reagents the matter in a mixture came from and its walls have touched. It travels with every
+//! transfer and stays when the matter leaves, until the walls are rinsed.
+//!
+//! States are made only where a law or a clause asks for them, and only for the reagents that can get there.
+
+use matterix_ir::model::{Action, Domain, State};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
+
+use super::Elaborator;
+
+impl Elaborator<'_> {
+    /// Whether a mixture has touched a reagent; absent where that reagent cannot get there.
+    fn touched(&mut self, mixture: InstanceId, origin: &str) -> Option<NodeId> {
+        if !self.reach.origins(&self.instances[mixture.0 as usize].name).any(|o| o == origin) {
+            return None;
+        }
+        let key = (mixture, origin.to_string());
+        if let Some(state) = self.lineage.get(&key) {
+            return Some(self.graph.add(Op::State(*state)));
+        }
+        let inst = &self.instances[mixture.0 as usize];
+        let (name, span) = (format!("{}.origins[{origin}]", inst.name), inst.span);
+        let held = inst.origin.as_deref() == Some(origin);
+        let initial = self.graph.number(f64::from(u8::from(held)));
+        let index = self.states.len() as u32;
+        self.state_owner.push(mixture);
+        self.states.push(State { name, domain: Domain::Bool, initial, scale: 1.0, span });
+        self.lineage.insert(key, index);
+        Some(self.graph.add(Op::State(index)))
+    }
+
+    fn origins_of(&self, mixture: InstanceId) -> Vec<String> {
+        self.reach.origins(&self.instances[mixture.0 as usize].name).map(String::from).collect()
+    }
+
+    /// Whether `a` has touched something that `b` has not.
+    pub fn soils(&mut self, a: InstanceId, b: InstanceId) -> NodeId {
+        self.follows_lineage = true;
+        let mut any = self.graph.number(0.0);
+        for origin in self.origins_of(a) {
+            let Some(mut foreign) = self.touched(a, &origin) else { continue };
+            if let Some(known) = self.touched(b, &origin) {
+                let unknown = self.graph.unary(UnaryOp::Not, known);
+                foreign = self.graph.binary(BinaryOp::And, foreign, unknown);
+            }
+            any = self.graph.binary(BinaryOp::Or, any, foreign);
+        }
+        any
+    }
+
+    /// What a transfer does to the lineage of its destination.
+    pub fn inherit(&mut self, from: InstanceId, to: InstanceId, span: Span) -> Vec<Action> {
+        let mut out = Vec::new();
+        for origin in self.origins_of(from) {
+            let (Some(there), Some(here)) = (self.touched(from, &origin), self.touched(to, &origin)) else { continue };
+            let value = self.graph.binary(BinaryOp::Or, here, there);
+            if let Op::State(state) = self.graph.op(here) {
+                out.push(Action::Assign { state, value, span });
+            }
+        }
+        out
+    }
+
+    /// Makes the walls of a mixture clean.
+    pub fn rinse(&mut self, mixture: InstanceId, span: Span) -> Vec<Action> {
+        let clean = self.graph.number(0.0);
+        let mut out = Vec::new();
+        for origin in self.origins_of(mixture) {
+            let node = self.touched(mixture, &origin);
+            if let Some(Op::State(state)) = node.map(|n| self.graph.op(n)) {
+                out.push(Action::Assign { state, value: clean, span });
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,78 @@
+//! Functions of lists: an element by a number known only when running, the ways from one list to another.
+
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
+
+use super::Value;
+use crate::elaborate::Elaborator;
+
+impl Elaborator<'_> {
+    /// The n-th of a list of instances, counted from 1; `nothing` beyond its ends.
+    pub fn nth(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
+        let instances: Option<Vec<InstanceId>> = items
+            .iter()
+            .map(|i| match i {
+                Value::Instance(id) => Some(*id),
+                _ => None,
+            })
+            .collect();
+        if let Some(number) = self.known(n)
+            && number >= 1.0
+            && number.fract() == 0.0
+            && let Some(item) = items.get(number as usize - 1)
+        {
+            return item.clone();
+        }
+        let Some(instances) = instances else {
+            return self.expected("a list of instances", &Value::List(items.to_vec()), at);
+        };
+        let mut found = self.graph.number(-1.0);
+        for (index, id) in instances.iter().enumerate().rev() {
+            let (number, value) = (self.graph.number(index as f64 + 1.0), self.graph.number(f64::from(id.0)));
+            let here = self.graph.binary(BinaryOp::Eq, n, number);
+            found = self.graph.select(here, value, found);
+        }
+        self.picks.insert(found, instances);
+        Value::InstanceNode(found)
+    }
+
+    /// The ways of a distribution: one goes to each, each to its counterpart, or all to one.
+    pub fn paired(&mut self, from: &[Value], to: &[Value], at: Span) -> Value {
+        let pair = |(a, b): (&Value, &Value)| Value::Tuple(vec![a.clone(), b.clone()]);
+        match (from, to) {
+            ([one], many) => Value::List(many.iter().map(|b| pair((one, b))).collect()),
+            (many, [one]) => Value::List(many.iter().map(|a| pair((a, one))).collect()),
+            (a, b) if a.len() == b.len() => Value::List(a.iter().zip(b).map(pair).collect()),
+            (a, b) => {
+                let at = self.calls.first().copied().unwrap_or(at);
+                self.report(
+                    Diagnostic::error(
+                        codes::WRONG_ARGUMENTS,
+                        at,
+                        format!("{} sources cannot go to {} targets one by one", a.len(), b.len()),
+                        "the counts differ",
+                    )
+                    .help("one goes to many, many to as many, or many to one"),
+                );
+                Value::Error
+            }
+        }
+    }
+
+    /// An element of a list in words, where it has a name.
+    pub fn spoken(&self, value: &Value) -> Option<String> {
+        match value {
+            Value::Instance(id) => Some(self.instances[id.0 as usize].name.clone()),
+            Value::List(items) => match items.as_slice() {
+                [] => None,
+                [one] => self.spoken(one),
+                [first, .., last] => Some(format!("{} .. {}", self.spoken(first)?, self.spoken(last)?)),
+            },
+            Value::Tuple(items) if !items.is_empty() => {
+                let names: Option<Vec<String>> = items.iter().map(|i| self.spoken(i)).collect();
+                names.map(|names| format!("({})", names.join(", ")))
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! A definition as lines of an asset: its shape and its grid, one line for all places that are alike and evenly spaced.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::Span;
+
+use super::definition::{Definition, Opening, Well};
+use crate::ast::{Arg, AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
+use crate::elaborate::grids::Place;
+
+/// Unevenness below which places are evenly spaced, mm: definitions are rounded to hundredths.
+const EVEN: f64 = 0.02;
+
+/// The lines a definition stands for; all of them point to where its file is named.
+pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
+    let write = Writer { definition, at };
+    let mut lines: Vec<AssetLine> =
+        definition.size().map(|size| AssetLine::Field(write.shape("box", &size))).into_iter().collect();
+    lines.extend(write.grids().into_iter().map(AssetLine::Grid));
+    lines
+}
+
+struct Writer<'d> {
+    definition: &'d Definition,
+    at: Span,
+}
+
+/// Places with what stands there.
+type Places<'d> = BTreeMap<Place, &'d Well>;
+
+impl<'d> Writer<'d> {
+    fn grids(&self) -> Vec<Grid> {
+        let mut alike: Vec<Places<'d>> = Vec::new();
+        let wells = self.definition.wells().filter_map(|(name, well)| Some((Place::parse(name)?, well)));
+        for (place, well) in wells.collect::<Places<'d>>() {
+            let group = alike.iter_mut().find(|g| g.values().next().is_some_and(|w| same(w, well)));
+            match group {
+                Some(group) => {
+                    group.insert(place, well);
+                }
+                None => alike.push(BTreeMap::from([(place, well)])),
+            }
+        }
+        let mut out = Vec::new();
+        for group in alike {
+            match self.pitch(&group) {
+                Some(pitch) => out.extend(self.line(&group, Some(pitch))),
+                None => out.extend(group.into_iter().filter_map(|one| self.line(&BTreeMap::from([one]), None))),
+            }
+        }
+        out
+    }
+
+    /// From column to column and row to row, mm, where the places fill an even rectangle.
+    fn pitch(&self, group: &Places<'d>) -> Option<[f64; 2]> {
+        let rows: BTreeSet<u32> = group.keys().map(|p| p.row.unwrap_or(0)).collect();
+        let columns: BTreeSet<u32> = group.keys().map(|p| p.column).collect();
+        let (first, last) = (group.first_key_value()?, group.last_key_value()?);
+        let across = |set: &BTreeSet<u32>| set.last().zip(set.first()).map_or(0, |(b, a)| b - a);
+        let (wide, deep) = (across(&columns), across(&rows));
+        let whole = (wide as usize + 1) * (deep as usize + 1) == group.len();
+        let [x, y, _] = self.definition.position(first.1);
+        let [right, front, _] = self.definition.position(last.1);
+        let step = |over: f64, count: u32| if count == 0 { 0.0 } else { over / f64::from(count) };
+        let pitch = [step(right - x, wide), step(y - front, deep)];
+        let even = group.iter().all(|(place, well)| {
+            let (column, row) =
+                (place.column - first.0.column, place.row.unwrap_or(0) as f64 - first.0.row.unwrap_or(0) as f64);
+            let [at_x, at_y, _] = self.definition.position(well);
+            (x + f64::from(column) * pitch[0] - at_x).abs() < EVEN && (y - row * pitch[1] - at_y).abs() < EVEN
+        });
+        (whole && even).then_some(pitch)
+    }
+
+    fn line(&self, group: &Places<'d>, pitch: Option<[f64; 2]>) -> Option<Grid> {
+        let ((from, well), (to, _)) = (group.first_key_value()?, group.last_key_value()?);
+        let (grid, kind) = if self.definition.is_tip_rack() { ("tips", "Tip") } else { ("wells", "Well") };
+        let shape = match well.opening {
+            Opening::Circular { diameter } => self.shape("cylinder", &[diameter, well.depth]),
+            Opening::Rectangular { x_dimension, y_dimension } => {
+                self.shape("box", &[x_dimension, y_dimension, well.depth])
+            }
+        };
+        let volume = self.quantity(well.total_liquid_volume, "uL");
+        let fields = vec![self.field("max_volume", volume), shape];
+        let ty = Path { segments: vec![self.name(kind)], span: self.at };
+        Some(Grid {
+            name: self.name(grid),
+            from: self.name(&from.to_string()),
+            to: (from != to).then(|| self.name(&to.to_string())),
+            literal: AssetLiteral { ty, fields, span: self.at },
+            at: Some(self.lengths(&self.definition.position(well))),
+            pitch: pitch.map(|p| self.lengths(&p)),
+            row: None,
+        })
+    }
+
+    fn name(&self, text: &str) -> Name {
+        Name { text: text.to_string(), span: self.at }
+    }
+
+    fn expr(&self, kind: ExprKind) -> Expr {
+        Expr { kind: Box::new(kind), span: self.at }
+    }
+
+    fn unit(&self, text: &str) -> UnitText {
+        UnitText { text: text.to_string(), span: self.at }
+    }
+
+    fn quantity(&self, value: f64, unit: &str) -> Expr {
+        self.expr(ExprKind::Quantity(value, self.unit(unit)))
+    }
+
+    fn lengths(&self, values: &[f64]) -> Expr {
+        let items = values.iter().map(|v| self.expr(ExprKind::Number(*v))).collect();
+        self.expr(ExprKind::Tuple(items, Some(self.unit("mm"))))
+    }
+
+    fn field(&self, key: &str, value: Expr) -> Field {
+        Field { key: self.name(key), value: FieldValue::Expr(value), span: self.at }
+    }
+
+    /// `shape: box(x, y, z)`.
+    fn shape(&self, kind: &str, sizes: &[f64]) -> Field {
+        let args = sizes.iter().map(|s| Arg { name: None, value: self.quantity(*s, "mm") }).collect();
+        let callee = self.expr(ExprKind::Name(self.name(kind)));
+        self.field("shape", self.expr(ExprKind::Call(callee, args)))
+    }
+}
+
+fn same(a: &Well, b: &Well) -> bool {
+    a.opening == b.opening && a.depth == b.depth && a.total_liquid_volume == b.total_liquid_volume
+}
