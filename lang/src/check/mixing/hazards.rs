@@ -1,0 +1,89 @@
+//! H2: hazards that a step brings about, such as a set point above the boiling point of what stands on the plate.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::model::Domain;
+use matterix_ir::{Diagnostic, Severity, codes};
+
+use super::Walk;
+use super::world::World;
+use crate::elaborate::hazards::Hazard;
+
+/// The hazards of a lab, by the states they depend on.
+pub(super) struct Hazards {
+    all: Vec<Hazard>,
+    by_state: BTreeMap<u32, Vec<usize>>,
+    /// What is reported already, until it is over.
+    present: BTreeSet<usize>,
+}
+
+impl Hazards {
+    pub(super) fn new(all: Vec<Hazard>) -> Self {
+        let mut by_state: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (i, hazard) in all.iter().enumerate() {
+            for s in &hazard.states {
+                by_state.entry(*s).or_default().push(i);
+            }
+        }
+        Hazards { all, by_state, present: BTreeSet::new() }
+    }
+}
+
+impl Walk<'_, '_> {
+    /// Judges the hazards that depend on states that a step changed.
+    pub(super) fn endanger(&mut self, world: &mut World) {
+        let changed = world.take_changed();
+        let touched: BTreeSet<usize> =
+            changed.iter().filter_map(|s| self.hazards.by_state.get(s)).flatten().copied().collect();
+        for i in touched {
+            let hazard = &self.hazards.all[i];
+            if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
+                self.hazards.present.remove(&i);
+                continue;
+            }
+            if self.hazards.present.contains(&i) {
+                continue;
+            }
+            let d = self.hazard(hazard, world);
+            self.hazards.present.insert(i);
+            if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
+                self.found.push(d);
+            }
+        }
+    }
+
+    fn hazard(&self, hazard: &Hazard, world: &World) -> Diagnostic {
+        let place = self.place();
+        let words = hazard.name.replace('_', " ");
+        let code = codes::find(&hazard.name.replace('_', "-")).unwrap_or(codes::HAZARD);
+        let about = hazard.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
+        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
+        let headline = format!("{words}: {}", things.join(" and "));
+        let mut d = Diagnostic::error(code, place, headline, "brings it about");
+        if !hazard.grave {
+            d.severity = Severity::Warning;
+        }
+        let mut places = vec![place];
+        for s in &hazard.states {
+            if let Some(span) = world.set_at(*s)
+                && !places.contains(&span)
+            {
+                places.push(span);
+                let name = &self.eyes.lab.states[*s as usize].name;
+                d = d.because(span, format!("`{name}` is set here"));
+            }
+        }
+        for term in &hazard.terms {
+            let value = self.eyes.value(term.node, world);
+            if let Domain::Quantity(unit) = &term.domain
+                && value.is_finite()
+            {
+                d = d.help(format!("`{}` is {}", term.name, unit.show(value)));
+            }
+        }
+        if let Some(help) = &hazard.help {
+            d = d.help(help.clone());
+        }
+        d
+    }
+}

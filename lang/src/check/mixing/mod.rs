@@ -1,0 +1,351 @@
+//! H1 and M1: which species meet on the way of the plan, and what the vessels are made of.
+//!
+//! The plan is followed in its order. Branches join; loops are followed twice, which brings together whatever more turns
+//! would. Residues count: what was emptied is still wet.
+
+mod eyes;
+mod hazards;
+mod reactions;
+mod report;
+mod world;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Plan, PlanStep, Step, StepId};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, FileId, Severity, Span};
+
+use crate::ast::{MemberKind, Role};
+use crate::elaborate::{Elaborator, SpeciesId};
+use crate::eval::{Type, Value};
+use crate::names::DeclId;
+use crate::screen::Consequence;
+use eyes::Eyes;
+use hazards::Hazards;
+use world::{Before, World};
+
+/// Steps after which loops are followed once only, so that nested loops stay cheap.
+const PATIENCE: usize = 20_000;
+
+/// Judges what the vessels of a lab hold, for a lab without a workflow.
+pub fn contents(lab: &mut Elaborator<'_>) {
+    let nothing = PlanStep { label: String::new(), span: lab.lab_name, step: Step::Sequence(Vec::new()) };
+    let plan = Plan {
+        workflow: String::new(),
+        arguments: Vec::new(),
+        steps: vec![nothing],
+        root: StepId(0),
+        locals: Vec::new(),
+        limits: Vec::new(),
+        ends: Vec::new(),
+    };
+    mixing(lab, &plan);
+}
+
+/// Judges what a plan brings together.
+pub fn mixing(lab: &mut Elaborator<'_>, plan: &Plan) {
+    // Contents and transfers must be right before one can tell what meets.
+    if lab.diagnostics.iter().any(|d| d.severity == Severity::Error) {
+        return;
+    }
+    let materials = materials(lab);
+    let hazards = Hazards::new(lab.hazards());
+    let eyes = Eyes::new(lab);
+    let library: BTreeSet<FileId> =
+        lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
+    let mut walk = Walk {
+        silent: moves_of_plan(plan, &eyes.order),
+        eyes: &eyes,
+        materials,
+        hazards,
+        plan,
+        library,
+        places: vec![plan.get(plan.root).span],
+        seen: BTreeSet::new(),
+        walls: BTreeSet::new(),
+        at_walls: BTreeSet::new(),
+        pending: Vec::new(),
+        found: Vec::new(),
+        steps: 0,
+    };
+    let mut world = World::initial(&eyes, plan.locals.len());
+    walk.begin(&mut world);
+    walk.endanger(&mut world);
+    walk.step(plan.root, world);
+    let found = walk.found;
+    for d in found {
+        lab.report(d);
+    }
+}
+
+/// The transfers between mixtures that operations make themselves.
+fn moves_of_plan(plan: &Plan, order: &[InstanceId]) -> BTreeSet<(InstanceId, InstanceId)> {
+    let mut out = BTreeSet::new();
+    for step in &plan.steps {
+        let Step::Operation(o) = &step.step else { continue };
+        for action in o.at_start.iter().chain(&o.at_end) {
+            if let Action::Move { from, to, .. } = action
+                && let (Some(a), Some(b)) = (order.get(*from as usize), order.get(*to as usize))
+            {
+                out.insert((*a, *b));
+            }
+        }
+    }
+    out
+}
+
+/// What the walls around mixtures are made of: the first parameter that is a material of what holds them.
+fn materials(lab: &mut Elaborator<'_>) -> BTreeMap<InstanceId, DeclId> {
+    let mut out = BTreeMap::new();
+    for m in
+        (0..lab.instances.len() as u32).map(InstanceId).filter(|m| lab.per_species(*m).is_some()).collect::<Vec<_>>()
+    {
+        let holders: Vec<InstanceId> = std::iter::successors(Some(m), |i| lab.instances[i.0 as usize].owner).collect();
+        let found = holders.into_iter().find_map(|i| material_of(lab, i));
+        out.extend(found.map(|material| (m, material)));
+    }
+    out
+}
+
+fn material_of(lab: &mut Elaborator<'_>, id: InstanceId) -> Option<DeclId> {
+    for member in lab.all_members(id) {
+        let MemberKind::Value { role: Role::Param, ty, name, .. } = &member.member.kind else { continue };
+        if !matches!(lab.resolve_type(ty, member.module), Type::Material { .. }) {
+            continue;
+        }
+        if let Value::Material(material) = lab.member_value(id, member, name.span) {
+            return Some(material);
+        }
+    }
+    None
+}
+
+struct Walk<'w, 'a> {
+    eyes: &'w Eyes<'w, 'a>,
+    /// What the wall around each mixture is made of, where that is said.
+    materials: BTreeMap<InstanceId, DeclId>,
+    hazards: Hazards,
+    plan: &'w Plan,
+    /// Transfers that operations make; the others are made by processes and events.
+    silent: BTreeSet<(InstanceId, InstanceId)>,
+    library: BTreeSet<FileId>,
+    /// Places in the user's text around the current step, innermost last.
+    places: Vec<Span>,
+    /// Pairs found, with the place and the mixture.
+    seen: BTreeSet<(Span, SpeciesId, SpeciesId)>,
+    /// Walls looked at, by what touches them.
+    walls: BTreeSet<(InstanceId, SpeciesId)>,
+    at_walls: BTreeSet<(Span, DeclId, SpeciesId)>,
+    /// Findings of the current event, with what they are ranked by.
+    pending: Vec<(Severity, Vec<Consequence>, Diagnostic)>,
+    found: Vec<Diagnostic>,
+    steps: usize,
+}
+
+impl Walk<'_, '_> {
+    /// What the vessels hold when the plan begins.
+    fn begin(&mut self, world: &mut World) {
+        for m in self.eyes.order.clone() {
+            let all: Vec<SpeciesId> = world.present(m).map(|p| p.0.0).collect();
+            for (i, s) in all.iter().enumerate() {
+                self.meet(world, m, *s, &all[..i], None);
+                self.touch(world, m, *s, None);
+            }
+            self.settle();
+            world.react(self.eyes.lab, m, self.eyes.lab.instances[m.0 as usize].span);
+        }
+    }
+
+    fn place(&self) -> Span {
+        self.places.last().copied().unwrap_or_default()
+    }
+
+    fn each(&mut self, steps: &[StepId], world: World) -> World {
+        steps.iter().fold(world, |world, s| self.step(*s, world))
+    }
+
+    fn step(&mut self, id: StepId, world: World) -> World {
+        self.steps += 1;
+        let step = self.plan.get(id);
+        let own = !self.library.contains(&step.span.file) && step.span != Span::default();
+        if own {
+            self.places.push(step.span);
+        }
+        let world = self.inside(&step.step, world);
+        if own {
+            self.places.pop();
+        }
+        world
+    }
+
+    fn inside(&mut self, step: &Step, mut world: World) -> World {
+        match step {
+            Step::Sequence(list) | Step::Parallel(list) => self.each(list, world),
+            Step::Operation(o) => {
+                // What cannot begin does nothing; that is another finding.
+                if o.needs.iter().any(|need| self.eyes.truth(need.node, &world) == Some(false)) {
+                    return world;
+                }
+                for action in o.at_start.iter().chain(&o.at_end) {
+                    self.action(action, &mut world);
+                }
+                self.streams(&mut world);
+                self.endanger(&mut world);
+                world
+            }
+            Step::Guarded { body, handlers, finally } => {
+                let before = world.clone();
+                let mut after = self.step(*body, world);
+                for (_, handler) in handlers {
+                    let handled = self.step(*handler, before.clone().join(after.clone()));
+                    if !self.leaves(*handler) {
+                        after = after.join(handled);
+                    }
+                }
+                match finally {
+                    Some(finally) => self.step(*finally, after),
+                    None => after,
+                }
+            }
+            Step::Try(list) => {
+                let mut before = world.clone();
+                let mut after: Option<World> = None;
+                for s in list {
+                    let done = self.step(*s, before.clone());
+                    before = before.join(done.clone());
+                    after = Some(match after {
+                        Some(a) => a.join(done),
+                        None => done,
+                    });
+                }
+                after.unwrap_or(world)
+            }
+            Step::If { condition, then, otherwise } => match (self.eyes.truth(condition.node, &world), otherwise) {
+                (Some(true), _) => self.step(*then, world),
+                (Some(false), Some(otherwise)) => self.step(*otherwise, world),
+                (Some(false), None) => world,
+                (None, otherwise) => {
+                    let taken = self.step(*then, world.clone());
+                    let not = match otherwise {
+                        Some(otherwise) => self.step(*otherwise, world),
+                        None => world,
+                    };
+                    match (self.leaves(*then), otherwise.is_some_and(|o| self.leaves(o))) {
+                        (true, false) => not,
+                        (false, true) => taken,
+                        _ => taken.join(not),
+                    }
+                }
+            },
+            Step::Repeat { times, body } => {
+                let times = self.eyes.value(*times, &world);
+                if times == 0.0 {
+                    return world;
+                }
+                let once = self.step(*body, world);
+                if times == 1.0 || self.steps > PATIENCE {
+                    return once;
+                }
+                let twice = self.step(*body, once.clone());
+                once.join(twice)
+            }
+            Step::RepeatWhile { body, .. } => {
+                let once = self.step(*body, world.clone());
+                let some = world.join(once.clone());
+                if self.steps > PATIENCE {
+                    return some;
+                }
+                let twice = self.step(*body, once);
+                some.join(twice)
+            }
+            Step::Let { local, value } => {
+                let value = self.eyes.value(*value, &world);
+                world.keep(*local, value);
+                world
+            }
+            Step::Skill { body, .. }
+            | Step::Named { body, .. }
+            | Step::Keep { body, .. }
+            | Step::Within { body, .. }
+            | Step::Claim { body, .. }
+            | Step::Start { body, .. } => self.step(*body, world),
+            _ => world,
+        }
+    }
+
+    /// Whether nothing after a step is reached from it: it fails, or begins the body around it again.
+    fn leaves(&self, id: StepId) -> bool {
+        match &self.plan.get(id).step {
+            Step::Fail { .. } | Step::Retry { .. } => true,
+            Step::Sequence(list) => list.iter().any(|s| self.leaves(*s)),
+            _ => false,
+        }
+    }
+
+    fn action(&mut self, action: &Action, world: &mut World) {
+        let before = match action {
+            Action::Move { from, to, .. } => {
+                let order = &self.eyes.order;
+                order.get(*from as usize).zip(order.get(*to as usize)).map(|(a, b)| (*b, world.before(*a, *b)))
+            }
+            Action::Assign { .. } => None,
+        };
+        world.act(self.eyes, action, self.place());
+        if let Some((to, before)) = before {
+            self.arrived(&before, world, to);
+        }
+    }
+
+    /// Transfers that processes and events make from now on.
+    fn streams(&mut self, world: &mut World) {
+        let lab = self.eyes.lab;
+        let mut active: BTreeSet<(InstanceId, InstanceId)> = BTreeSet::new();
+        let mut by_process: BTreeSet<(InstanceId, InstanceId)> = BTreeSet::new();
+        for (process, from, to) in &lab.streams {
+            by_process.insert((*from, *to));
+            let guard = lab.processes.get(*process).and_then(|p| p.guard);
+            if guard.is_none_or(|g| self.eyes.truth(g, world) != Some(false)) {
+                active.insert((*from, *to));
+            }
+        }
+        let by_event = lab.moves.iter().filter(|m| !by_process.contains(m) && !self.silent.contains(m));
+        active.extend(by_event);
+        // One stream may feed the next.
+        for _ in 0..active.len() {
+            let mut changed = false;
+            for (from, to) in &active {
+                let fresh = |w: &World| w.present(*to).filter(|(_, e)| !e.residue).count();
+                let (before, count) = (world.before(*from, *to), fresh(world));
+                world.transfer(self.eyes, f64::NAN, *from, *to, self.place(), true);
+                if fresh(world) != count {
+                    changed = true;
+                    self.arrived(&before, world, *to);
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+    }
+
+    /// Judges what a transfer brought.
+    fn arrived(&mut self, before: &Before, world: &mut World, to: InstanceId) {
+        let brought: Vec<SpeciesId> = before.source.iter().filter(|(_, e)| !e.residue).map(|p| *p.0).collect();
+        let there: Vec<SpeciesId> = before.target.keys().copied().collect();
+        for s in &brought {
+            let others: Vec<SpeciesId> = there.iter().filter(|o| !brought.contains(o)).copied().collect();
+            if !there.contains(s) {
+                self.meet(world, to, *s, &others, Some(before));
+            }
+            self.touch(world, to, *s, Some(before));
+        }
+        let place = self.place();
+        let made = world.react(self.eyes.lab, to, place);
+        for s in made {
+            let all: Vec<SpeciesId> = world.present(to).map(|p| p.0.0).filter(|o| *o != s).collect();
+            self.meet(world, to, s, &all, None);
+        }
+        self.settle();
+    }
+}

@@ -1,0 +1,278 @@
+//! What each mixture holds while the plan is followed: every species that got there, how concentrated, and on which way.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::Span;
+use matterix_ir::model::Action;
+use matterix_ir::scene::InstanceId;
+
+use super::eyes::Eyes;
+use crate::elaborate::SpeciesId;
+use crate::screen::Presence;
+
+/// A way that a species took into a mixture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Came {
+    /// The holding line, or the step of a transfer.
+    pub span: Span,
+    /// The mixture it got into there.
+    pub into: InstanceId,
+}
+
+/// A species in a mixture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Entry {
+    /// mol per kg of mixture as it is now (kg per kg where counted by mass), not more than this; absent if not known.
+    pub content: Option<f64>,
+    /// There whatever way the plan takes.
+    pub certain: bool,
+    /// What is left on the walls of something emptied.
+    pub residue: bool,
+    /// The places in the text that brought it, first to last.
+    pub came: Vec<Came>,
+}
+
+/// What two mixtures held before a transfer.
+pub struct Before {
+    /// Where it comes from.
+    pub source: BTreeMap<SpeciesId, Entry>,
+    /// Where it goes.
+    pub target: BTreeMap<SpeciesId, Entry>,
+}
+
+/// A transfer of less is what rounding leaves, kg.
+const SPECK: f64 = 1e-10;
+
+/// The longest history that is kept of one species in one mixture.
+const HISTORY: usize = 4;
+
+/// The state of the lab at one point of the plan, without the work of time: nothing warms up or reacts.
+#[derive(Clone, Debug)]
+pub struct World {
+    /// By mixture.
+    pub mixtures: BTreeMap<InstanceId, BTreeMap<SpeciesId, Entry>>,
+    /// By state index; not a number where it is not known.
+    pub states: Vec<f64>,
+    /// By the index of kept values; not a number where it is not known.
+    pub locals: Vec<f64>,
+    /// The step that last assigned a state.
+    set: BTreeMap<u32, Span>,
+    /// States changed since they were last asked for.
+    changed: BTreeSet<u32>,
+}
+
+impl World {
+    /// Where the plan begins: what everything holds.
+    pub fn initial(eyes: &Eyes<'_, '_>, locals: usize) -> World {
+        let lab = eyes.lab;
+        let mut world = World {
+            mixtures: BTreeMap::new(),
+            states: vec![f64::NAN; lab.states.len()],
+            locals: vec![f64::NAN; locals],
+            set: BTreeMap::new(),
+            changed: (0..lab.states.len() as u32).collect(),
+        };
+        // Initial values depend on parameters only.
+        for (i, state) in lab.states.iter().enumerate() {
+            world.states[i] = eyes.value(state.initial, &world);
+        }
+        for &m in &eyes.order {
+            let instance = &lab.instances[m.0 as usize];
+            let mut entries = BTreeMap::new();
+            for (s, amount) in &instance.contents {
+                let amount = eyes.value(*amount, &world);
+                if amount == 0.0 {
+                    continue;
+                }
+                let owner = instance.owner.map_or("", |o| lab.instances[o.0 as usize].name.as_str());
+                let at = |name: &str| lab.held_at.get(&(name.to_string(), *s)).copied();
+                let span = at(&instance.name).or_else(|| at(owner)).unwrap_or(instance.span);
+                let came = vec![Came { span, into: m }];
+                entries.insert(*s, Entry { content: None, certain: true, residue: false, came });
+            }
+            world.mixtures.insert(m, entries);
+        }
+        for &m in &eyes.order {
+            world.weigh(eyes, m);
+        }
+        world
+    }
+
+    /// What two mixtures hold now.
+    pub fn before(&self, from: InstanceId, to: InstanceId) -> Before {
+        let of = |m: InstanceId| self.mixtures.get(&m).cloned().unwrap_or_default();
+        Before { source: of(from), target: of(to) }
+    }
+
+    /// What is in a mixture, as the screen asks for it.
+    pub fn present(&self, m: InstanceId) -> impl Iterator<Item = (Presence, &Entry)> {
+        self.mixtures.get(&m).into_iter().flatten().map(|(s, e)| ((*s, e.content), e))
+    }
+
+    /// Brings the contents of a mixture up to date with the amounts, where these are known.
+    fn weigh(&mut self, eyes: &Eyes<'_, '_>, m: InstanceId) {
+        let mass = eyes.mass(m, self);
+        if mass.is_nan() || mass <= 0.0 {
+            return;
+        }
+        let Some(entries) = self.mixtures.get_mut(&m) else { return };
+        for (s, state) in eyes.amounts.get(&m).map_or(&[][..], Vec::as_slice) {
+            if let Some(entry) = entries.get_mut(s) {
+                let content = self.states[*state as usize] / mass;
+                // Made on the way: known as a bound, not as an amount.
+                if content > 0.0 || entry.residue {
+                    entry.content = Some(content);
+                }
+            }
+        }
+    }
+
+    /// The states changed since this was last asked.
+    pub fn take_changed(&mut self) -> BTreeSet<u32> {
+        std::mem::take(&mut self.changed)
+    }
+
+    /// The step that last assigned a state.
+    pub fn set_at(&self, state: u32) -> Option<Span> {
+        self.set.get(&state).copied()
+    }
+
+    /// Keeps a value.
+    pub fn keep(&mut self, local: u32, value: f64) {
+        if let Some(slot) = self.locals.get_mut(local as usize) {
+            *slot = value;
+        }
+    }
+
+    /// An action of an operation: assignments change states, transfers take a share of everything.
+    pub fn act(&mut self, eyes: &Eyes<'_, '_>, action: &Action, step: Span) {
+        match action {
+            Action::Assign { state, value, .. } => {
+                let value = eyes.value(*value, self);
+                // Lineage that ends says that the walls were rinsed.
+                if value == 0.0
+                    && self.states[*state as usize] == 1.0
+                    && let Some(m) = eyes.lineage.get(state)
+                    && let Some(entries) = self.mixtures.get_mut(m)
+                {
+                    entries.retain(|_, e| !e.residue);
+                }
+                self.states[*state as usize] = value;
+                self.set.insert(*state, step);
+                self.changed.insert(*state);
+            }
+            Action::Move { fraction, from, to, .. } => {
+                let share = eyes.value(*fraction, self);
+                let (Some(&from), Some(&to)) = (eyes.order.get(*from as usize), eyes.order.get(*to as usize)) else {
+                    return;
+                };
+                if share == 0.0 || from == to {
+                    return;
+                }
+                self.transfer(eyes, share, from, to, step, true);
+            }
+        }
+    }
+
+    /// Takes a share, which may be not a number, from one mixture into another.
+    pub fn transfer(
+        &mut self,
+        eyes: &Eyes<'_, '_>,
+        share: f64,
+        from: InstanceId,
+        to: InstanceId,
+        step: Span,
+        certain: bool,
+    ) {
+        let moved = share * eyes.mass(from, self);
+        let known = share > 0.0 && share <= 1.0 + 1e-9;
+        let share = if known { share.min(1.0) } else { f64::NAN };
+        if let (Some(have), Some(get)) = (eyes.extensive.get(&from), eyes.extensive.get(&to)) {
+            for (key, a) in have {
+                let there = self.states[*a as usize];
+                if there == 0.0 {
+                    continue;
+                }
+                if let Some(b) = get.get(key) {
+                    self.states[*b as usize] += share * there;
+                }
+                self.states[*a as usize] = there - share * there;
+                self.changed.insert(*a);
+                self.changed.extend(get.get(key));
+            }
+        }
+        if moved < SPECK {
+            return;
+        }
+        let source = self.mixtures.get(&from).cloned().unwrap_or_default();
+        let emptied = share >= 1.0 - 1e-9;
+        if emptied && let Some(entries) = self.mixtures.get_mut(&from) {
+            entries.values_mut().for_each(|e| e.residue = true);
+        }
+        let target = self.mixtures.entry(to).or_default();
+        for (s, entry) in source {
+            // What stuck to the walls of the source is not worth a history of its own.
+            if entry.residue {
+                continue;
+            }
+            let mut came = entry.came.clone();
+            if came.len() < HISTORY && came.last().is_none_or(|c| c.span != step || c.into != to) {
+                came.push(Came { span: step, into: to });
+            }
+            let arrived = Entry { came, certain: entry.certain && certain, residue: false, content: entry.content };
+            match target.get_mut(&s) {
+                None => {
+                    target.insert(s, arrived);
+                }
+                Some(there) => {
+                    there.content = greater(there.content, arrived.content);
+                    there.certain |= arrived.certain;
+                    if there.residue {
+                        there.came = arrived.came;
+                        there.residue = false;
+                    }
+                }
+            }
+        }
+        self.weigh(eyes, to);
+    }
+
+    /// What may be there after either of two ways.
+    pub fn join(mut self, other: World) -> World {
+        for (value, o) in self.states.iter_mut().zip(&other.states) {
+            if *value != *o {
+                *value = f64::NAN;
+            }
+        }
+        for (value, o) in self.locals.iter_mut().zip(&other.locals) {
+            if *value != *o {
+                *value = f64::NAN;
+            }
+        }
+        self.changed.extend(other.changed);
+        self.set.extend(other.set);
+        for (m, entries) in other.mixtures {
+            let mine = self.mixtures.entry(m).or_default();
+            for (s, entry) in mine.iter_mut() {
+                entry.certain &= entries.get(s).is_some_and(|e| e.certain);
+            }
+            for (s, entry) in entries {
+                match mine.get_mut(&s) {
+                    Some(there) => {
+                        there.content = greater(there.content, entry.content);
+                        there.residue &= entry.residue;
+                    }
+                    None => {
+                        mine.insert(s, Entry { certain: false, ..entry });
+                    }
+                }
+            }
+        }
+        self
+    }
+}
+
+/// The greater bound; none if one of them is not known.
+fn greater(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    a.zip(b).map(|(a, b)| a.max(b))
+}
