@@ -1,0 +1,131 @@
+//! S1, D3, R1, R2: what no order and no patience mends. All of it is about the run in which nothing fails.
+
+mod deadlock;
+mod show;
+mod takes;
+mod twice;
+mod windows;
+
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+
+use matterix_ir::Diagnostic;
+use matterix_ir::model::{Derivative, Event};
+use matterix_ir::plan::{Caught, Plan, Step, StepId};
+use matterix_timing::walk::Durations;
+use matterix_timing::{Known, Point, ROUNDING, Scope, Timing};
+
+use crate::elaborate::Elaborator;
+
+/// Networks are searched from at most so many points: plans with more branches than that are left to the run.
+const MOST_SEARCHES: usize = 4000;
+
+/// Reports contradictions in the times of a plan and in the use of instances.
+pub fn plan(lab: &mut Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) {
+    let found = findings(lab, plan, derivatives, events);
+    found.into_iter().for_each(|d| lab.report(d));
+}
+
+fn findings(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
+    let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
+    let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
+    let timing = Timing::of(plan, &known, Durations::Bounds);
+    let mut found = takes::findings(plan, &known, &timing);
+    let (late, network) = windows::findings(plan, &timing);
+    let told = |d: &Diagnostic| found.iter().any(|f: &Diagnostic| f.code == d.code && f.span() == d.span());
+    let late: Vec<Diagnostic> = late.into_iter().filter(|d| !told(d)).collect();
+    found.extend(late);
+    // What is contradicted says nothing about who meets whom.
+    let times = Times::new(plan, Timing { network, ..timing });
+    let name = |i: matterix_ir::scene::InstanceId| {
+        lab.instances.get(i.0 as usize).map_or_else(String::new, |i| i.name.clone())
+    };
+    found.extend(twice::findings(&times, &name));
+    found.extend(deadlock::findings(&times, &name));
+    found
+}
+
+/// Least times from a point to all others, s, with what holds in some scopes.
+type Searched = BTreeMap<(Point, Vec<Scope>), Vec<f64>>;
+
+/// The plan with its times, and answers about pairs of steps.
+struct Times<'p> {
+    plan: &'p Plan,
+    timing: Timing,
+    searched: RefCell<Searched>,
+    searches: Cell<usize>,
+}
+
+impl<'p> Times<'p> {
+    fn new(plan: &'p Plan, timing: Timing) -> Self {
+        Times { plan, timing, searched: RefCell::default(), searches: Cell::new(0) }
+    }
+
+    /// The least time between two points, s; none where it is not known.
+    fn least(&self, from: Point, to: Point, scopes: &[Scope]) -> Option<f64> {
+        if from == to {
+            return Some(0.0);
+        }
+        let key = (from, scopes.to_vec());
+        let mut searched = self.searched.borrow_mut();
+        if !searched.contains_key(&key) {
+            if self.searches.get() >= MOST_SEARCHES {
+                return None;
+            }
+            self.searches.set(self.searches.get() + 1);
+            searched.insert(key.clone(), self.timing.network.least_from(from, scopes).unwrap_or_default());
+        }
+        let least = searched.get(&key)?.get(to.0 as usize).copied()?;
+        least.is_finite().then_some(least)
+    }
+
+    /// Whether the plan lets two steps run at the same time, as far as its shape tells.
+    fn beside(&self, a: StepId, b: StepId) -> bool {
+        match (self.timing.visit(a), self.timing.visit(b)) {
+            (Some(a), Some(b)) => self.timing.beside(a, b),
+            _ => false,
+        }
+    }
+
+    /// Whether one step is over before the other begins in every run.
+    fn apart(&self, a: StepId, b: StepId) -> bool {
+        let (a, b) = (self.all_turns(a, b), self.all_turns(b, a));
+        let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
+        let scopes = [a.scope, b.scope];
+        // Two actions without duration meet where nothing keeps them apart; others may follow each other closely.
+        let at_once = a.lasts.max <= 0.0 && b.lasts.max <= 0.0;
+        let gap = if at_once { ROUNDING } else { -ROUNDING };
+        let after = |first: Point, second: Point| self.least(first, second, &scopes).is_some_and(|t| t > gap);
+        after(a.end, b.start) || after(b.end, a.start)
+    }
+
+    /// Whether the steps run at the same time in every run.
+    fn together(&self, a: StepId, b: StepId) -> bool {
+        let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
+        let scopes = [a.scope, b.scope];
+        let sure = scopes.iter().all(|s| *s == matterix_timing::network::WHOLE);
+        let at_least = |from: Point, to: Point, lasts: f64| {
+            let least = self.least(from, to, &scopes);
+            least.is_some_and(|t| if lasts > 0.0 { t > ROUNDING } else { t >= -ROUNDING })
+        };
+        sure && at_least(a.start, b.end, b.lasts.min) && at_least(b.start, a.end, a.lasts.min)
+    }
+
+    /// The outermost loop around a step that is not around the other, else the step itself: what is known of times in
+    /// a loop is known of its last turn.
+    fn all_turns(&self, step: StepId, other: StepId) -> StepId {
+        let outer: Vec<StepId> = self.timing.around(other).collect();
+        let is_loop = |s: &StepId| matches!(self.plan.get(*s).step, Step::Repeat { .. } | Step::RepeatWhile { .. });
+        self.timing.around(step).take_while(|s| !outer.contains(s)).filter(is_loop).last().unwrap_or(step)
+    }
+}
+
+/// Whether a handler around a step names a failure: whoever wrote it expects it.
+fn expected(plan: &Plan, timing: &Timing, step: StepId, failure: &str) -> bool {
+    timing.around(step).any(|around| match &plan.get(around).step {
+        Step::Guarded { handlers, .. } => {
+            handlers.iter().any(|(caught, _)| matches!(caught, Caught::Named(name) if name == failure))
+        }
+        _ => false,
+    })
+}

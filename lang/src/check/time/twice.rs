@@ -1,0 +1,115 @@
+//! R1: one instance used by two steps at the same time.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_timing::usage::{self, Use};
+
+use super::{Times, expected, show};
+
+/// Pairs of uses at most.
+const MOST: usize = 200_000;
+
+/// Uses that overlap, or may, where nothing makes them take turns.
+pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
+    let uses = usage::uses(times.plan, &times.timing);
+    let mut clashes: Vec<(&Use, &Use, bool)> = Vec::new();
+    let mut pairs = 0;
+    for (i, first) in uses.iter().enumerate() {
+        for second in uses[i + 1..].iter().take_while(|u| u.instance == first.instance) {
+            if thread(times, first.step) == thread(times, second.step) {
+                continue;
+            }
+            pairs += 1;
+            if pairs <= MOST {
+                clashes.extend(clash(times, first, second).map(|sure| (first, second, sure)));
+            }
+        }
+    }
+    // Between two lines of steps one clash over an instance is said, a certain one before one that may be.
+    clashes.sort_by_key(|c| !c.2);
+    let mut said: BTreeSet<(InstanceId, StepId, StepId)> = BTreeSet::new();
+    clashes.retain(|(a, b, _)| said.insert((a.instance, line(times, a.step), line(times, b.step))));
+    clashes.into_iter().map(|(a, b, sure)| finding(times, a, b, sure, &name(a.instance))).collect()
+}
+
+fn thread(times: &Times<'_>, step: StepId) -> u32 {
+    times.timing.visit(step).map_or(0, |v| v.thread)
+}
+
+/// The line of steps a step stands in, as the step it began with.
+fn line(times: &Times<'_>, step: StepId) -> StepId {
+    let inside = |s: &StepId| thread(times, *s) == thread(times, step);
+    times.timing.around(step).take_while(inside).last().unwrap_or(step)
+}
+
+/// Whether two uses overlap: certainly, perhaps, or (none) never.
+fn clash(times: &Times<'_>, a: &Use, b: &Use) -> Option<bool> {
+    if !times.beside(a.step, b.step)
+        || take_turns(times, a, b)
+        || expected(times.plan, &times.timing, a.step, "claimed")
+    {
+        return None;
+    }
+    if times.together(a.step, b.step) {
+        return Some(true);
+    }
+    if times.apart(a.step, b.step) || harmless(times, a.step, b.step) {
+        return None;
+    }
+    Some(false)
+}
+
+/// Whether both stand in a `claim` of the instance that is not around the other.
+fn take_turns(times: &Times<'_>, a: &Use, b: &Use) -> bool {
+    let claimed = |own: &Use, other: &Use| {
+        let others: Vec<StepId> = times.timing.around(other.step).collect();
+        times.timing.around(own.step).filter(|s| !others.contains(s)).any(|s| match &times.plan.get(s).step {
+            Step::Claim { claims, .. } => claims.contains(&own.instance),
+            _ => false,
+        })
+    };
+    claimed(a, b) && claimed(b, a)
+}
+
+/// Two commands that are over at once meet only by chance, and only those that set the same are then in doubt.
+fn harmless(times: &Times<'_>, a: StepId, b: StepId) -> bool {
+    let at_once = |s: StepId| times.timing.visit(s).is_some_and(|v| v.lasts.max <= 0.0);
+    at_once(a) && at_once(b) && written(times.plan, a).is_disjoint(&written(times.plan, b))
+}
+
+/// The states that a step and what is below it assign.
+fn written(plan: &Plan, step: StepId) -> BTreeSet<u32> {
+    let mut out = BTreeSet::new();
+    let mut open = vec![step];
+    while let Some(step) = open.pop() {
+        let node = &plan.get(step).step;
+        if let Step::Operation(operation) = node {
+            out.extend(operation.at_start.iter().chain(&operation.at_end).filter_map(|a| match a {
+                Action::Assign { state, .. } => Some(*state),
+                _ => None,
+            }));
+        }
+        open.extend(node.children());
+    }
+    out
+}
+
+fn finding(times: &Times<'_>, a: &Use, b: &Use, sure: bool, name: &str) -> Diagnostic {
+    let own = |u: &Use| times.plan.get(show::own(times.plan, &times.timing, u.step));
+    let (mut first, mut second) = (own(a), own(b));
+    if first.span > second.span {
+        std::mem::swap(&mut first, &mut second);
+    }
+    let may = if sure { "" } else { "may " };
+    let headline = format!("`{}` and `{}` {may}use `{name}` at the same time", first.label, second.label);
+    let mut d = Diagnostic::error(codes::CLAIMED_TWICE, second.span, headline, format!("uses `{name}`"))
+        .because(first.span, format!("`{name}` {} in use here", if sure { "is" } else { "may be" }));
+    if !sure {
+        d.severity = Severity::Warning;
+    }
+    d.help(format!("put each into `claim {name} {{ }}`, so that they take turns, or do one after the other"))
+}
