@@ -3,7 +3,7 @@
 use matterix_ir::{Diagnostic, Severity, Sources, codes};
 
 use super::ignored;
-use crate::ast::{AssetLine, FieldValue, Item, ItemKind, MemberKind, Param, Role};
+use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
@@ -35,7 +35,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
     };
     match &item.kind {
         ItemKind::Capability { .. } => capability(lab, id, module),
-        ItemKind::Asset { .. } => asset(lab, id, item),
+        ItemKind::Asset { .. } => asset(lab, id, item, module),
         ItemKind::Process(p) => {
             let mut scope = Scope::module(module);
             bind(lab, &p.params, module, &mut scope);
@@ -46,11 +46,18 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             bind(lab, &e.params, module, &mut scope);
             lab.check_event(e, &mut scope);
         }
-        ItemKind::Fn { params, body, external, name, .. } => {
+        ItemKind::Hazard { params, when, .. } => {
+            let mut scope = Scope::module(module);
+            bind(lab, params, module, &mut scope);
+            lab.truth(when, &mut scope);
+        }
+        ItemKind::Fn { params, body, external, name, result, options } => {
+            report(lab, ignored::limits("a function", options));
             let mut scope = Scope::module(module);
             bind(lab, params, module, &mut scope);
             if let Some(body) = body {
-                lab.expr(body, &mut scope);
+                let ty = result.as_ref().map_or(Type::Any, |ty| lab.resolve_type(ty, module));
+                lab.hinted(body, &ty, &mut scope);
             } else if *external && !crate::eval::external::is_bound(&name.text) {
                 lab.report(
                     Diagnostic::error(
@@ -69,18 +76,14 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             lab.truth(body, &mut scope);
         }
         ItemKind::Const { value, ty, name } => {
-            let v = lab.expr(value, &mut Scope::module(module));
-            if let Some(ty) = ty {
-                let ty = lab.resolve_type(ty, module);
-                lab.coerce(v, &ty, value.span, &name.text);
-            }
+            let ty = ty.as_ref().map_or(Type::Any, |ty| lab.resolve_type(ty, module));
+            lab.typed(value, &ty, &mut Scope::module(module), &name.text);
         }
         ItemKind::Solution { .. } => {
             lab.composition(id);
             lab.check_label(id);
         }
-        ItemKind::Reaction { name, fields, .. } => {
-            report(lab, ignored::reaction(fields));
+        ItemKind::Reaction { name, .. } => {
             for (index, r) in lab.tables.reactions.iter().enumerate() {
                 if r.module == module && r.name.trim_end_matches(".reverse") == name.text {
                     lab.check_rate(crate::eval::ReactionId(index as u32));
@@ -90,21 +93,22 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
         ItemKind::Species { fields, .. } => {
             for f in fields {
                 if let FieldValue::Expr(e) = &f.value
-                    && !matches!(f.key.text.as_str(), "by" | "same_as" | "phase" | "hazards" | "color" | "solubility")
+                    && !matches!(
+                        f.key.text.as_str(),
+                        "by" | "same_as" | "phase" | "hazards" | "reactive_groups" | "color" | "solubility"
+                    )
                 {
                     lab.expr(e, &mut Scope::module(module));
                 }
             }
         }
-        ItemKind::Skill { sig, .. } => {
-            report(lab, ignored::parameters(sig));
+        ItemKind::Skill { .. } => {
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }
         ItemKind::Driver { .. } => later(lab, "drivers"),
         ItemKind::Study { .. } => later(lab, "studies"),
         ItemKind::Fit { .. } => later(lab, "fits"),
-        ItemKind::Test { .. } => later(lab, "tests"),
         _ => {}
     }
 }
@@ -146,7 +150,17 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
                 lab.initial_mode = false;
                 lab.readings_live = false;
                 let state = matches!(role, Role::State | Role::Extensive);
-                if state && !matches!(ty, Type::Bool | Type::Quantity { .. } | Type::Instance { .. } | Type::Any) {
+                if state
+                    && !matches!(
+                        ty,
+                        Type::Bool
+                            | Type::Int
+                            | Type::Quantity { .. }
+                            | Type::Instance { .. }
+                            | Type::Enum(_)
+                            | Type::Any
+                    )
+                {
                     let shown = lab.tables.type_name(&ty);
                     lab.report(unsupported(name.span, &format!("states that hold {shown}")));
                 }
@@ -161,10 +175,10 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
             MemberKind::Process(p) => lab.check_process(p, &mut Scope::of_member(this, m)),
             MemberKind::Event(e) => lab.check_event(e, &mut Scope::of_member(this, m)),
             MemberKind::Command { sig, clauses } => {
-                report(lab, ignored::parameters(sig));
                 let mut planner = Planner::new(lab, &EMPTY);
                 planner.check_command(this, sig, clauses, m);
             }
+            MemberKind::Limit { cond, .. } => drop(lab.truth(cond, &mut Scope::of_member(this, m))),
             MemberKind::Frame { .. } | MemberKind::Error => {}
         }
     }
@@ -173,14 +187,24 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
 /// Labels of a declaration checked by itself are never shown.
 static EMPTY: std::sync::LazyLock<Sources> = std::sync::LazyLock::new(Sources::default);
 
-fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item) {
+fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize) {
     let ItemKind::Asset { lines, source, .. } = &item.kind else { return };
-    if let Some((word, _)) = source {
+    if let Some((word, _)) = source
+        && !crate::labware::is_known(word)
+    {
         lab.report(unsupported(word.span, "assets from files"));
     }
     for line in lines {
-        if let AssetLine::Field(f) = line {
-            lab.check_fields(id, std::slice::from_ref(f));
+        let literal = match line {
+            AssetLine::Field(f) => {
+                lab.check_fields(id, std::slice::from_ref(f));
+                continue;
+            }
+            AssetLine::Part { literal, .. } | AssetLine::Grid(Grid { literal, .. }) => literal,
+            _ => continue,
+        };
+        if let Some(kind) = lab.kind_named(&literal.ty, module) {
+            lab.check_fields(kind, &literal.fields);
         }
     }
     let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));

@@ -1,24 +1,40 @@
 //! What would be read and then have no effect: said, so that nothing written is passed over in silence.
 
+use matterix_ir::stock::Count;
 use matterix_ir::{Diagnostic, codes};
 
-use crate::ast::{Field, NamedExpr, Role, Sig};
-use crate::elaborate::species::field;
-use crate::eval::types::unsupported;
+use crate::ast::{NamedExpr, Role};
 use crate::names::near;
+use crate::stock::{COUNTS_AS, count_of};
 
 /// Options of a member that mean nothing for a member of its kind.
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
-        Role::State => ("a state", &["unit", "scale"]),
+        Role::State => ("a state", &["unit", "scale", COUNTS_AS]),
         Role::Extensive => ("an extensive quantity", &["unit", "scale"]),
-        Role::Derived => ("a derived quantity", &["unit", "hidden"]),
+        Role::Derived => ("a derived quantity", &["unit", "hidden", COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
         Role::Param => ("a parameter", &["above", "at_least"]),
         Role::Flow => ("a flow", &[]),
         Role::Part => ("a part", &[]),
     };
+    unknown(what, given, known)
+}
+
+/// Options that bound a value and mean nothing else.
+pub fn limits(what: &str, given: &[NamedExpr]) -> Vec<Diagnostic> {
+    unknown(what, given, &["above", "at_least"])
+}
+
+fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {
     let unknown = given.iter().filter(|o| !known.contains(&o.name.text.as_str()));
+    let words =
+        given.iter().filter(|o| o.name.text == COUNTS_AS && known.contains(&COUNTS_AS) && count_of(o).is_none());
+    let words = words.map(|o| {
+        let all: Vec<String> = Count::ALL.iter().map(|(word, _)| format!("`{word}`")).collect();
+        let headline = format!("`{COUNTS_AS}` is one of {}", all.join(", "));
+        Diagnostic::error(codes::UNKNOWN_NAME, o.value.span, headline, "not one of them")
+    });
     unknown
         .map(|o| {
             let headline = format!("{what} has no option `{}`", o.name.text);
@@ -30,22 +46,6 @@ pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
                 None => d,
             }
         })
-        .collect()
-}
-
-/// Parameters that no call can give: each group takes one.
-pub fn parameters(sig: &Sig) -> Vec<Diagnostic> {
-    let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params));
-    groups
-        .filter_map(|params| params.get(1))
-        .map(|p| unsupported(p.name.span, "several parameters in one pair of brackets"))
-        .collect()
-}
-
-/// Fields of a reaction that no law looks at yet.
-pub fn reaction(fields: &[Field]) -> Vec<Diagnostic> {
-    field(fields, "requires")
-        .map(|f| unsupported(f.key.span, "conditions that a reaction `requires`"))
-        .into_iter()
+        .chain(words)
         .collect()
 }

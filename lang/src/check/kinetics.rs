@@ -1,12 +1,14 @@
 //! K1: reactions that can never start.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, codes};
 
+use super::flow::Window;
 use crate::elaborate::tables::ReactionDef;
 use crate::elaborate::{Elaborator, SpeciesId, Tables};
+use crate::eval::ReactionId;
 use crate::names::DeclId;
 
 /// What one workflow's lab says of the reactions: which start, and what there is anywhere.
@@ -18,13 +20,15 @@ pub struct Starts {
     anywhere: BTreeSet<SpeciesId>,
     /// Name of the lab in the text.
     lab: Span,
+    /// What is known of the conditions of reactions over the plan, if it could be followed.
+    pub windows: Option<BTreeMap<ReactionId, Window>>,
 }
 
 /// Which reactions can start in a lab.
 pub fn starts(lab: &Elaborator<'_>, lab_decl: DeclId) -> Starts {
     let reactions = meets(lab);
     let span = crate::names::item_name(lab.tables.names.decl(lab_decl).item).map_or_else(Span::default, |n| n.1);
-    Starts { reactions, anywhere: lab.reach.anywhere(), lab: span }
+    Starts { reactions, anywhere: lab.reach.anywhere(), lab: span, windows: None }
 }
 
 /// By reaction index: whether its reactants meet in a vessel.
@@ -45,7 +49,11 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
     let mut reported: Vec<usize> = Vec::new();
     for (index, r) in tables.reactions.iter().enumerate() {
         let started = workflows.iter().any(|w| w.reactions.get(index) == Some(&true));
-        if r.module != module || r.reverse || started {
+        if r.module != module || r.reverse {
+            continue;
+        }
+        if started {
+            out.extend(never_warm(tables, index, workflows));
             continue;
         }
         let lab_span = first.lab;
@@ -101,6 +109,33 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
         out.push(d);
     }
     out
+}
+
+/// A reaction whose reactants meet, but never at temperatures (or whatever else its law asks for) where it goes.
+fn never_warm(tables: &Tables<'_>, index: usize, workflows: &[Starts]) -> Option<Diagnostic> {
+    let id = ReactionId(index as u32);
+    let r = &tables.reactions[index];
+    let mut all = Window::default();
+    for w in workflows.iter().filter(|w| w.reactions.get(index) == Some(&true)) {
+        // A law without a condition, or one that could not be followed, may act.
+        let window = w.windows.as_ref()?.get(&id)?;
+        if window.reached {
+            return None;
+        }
+        all = Window { reached: false, low: all.low.min(window.low), high: all.high.max(window.high) };
+    }
+    let headline = format!("`{}` can never start: its reactants meet, but never where its law holds", r.name);
+    let d = Diagnostic::error(codes::REACTION_NEVER_STARTS, r.span, headline, "never goes on");
+    let valid = r.fields.iter().find(|f| f.key.text == "valid");
+    let unit = tables.units.dimension("Temperature").and_then(|t| tables.units.preferred_point(&t.dimension));
+    Some(match (valid, unit) {
+        (Some(field), Some(unit)) if all.low.is_finite() && all.high.is_finite() => {
+            let (low, high) = (unit.show(all.low), unit.show(all.high));
+            d.because(field.span, format!("what holds its reactants stays between {low} and {high}"))
+                .help("heat or cool the vessel further, or widen `valid` if the law is known to hold there")
+        }
+        _ => d.help("see what `valid` and `requires` ask for"),
+    })
 }
 
 /// U4: rate constants of the reactions that can start.

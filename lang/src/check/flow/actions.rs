@@ -1,0 +1,285 @@
+//! What operations need and do.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::NodeId;
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Condition, Operation, Presumption};
+
+use super::Flow;
+use super::facts::Facts;
+use super::value::{Known, Why};
+
+/// Events that set each other off at one instant before the rest is left to the run.
+const MOST_EVENTS: usize = 200;
+
+impl Flow<'_, '_> {
+    /// Looks at needs; whether none fails for certain. What a failed need looks at counts as unknown from here on, so
+    /// that one mistake is one message.
+    pub fn needs(&mut self, label: &str, needs: &[Condition], facts: &mut Facts) -> bool {
+        let mut met = true;
+        for need in needs {
+            let value = self.eval(need.node, facts);
+            match value.truth() {
+                Some(true) => continue,
+                Some(false) => {
+                    let name = need.refusal.as_ref().map_or("need", |r| &r.failure);
+                    if !self.is_taken(name) {
+                        self.unmet(label, need, facts, false);
+                    }
+                    self.raise(name, facts.clone());
+                    let states = self.parts(need.node).states.clone();
+                    self.forget(&states, facts);
+                    met = false;
+                    // The step fails here: what it needs beyond does not matter any more.
+                    break;
+                }
+                None => {
+                    if value.why() == Some(Why::Paths) && !self.is_shared(need.node) {
+                        let name = need.refusal.as_ref().map_or("need", |r| &r.failure);
+                        if !self.is_taken(name) {
+                            self.unmet(label, need, facts, true);
+                        }
+                        let states = self.parts(need.node).states.clone();
+                        self.forget(&states, facts);
+                    }
+                }
+            }
+        }
+        met
+    }
+
+    /// Looks at what a command presumes. Steps that clean up may do so in vain.
+    fn presumptions(&mut self, label: &str, presumes: &[Presumption], facts: &mut Facts) {
+        if self.cleaning > 0 {
+            return;
+        }
+        for Presumption { condition, ever } in presumes {
+            let node = condition.node;
+            let fails = self.eval(node, facts).truth() == Some(false) && !(*ever && facts.held.contains(&node));
+            if fails && !self.is_shared(node) {
+                self.in_vain(label, condition, facts);
+                facts.held.insert(node);
+            }
+        }
+    }
+
+    /// Notes which presumed conditions hold, or may hold, after these states have changed.
+    fn note_held(&mut self, states: &[u32], facts: &mut Facts) {
+        let due: BTreeSet<NodeId> = states.iter().filter_map(|s| self.presumed_of.get(s)).flatten().copied().collect();
+        for node in due {
+            if self.eval(node, facts).truth() != Some(false) {
+                facts.held.insert(node);
+            }
+        }
+    }
+
+    /// Whether a handler of the user's takes a failure by name.
+    pub fn is_taken(&self, name: &str) -> bool {
+        self.caught.iter().flatten().any(|c| c.as_deref().is_none_or(|c| c == name))
+    }
+
+    /// Forgets states, and what depends on them.
+    pub fn forget(&mut self, states: &[u32], facts: &mut Facts) {
+        facts.forget(states);
+        for s in states {
+            self.touch(*s, facts);
+        }
+        self.note_held(states, facts);
+    }
+
+    /// Notes that a state has changed.
+    fn touch(&self, state: u32, facts: &mut Facts) {
+        if let Some(rates) = self.rates_of.get(&state) {
+            facts.unsettled.extend(rates);
+        }
+    }
+
+    /// Changes states by the statement that is followed now.
+    pub fn write(&mut self, changes: Vec<(u32, Known)>, facts: &mut Facts) -> Vec<u32> {
+        let changed: Vec<u32> =
+            changes.iter().filter(|(s, v)| facts.states[*s as usize] != *v).map(|(s, _)| *s).collect();
+        for s in &changed {
+            self.touch(*s, facts);
+        }
+        facts.write(self.site(), changes);
+        self.note_held(&changed, facts);
+        changed
+    }
+
+    /// Performs actions in order, and the events they set off.
+    pub fn perform(&mut self, actions: &[Action], facts: &mut Facts) {
+        let mut changed = Vec::new();
+        for action in actions {
+            changed.extend(self.act(action, facts));
+        }
+        let due = self.events_on(&changed);
+        self.fire(due, facts);
+        let limits = changed.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
+        self.limits(limits, facts);
+    }
+
+    /// Looks at limits after what they depend on has changed.
+    pub fn limits(&mut self, mut due: Vec<u32>, facts: &mut Facts) {
+        due.sort_unstable();
+        due.dedup();
+        for i in due {
+            let limit = &self.plan.limits[i as usize];
+            let value = self.eval(limit.condition.node, facts);
+            let some = match value.truth() {
+                Some(true) => continue,
+                Some(false) => false,
+                None if value.why() == Some(Why::Paths) && !self.is_shared(limit.condition.node) => true,
+                None => continue,
+            };
+            let name = limit.condition.refusal.as_ref().map_or("need", |r| &r.failure);
+            if !self.is_taken(name) {
+                self.passed(limit, facts, some);
+            }
+            if !some {
+                self.raise(name, facts.clone());
+            }
+            let states = self.parts(limit.condition.node).states.clone();
+            self.forget(&states, facts);
+        }
+    }
+
+    fn act(&mut self, action: &Action, facts: &mut Facts) -> Vec<u32> {
+        match action {
+            Action::Assign { state, value, .. } => {
+                let value = self.eval(*value, facts);
+                self.write(vec![(*state, value)], facts)
+            }
+            Action::Move { fraction, from, to, .. } => {
+                let fraction = self.eval(*fraction, facts);
+                self.transfer(&fraction, *from as usize, *to as usize, facts)
+            }
+        }
+    }
+
+    fn transfer(&mut self, fraction: &Known, from: usize, to: usize, facts: &mut Facts) -> Vec<u32> {
+        let (low, high) = fraction.bounds();
+        if low > 1.0 + 1e-9 || high < 0.0 {
+            self.too_much(from, low);
+        }
+        let fraction = match fraction.exact() {
+            Some(f) if (0.0..=1.0).contains(&f) => Known::Point(f),
+            Some(f) => Known::Point(f.clamp(0.0, 1.0)),
+            None => match fraction {
+                Known::Few(..) if low >= 0.0 && high <= 1.0 => fraction.clone(),
+                _ => Known::Range(low.clamp(0.0, 1.0), high.clamp(0.0, 1.0), fraction.why().unwrap_or(Why::Unknown)),
+            },
+        };
+        let mut changes = Vec::new();
+        for (key, source) in &self.mixtures[from] {
+            let there = self.mixtures[to].iter().find(|(k, _)| k.member == key.member && k.species == key.species);
+            let Some((_, target)) = there else { continue };
+            if source == target {
+                continue;
+            }
+            let held = &facts.states[*source as usize];
+            let moved = Known::binary(matterix_ir::BinaryOp::Mul, &fraction, held);
+            // A share of what is there leaves the rest: exact where the share is.
+            let rest = match fraction.exact() {
+                Some(f) => Known::binary(matterix_ir::BinaryOp::Mul, &Known::Point(1.0 - f), held),
+                None => {
+                    let one = Known::Point(1.0);
+                    let share = Known::binary(matterix_ir::BinaryOp::Sub, &one, &fraction);
+                    Known::binary(matterix_ir::BinaryOp::Mul, &share, held)
+                }
+            };
+            let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[*target as usize], &moved);
+            changes.push((*source, rest));
+            changes.push((*target, more));
+        }
+        self.write(changes, facts)
+    }
+
+    /// Fires those of the events that became true, and what they set off, until none does.
+    pub fn fire(&mut self, mut due: Vec<u32>, facts: &mut Facts) {
+        for _ in 0..MOST_EVENTS {
+            due.sort_unstable();
+            due.dedup();
+            let mut next = Vec::new();
+            for i in std::mem::take(&mut due) {
+                let event = &self.events[i as usize];
+                let now = self.eval(event.when, facts).truth();
+                let before = std::mem::replace(&mut facts.fired[i as usize], now);
+                if now == Some(false) || (now == Some(true) && before == Some(true)) {
+                    continue;
+                }
+                let untouched = facts.clone();
+                let mut changed = Vec::new();
+                for action in &event.actions {
+                    changed.extend(self.act(action, facts));
+                }
+                if (now, before) != (Some(true), Some(false)) {
+                    let happened = facts.clone();
+                    *facts = untouched.join(happened, &untouched, self.site(), Why::Unknown);
+                }
+                facts.fired[i as usize] = self.eval(event.when, facts).truth();
+                next.extend(self.events_on(&changed));
+                // What may happen over and over is not followed further.
+                if now.is_none() {
+                    next.retain(|n| *n != i);
+                }
+            }
+            if next.is_empty() {
+                return;
+            }
+            due = next;
+        }
+    }
+
+    /// The events that look at any of these states.
+    pub fn events_on(&self, states: &[u32]) -> Vec<u32> {
+        states.iter().filter_map(|s| self.events_of.get(s)).flatten().copied().collect()
+    }
+
+    /// Follows a command or a primitive skill.
+    pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Facts {
+        self.presumptions(label, &operation.presumes, &mut facts);
+        let met = self.needs(label, &operation.needs, &mut facts);
+        if !met {
+            // Said already: what it would have done is not known.
+            let written = self.written(operation);
+            self.forget(&written, &mut facts);
+        } else {
+            self.perform(&operation.at_start, &mut facts);
+        }
+        match (&operation.takes, &operation.until) {
+            (_, Some(until)) => {
+                let node = until.node;
+                let value = self.eval(node, &facts);
+                if value.truth() != Some(true) {
+                    self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
+                    self.assume(node, true, &mut facts);
+                }
+            }
+            (Some(takes), None) => {
+                let time = self.eval(takes.nominal, &facts);
+                self.pass(&time, &mut facts);
+            }
+            (None, None) => {}
+        }
+        if met {
+            self.perform(&operation.at_end, &mut facts);
+        }
+        facts
+    }
+
+    /// The states that an operation writes.
+    fn written(&self, operation: &Operation) -> Vec<u32> {
+        let mut out = Vec::new();
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            match action {
+                Action::Assign { state, .. } => out.push(*state),
+                Action::Move { from, to, .. } => {
+                    let both = [from, to].map(|m| &self.mixtures[*m as usize]);
+                    out.extend(both.into_iter().flatten().map(|(_, state)| *state));
+                }
+            }
+        }
+        out
+    }
+}

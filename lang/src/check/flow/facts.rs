@@ -1,0 +1,128 @@
+//! What is known at one point of the plan, and how it came to be.
+
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
+use matterix_ir::{NodeId, Span};
+
+use super::evolve::Barrier;
+use super::value::{Known, Why};
+
+/// One change on the way to a point of the plan.
+#[derive(Debug)]
+pub struct Event {
+    /// The statement that made it.
+    pub span: Span,
+    /// The states it changed, with what they were before.
+    pub before: Vec<(u32, Known)>,
+    /// What happened earlier.
+    pub earlier: History,
+}
+
+/// The way to a point of the plan, the latest change first.
+pub type History = Option<Rc<Event>>;
+
+/// What is known at one point of the plan.
+#[derive(Clone, Debug)]
+pub struct Facts {
+    /// By state index, SI.
+    pub states: Vec<Known>,
+    /// By local index, SI.
+    pub locals: Vec<Known>,
+    /// Seconds since the run began.
+    pub time: Known,
+    /// How it came to be.
+    pub history: History,
+    /// Derivatives that may have changed since time last passed, by index.
+    pub unsettled: BTreeSet<u32>,
+    /// Derivatives that are not known to be zero, by index.
+    pub moving: BTreeSet<u32>,
+    /// Bounds of what moves for all time to come, while nothing else changes.
+    pub barrier: Option<Barrier>,
+    /// By event index: whether its condition held when it was last looked at.
+    pub fired: Vec<Option<bool>>,
+    /// Presumed conditions that have held at some moment, or may have.
+    pub held: BTreeSet<NodeId>,
+}
+
+impl Facts {
+    /// Sets states, noting what they were.
+    pub fn write(&mut self, span: Span, changes: Vec<(u32, Known)>) {
+        let mut before = Vec::with_capacity(changes.len());
+        for (state, value) in changes {
+            let place = &mut self.states[state as usize];
+            if *place != value {
+                before.push((state, std::mem::replace(place, value)));
+            }
+        }
+        if before.is_empty() {
+            return;
+        }
+        // The changes of one statement are one event.
+        if let Some(last) = &mut self.history
+            && last.span == span
+            && let Some(last) = Rc::get_mut(last)
+        {
+            for (state, value) in before {
+                if !last.before.iter().any(|(s, _)| *s == state) {
+                    last.before.push((state, value));
+                }
+            }
+            return;
+        }
+        let earlier = self.history.take();
+        self.history = Some(Rc::new(Event { span, before, earlier }));
+    }
+
+    /// Forgets states that only a run can tell.
+    pub fn forget(&mut self, states: &[u32]) {
+        for state in states {
+            self.states[*state as usize] = Known::nothing();
+        }
+    }
+
+    /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
+    pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
+        let mut out = self.clone();
+        let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
+        for (i, (x, y)) in a.states.iter().zip(&b.states).enumerate() {
+            let both = x.join(y, why);
+            if both == self.states[i] {
+                continue;
+            }
+            let state = i as u32;
+            let maker = changed_by(&a.history, &self.history, state).or(changed_by(&b.history, &self.history, state));
+            let maker = maker.unwrap_or(span);
+            match changes.iter_mut().find(|(s, _)| *s == maker) {
+                Some((_, list)) => list.push((state, both)),
+                None => changes.push((maker, vec![(state, both)])),
+            }
+        }
+        changes.sort_by_key(|(s, _)| *s);
+        for (maker, list) in changes {
+            out.write(maker, list);
+        }
+        out.locals = a.locals.iter().zip(&b.locals).map(|(x, y)| x.join(y, why)).collect();
+        out.time = a.time.join(&b.time, Why::Unknown);
+        out.unsettled.extend(a.unsettled.iter().chain(&b.unsettled));
+        out.moving.extend(a.moving.iter().chain(&b.moving));
+        out.barrier = None;
+        out.held.extend(a.held.iter().chain(&b.held));
+        out
+    }
+}
+
+/// The latest statement since `base` that changed a state.
+fn changed_by(history: &History, base: &History, state: u32) -> Option<Span> {
+    let mut at = history.as_ref();
+    while let Some(event) = at {
+        if base.as_ref().is_some_and(|b| Rc::ptr_eq(b, event)) {
+            return None;
+        }
+        if event.before.iter().any(|(s, _)| *s == state) {
+            return Some(event.span);
+        }
+        at = event.earlier.as_ref();
+    }
+    None
+}

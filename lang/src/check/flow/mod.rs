@@ -1,0 +1,282 @@
+//! What is known at every point of the plan, found by following it before anything moves.
+//!
+//! Numbers are followed exactly, as one of a few, or within bounds, over every way through the plan (abstract
+//! interpretation); where ways meet, what is known is what holds on all of them. The way followed is the one on which
+//! devices do what they are told: failures that only a device can report (`fails`) are not assumed to happen, those the
+//! plan itself raises are. A need that fails on every way is an error, one that fails on some a warning; what only a
+//! run can tell is left to the run.
+
+mod actions;
+mod eval;
+mod evolve;
+mod facts;
+mod otherwise;
+mod report;
+mod value;
+mod walk;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::rc::Rc;
+
+use matterix_ir::model::{Derivative, Event};
+use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
+
+pub use self::evolve::Window;
+use self::facts::Facts;
+use self::value::Known;
+use crate::elaborate::{Elaborator, ExtensiveKey};
+use crate::eval::ReactionId;
+
+/// Steps followed before the rest of a plan is left to the run.
+const MOST_STEPS: usize = 400_000;
+
+/// What a failure is called, and what is known when it is raised.
+type Raised = (String, Facts);
+
+/// A statement of the user's that is followed now.
+struct Site {
+    span: Span,
+    label: String,
+    /// Whether it calls a skill or command.
+    calls: bool,
+}
+
+/// Working state of one pass over a plan.
+struct Flow<'l, 'a> {
+    lab: &'l Elaborator<'a>,
+    sources: &'l Sources,
+    plan: &'l Plan,
+    events: &'l [Event],
+    derivatives: &'l [Derivative],
+    /// Extensive states by mixture index.
+    mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
+    params: Vec<Known>,
+    /// What a node depends on: operations in order, and states.
+    parts: HashMap<NodeId, Rc<eval::Parts>>,
+    /// Values of the operations of the node evaluated last.
+    values: Vec<Known>,
+    /// Derivatives that depend on a state.
+    rates_of: BTreeMap<u32, Vec<u32>>,
+    /// Events that depend on a state.
+    events_of: BTreeMap<u32, Vec<u32>>,
+    /// Limits that depend on a state, by index.
+    limits_of: BTreeMap<u32, Vec<u32>>,
+    /// Conditions that steps presume to have held, by the states they depend on.
+    presumed_of: BTreeMap<u32, Vec<NodeId>>,
+    /// Events that depend on time.
+    timed: Vec<u32>,
+    /// States that are amounts of species.
+    amounts: BTreeSet<u32>,
+    /// What is known of the conditions of reactions.
+    windows: BTreeMap<ReactionId, Window>,
+    /// Conditions of the workflow's own branches that constants decide: how they come out, and whether there is an `else`.
+    branches: BTreeMap<Span, (String, BTreeSet<bool>, bool)>,
+    findings: Vec<report::Finding>,
+    /// Failures raised inside each open body with handlers, innermost last.
+    guards: Vec<Vec<Raised>>,
+    /// Names of failures that handlers around take; none for every one.
+    caught: Vec<Vec<Option<String>>>,
+    /// The user's statements around, innermost last.
+    sites: Vec<Site>,
+    /// Findings are not reported while this is not 0.
+    quiet: usize,
+    /// While this is not 0 it is open whether the plan gets here: what fails for certain fails on some ways.
+    doubt: usize,
+    /// While this is not 0 the steps clean up, as those of handlers and `finally` do.
+    cleaning: usize,
+    /// States that other branches change at the same time.
+    shared: Vec<BTreeSet<u32>>,
+    steps: usize,
+}
+
+/// Follows the plan and reports what would go wrong.
+pub fn check(
+    lab: &Elaborator<'_>,
+    sources: &Sources,
+    plan: &Plan,
+    events: &[Event],
+    derivatives: &[Derivative],
+) -> (Vec<Diagnostic>, BTreeMap<ReactionId, Window>) {
+    let mut flow = Flow::new(lab, sources, plan, events, derivatives);
+    flow.follow();
+    let windows = std::mem::take(&mut flow.windows);
+    let others = otherwise::other_values(&mut flow);
+    let mut found = flow.diagnostics();
+    for (param, value) in others {
+        let mut flow = Flow::new(lab, sources, plan, events, derivatives);
+        flow.params[param as usize] = Known::point(value);
+        flow.follow();
+        let new = otherwise::said_of(lab, param, value, flow.diagnostics());
+        found.extend(
+            new.into_iter()
+                .filter(|d| !found.iter().any(|f| f.code == d.code && f.span() == d.span()))
+                .collect::<Vec<_>>(),
+        );
+    }
+    (found, windows)
+}
+
+impl<'l, 'a> Flow<'l, 'a> {
+    fn new(
+        lab: &'l Elaborator<'a>,
+        sources: &'l Sources,
+        plan: &'l Plan,
+        events: &'l [Event],
+        derivatives: &'l [Derivative],
+    ) -> Self {
+        let mut mixtures: Vec<Vec<(ExtensiveKey, u32)>> = Vec::new();
+        let mut of: BTreeMap<InstanceId, usize> = BTreeMap::new();
+        for i in 0..lab.instances.len() as u32 {
+            if lab.per_species(InstanceId(i)).is_some() {
+                of.insert(InstanceId(i), mixtures.len());
+                mixtures.push(Vec::new());
+            }
+        }
+        for (key, state) in &lab.extensive {
+            if let Some(m) = of.get(&key.instance) {
+                mixtures[*m].push((key.clone(), *state));
+            }
+        }
+        let mut flow = Flow {
+            lab,
+            sources,
+            plan,
+            events,
+            derivatives,
+            mixtures,
+            params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
+            parts: HashMap::new(),
+            values: vec![Known::Point(0.0); lab.graph.ops().len()],
+            rates_of: BTreeMap::new(),
+            events_of: BTreeMap::new(),
+            limits_of: BTreeMap::new(),
+            presumed_of: BTreeMap::new(),
+            timed: Vec::new(),
+            amounts: lab.extensive.iter().filter(|(k, _)| k.species.is_some()).map(|(_, s)| *s).collect(),
+            windows: BTreeMap::new(),
+            branches: BTreeMap::new(),
+            findings: Vec::new(),
+            guards: Vec::new(),
+            caught: Vec::new(),
+            sites: Vec::new(),
+            quiet: 0,
+            doubt: 0,
+            cleaning: 0,
+            shared: Vec::new(),
+            steps: 0,
+        };
+        for (i, d) in derivatives.iter().enumerate() {
+            for state in flow.parts(d.rate).states.clone() {
+                flow.rates_of.entry(state).or_default().push(i as u32);
+            }
+        }
+        for (i, e) in events.iter().enumerate() {
+            for state in flow.parts(e.when).states.clone() {
+                flow.events_of.entry(state).or_default().push(i as u32);
+            }
+            if flow.parts(e.when).timed {
+                flow.timed.push(i as u32);
+            }
+        }
+        for (i, limit) in plan.limits.iter().enumerate() {
+            for state in flow.parts(limit.condition.node).states.clone() {
+                flow.limits_of.entry(state).or_default().push(i as u32);
+            }
+        }
+        for node in presumed(plan) {
+            for state in flow.parts(node).states.clone() {
+                flow.presumed_of.entry(state).or_default().push(node);
+            }
+        }
+        flow
+    }
+
+    /// Follows the plan from its start.
+    fn follow(&mut self) {
+        let mut facts = self.start();
+        self.fire((0..self.events.len() as u32).collect(), &mut facts);
+        self.limits((0..self.plan.limits.len() as u32).collect(), &mut facts);
+        let begun = facts.clone();
+        // What a mistake cut short is not finished for another reason.
+        if let Some(ended) = self.walk(self.plan.root, facts)
+            && !self.findings.iter().any(report::Finding::is_error)
+        {
+            self.ends(&begun, &ended);
+        }
+        self.dead_branches();
+    }
+
+    /// What is known when the run begins.
+    fn start(&mut self) -> Facts {
+        let mut facts = Facts {
+            states: vec![Known::nothing(); self.lab.states.len()],
+            locals: vec![Known::nothing(); self.plan.locals.len()],
+            time: Known::Point(0.0),
+            history: None,
+            unsettled: (0..self.derivatives.len() as u32).collect(),
+            moving: BTreeSet::new(),
+            barrier: None,
+            fired: vec![Some(false); self.events.len()],
+            held: BTreeSet::new(),
+        };
+        let states = &self.lab.states;
+        facts.states = (0..states.len()).map(|i| self.eval(states[i].initial, &facts)).collect();
+        for node in presumed(self.plan) {
+            if self.eval(node, &facts).truth() != Some(false) {
+                facts.held.insert(node);
+            }
+        }
+        facts
+    }
+
+    /// Notes how a branch of the workflow itself comes out where constants decide it.
+    fn note_branch(&mut self, condition: &Condition, otherwise: bool) {
+        let in_skill = self.sites.iter().any(|s| s.calls);
+        let constant = self.lab.graph.constant(condition.node);
+        if let Some(v) = constant.filter(|_| !in_skill && !self.in_library(condition.span)) {
+            let entry = self.branches.entry(condition.span);
+            let (_, seen, _) = entry.or_insert_with(|| (condition.text.clone(), BTreeSet::new(), otherwise));
+            seen.insert(v != 0.0);
+        }
+    }
+
+    /// Whether a span stands in the library.
+    fn in_library(&self, span: Span) -> bool {
+        self.sources.get(span.file).is_some_and(|f| f.name.contains("::"))
+    }
+
+    /// The user's statement that is followed now.
+    fn site(&self) -> Span {
+        self.sites.last().map(|s| s.span).unwrap_or_default()
+    }
+
+    /// Whether a condition may depend on what other branches do meanwhile.
+    fn is_shared(&mut self, node: NodeId) -> bool {
+        if self.shared.is_empty() {
+            return false;
+        }
+        let states = self.parts(node).states.clone();
+        self.shared.iter().any(|set| states.iter().any(|s| set.contains(s)))
+    }
+}
+
+/// What steps presume to have held at some moment.
+fn presumed(plan: &Plan) -> BTreeSet<NodeId> {
+    let operations = plan.steps.iter().filter_map(|s| match &s.step {
+        Step::Operation(o) => Some(o),
+        _ => None,
+    });
+    operations.flat_map(|o| &o.presumes).filter(|p| p.ever).map(|p| p.condition.node).collect()
+}
+
+/// Whether a finding of this kind is an error even where it happens on some ways only: what is gone stays gone.
+fn forbidden_on_any_way(code: Code) -> bool {
+    code.family == "T2"
+}
+
+/// Whether a finding of this kind is a warning even where it happens on every way: what is done twice does no harm.
+fn only_advice(code: Code) -> bool {
+    code.family == "T3"
+}

@@ -1,0 +1,370 @@
+//! Findings with their history.
+
+use matterix_ir::model::Domain;
+use matterix_ir::plan::{Condition, Limit, Refusal, Term};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Span, codes};
+
+use super::facts::Facts;
+use super::value::Known;
+use super::{Flow, forbidden_on_any_way, only_advice};
+
+/// A finding, and how often it was made.
+pub struct Finding {
+    diagnostic: Diagnostic,
+    /// The condition or construct it is about.
+    about: Span,
+    count: usize,
+}
+
+impl Finding {
+    /// Whether another one says the same of the same place.
+    pub fn is_like(&self, other: &Finding) -> bool {
+        self.diagnostic.code == other.diagnostic.code
+            && self.diagnostic.span() == other.diagnostic.span()
+            && self.about == other.about
+    }
+
+    /// Whether it is an error.
+    pub fn is_error(&self) -> bool {
+        self.diagnostic.severity == Severity::Error
+    }
+}
+
+/// So many steps of the history are shown for one quantity.
+const STEPS_SHOWN: usize = 3;
+
+impl Flow<'_, '_> {
+    /// All findings; one that was made several times says so.
+    pub fn diagnostics(self) -> Vec<Diagnostic> {
+        let said = |f: Finding| match f.count {
+            1 => f.diagnostic,
+            n => f.diagnostic.help(format!("the same happens {n} times in this run")),
+        };
+        self.findings.into_iter().map(said).collect()
+    }
+
+    /// Adds a finding, or counts it if it was made before.
+    pub fn found(&mut self, diagnostic: Diagnostic, about: Span) {
+        if self.quiet > 0 {
+            return;
+        }
+        let new = Finding { diagnostic, about, count: 1 };
+        match self.findings.iter_mut().find(|f| f.is_like(&new)) {
+            Some(old) => {
+                old.count += 1;
+                if new.is_error() && !old.is_error() {
+                    old.diagnostic = new.diagnostic;
+                }
+            }
+            None => self.findings.push(new),
+        }
+    }
+
+    /// A need that does not hold: on every way, or on some.
+    pub fn unmet(&mut self, label: &str, need: &Condition, facts: &Facts, some: bool) {
+        // The library's own steps are not what the reader wrote.
+        let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
+        let what = match &need.refusal {
+            Some(r) => format!("`{label}` cannot be done: {}", r.failure.replace('_', " ")),
+            None => format!("`{label}` cannot be done: it needs `{}`", need.text),
+        };
+        self.demand(what, need, facts, some);
+    }
+
+    /// Something presumed that holds on no way.
+    pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &Facts) {
+        let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
+        let what = match &presumed.refusal {
+            Some(r) => format!("`{label}` is out of place: {}", r.failure.replace('_', " ")),
+            None => format!("`{label}` is out of place: it presumes `{}`", presumed.text),
+        };
+        self.demand(what, presumed, facts, false);
+    }
+
+    fn demand(&mut self, what: String, need: &Condition, facts: &Facts, some: bool) {
+        let code = need.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
+        let some = some || self.doubt > 0;
+        let headline = if some { format!("{what}, on some ways through the plan") } else { what };
+        let measured = self.measured(need, facts);
+        let said = if measured.is_empty() { "not possible".to_string() } else { measured.join(", ") };
+        let mut d = self.at_site(code, headline, said, some);
+        // The first that is missing ends a call; what its later steps lack follows from that.
+        if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == d.span() && f.about != need.span) {
+            return;
+        }
+        if d.span() != need.span {
+            d = d.because(need.span, format!("needed here: `{}`", need.text));
+        }
+        d = self.with_history(d, need.node, &need.terms, facts);
+        d.help.extend(need.refusal.as_ref().and_then(|r| r.help.clone()));
+        self.found(d, need.span);
+    }
+
+    /// A limit of a thing that is passed by what is done, or from the start.
+    pub fn passed(&mut self, limit: &Limit, facts: &Facts, some: bool) {
+        let condition = &limit.condition;
+        if let Some(label) = self.sites.last().map(|s| s.label.clone()) {
+            return self.unmet(&label, condition, facts, some);
+        }
+        let code = condition.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
+        // Where too many things stand somewhere, the last of them is what is wrong.
+        let owner = self.too_many(condition, facts).map(|s| self.lab.state_owner[s as usize]);
+        let about = owner.unwrap_or(limit.instance);
+        let (name, span) = (self.lab.spoken_name(about), self.declared_at(about));
+        let what = condition.refusal.as_ref().map_or(condition.text.clone(), |r| r.failure.replace('_', " "));
+        let said = self.measured(condition, facts).join(", ");
+        let mut d = Diagnostic::error(code, span, format!("`{name}` cannot start like this: {what}"), said);
+        if span != condition.span {
+            d = d.because(condition.span, format!("needed here: `{}`", condition.text));
+        }
+        d.help.extend(condition.refusal.as_ref().and_then(|r| r.help.clone()));
+        self.found(d, condition.span);
+    }
+
+    /// Where things stand at the wrong place from the start: the place of the last one without which a limit would hold.
+    fn too_many(&mut self, limit: &Condition, facts: &Facts) -> Option<u32> {
+        let states = self.parts(limit.node).states.clone();
+        let mut facts = facts.clone();
+        states.into_iter().rev().find(|s| {
+            let s = *s as usize;
+            if self.lab.states[s].domain != Domain::Instance {
+                return false;
+            }
+            let there = std::mem::replace(&mut facts.states[s], Known::Point(-1.0));
+            let holds = self.eval(limit.node, &facts).truth() == Some(true);
+            facts.states[s] = there;
+            holds
+        })
+    }
+
+    /// An expectation that cannot hold.
+    pub fn unexpected(&mut self, condition: &Condition, facts: &Facts) {
+        let some = self.doubt > 0;
+        let ways = if some { ", on some ways through the plan" } else { "" };
+        let headline = format!("`{}` does not hold{ways}", condition.text);
+        let measured = self.measured(condition, facts);
+        let said = if measured.is_empty() { "expected here".to_string() } else { measured.join(", ") };
+        let d = Diagnostic { ..Diagnostic::error(codes::EXPECTATION_FAILED, condition.span, headline, said) };
+        let d = Diagnostic { severity: severity(codes::EXPECTATION_FAILED, some), ..d };
+        let d = self.with_history(d, condition.node, &condition.terms, facts);
+        self.found(d, condition.span);
+    }
+
+    /// Looks at what should hold at the end and held at the start.
+    pub fn ends(&mut self, begun: &Facts, ended: &Facts) {
+        let plan = self.plan;
+        for Limit { instance, condition: end } in &plan.ends {
+            let kept = self.eval(end.node, begun).truth() == Some(true);
+            if !kept || self.eval(end.node, ended).truth() != Some(false) {
+                continue;
+            }
+            let changed: Vec<(Span, String)> = end.terms.iter().flat_map(|t| self.history(t, ended)).collect();
+            let Some((span, said)) = changed.into_iter().next() else { continue };
+            let name = self.lab.spoken_name(*instance);
+            let how = end.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
+            let headline = format!("`{}` ends, and `{name}` is {how}", plan.workflow);
+            let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
+            d = d.because(end.span, format!("looked for here: `{}`", end.text));
+            d.help.extend(end.refusal.as_ref().and_then(|r| r.help.clone()));
+            self.found(d, end.span);
+        }
+    }
+
+    /// A wait for something that cannot come: at all, or in the time given.
+    pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &Facts, after: &Facts) {
+        let still = self.eval(condition.node, before) == self.eval(condition.node, after)
+            && condition.compared.iter().all(|c| self.eval(c.value, before) == self.eval(c.value, after));
+        let (code, headline) = match (still, limited) {
+            (true, _) => (codes::WAITS_FOR_EVER, format!("`{}` never comes true: nothing changes it", condition.text)),
+            (false, true) => (codes::NOT_REACHED, format!("`{}` cannot come true in the time given", condition.text)),
+            (false, false) => (codes::NOT_REACHED, format!("`{}` is never reached", condition.text)),
+        };
+        let measured = self.measured(condition, after);
+        let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
+        let d = self.at_site(code, headline, said, self.doubt > 0);
+        let d = self.with_history(d, condition.node, &condition.terms, before);
+        self.found(d, condition.span);
+    }
+
+    /// Branches that constants alone decide, whatever the run does.
+    pub fn dead_branches(&mut self) {
+        for (span, (text, seen, otherwise)) in std::mem::take(&mut self.branches) {
+            let dead = match (seen.contains(&true), seen.contains(&false)) {
+                (false, true) => "what follows is never done",
+                (true, false) if otherwise => "what follows `else` is never done",
+                _ => continue,
+            };
+            let comes = if seen.contains(&true) { "always" } else { "never" };
+            let headline = format!("`{text}` {comes} holds: constants decide it");
+            let d = Diagnostic::warning(codes::DEAD_BRANCH, span, headline, dead);
+            self.found(d.help("take the branch out, or make a parameter of the workflow what should decide"), span);
+        }
+    }
+
+    /// A transfer of more than there is.
+    pub fn too_much(&mut self, from: usize, fraction: f64) {
+        let name = self.mixtures[from].first().map_or_else(String::new, |(k, _)| self.lab.spoken_name(k.instance));
+        let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
+        let times = matterix_ir::quantity::show_number(fraction);
+        let headline = format!("`{label}` takes more from `{name}` than it holds");
+        let d =
+            self.at_site(codes::TRANSFER_FRACTION, headline, format!("{times} times what there is"), self.doubt > 0);
+        let about = d.span();
+        self.found(d, about);
+    }
+
+    fn at_site(&self, code: Code, headline: String, said: String, some: bool) -> Diagnostic {
+        let mut d = Diagnostic::error(code, self.site(), headline, said);
+        d.severity = severity(code, some);
+        for site in self.sites.iter().rev().skip(1).filter(|s| s.calls).take(2) {
+            d = d.because(site.span, format!("in `{}`", site.label));
+        }
+        d
+    }
+
+    /// What a condition compares, in numbers: `` `a + b` is 600 uL, at most 360 uL``.
+    fn measured(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
+        let mut out = Vec::new();
+        for c in &condition.compared {
+            let value = self.eval(c.value, facts);
+            let low = c.low.map(|n| self.eval(n, facts));
+            let high = c.high.map(|n| self.eval(n, facts));
+            let show = |k: &Known| shown(k, |v| c.unit.show(v));
+            let limits = match (low, high) {
+                (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
+                (Some(l), None) => format!("at least {}", show(&l)),
+                (None, Some(h)) => format!("at most {}", show(&h)),
+                (None, None) => continue,
+            };
+            out.push(format!("`{}` is {}, {limits}", c.text, show(&value)));
+        }
+        out
+    }
+
+    /// Adds how the members a condition reads came to be what they are, in the order it happened.
+    fn with_history(&mut self, mut d: Diagnostic, node: NodeId, terms: &[Term], facts: &Facts) -> Diagnostic {
+        let mut said: Vec<(Span, String)> = Vec::new();
+        if terms.is_empty() {
+            said = self.changes_behind(node, facts);
+        }
+        for term in terms {
+            let mut steps = self.history(term, facts);
+            if steps.is_empty() {
+                let states = self.parts(term.node).states.clone();
+                let owner = states.first().map(|s| self.lab.state_owner[*s as usize]);
+                let value = self.eval(term.node, facts);
+                let span = owner.map(|o| self.declared_at(o)).unwrap_or_default();
+                if !span.is_empty() && value.why().is_none() {
+                    steps
+                        .push((span, format!("`{}` is {} from the start", term.name, self.show(&value, &term.domain))));
+                }
+            }
+            steps.reverse();
+            said.extend(steps);
+        }
+        said.dedup();
+        for (span, text) in said {
+            d = d.because(span, text);
+        }
+        d
+    }
+
+    /// The changes of states behind a condition that names no member itself, as one that calls a function.
+    fn changes_behind(&mut self, node: NodeId, facts: &Facts) -> Vec<(Span, String)> {
+        let order = self.parts(node).order.clone();
+        let mut said = Vec::new();
+        for node in order {
+            let Op::State(s) = self.lab.graph.op(node) else { continue };
+            let state = &self.lab.states[s as usize];
+            let term = Term { name: state.name.clone(), node, domain: state.domain.clone() };
+            let touched = self.lab.lineage.iter().find(|(_, state)| **state == s).map(|(key, _)| key.clone());
+            let latest = self.history(&term, facts).into_iter().take(1);
+            said.extend(latest.map(|(span, text)| match &touched {
+                Some((mixture, reagent)) => {
+                    (span, format!("`{}` has touched `{reagent}` after this", self.lab.spoken_name(*mixture)))
+                }
+                None => (span, text),
+            }));
+            if said.len() == STEPS_SHOWN {
+                break;
+            }
+        }
+        said.sort_by_key(|(span, _)| *span);
+        said
+    }
+
+    /// The latest statements that changed a member, latest first, each once.
+    fn history(&mut self, term: &Term, facts: &Facts) -> Vec<(Span, String)> {
+        let states = self.parts(term.node).states.clone();
+        let mut then = facts.clone();
+        let mut at = facts.history.clone();
+        let mut steps: Vec<(Span, String)> = Vec::new();
+        while let Some(event) = at {
+            let concerned: Vec<_> = event.before.iter().filter(|(s, _)| states.contains(s)).cloned().collect();
+            if !concerned.is_empty() {
+                let after = self.eval(term.node, &then);
+                for (state, before) in concerned {
+                    then.states[state as usize] = before;
+                }
+                if self.eval(term.node, &then) != after && !steps.iter().any(|(s, _)| *s == event.span) {
+                    if steps.len() == STEPS_SHOWN {
+                        break;
+                    }
+                    let text = format!("`{}` is {} after this", term.name, self.show(&after, &term.domain));
+                    steps.push((event.span, text));
+                }
+            }
+            at = event.earlier.clone();
+        }
+        steps
+    }
+
+    /// Where the user declared an instance, or what it is a part of.
+    fn declared_at(&self, id: InstanceId) -> Span {
+        let mut inst = &self.lab.instances[id.0 as usize];
+        while let Some(owner) = inst.owner
+            && self.in_library(inst.span)
+        {
+            inst = &self.lab.instances[owner.0 as usize];
+        }
+        inst.span
+    }
+
+    fn show(&self, value: &Known, domain: &Domain) -> String {
+        shown(value, |v| match domain {
+            Domain::Quantity(unit) => unit.show(v),
+            Domain::Bool => (if v == 0.0 { "false" } else { "true" }).to_string(),
+            Domain::Enum(words) => words.get(v as usize).map_or("?".to_string(), |word| format!("`{word}`")),
+            Domain::Instance if v < 0.0 => "nothing".to_string(),
+            Domain::Instance => match self.lab.instances.get(v as usize) {
+                Some(i) => format!("`{}`", i.name),
+                None => "?".to_string(),
+            },
+        })
+    }
+}
+
+/// How bad a finding is that is made on every way, or on some.
+fn severity(code: Code, some: bool) -> Severity {
+    let mild = only_advice(code) || (some && !forbidden_on_any_way(code));
+    if mild { Severity::Warning } else { Severity::Error }
+}
+
+/// What is known, in words.
+fn shown(value: &Known, show: impl Fn(f64) -> String) -> String {
+    // What is left of a subtraction is not worth telling beside what it was taken from.
+    let (low, high) = value.bounds();
+    let largest = if high.is_finite() { low.abs().max(high.abs()) } else { low.abs() };
+    let show = |v: f64| show(if v.abs() < 1e-9 * largest { 0.0 } else { v });
+    match value {
+        Known::Point(v) => show(*v),
+        Known::Few(all, _) => all.iter().map(|v| show(*v)).collect::<Vec<_>>().join(" or "),
+        Known::Range(low, high, _) if low.is_finite() && high.is_finite() => {
+            format!("between {} and {}", show(*low), show(*high))
+        }
+        Known::Range(low, _, _) if low.is_finite() => format!("{} or more", show(*low)),
+        Known::Range(_, high, _) if high.is_finite() => format!("{} or less", show(*high)),
+        Known::Range(..) => "not known".to_string(),
+    }
+}

@@ -1,0 +1,317 @@
+//! What is known of a number before the run: exactly, one of a few, or within bounds.
+
+use std::rc::Rc;
+
+use matterix_ir::graph::{binary, unary};
+use matterix_ir::{BinaryOp, UnaryOp};
+
+/// Why a number is not known exactly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Why {
+    /// It differs between ways through the plan.
+    Paths,
+    /// It depends on what only a run can tell.
+    Unknown,
+}
+
+/// What is known of a number.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Known {
+    /// This number.
+    Point(f64),
+    /// One of these, in rising order.
+    Few(Rc<[f64]>, Why),
+    /// Between these, ends included.
+    Range(f64, f64, Why),
+}
+
+/// So many single values are kept apart before only their bounds are.
+const MOST: usize = 8;
+
+/// Numbers closer than this, relative to the larger, are not told apart.
+const CLOSE: f64 = 1e-9;
+
+impl Known {
+    /// Nothing is known.
+    pub fn nothing() -> Self {
+        Known::Range(f64::NEG_INFINITY, f64::INFINITY, Why::Unknown)
+    }
+
+    /// A truth value that is not known.
+    pub fn either(why: Why) -> Self {
+        Known::Few(Rc::from([0.0, 1.0]), why)
+    }
+
+    /// A number; what is no number is not known.
+    pub fn point(value: f64) -> Self {
+        if value.is_nan() { Known::nothing() } else { Known::Point(value) }
+    }
+
+    /// The bounds, ends included.
+    pub fn bounds(&self) -> (f64, f64) {
+        match self {
+            Known::Point(v) => (*v, *v),
+            Known::Few(all, _) => (all[0], all[all.len() - 1]),
+            Known::Range(low, high, _) => (*low, *high),
+        }
+    }
+
+    /// Why it is not known exactly, if it is not.
+    pub fn why(&self) -> Option<Why> {
+        match self {
+            Known::Point(_) => None,
+            Known::Few(_, why) | Known::Range(_, _, why) => Some(*why),
+        }
+    }
+
+    /// The number, if it is known exactly.
+    pub fn exact(&self) -> Option<f64> {
+        match self {
+            Known::Point(v) => Some(*v),
+            _ => None,
+        }
+    }
+
+    /// Whether, as a truth value, it is certainly not 0, certainly 0, or neither.
+    pub fn truth(&self) -> Option<bool> {
+        match self {
+            Known::Point(v) => Some(*v != 0.0),
+            Known::Few(all, _) => {
+                let zeros = all.iter().filter(|v| **v == 0.0).count();
+                if zeros == 0 { Some(true) } else { (zeros == all.len()).then_some(false) }
+            }
+            Known::Range(low, high, _) => (*low > 0.0 || *high < 0.0).then_some(true),
+        }
+    }
+
+    fn values(&self) -> Option<&[f64]> {
+        match self {
+            Known::Point(v) => Some(std::slice::from_ref(v)),
+            Known::Few(all, _) => Some(all),
+            Known::Range(..) => None,
+        }
+    }
+
+    fn of(mut all: Vec<f64>, why: Why) -> Self {
+        if all.iter().any(|v| v.is_nan()) {
+            return Known::nothing();
+        }
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        match all.as_slice() {
+            [one] => Known::Point(*one),
+            [first, .., last] if all.len() > MOST => Known::Range(*first, *last, why),
+            _ => Known::Few(all.into(), why),
+        }
+    }
+
+    fn range(low: f64, high: f64, why: Why) -> Self {
+        if low.is_nan() || high.is_nan() {
+            return Known::nothing();
+        }
+        if low == high { Known::Point(low) } else { Known::Range(low, high, why) }
+    }
+
+    /// Either of two, depending on the way taken.
+    pub fn join(&self, other: &Known, because: Why) -> Known {
+        if self == other {
+            return self.clone();
+        }
+        let why = [self.why(), other.why()].into_iter().flatten().max().map_or(because, |w| w.max(because));
+        match (self.values(), other.values()) {
+            (Some(a), Some(b)) => Known::of(a.iter().chain(b).copied().collect(), why),
+            _ => {
+                let ((a, b), (c, d)) = (self.bounds(), other.bounds());
+                Known::range(a.min(c), b.max(d), why)
+            }
+        }
+    }
+
+    /// An operation on one number.
+    pub fn unary(op: UnaryOp, a: &Known) -> Known {
+        let Some(why) = a.why() else { return Known::point(unary(op, a.bounds().0)) };
+        if let Some(all) = a.values() {
+            return Known::of(all.iter().map(|v| unary(op, *v)).collect(), why);
+        }
+        let (low, high) = a.bounds();
+        match op {
+            UnaryOp::Neg => Known::range(-high, -low, why),
+            UnaryOp::Not => match a.truth() {
+                Some(truth) => Known::Point(f64::from(u8::from(!truth))),
+                None => Known::either(why),
+            },
+            UnaryOp::Exp | UnaryOp::Floor => Known::range(unary(op, low), unary(op, high), why),
+            UnaryOp::Ln | UnaryOp::Sqrt if low >= 0.0 => Known::range(unary(op, low), unary(op, high), why),
+            UnaryOp::Abs if low >= 0.0 => Known::range(low, high, why),
+            UnaryOp::Abs if high <= 0.0 => Known::range(-high, -low, why),
+            UnaryOp::Abs => Known::range(0.0, high.max(-low), why),
+            UnaryOp::Sin | UnaryOp::Cos => Known::range(-1.0, 1.0, why),
+            UnaryOp::Ln | UnaryOp::Sqrt => Known::nothing(),
+        }
+    }
+
+    /// An operation on two numbers.
+    pub fn binary(op: BinaryOp, a: &Known, b: &Known) -> Known {
+        if let (Known::Point(x), Known::Point(y)) = (a, b) {
+            return Known::points(op, *x, *y);
+        }
+        // What decides alone does not need the other.
+        match op {
+            BinaryOp::And if a.truth() == Some(false) || b.truth() == Some(false) => return Known::Point(0.0),
+            BinaryOp::Or if a.truth() == Some(true) || b.truth() == Some(true) => return Known::Point(1.0),
+            // Nothing over something is nothing; over nothing it is no number, and no definition asks for that.
+            BinaryOp::Div if a.exact() == Some(0.0) && b.exact().is_none() => return Known::Point(0.0),
+            BinaryOp::Mul if a.exact() == Some(0.0) || b.exact() == Some(0.0) => return Known::Point(0.0),
+            _ => {}
+        }
+        let why = a.why().max(b.why()).unwrap_or(Why::Paths);
+        if let (Some(x), Some(y)) = (a.values(), b.values())
+            && x.len() * y.len() <= MOST * MOST
+        {
+            let mut all = Vec::with_capacity(x.len() * y.len());
+            for p in x {
+                for q in y {
+                    match Known::points(op, *p, *q) {
+                        Known::Point(v) => all.push(v),
+                        Known::Few(some, _) => all.extend(some.iter()),
+                        other => return other,
+                    }
+                }
+            }
+            return Known::of(all, why);
+        }
+        Known::ranges(op, a.bounds(), b.bounds(), why)
+    }
+
+    /// Two exact numbers. Where a comparison hangs on rounding, it is left open.
+    fn points(op: BinaryOp, a: f64, b: f64) -> Known {
+        let result = binary(op, a, b);
+        let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
+        if compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) {
+            return Known::either(Why::Unknown);
+        }
+        Known::point(result)
+    }
+
+    fn ranges(op: BinaryOp, (a, b): (f64, f64), (c, d): (f64, f64), why: Why) -> Known {
+        let decided = |yes: bool, no: bool| match (yes, no) {
+            (true, _) => Known::Point(1.0),
+            (_, true) => Known::Point(0.0),
+            _ => Known::either(why),
+        };
+        match op {
+            BinaryOp::Add => Known::range(a + c, b + d, why),
+            BinaryOp::Sub => Known::range(a - d, b - c, why),
+            BinaryOp::Mul => Known::corners([times(a, c), times(a, d), times(b, c), times(b, d)], why),
+            BinaryOp::Div if c > 0.0 || d < 0.0 => Known::corners([a / c, a / d, b / c, b / d], why),
+            // Nothing is below zero where neither operand is.
+            BinaryOp::Div if a >= 0.0 && c >= 0.0 => Known::range(a / d, f64::INFINITY, why),
+            BinaryOp::Div => Known::nothing(),
+            BinaryOp::Pow if a >= 0.0 && c == d => {
+                let (low, high) = (binary(op, a, c), binary(op, b, c));
+                Known::range(low.min(high), low.max(high), why)
+            }
+            BinaryOp::Pow => Known::nothing(),
+            BinaryOp::Min => Known::range(a.min(c), b.min(d), why),
+            BinaryOp::Max => Known::range(a.max(c), b.max(d), why),
+            BinaryOp::Lt => decided(b < c, a >= d),
+            BinaryOp::Le => decided(b <= c, a > d),
+            BinaryOp::Eq => decided(false, b < c || a > d),
+            BinaryOp::And | BinaryOp::Or => {
+                let truth = |low: f64, high: f64| Known::Range(low, high, why).truth();
+                match (op, truth(a, b), truth(c, d)) {
+                    (BinaryOp::And, Some(true), Some(true)) => Known::Point(1.0),
+                    _ => Known::either(why),
+                }
+            }
+        }
+    }
+
+    fn corners(all: [f64; 4], why: Why) -> Known {
+        let low = all.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if all.iter().any(|v| v.is_nan()) { Known::nothing() } else { Known::range(low, high, why) }
+    }
+
+    /// One of two by a condition.
+    pub fn select(c: &Known, a: &Known, b: &Known) -> Known {
+        match c.truth() {
+            Some(true) => a.clone(),
+            Some(false) => b.clone(),
+            None => a.join(b, c.why().unwrap_or(Why::Paths)),
+        }
+    }
+}
+
+/// A product of bounds, where nothing times without bound is nothing.
+fn times(a: f64, b: f64) -> f64 {
+    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn known() -> impl Strategy<Value = (Known, f64)> {
+        let value = -50.0..50.0_f64;
+        prop_oneof![
+            value.clone().prop_map(|v| (Known::Point(v), v)),
+            (value.clone(), value.clone()).prop_map(|(a, b)| (Known::of(vec![a, b], Why::Paths), a)),
+            (value.clone(), value, 0.0..1.0_f64).prop_map(|(a, b, t)| {
+                let (low, high) = (a.min(b), a.max(b));
+                (Known::range(low, high, Why::Paths), low + t * (high - low))
+            }),
+        ]
+    }
+
+    fn holds(known: &Known, value: f64) -> bool {
+        let (low, high) = known.bounds();
+        let slack = 1e-9 * value.abs().max(1.0);
+        value.is_nan() || (low - slack <= value && value <= high + slack)
+    }
+
+    const OPS: [BinaryOp; 12] = [
+        BinaryOp::Add,
+        BinaryOp::Sub,
+        BinaryOp::Mul,
+        BinaryOp::Div,
+        BinaryOp::Pow,
+        BinaryOp::Min,
+        BinaryOp::Max,
+        BinaryOp::Lt,
+        BinaryOp::Le,
+        BinaryOp::Eq,
+        BinaryOp::And,
+        BinaryOp::Or,
+    ];
+
+    proptest! {
+        #[test]
+        fn a_result_lies_within_what_is_known((a, x) in known(), (b, y) in known(), op in 0..12usize) {
+            let result = binary(OPS[op], x, y);
+            prop_assert!(holds(&Known::binary(OPS[op], &a, &b), result), "{a:?} {:?} {b:?}", OPS[op]);
+        }
+
+        #[test]
+        fn either_way_lies_within_the_join((a, x) in known(), (b, y) in known()) {
+            let both = a.join(&b, Why::Paths);
+            prop_assert!(holds(&both, x) && holds(&both, y));
+        }
+
+        #[test]
+        fn one_operand_lies_within_what_is_known((a, x) in known()) {
+            for op in [UnaryOp::Neg, UnaryOp::Not, UnaryOp::Exp, UnaryOp::Ln, UnaryOp::Sqrt, UnaryOp::Abs, UnaryOp::Floor] {
+                prop_assert!(holds(&Known::unary(op, &a), unary(op, x)), "{op:?} {a:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rounding_decides_nothing() {
+        let tenth = (0..10).map(|_| 0.1).sum::<f64>();
+        assert_eq!(Known::binary(BinaryOp::Le, &Known::Point(1.0), &Known::Point(tenth)).truth(), None);
+        assert_eq!(Known::binary(BinaryOp::Le, &Known::Point(1.0), &Known::Point(1.0)).truth(), Some(true));
+    }
+}

@@ -1,0 +1,440 @@
+//! The steps of the plan, one construct at a time. Each gives what is known after it, or nothing where it never ends
+//! by itself.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Caught, Condition, Step, StepId};
+use matterix_ir::{BinaryOp, NodeId};
+
+use super::facts::Facts;
+use super::report::Finding;
+use super::value::{Known, Why};
+use super::{Flow, MOST_STEPS, Site};
+
+/// Turns of a loop followed one by one.
+const MOST_TURNS: usize = 2000;
+
+/// Depth of `parallel` to which every branch is followed both before and after its siblings.
+const MOST_PARALLEL: usize = 3;
+
+impl Flow<'_, '_> {
+    /// Follows a step.
+    pub fn walk(&mut self, id: StepId, facts: Facts) -> Option<Facts> {
+        self.steps += 1;
+        if self.steps > MOST_STEPS {
+            return None;
+        }
+        let node = self.plan.get(id);
+        let block = matches!(node.step, Step::Sequence(_) | Step::Guarded { .. } | Step::Parallel(_) | Step::Try(_));
+        let own = !block && !node.span.is_empty() && !self.in_library(node.span);
+        if own {
+            let calls = matches!(node.step, Step::Operation(_) | Step::Skill { .. });
+            self.sites.push(Site { span: node.span, label: node.label.clone(), calls });
+        }
+        let after = self.step(id, facts);
+        if own {
+            self.sites.pop();
+        }
+        after
+    }
+
+    fn step(&mut self, id: StepId, mut facts: Facts) -> Option<Facts> {
+        let plan = self.plan;
+        let node = plan.get(id);
+        match &node.step {
+            Step::Sequence(steps) => {
+                for step in steps {
+                    facts = self.walk(*step, facts)?;
+                }
+                Some(facts)
+            }
+            Step::Parallel(branches) => self.parallel(branches, facts),
+            Step::Operation(operation) => Some(self.operation(&node.label, operation, facts)),
+            Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
+            Step::Retry { .. } => None,
+            Step::Try(alternatives) => self.alternatives(id, alternatives, facts),
+            Step::Skill { needs, body, .. } => {
+                let met = self.needs(&node.label, needs, &mut facts);
+                self.quiet += usize::from(!met);
+                let after = self.walk(*body, facts);
+                self.quiet -= usize::from(!met);
+                after
+            }
+            Step::Named { start, end, body, .. } => {
+                facts.locals[*start as usize] = facts.time.clone();
+                let mut after = self.walk(*body, facts)?;
+                after.locals[*end as usize] = after.time.clone();
+                Some(after)
+            }
+            Step::Let { local, value } => {
+                facts.locals[*local as usize] = self.eval(*value, &facts);
+                Some(facts)
+            }
+            Step::Wait { duration } => {
+                let time = self.eval(*duration, &facts);
+                self.pass(&time, &mut facts);
+                Some(facts)
+            }
+            Step::WaitUntil { condition, timeout } => self.wait_until(condition, *timeout, facts),
+            Step::Hold { condition, duration, timeout } => {
+                let mut facts = self.wait_until(condition, *timeout, facts)?;
+                let time = self.eval(*duration, &facts);
+                self.pass(&time, &mut facts);
+                self.assume(condition.node, true, &mut facts);
+                Some(facts)
+            }
+            Step::Keep { condition, body } => {
+                let mut broken = facts.clone();
+                self.widen(*body, &mut broken);
+                self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
+                self.raise("broken", broken);
+                if self.eval(condition.node, &facts).truth() == Some(false) && !self.is_shared(condition.node) {
+                    self.unexpected(condition, &facts);
+                }
+                self.walk(*body, facts)
+            }
+            Step::During { body, .. } => {
+                // It breaks after any time, with any part of the body done.
+                let mut broken = facts.clone();
+                self.widen(*body, &mut broken);
+                self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
+                self.raise("broken", broken);
+                self.walk(*body, facts)
+            }
+            Step::Within { body, .. } => {
+                self.raise("late", facts.clone());
+                self.walk(*body, facts)
+            }
+            Step::If { condition, then, otherwise } => self.choice(id, condition, *then, *otherwise, facts),
+            Step::Repeat { times, body } => {
+                let times = self.eval(*times, &facts);
+                self.repeat(id, &times, *body, facts)
+            }
+            Step::RepeatWhile { condition, max, body } => {
+                let max = self.eval(*max, &facts);
+                self.repeat_while(id, condition, &max, *body, facts)
+            }
+            Step::Claim { body, .. } | Step::Start { body, .. } => self.walk(*body, facts),
+            Step::Fail { name, .. } => {
+                self.raise(name, facts);
+                None
+            }
+            Step::Expect(conditions) => {
+                // What holds on some ways only is the run's to judge.
+                for c in conditions {
+                    if self.eval(c.node, &facts).truth() == Some(false) && !self.is_shared(c.node) {
+                        self.unexpected(c, &facts);
+                    }
+                }
+                Some(facts)
+            }
+            Step::Await { .. } | Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
+        }
+    }
+
+    fn wait_until(&mut self, condition: &Condition, timeout: Option<NodeId>, mut facts: Facts) -> Option<Facts> {
+        let value = self.eval(condition.node, &facts);
+        if value.truth() == Some(true) {
+            return Some(facts);
+        }
+        let parts = self.parts(condition.node);
+        let shared = self.is_shared(condition.node);
+        let before = facts.clone();
+        let longest = match timeout {
+            Some(node) => self.eval(node, &facts).bounds().1,
+            None => f64::INFINITY,
+        };
+        self.pass(&Known::Range(0.0, longest, Why::Unknown), &mut facts);
+        if timeout.is_some() {
+            self.raise("timeout", facts.clone());
+        }
+        if value.truth() == Some(false) && !parts.timed && !shared {
+            let never = self.eval(condition.node, &facts).truth() == Some(false);
+            if never {
+                if !self.is_taken("timeout") {
+                    self.never_comes(condition, timeout.is_some(), &before, &facts);
+                }
+                let states = parts.states.clone();
+                self.forget(&states, &mut facts);
+                return Some(facts);
+            }
+        }
+        // Another branch may do what is waited for.
+        if value.truth() == Some(false) && shared {
+            let states: Vec<u32> = self.shared.iter().flatten().copied().collect();
+            self.forget(&states, &mut facts);
+        }
+        self.assume(condition.node, true, &mut facts);
+        Some(facts)
+    }
+
+    fn choice(
+        &mut self,
+        id: StepId,
+        condition: &Condition,
+        then: StepId,
+        otherwise: Option<StepId>,
+        facts: Facts,
+    ) -> Option<Facts> {
+        let value = self.eval(condition.node, &facts);
+        self.note_branch(condition, otherwise.is_some());
+        let mut branch = |holds: bool, facts: &Facts| {
+            let mut facts = facts.clone();
+            self.assume(condition.node, holds, &mut facts);
+            match (holds, otherwise) {
+                (true, _) => self.walk(then, facts),
+                (false, Some(step)) => self.walk(step, facts),
+                (false, None) => Some(facts),
+            }
+        };
+        match value.truth() {
+            Some(holds) => branch(holds, &facts),
+            None => {
+                let (yes, no) = (branch(true, &facts), branch(false, &facts));
+                self.meet(id, &facts, yes, no)
+            }
+        }
+    }
+
+    /// What is known after one of two ways from `base`.
+    fn meet(&self, id: StepId, base: &Facts, a: Option<Facts>, b: Option<Facts>) -> Option<Facts> {
+        match (a, b) {
+            (Some(a), Some(b)) => {
+                let span = self.plan.get(id).span;
+                Some(base.join(a, &b, if self.in_library(span) { self.site() } else { span }, Why::Paths))
+            }
+            (one, other) => one.or(other),
+        }
+    }
+
+    fn repeat(&mut self, id: StepId, times: &Known, body: StepId, mut facts: Facts) -> Option<Facts> {
+        let (low, high) = times.bounds();
+        let before_all = facts.clone();
+        for turn in 0..MOST_TURNS {
+            let done = turn as f64;
+            if done >= high {
+                return Some(facts);
+            }
+            let before = facts.clone();
+            let after = self.walk(body, facts);
+            facts = if done >= low { self.meet(id, &before, Some(before.clone()), after)? } else { after? };
+            if facts.states == before.states {
+                return Some(later(facts, &before));
+            }
+        }
+        self.widen(body, &mut facts);
+        Some(later(facts, &before_all))
+    }
+
+    fn repeat_while(
+        &mut self,
+        id: StepId,
+        condition: &Condition,
+        max: &Known,
+        body: StepId,
+        mut facts: Facts,
+    ) -> Option<Facts> {
+        let start = facts.clone();
+        let mut ends: Option<Facts> = None;
+        let (_, most) = max.bounds();
+        for turn in 0..MOST_TURNS {
+            let holds = self.eval(condition.node, &facts).truth();
+            if holds != Some(true) {
+                let mut out = facts.clone();
+                self.assume(condition.node, false, &mut out);
+                ends = self.meet(id, &start, ends, Some(out));
+            }
+            if holds == Some(false) {
+                return ends;
+            }
+            if turn as f64 >= most {
+                self.raise("max", facts);
+                return ends;
+            }
+            let before = facts.clone();
+            self.assume(condition.node, true, &mut facts);
+            let open = turn > 0 && ends.is_some();
+            self.doubt += usize::from(open);
+            let after = self.walk(body, facts);
+            self.doubt -= usize::from(open);
+            let Some(after) = after else { return ends };
+            facts = after;
+            if facts.states == before.states {
+                self.raise("max", facts.clone());
+                // A loop that changes nothing it looks at ends by what only a run can tell.
+                let facts = later(facts, &before);
+                return match ends {
+                    Some(ends) => self.meet(id, &start, Some(ends), Some(facts)),
+                    None => Some(facts),
+                };
+            }
+        }
+        self.widen(body, &mut facts);
+        self.meet(id, &start, ends, Some(facts))
+    }
+
+    /// Forgets what a body changes.
+    fn widen(&mut self, body: StepId, facts: &mut Facts) {
+        let states: Vec<u32> = self.writes(body).into_iter().collect();
+        self.forget(&states, facts);
+    }
+
+    /// The states that the operations below a step change.
+    fn writes(&self, id: StepId) -> BTreeSet<u32> {
+        let mut out = BTreeSet::new();
+        let mut todo = vec![id];
+        while let Some(id) = todo.pop() {
+            let step = &self.plan.get(id).step;
+            if let Step::Operation(o) = step {
+                for action in o.at_start.iter().chain(&o.at_end) {
+                    match action {
+                        Action::Assign { state, .. } => drop(out.insert(*state)),
+                        Action::Move { from, to, .. } => {
+                            for m in [from, to] {
+                                out.extend(self.mixtures[*m as usize].iter().map(|(_, s)| *s));
+                            }
+                        }
+                    }
+                }
+            }
+            todo.extend(step.children());
+        }
+        out
+    }
+
+    /// Branches side by side: followed one after the other, in the order of the text and the other way round. What goes
+    /// wrong in one order only may be right in the order of the run.
+    fn parallel(&mut self, branches: &[StepId], facts: Facts) -> Option<Facts> {
+        let writes: Vec<BTreeSet<u32>> = branches.iter().map(|b| self.writes(*b)).collect();
+        let forward: Vec<usize> = (0..branches.len()).collect();
+        let backward: Vec<usize> = forward.iter().rev().copied().collect();
+        let mark = self.findings.len();
+        let first = self.in_order(branches, &forward, &writes, facts.clone());
+        if branches.len() < 2 || self.shared.len() >= MOST_PARALLEL {
+            return first;
+        }
+        let one: Vec<Finding> = self.findings.split_off(mark);
+        let second = self.in_order(branches, &backward, &writes, facts.clone());
+        let other: Vec<Finding> = self.findings.split_off(mark);
+        let both = one.iter().any(|f| other.iter().any(|o| o.is_like(f)));
+        // Something goes wrong in either order, if not at the same place: the first order tells it.
+        let either = !both && one.iter().any(Finding::is_error) && other.iter().any(Finding::is_error);
+        self.findings.extend(one.into_iter().filter(|f| either || other.iter().any(|o| o.is_like(f))));
+        match (first, second) {
+            (Some(a), Some(b)) => Some(facts.join(a, &b, self.site(), Why::Unknown)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    fn in_order(
+        &mut self,
+        branches: &[StepId],
+        order: &[usize],
+        writes: &[BTreeSet<u32>],
+        mut facts: Facts,
+    ) -> Option<Facts> {
+        let start = facts.time.clone();
+        let mut longest = start.clone();
+        for i in order {
+            let others = writes.iter().enumerate().filter(|(o, _)| o != i);
+            self.shared.push(others.flat_map(|(_, w)| w.iter().copied()).collect());
+            facts.time = start.clone();
+            let after = self.walk(branches[*i], facts);
+            self.shared.pop();
+            facts = after?;
+            longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
+        }
+        facts.time = longest;
+        Some(facts)
+    }
+
+    fn guarded(
+        &mut self,
+        id: StepId,
+        body: StepId,
+        handlers: &[(Caught, StepId)],
+        finally: Option<StepId>,
+        facts: Facts,
+    ) -> Option<Facts> {
+        let names = handlers.iter().map(|(c, _)| match c {
+            Caught::Named(name) => Some(name.clone()),
+            Caught::Any => None,
+        });
+        // The library's own handlers are for devices that fail, not for mistakes in the plan.
+        let library = self.in_library(self.plan.get(id).span);
+        self.caught.push(if library { Vec::new() } else { names.collect() });
+        self.guards.push(Vec::new());
+        let mut after = self.walk(body, facts.clone());
+        let mut raised = self.guards.pop().unwrap_or_default();
+        self.caught.pop();
+        for (caught, handler) in handlers {
+            let (taken, rest): (Vec<_>, Vec<_>) = raised.into_iter().partition(|(name, _)| match caught {
+                Caught::Named(n) => n == name,
+                Caught::Any => true,
+            });
+            raised = rest;
+            let entry = taken.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths));
+            if let Some(entry) = entry {
+                self.cleaning += 1;
+                let end = self.walk(*handler, entry);
+                self.cleaning -= 1;
+                after = self.meet(id, &facts, after, end);
+            }
+        }
+        let out = match (finally, after) {
+            (Some(finally), after) => {
+                let ends = after.is_some();
+                let entry = after.or_else(|| raised.first().map(|(_, facts)| facts.clone()));
+                self.cleaning += 1;
+                let end = entry.and_then(|facts| self.walk(finally, facts));
+                self.cleaning -= 1;
+                end.filter(|_| ends)
+            }
+            (None, after) => after,
+        };
+        if let Some(outer) = self.guards.last_mut() {
+            outer.extend(raised);
+        }
+        out
+    }
+
+    fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: Facts) -> Option<Facts> {
+        let mut end = None;
+        let mut entry = facts.clone();
+        for (i, step) in alternatives.iter().enumerate() {
+            let last = i + 1 == alternatives.len();
+            self.caught.push(if last { Vec::new() } else { vec![None] });
+            self.guards.push(Vec::new());
+            let after = self.walk(*step, entry.clone());
+            let raised = self.guards.pop().unwrap_or_default();
+            self.caught.pop();
+            end = self.meet(id, &facts, end, after);
+            if last {
+                if let Some(outer) = self.guards.last_mut() {
+                    outer.extend(raised);
+                }
+                break;
+            }
+            match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
+                Some(next) => entry = next,
+                // Only a device's failure leads to the next one: how far this one got is not known.
+                None => {
+                    let states: Vec<u32> = self.writes(*step).into_iter().collect();
+                    self.forget(&states, &mut entry);
+                }
+            }
+        }
+        end
+    }
+}
+
+/// The same after more turns, of which only the time is told apart.
+fn later(mut facts: Facts, before: &Facts) -> Facts {
+    if facts.time != before.time || facts.locals != before.locals {
+        let (since, _) = facts.time.bounds();
+        facts.time = Known::Range(since, f64::INFINITY, Why::Unknown);
+        facts.locals.iter_mut().zip(&before.locals).filter(|(a, b)| a != b).for_each(|(a, _)| *a = Known::nothing());
+    }
+    facts
+}
