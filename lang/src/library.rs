@@ -8,4 +8,27 @@ macro_rules! modules {
     };
 }
 
-modules! { "bodies" "chemistry" "devices" "furniture" "glassware" "heating" "math" "prelude" "robots" "skills" "species" "thermal" "units" }
+macro_rules! files {
+    ($($name:literal)*) => {
+        /// Data files of the library with their texts.
+        const FILES: &[(&str, &str)] =
+            &[$((concat!($name, ".json"), include_str!(concat!("../../assets/labware/", $name, ".json")))),*];
+    };
+}
+
+files! {
+    "corning_96_wellplate_360ul_flat"
+    "nest_12_reservoir_15ml"
+    "opentrons_1_trash_1100ml_fixed"
+    "opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap"
+    "opentrons_96_tiprack_1000ul"
+    "opentrons_96_tiprack_20ul"
+    "opentrons_96_tiprack_300ul"
+}
+
+/// A data file of the library.
+pub fn file(name: &str) -> Option<&'static str> {
+    FILES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
+
+modules! { "bodies" "centrifuges" "chemistry" "closures" "devices" "furniture" "glassware" "hazards" "heating" "labware" "materials" "math" "opentrons" "pipetting" "prelude" "reactivity" "robots" "shakers" "skills" "species" "thermal" "units" "vials" }

@@ -6,6 +6,9 @@ use matterix_ir::FileId;
 pub trait Loader {
     /// The module `module` (`sn1`, `parts::racks`) as seen from the file `from`: its display name and text.
     fn load(&self, from: FileId, module: &str) -> Option<(String, String)>;
+
+    /// The text of a data file as named in the file `from`, or in words why it cannot be read.
+    fn file(&self, from: FileId, path: &str) -> Result<String, String>;
 }
 
 /// A loader that knows the standard library only.
@@ -14,5 +17,9 @@ pub struct LibraryOnly;
 impl Loader for LibraryOnly {
     fn load(&self, _: FileId, _: &str) -> Option<(String, String)> {
         None
+    }
+
+    fn file(&self, _: FileId, _: &str) -> Result<String, String> {
+        Err("there is no such file".into())
     }
 }

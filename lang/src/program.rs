@@ -5,14 +5,15 @@ use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, InstanceId, Pose, Scene, Shape};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
-use crate::ast::{AssetLine, Expr, ExprKind, FieldValue, ItemKind, MemberKind, Role};
+use crate::ast::{AssetLine, Expr, ExprKind, FieldValue, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
-use crate::names::{self, DeclId, Module, Names, near};
+use crate::names::{self, DeclId, Names, near};
+use crate::task::{self, Given, Task};
 
 /// What a compilation is asked for.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +22,21 @@ pub struct Options {
     pub workflow: Option<String>,
     /// Values of parameters as text: `("target", "40 degC")`.
     pub set: Vec<(String, String)>,
+    /// Which lab, for a workflow that runs in any.
+    pub lab: Option<String>,
+}
+
+/// A test, ready to run.
+#[derive(Clone, Debug)]
+pub struct Test {
+    /// Its name.
+    pub name: String,
+    /// Where its name stands.
+    pub span: Span,
+    /// What is run; none where it has an error.
+    pub program: Option<Program>,
+    /// What was found in it.
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Checks a file: everything it declares, and every workflow in its lab.
@@ -33,16 +49,29 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
     diagnostics.extend(checks::declarations(&tables, sources, root));
-    let workflows = workflows(&names, root);
+    let items = runnable(&names, root);
     let mut starts = Vec::new();
-    for built in judge(&tables, sources, &workflows) {
+    let mut tasks = Vec::new();
+    for item in items.iter().copied() {
+        match task::labs(&tables, sources, root, item, &[]) {
+            Ok(labs) => {
+                tasks.extend(labs.into_iter().map(|lab| Task { item, lab, given: task::given(&tables, item, &[]) }))
+            }
+            Err(d) => diagnostics.push(*d),
+        }
+    }
+    let found_all = !tasks.is_empty();
+    for task in &tasks {
+        diagnostics.extend(task::check_given(&tables, task.item, &task.given));
+    }
+    for built in judge(&tables, sources, &tasks) {
         diagnostics.extend(built.findings);
         starts.extend(built.starts);
     }
-    if starts.len() == workflows.len() {
+    if found_all && starts.len() == tasks.len() {
         diagnostics.extend(checks::never_starts(&tables, root, &starts));
     }
-    if workflows.is_empty() {
+    if items.is_empty() {
         for id in names.declared_by(root) {
             if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
                 diagnostics.extend(checks::lab(&tables, id));
@@ -59,33 +88,109 @@ pub fn compile(
     loader: &dyn Loader,
     options: &Options,
 ) -> (Option<Program>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics) = names::load(sources, file, loader);
+    let (program, diagnostics) = compile_and(sources, file, loader, options, |_, _, _| ());
+    (program.map(|(program, ())| program), diagnostics)
+}
+
+/// Compiles one workflow of a file and writes it as a protocol for people, in Markdown.
+pub fn document(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+) -> (Option<String>, Vec<Diagnostic>) {
+    let (text, diagnostics) = compile_and(sources, file, loader, options, |program, task, context| {
+        crate::prose::protocol(context.0, context.1, program, task)
+    });
+    (text.map(|(_, text)| text), diagnostics)
+}
+
+/// Compiles one workflow of a file; where that succeeds, `then` makes something more of it.
+fn compile_and<T>(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+    then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
+) -> (Option<(Program, T)>, Vec<Diagnostic>) {
+    let (modules, mut diagnostics) = names::load(sources, file, loader);
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
-    let set = argument_modules(sources, options, &mut modules, &mut diagnostics);
+    let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
     let (tables, found) = Tables::new(&names);
     diagnostics.extend(found);
     diagnostics.extend(checks::declarations(&tables, sources, root));
-    let Some(id) = choose_workflow(&names, root, file, options, &mut diagnostics) else {
+    let Some(item) = choose_workflow(&names, root, file, options, &mut diagnostics) else {
         return (None, finish(diagnostics, sources));
     };
-    let arguments = arguments(&names, id, &set, &mut diagnostics);
-    let built = build(&tables, sources, id, &arguments, true);
+    let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
+    diagnostics.extend(task::check_given(&tables, item, &given));
+    let lab = match task::lab(&tables, sources, root, item, &given, options.lab.as_deref()) {
+        Ok(lab) => lab,
+        Err(d) => {
+            diagnostics.push(*d);
+            return (None, finish(diagnostics, sources));
+        }
+    };
+    let task = Task { item, lab, given };
+    let built = build(&tables, sources, &task, true);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
-    if workflows(&names, root).len() == 1 {
+    if runnable(&names, root).len() == 1 {
         diagnostics.extend(checks::never_starts(&tables, root, built.starts.as_slice()));
     }
     let diagnostics = finish(diagnostics, sources);
     let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
-    (built.program.filter(|_| !failed), diagnostics)
+    let program = built.program.filter(|_| !failed);
+    let more = program.map(|program| {
+        let more = then(&program, &task, (&tables, sources));
+        (program, more)
+    });
+    (more, diagnostics)
 }
 
-/// The workflows that a module declares.
-fn workflows(names: &Names<'_>, module: usize) -> Vec<DeclId> {
-    let is_workflow = |id: &DeclId| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. });
-    names.declared_by(module).filter(is_workflow).collect()
+/// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
+/// them is returned apart.
+pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
+    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
+    let (names, found) = Names::new(&modules);
+    diagnostics.extend(found);
+    let (tables, found) = Tables::new(&names);
+    diagnostics.extend(found);
+    let mut tests = Vec::new();
+    for item in names.declared_by(root) {
+        let ItemKind::Test { name, .. } = &names.decl(item).item.kind else { continue };
+        if !name.text.contains(wanted) {
+            continue;
+        }
+        let given = task::given(&tables, item, &[]);
+        let mut found = task::check_given(&tables, item, &given);
+        let mut program = None;
+        match task::lab(&tables, sources, root, item, &given, None) {
+            Ok(lab) => {
+                let built = build(&tables, sources, &Task { item, lab, given }, true);
+                found.extend(built.findings);
+                program = built.program;
+            }
+            Err(d) => found.push(*d),
+        }
+        let diagnostics = finish(found, sources);
+        let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+        let program = program.filter(|_| !failed);
+        tests.push(Test { name: name.text.clone(), span: name.span, program, diagnostics });
+    }
+    if !tests.is_empty() {
+        diagnostics.extend(checks::declarations(&tables, sources, root));
+    }
+    (tests, finish(diagnostics, sources))
+}
+
+/// The workflows and tests that a module declares.
+fn runnable(names: &Names<'_>, module: usize) -> Vec<DeclId> {
+    let is_run = |id: &DeclId| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. } | ItemKind::Test { .. });
+    names.declared_by(module).filter(is_run).collect()
 }
 
 /// Each finding once, in the order of the text, without those that only follow from others.
@@ -101,47 +206,15 @@ fn finish(mut diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic
     checks::without_consequences(out, sources)
 }
 
-/// `--set name=value` as a module of one constant, so that its value is read like any other.
-fn argument_modules(
-    sources: &mut Sources,
-    options: &Options,
-    modules: &mut Vec<Module>,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<(String, usize)> {
+/// The values of `--set name=value`, each read as it was typed.
+fn typed_values(sources: &mut Sources, options: &Options, diagnostics: &mut Vec<Diagnostic>) -> Vec<(Name, Expr)> {
     let mut out = Vec::new();
     for (name, value) in &options.set {
-        let text = format!("mtx 1\nconst value = {value}\n");
-        let file = sources.add(format!("--set {name}"), text.clone());
-        let (tree, found) = crate::syntax::parse(file, &text);
+        let text = format!("{name}={value}");
+        let file = sources.add("--set", text.clone());
+        let (value, found) = crate::syntax::parse_value(file, &text, name.len() + 1);
         diagnostics.extend(found);
-        out.push((name.clone(), modules.len()));
-        modules.push(Module { name: format!("--set {name}"), file, tree });
-    }
-    out
-}
-
-fn arguments(
-    names: &Names<'_>,
-    workflow: DeclId,
-    set: &[(String, usize)],
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<(String, DeclId)> {
-    let ItemKind::Workflow { params, name, .. } = &names.decl(workflow).item.kind else { return Vec::new() };
-    let mut out = Vec::new();
-    for (key, module) in set {
-        if !params.iter().any(|p| p.name.text == *key) {
-            let near = near::nearest(key, params.iter().map(|p| &p.name.text));
-            let mut d = Diagnostic::error(
-                codes::UNKNOWN_PARAMETER,
-                name.span,
-                format!("`{}` has no parameter `{key}`", name.text),
-                "this workflow",
-            );
-            d.help.extend(near::question(&near));
-            diagnostics.push(d);
-            continue;
-        }
-        out.extend(names.declared_by(*module).next().map(|id| (key.clone(), id)));
+        out.push((Name { text: name.clone(), span: Span::new(file, 0, name.len()) }, value));
     }
     out
 }
@@ -204,25 +277,6 @@ fn choose_workflow(
     }
 }
 
-/// The lab a workflow runs in.
-fn lab_of(tables: &Tables<'_>, workflow: DeclId) -> Result<DeclId, Box<Diagnostic>> {
-    let decl = tables.names.decl(workflow);
-    let ItemKind::Workflow { lab, name, .. } = &decl.item.kind else {
-        return Err(Box::new(crate::eval::types::unsupported(decl.item.span, "such items")));
-    };
-    let Some(path) = lab else {
-        return Err(Box::new(crate::eval::types::unsupported(name.span, "workflows `in any lab`")));
-    };
-    let is_lab = |k: &ItemKind| matches!(k, ItemKind::Lab { .. });
-    let Some(word) = path.segments.last() else {
-        return Err(Box::new(crate::eval::types::unsupported(name.span, "workflows without a lab")));
-    };
-    match tables.names.lookup(decl.module, &word.text) {
-        Some(id) if is_lab(&tables.names.decl(id).item.kind) => Ok(id),
-        _ => Err(Box::new(tables.names.unknown(decl.module, word, "lab", is_lab))),
-    }
-}
-
 /// One workflow, built.
 struct Built {
     program: Option<Program>,
@@ -230,10 +284,10 @@ struct Built {
     starts: Option<checks::Starts>,
 }
 
-/// Findings of each workflow, in their order; workflows do not depend on each other, so all processors share them.
-fn judge(tables: &Tables<'_>, sources: &Sources, workflows: &[DeclId]) -> Vec<Built> {
+/// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
+fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>]) -> Vec<Built> {
     let judge =
-        |ids: &[DeclId]| -> Vec<Built> { ids.iter().map(|id| build(tables, sources, *id, &[], false)).collect() };
+        |tasks: &[Task<'a>]| -> Vec<Built> { tasks.iter().map(|task| build(tables, sources, task, false)).collect() };
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let share = workflows.len().div_ceil(processors).max(1);
     let (own, others) = workflows.split_at(share.min(workflows.len()));
@@ -255,24 +309,15 @@ fn judge(tables: &Tables<'_>, sources: &Sources, workflows: &[DeclId]) -> Vec<Bu
 
 /// Elaborates the lab and lowers the workflow; first to learn what is moved where, then for good. A program comes
 /// of it only where it is `to_run`.
-fn build(
-    tables: &Tables<'_>,
-    sources: &Sources,
-    workflow: DeclId,
-    arguments: &[(String, DeclId)],
-    to_run: bool,
-) -> Built {
-    let lab = match lab_of(tables, workflow) {
-        Ok(lab) => lab,
-        Err(d) => return Built { program: None, findings: vec![*d], starts: None },
-    };
+fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, to_run: bool) -> Built {
+    let lab = task.lab;
     let mut reach = Reach::default();
     loop {
         let mut elaborator = Elaborator::new(tables, reach.clone());
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
-        let plan = planner.workflow(workflow, arguments);
+        let plan = planner.task(task);
         elaborator.initialise();
         elaborator.close_holds();
         let events = elaborator.events();
@@ -285,14 +330,17 @@ fn build(
         }
         let (derivatives, balances) = elaborator.close();
         let observables = observables(&mut elaborator);
-        let starts = Some(checks::starts(&elaborator, lab));
+        let mut starts = checks::starts(&elaborator, lab);
         checks::model(&mut elaborator);
-        checks::plan(&mut elaborator, &plan);
+        starts.windows = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events);
+        let starts = Some(starts);
         if !to_run {
             return Built { program: None, findings: elaborator.diagnostics, starts };
         }
         let mixtures = mixtures(&elaborator, &observables);
         let scene = scene(&mut elaborator, lab);
+        let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
+        let stock = crate::stock::stock(&mut elaborator, sources, &mixtures, workflow);
         let model = Model {
             params: elaborator.params,
             states: elaborator.states,
@@ -311,7 +359,7 @@ fn build(
             graph: elaborator.graph,
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan };
+        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
         return Built { program: Some(program), findings: elaborator.diagnostics, starts };
     }
 }
@@ -477,7 +525,7 @@ fn geometry(lab: &mut Elaborator<'_>, id: InstanceId) -> (Vec<Frame>, Option<Sha
             frames.push(Frame { name: name.text.clone(), pose: Pose { position, rpy: [0.0; 3] } });
         }
     }
-    let shape = lab.instances[id.0 as usize].setting("shape").and_then(|(_, value, _)| match value {
+    let shape = lab.instances[id.0 as usize].setting("shape").and_then(|s| match s.value() {
         FieldValue::Expr(e) => shape(lab, e),
         _ => None,
     });
