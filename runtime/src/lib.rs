@@ -4,9 +4,11 @@
 #![allow(clippy::result_large_err)]
 
 pub mod backend;
+pub mod bill;
 pub mod exec;
 pub mod fault;
 pub mod ledger;
 pub mod process;
 pub mod record;
 pub mod run;
+pub mod schedule;

@@ -82,7 +82,7 @@ fn followed(plan: &Plan) -> impl Iterator<Item = &Condition> {
         Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } | Step::Keep { condition, .. } => {
             std::slice::from_ref(condition)
         }
-        Step::Skill { invariants, .. } => invariants,
+        Step::Skill { invariants, .. } | Step::During { invariants, .. } => invariants,
         Step::Operation(operation) => operation.until.as_slice(),
         _ => &[],
     })

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::NodeId;
 use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::quantity::show_number;
+use matterix_ir::{NodeId, Text};
 
 use super::frame::{End, FrameId, Kind, Phase};
 use super::judge::Raised;
@@ -50,7 +50,7 @@ impl<'p> Executor<'p, '_> {
                 self.set_kind(id, Kind::Try { index: 0 });
                 self.next_alternative(id, 0);
             }
-            Step::Skill { .. } | Step::Keep { .. } => self.begin_monitored(id, step)?,
+            Step::Skill { .. } | Step::Keep { .. } | Step::During { .. } => self.begin_monitored(id, step)?,
             Step::Named { start, body, end, .. } => {
                 self.set_kind(id, Kind::Named);
                 self.backend.set_local(*start, Some(self.now));
@@ -76,7 +76,10 @@ impl<'p> Executor<'p, '_> {
             }
             Step::Start { job, body } => self.begin_job(id, job, *body),
             Step::Await { job } => self.begin_await(id, job),
-            Step::Fail { name, text } => self.fail(id, Raised::named(name, text.as_str())),
+            Step::Fail { name, text } => {
+                let text = self.words(text)?;
+                self.fail(id, Raised::named(name, text));
+            }
             simple => {
                 self.perform(step, simple)?;
                 self.push_end(id, End::Done);
@@ -101,11 +104,27 @@ impl<'p> Executor<'p, '_> {
                 self.recordings.insert(id, Recording { name, value, unit, since: self.now, every, turn: 0 });
                 self.sample()?;
             }
-            Step::Note(text) => self.out.note(self.now, id, text),
-            Step::Ask(text) => self.out.ask(self.now, id, text),
+            Step::Note(text) => {
+                let text = self.words(text)?;
+                self.out.note(self.now, id, &text);
+            }
+            Step::Ask(text) => {
+                let text = self.words(text)?;
+                self.out.ask(self.now, id, &text);
+            }
             _ => {}
         }
         Ok(())
+    }
+
+    /// A text with its values as they are now.
+    fn words(&mut self, text: &Text) -> Result<String, Fault> {
+        let instances = &self.scene.instances;
+        let name = |v: f64| match instances.get(v as usize) {
+            Some(instance) if v >= 0.0 => instance.name.clone(),
+            _ => "nothing".to_owned(),
+        };
+        text.show(|node| self.backend.value(node, self.out), name)
     }
 
     fn begin_parallel(&mut self, id: FrameId, list: &[StepId]) {

@@ -23,12 +23,21 @@ pub(super) struct Raised {
     /// Its cause, where it is not the whole statement.
     pub span: Option<Span>,
     pub measured: Vec<Measured>,
+    /// How to mend it.
+    pub help: Option<String>,
 }
 
 impl Raised {
     /// A failure that handlers know as `name`.
     pub fn named(name: &str, text: impl Into<String>) -> Self {
-        Raised { name: name.to_owned(), text: text.into(), code: codes::RUN_FAILED, span: None, measured: Vec::new() }
+        Raised {
+            name: name.to_owned(),
+            text: text.into(),
+            code: codes::RUN_FAILED,
+            span: None,
+            measured: Vec::new(),
+            help: None,
+        }
     }
 }
 
@@ -125,7 +134,7 @@ impl Executor<'_, '_> {
     /// A failure of `condition` at a step.
     pub(super) fn unmet(&mut self, condition: &Condition, name: &str, code: Code, text: String) -> Raised {
         let measured = self.measured(&condition.compared);
-        Raised { name: name.to_owned(), text, code, span: Some(condition.span), measured }
+        Raised { name: name.to_owned(), text, code, span: Some(condition.span), measured, help: None }
     }
 
     /// The trace of something raised in a frame.
@@ -134,8 +143,9 @@ impl Executor<'_, '_> {
         let steps: Vec<_> =
             frames.filter_map(|f| f.step.map(|s| FailureTrace::entry(self.plan, s, f.started))).collect();
         let span = raised.span.or(steps.first().map(|s| s.span)).unwrap_or_default();
-        let Raised { name, text, code, measured, .. } = raised;
-        FailureTrace { name, text, code, fault: false, span, time: self.now, steps, measured, help: Vec::new() }
+        let Raised { name, text, code, measured, help, .. } = raised;
+        let help = help.into_iter().collect();
+        FailureTrace { name, text, code, fault: false, span, time: self.now, steps, measured, help }
     }
 
     /// Raises a failure in a frame, which ends with it.

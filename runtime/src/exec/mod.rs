@@ -42,6 +42,8 @@ pub use tee::Tee;
 
 use crate::backend::Backend;
 use crate::fault::Fault;
+pub use claims::Turn;
+
 use claims::Claims;
 use frame::{End, Frame, FrameId, Kind, Stop, Task};
 
@@ -57,12 +59,14 @@ pub struct Limits<'c> {
     pub steps_per_instant: usize,
     /// Set from outside to end the run early; every `finally` still runs.
     pub cancel: Option<&'c AtomicBool>,
+    /// The turns that claiming blocks take, in order; without one, a block takes its turn as it asks.
+    pub turns: &'c [Turn],
 }
 
 impl Default for Limits<'_> {
     /// 30 days, a million steps.
     fn default() -> Self {
-        Limits { horizon: 30.0 * 86_400.0, steps_per_instant: 100_000, cancel: None }
+        Limits { horizon: 30.0 * 86_400.0, steps_per_instant: 100_000, cancel: None, turns: &[] }
     }
 }
 
@@ -202,7 +206,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             frames: BTreeMap::new(),
             created: 0,
             tasks: Vec::new(),
-            claims: Claims::default(),
+            claims: Claims::with_turns(limits.turns),
             recordings: BTreeMap::new(),
             job_names: BTreeSet::new(),
             steps: vec![StepRecord::default(); plan.steps.len()],

@@ -2,7 +2,7 @@
 
 use matterix_ir::NodeId;
 use matterix_ir::codes;
-use matterix_ir::plan::{Condition, Step, StepId, Takes};
+use matterix_ir::plan::{Condition, Refusal, Step, StepId, Takes};
 use matterix_ir::quantity::show_number;
 
 use super::Executor;
@@ -17,15 +17,18 @@ impl Executor<'_, '_> {
         let (needs, kept, body): (&[Condition], &[Condition], StepId) = match &plan.get(step).step {
             Step::Skill { needs, invariants, body, .. } => (needs, invariants, *body),
             Step::Keep { condition, body } => (&[], std::slice::from_ref(condition), *body),
+            Step::During { invariants, body } => (&[], invariants, *body),
             _ => return Ok(()),
         };
         if !self.needs_met(id, step, needs)? {
             return Ok(());
         }
+        // What an operation keeps is looked at when it has begun.
+        let from_start = matches!(plan.get(step).step, Step::During { .. });
         let mut monitors = Vec::new();
         for (index, condition) in kept.iter().enumerate() {
             let Some(follower) = self.follower(step, condition) else { continue };
-            if !self.follower_holds(&follower)? {
+            if !from_start && !self.follower_holds(&follower)? {
                 let raised = self.broken(condition);
                 self.fail(id, raised);
                 return Ok(());
@@ -43,12 +46,20 @@ impl Executor<'_, '_> {
             if !self.judge(step, need)? {
                 let label = &self.plan.get(step).label;
                 let text = format!("`{label}` needs `{}`, which does not hold", need.text);
-                let raised = self.unmet(need, "need", codes::NEED_UNMET, text);
+                let raised = self.refused(need, text);
                 self.fail(id, raised);
                 return Ok(false);
             }
         }
         Ok(true)
+    }
+
+    /// What a need or limit that does not hold raises.
+    pub(super) fn refused(&mut self, condition: &Condition, text: String) -> Raised {
+        let name = condition.refusal.as_ref().map_or("need", |r| &r.failure);
+        let code = condition.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
+        let help = condition.refusal.as_ref().and_then(|r| r.help.clone());
+        Raised { help, ..self.unmet(condition, name, code, text) }
     }
 
     /// What a breach of an invariant raises.
@@ -119,11 +130,12 @@ impl Executor<'_, '_> {
         let Some(step) = frame.step else { return };
         let children = frame.children.clone();
         let condition = match &plan.get(step).step {
-            Step::Skill { invariants, .. } => invariants.get(index),
+            Step::Skill { invariants, .. } | Step::During { invariants, .. } => invariants.get(index),
             Step::Keep { condition, .. } => Some(condition),
             _ => None,
         };
         let Some(condition) = condition else { return };
+        let stop = if matches!(plan.get(step).step, Step::During { .. }) { Stop::Now } else { Stop::Boundary };
         let raised = self.broken(condition);
         let trace = Box::new(self.trace(id, raised));
         self.out.failure(&trace);
@@ -131,7 +143,7 @@ impl Executor<'_, '_> {
             *breach = Some(trace);
         }
         for child in children {
-            self.stop(child, Stop::Boundary, false);
+            self.stop(child, stop, false);
         }
     }
 

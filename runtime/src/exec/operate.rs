@@ -6,7 +6,7 @@ use matterix_ir::scene::InstanceId;
 
 use super::Executor;
 use super::claims::{Request, Use};
-use super::frame::{End, Follower, FrameId, Kind};
+use super::frame::{End, Follower, FrameId, Kind, Stop};
 use super::judge::Raised;
 use super::listener::OperationState;
 use crate::backend::{Follow, Status};
@@ -34,14 +34,17 @@ impl<'p> Executor<'p, '_> {
     /// Asks for instances; what becomes free is granted in turn.
     pub(super) fn request(&mut self, id: FrameId, instances: Vec<InstanceId>) {
         let within = self.ancestors(id).collect();
-        self.claims.request(Request { frame: id, instances, within });
+        let claim =
+            self.frames.get(&id).and_then(|f| f.step).filter(|s| matches!(self.plan.get(*s).step, Step::Claim { .. }));
+        let turn = claim.and_then(|step| self.claims.turn_of(step));
+        self.claims.request(Request { frame: id, turn, instances, within });
         self.grant(false);
     }
 
     /// Lets every request go on that can be granted; whether there was one.
     pub(super) fn grant(&mut self, overtake: bool) -> bool {
         let plan = self.plan;
-        let granted = self.claims.grant(overtake);
+        let granted = self.claims.grant(overtake, self.now);
         for &id in granted.iter().rev() {
             let Some(step) = self.frames.get(&id).filter(|f| f.stop.is_none()).and_then(|f| f.step) else { continue };
             match &plan.get(step).step {
@@ -107,6 +110,9 @@ impl<'p> Executor<'p, '_> {
         self.set_kind(id, Kind::Operation { ticket, until: None, watch: None });
         self.out.operation(self.now, step, operation, OperationState::Started);
         self.changed();
+        if self.frames.get(&id).is_none_or(|f| f.stop == Some(Stop::Now)) {
+            return Ok(());
+        }
         self.poll(id)
     }
 
@@ -123,7 +129,9 @@ impl<'p> Executor<'p, '_> {
                 self.set_kind(id, Kind::Pass);
                 self.out.operation(self.now, step, operation, OperationState::Ended);
                 self.changed();
-                self.push_end(id, End::Done);
+                if self.within_limits(id, operation)? {
+                    self.push_end(id, End::Done);
+                }
             }
             Status::Failed { name, text } => {
                 self.set_kind(id, Kind::Pass);
@@ -133,6 +141,22 @@ impl<'p> Executor<'p, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Raises a failure for the first limit that an operation has passed; whether all hold.
+    fn within_limits(&mut self, id: FrameId, operation: &Operation) -> Result<bool, Fault> {
+        let plan = self.plan;
+        let Some(step) = self.frames.get(&id).and_then(|f| f.step) else { return Ok(true) };
+        for limit in operation.limits.iter().filter_map(|i| plan.limits.get(*i as usize)) {
+            let limit = &limit.condition;
+            if !self.judge(step, limit)? {
+                let text = format!("`{}` does not keep `{}`", self.label(id), limit.text);
+                let raised = self.refused(limit, text);
+                self.fail(id, raised);
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// The world changed within this instant: invariants are looked at before anything else happens.

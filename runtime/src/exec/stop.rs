@@ -66,6 +66,7 @@ impl Executor<'_, '_> {
             code: fault.code,
             span: fault.span,
             measured: Vec::new(),
+            help: None,
         };
         FailureTrace { fault: true, time: fault.time, help: fault.help, ..self.trace(id, raised) }
     }

@@ -90,6 +90,10 @@ impl Executor<'_, '_> {
             }
             agenda.progress |= waits;
         }
+        if let Some(due) = self.claims.next_due(self.now) {
+            agenda.at(due);
+            agenda.progress = true;
+        }
         agenda
     }
 
@@ -157,6 +161,8 @@ impl Executor<'_, '_> {
 
     /// Looks at every frame in the order in which they began; what follows from one happens before the next.
     fn look_at_all(&mut self, fired: &Fired) {
+        self.grant(false);
+        self.drain();
         let ids: Vec<FrameId> = self.frames.keys().copied().collect();
         for id in ids {
             let nodes = fired.get(&id).map_or(&[][..], Vec::as_slice);

@@ -27,7 +27,7 @@ impl Engine<'_> {
             observer.event(self.time, event);
             let model = self.model;
             for action in &model.events[event].actions {
-                self.perform(action)?;
+                self.perform(action, observer)?;
             }
         }
         self.report_processes(observer);
@@ -78,14 +78,19 @@ impl Engine<'_> {
     }
 
     /// Performs one action.
-    pub(super) fn perform(&mut self, action: &Action) -> Result<(), Fault> {
+    pub(super) fn perform(&mut self, action: &Action, observer: &mut dyn Observer) -> Result<(), Fault> {
         match *action {
             Action::Assign { state, value, span } => {
                 let value = self.eval(value);
                 self.write(state, value);
                 self.check_states(Some(&[state])).map_err(|f| f.at(span))
             }
-            Action::Move { fraction, from, to, span } => self.carry(self.eval(fraction), from, to, span),
+            Action::Move { fraction, from, to, span } => {
+                let fraction = self.eval(fraction);
+                self.carry(fraction, from, to, span)?;
+                observer.moved(self.time, from, to, fraction);
+                Ok(())
+            }
         }
     }
 

@@ -1,4 +1,5 @@
-//! Values of the graph at one instant, each computed once.
+//! Values of the graph at one instant, each computed once, and again only where what it depends on has changed: of a
+//! deck with hundreds of wells a step changes two.
 
 use matterix_ir::graph::{Env, eval_op};
 use matterix_ir::{Graph, NodeId};
@@ -7,55 +8,123 @@ use matterix_ir::{Graph, NodeId};
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memo {
     values: Vec<f64>,
-    /// The round in which a value was computed.
-    computed: Vec<u32>,
-    round: u32,
+    /// Whether the value is that of the present leaves. Whoever uses an unknown value is unknown, or pinned.
+    known: Vec<bool>,
+    /// Operations without operands.
+    leaves: Vec<NodeId>,
+    /// Who uses an operation: `users[first[n] .. first[n + 1]]`.
+    first: Vec<u32>,
+    users: Vec<NodeId>,
+    /// Values taken instead of computed.
+    pinned: Vec<NodeId>,
+    is_pinned: Vec<bool>,
+    /// The leaves may have changed.
+    stale: bool,
     todo: Vec<NodeId>,
 }
 
 impl Memo {
     /// Room for every operation of `graph`.
     pub(super) fn new(graph: &Graph) -> Self {
-        let size = graph.ops().len();
-        Memo { values: vec![0.0; size], computed: vec![0; size], round: 1, todo: Vec::new() }
+        let ops = graph.ops();
+        let size = ops.len();
+        let mut first = vec![0; size + 1];
+        for op in ops {
+            op.operands().for_each(|o| first[o.0 as usize + 1] += 1);
+        }
+        for i in 0..size {
+            first[i + 1] += first[i];
+        }
+        let mut next = first.clone();
+        let mut users = vec![NodeId(0); first[size] as usize];
+        for (i, op) in ops.iter().enumerate() {
+            for operand in op.operands() {
+                let slot = &mut next[operand.0 as usize];
+                users[*slot as usize] = NodeId(i as u32);
+                *slot += 1;
+            }
+        }
+        let leaves = (0..size as u32).map(NodeId).filter(|n| graph.op(*n).operands().next().is_none()).collect();
+        let (values, known, is_pinned) = (vec![0.0; size], vec![false; size], vec![false; size]);
+        let (pinned, todo) = (Vec::new(), Vec::new());
+        Memo { values, known, leaves, first, users, pinned, is_pinned, stale: true, todo }
     }
 
-    /// Forgets everything: the leaves have changed.
+    /// The leaves may have changed; pins are taken out.
     pub(super) fn forget(&mut self) {
-        self.round = self.round.wrapping_add(1);
-        if self.round == 0 {
-            self.computed.fill(0);
-            self.round = 1;
+        self.stale = true;
+        for node in std::mem::take(&mut self.pinned) {
+            self.is_pinned[node.0 as usize] = false;
+            self.lose(node);
         }
     }
 
     /// Takes `value` for `node` until it forgets.
     pub(super) fn pin(&mut self, node: NodeId, value: f64) {
-        self.values[node.0 as usize] = value;
-        self.computed[node.0 as usize] = self.round;
+        self.lose(node);
+        self.pinned.push(node);
+        self.is_pinned[node.0 as usize] = true;
+        self.keep(node, value);
     }
 
-    fn knows(&self, node: NodeId) -> bool {
-        self.computed[node.0 as usize] == self.round
+    fn keep(&mut self, node: NodeId, value: f64) {
+        self.values[node.0 as usize] = value;
+        self.known[node.0 as usize] = true;
+    }
+
+    /// The value of `node`, and what follows from it, is not known any more.
+    fn lose(&mut self, node: NodeId) {
+        self.known[node.0 as usize] = false;
+        let before = self.todo.len();
+        self.todo.push(node);
+        while self.todo.len() > before {
+            let Some(next) = self.todo.pop() else { return };
+            let (from, to) = (self.first[next.0 as usize] as usize, self.first[next.0 as usize + 1] as usize);
+            for user in &self.users[from..to] {
+                let at = user.0 as usize;
+                if self.known[at] && !self.is_pinned[at] {
+                    self.known[at] = false;
+                    self.todo.push(*user);
+                }
+            }
+        }
+    }
+
+    /// Takes the present leaves; what follows from those that changed is lost.
+    fn refresh(&mut self, graph: &Graph, env: Env<'_>) {
+        self.stale = false;
+        for i in 0..self.leaves.len() {
+            let leaf = self.leaves[i];
+            let at = leaf.0 as usize;
+            let value = eval_op(graph.op(leaf), env, &[]);
+            if self.is_pinned[at] || (self.known[at] && self.values[at].to_bits() == value.to_bits()) {
+                continue;
+            }
+            self.lose(leaf);
+            self.keep(leaf, value);
+        }
     }
 
     /// The value of `node`, the same as [`Graph::eval`] gives.
     pub(super) fn eval(&mut self, graph: &Graph, node: NodeId, env: Env<'_>) -> f64 {
-        if !self.knows(node) {
+        if self.stale {
+            self.refresh(graph, env);
+        }
+        if !self.known[node.0 as usize] {
             self.todo.push(node);
         }
         while let Some(&next) = self.todo.last() {
             let op = graph.op(next);
             let before = self.todo.len();
             for operand in op.operands() {
-                if !self.knows(operand) {
+                if !self.known[operand.0 as usize] {
                     self.todo.push(operand);
                 }
             }
             if self.todo.len() == before {
                 self.todo.pop();
                 let value = eval_op(op, env, &self.values);
-                self.pin(next, value);
+                self.keep(next, value);
             }
         }
         self.values[node.0 as usize]

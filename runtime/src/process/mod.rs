@@ -61,6 +61,8 @@ pub trait Observer {
     fn event(&mut self, time: f64, event: usize);
     /// A process has begun or ceased to run, by its index in the model.
     fn process(&mut self, time: f64, process: usize, running: bool);
+    /// A fraction of one mixture, by its index in the model, has moved into another within an instant.
+    fn moved(&mut self, _time: f64, _from: u32, _to: u32, _fraction: f64) {}
 }
 
 /// Observes nothing.
@@ -212,7 +214,7 @@ impl<'m> Engine<'m> {
         self.release(observer);
         self.show(observer);
         for action in actions {
-            self.perform(action)?;
+            self.perform(action, observer)?;
         }
         let last = actions.last().map(|a| match a {
             Action::Assign { span, .. } | Action::Move { span, .. } => *span,

@@ -14,6 +14,8 @@ pub(super) enum Shown<'a> {
     Bool,
     /// The name of an instance, or `nothing`.
     Instance,
+    /// One of these words.
+    Enum(&'a [String]),
 }
 
 /// One value, ready to be written.
@@ -23,7 +25,7 @@ pub(super) enum Cell<'a> {
     Number(f64),
     /// A truth value.
     Bool(bool),
-    /// The name of an instance.
+    /// The name of an instance, or a word.
     Name(&'a str),
 }
 
@@ -46,6 +48,7 @@ impl<'a> Column<'a> {
             Domain::Quantity(unit) => Shown::Quantity(unit),
             Domain::Bool => Shown::Bool,
             Domain::Instance => Shown::Instance,
+            Domain::Enum(words) => Shown::Enum(words),
         };
         Some(Column { name: &state.name, shown, parts: vec![run.recording.states.get(index)?.as_slice()] })
     }
@@ -72,17 +75,18 @@ impl<'a> Column<'a> {
     pub(super) fn symbol(&self) -> &'a str {
         match self.shown {
             Shown::Quantity(unit) => &unit.symbol,
-            Shown::Bool | Shown::Instance => "",
+            Shown::Bool | Shown::Instance | Shown::Enum(_) => "",
         }
     }
 
     /// One component of one sample; not a number where there is none.
-    pub(super) fn cell<'b>(&self, run: &Run<'b>, part: usize, sample: usize) -> Cell<'b> {
+    pub(super) fn cell(&self, run: &Run<'a>, part: usize, sample: usize) -> Cell<'a> {
         let value = self.parts.get(part).and_then(|p| p.get(sample)).copied().unwrap_or(f64::NAN);
         match self.shown {
             Shown::Quantity(unit) => Cell::Number(unit.of_si(value)),
             Shown::Bool => Cell::Bool(value != 0.0),
             Shown::Instance => Cell::Name(run.instance_name(value)),
+            Shown::Enum(words) => Cell::Name(words.get(value as usize).map_or("", String::as_str)),
         }
     }
 

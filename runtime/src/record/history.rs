@@ -97,7 +97,15 @@ pub(super) fn true_intervals(recording: &Recording, values: &[f64]) -> Vec<(f64,
 
 /// Whether a node only orders others, so that a reader of a time line does not miss it.
 pub(super) fn is_structure(step: &Step) -> bool {
-    matches!(step, Step::Sequence(_) | Step::Guarded { .. } | Step::Let { .. } | Step::Record { .. } | Step::Note(_))
+    matches!(
+        step,
+        Step::Sequence(_)
+            | Step::Guarded { .. }
+            | Step::During { .. }
+            | Step::Let { .. }
+            | Step::Record { .. }
+            | Step::Note(_)
+    )
 }
 
 /// Labels from the top of the tree to each node, joined by ` > `, and how many there are above it; nodes that only order

@@ -8,7 +8,7 @@ mod files;
 mod history;
 mod pose;
 mod recording;
-mod run;
+pub(crate) mod run;
 
 pub mod mcap;
 pub mod plot;

@@ -95,4 +95,4 @@ impl<'a> Run<'a> {
 }
 
 /// Name and version of the program that writes.
-pub(super) const TOOL: &str = concat!("matterixc ", env!("CARGO_PKG_VERSION"));
+pub(crate) const TOOL: &str = concat!("matterixc ", env!("CARGO_PKG_VERSION"));

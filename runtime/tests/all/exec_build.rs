@@ -26,6 +26,8 @@ impl Lab {
             steps: Vec::new(),
             root: StepId(0),
             locals: Vec::new(),
+            limits: Vec::new(),
+            ends: Vec::new(),
         };
         let program = Program {
             version: PROGRAM_VERSION,
@@ -33,6 +35,7 @@ impl Lab {
             scene: Scene::default(),
             model: Default::default(),
             plan,
+            stock: Default::default(),
         };
         Lab { program }
     }
@@ -123,14 +126,21 @@ impl Lab {
         let comparison =
             |(value, low)| Comparison { text: "a".into(), value, low: Some(low), high: None, unit: unit() };
         let compared = compared.into_iter().map(comparison).collect();
-        Condition { node, text: text.into(), span: Span::new(FileId(0), 9000, 9005), compared }
+        Condition {
+            node,
+            text: text.into(),
+            span: Span::new(FileId(0), 9000, 9005),
+            compared,
+            terms: Vec::new(),
+            refusal: None,
+        }
     }
 
     pub fn step(&mut self, step: Step) -> StepId {
         let index = self.program.plan.steps.len();
         let label = match &step {
             Step::Operation(operation) => operation.verb.clone(),
-            Step::Note(text) => text.clone(),
+            Step::Note(text) => text.show(|_| Ok::<_, ()>(None), |_| String::new()).unwrap_or_default(),
             Step::Claim { .. } => format!("claim {index}"),
             other => format!("{other:?}").chars().take_while(|c| c.is_alphabetic()).collect(),
         };
@@ -215,12 +225,14 @@ impl Lab {
             device: None,
             arguments: Vec::new(),
             needs: Vec::new(),
+            presumes: Vec::new(),
             at_start: Vec::new(),
             at_end: Vec::new(),
             takes: None,
             until: None,
             claims: Vec::new(),
             fails: Vec::new(),
+            limits: Vec::new(),
         }
     }
 

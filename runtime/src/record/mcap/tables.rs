@@ -201,6 +201,7 @@ fn column_schema(column: &Column<'_>) -> Value {
         }
         Shown::Bool => truth(""),
         Shown::Instance => text("name of an instance, or `nothing`"),
+        Shown::Enum(words) => text(&format!("one of {}", words.join(", "))),
     };
     if column.parts.len() > 1 { list(one) } else { one }
 }

@@ -4,7 +4,7 @@ use super::PlotError;
 use super::canvas::{Anchor, BOUNDARY, Canvas, GRID, INK, MUTED};
 
 /// The time axis all panels share.
-pub(super) struct TimeAxis {
+pub(crate) struct TimeAxis {
     end: f64,
     left: f64,
     right: f64,
@@ -14,7 +14,7 @@ pub(super) struct TimeAxis {
 
 impl TimeAxis {
     /// From 0 to `end` s between two edges, px; in the unit that suits the length.
-    pub(super) fn new(end: f64, left: f64, right: f64) -> Self {
+    pub(crate) fn new(end: f64, left: f64, right: f64) -> Self {
         let end = if end.is_finite() && end > 0.0 { end } else { 1.0 };
         let (symbol, factor) = match end {
             e if e <= 3600.0 => ("s", 1.0),
@@ -26,17 +26,17 @@ impl TimeAxis {
     }
 
     /// Where a time, s, stands, px.
-    pub(super) fn x(&self, time: f64) -> f64 {
+    pub(crate) fn x(&self, time: f64) -> f64 {
         self.left + (self.right - self.left) * (time / self.end).clamp(0.0, 1.0)
     }
 
     /// Left and right edge, px.
-    pub(super) fn edges(&self) -> (f64, f64) {
+    pub(crate) fn edges(&self) -> (f64, f64) {
         (self.left, self.right)
     }
 
     /// Lines at round times and where something happened, and the axis below.
-    pub(super) fn draw(&self, canvas: &Canvas<'_>, top: f64, bottom: f64, boundaries: &[f64]) -> Result<(), PlotError> {
+    pub(crate) fn draw(&self, canvas: &Canvas<'_>, top: f64, bottom: f64, boundaries: &[f64]) -> Result<(), PlotError> {
         let ticks = ticks(0.0, self.end / self.factor, 10);
         for &tick in &ticks.at {
             let x = self.x(tick * self.factor);
@@ -55,22 +55,22 @@ impl TimeAxis {
 }
 
 /// Round numbers in a range.
-pub(super) struct Ticks {
+pub(crate) struct Ticks {
     /// Ascending.
-    pub(super) at: Vec<f64>,
+    pub(crate) at: Vec<f64>,
     decimals: usize,
 }
 
 impl Ticks {
     /// With as many decimals as tell neighbours apart.
-    pub(super) fn label(&self, tick: f64) -> String {
+    pub(crate) fn label(&self, tick: f64) -> String {
         // Adding 0 turns -0 into 0.
         format!("{:.*}", self.decimals, tick + 0.0)
     }
 }
 
 /// About `count` multiples of 1, 2 or 5 times a power of ten in a range; none in an empty one.
-pub(super) fn ticks(low: f64, high: f64, count: usize) -> Ticks {
+pub(crate) fn ticks(low: f64, high: f64, count: usize) -> Ticks {
     let rough = (high - low) / count.max(1) as f64;
     if !(rough.is_finite() && rough > 0.0) {
         return Ticks { at: Vec::new(), decimals: 0 };
@@ -90,11 +90,11 @@ pub(super) fn ticks(low: f64, high: f64, count: usize) -> Ticks {
 }
 
 /// Power of ten of the first digit.
-pub(super) fn exponent(value: f64) -> i32 {
+pub(crate) fn exponent(value: f64) -> i32 {
     format!("{value:e}").rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0)
 }
 
 /// Correctly rounded.
-pub(super) fn power_of_ten(power: i32) -> f64 {
+pub(crate) fn power_of_ten(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(1.0)
 }

@@ -14,17 +14,22 @@ const FINE: f64 = 10.0;
 /// Text sizes the backend takes are line heights.
 const LINE: f64 = 1.24;
 
+/// A colour.
+pub(crate) type Ink = RGBColor;
+
+/// Text on dark bars.
+pub(crate) const PAPER: RGBColor = RGBColor(255, 255, 255);
 /// Text and frames.
-pub(super) const INK: RGBColor = RGBColor(38, 42, 48);
+pub(crate) const INK: RGBColor = RGBColor(38, 42, 48);
 /// Second-rank text.
-pub(super) const MUTED: RGBColor = RGBColor(104, 110, 118);
+pub(crate) const MUTED: RGBColor = RGBColor(104, 110, 118);
 /// Grid lines.
-pub(super) const GRID: RGBColor = RGBColor(228, 231, 235);
+pub(crate) const GRID: RGBColor = RGBColor(228, 231, 235);
 /// Lines where something happened.
-pub(super) const BOUNDARY: RGBColor = RGBColor(190, 196, 204);
+pub(crate) const BOUNDARY: RGBColor = RGBColor(190, 196, 204);
 
 /// Distinguishable to the colour-blind: Okabe and Ito (2008), their yellow, pale on white, replaced by grey.
-pub(super) const PALETTE: [RGBColor; 8] = [
+pub(crate) const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
@@ -37,7 +42,7 @@ pub(super) const PALETTE: [RGBColor; 8] = [
 
 /// Where a text is held.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     /// Its beginning.
     Start,
     /// Its middle.
@@ -47,12 +52,12 @@ pub(super) enum Anchor {
 }
 
 /// A page on which is drawn; positions in px from the upper left corner.
-pub(super) struct Canvas<'a> {
+pub(crate) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
 }
 
 /// A white page of this size, drawn on, as an SVG document.
-pub(super) fn page(
+pub(crate) fn page(
     width: f64,
     height: f64,
     paint: impl FnOnce(&Canvas<'_>) -> Result<(), PlotError>,
@@ -72,7 +77,7 @@ pub(super) fn page(
 
 impl Canvas<'_> {
     /// A line through the points, `width` px wide, dashed or not.
-    pub(super) fn line(
+    pub(crate) fn line(
         &self,
         points: &[(f64, f64)],
         color: RGBColor,
@@ -90,18 +95,18 @@ impl Canvas<'_> {
     }
 
     /// A filled rectangle from its upper left to its lower right corner.
-    pub(super) fn bar(&self, from: (f64, f64), to: (f64, f64), color: RGBColor) -> Result<(), PlotError> {
+    pub(crate) fn bar(&self, from: (f64, f64), to: (f64, f64), color: RGBColor) -> Result<(), PlotError> {
         let corners = [(fine(from.0), fine(from.1)), (fine(to.0), fine(to.1))];
         self.area.draw(&Rectangle::new(corners, color.filled())).map_err(failed)
     }
 
     /// The edge of a rectangle.
-    pub(super) fn frame(&self, from: (f64, f64), to: (f64, f64)) -> Result<(), PlotError> {
+    pub(crate) fn frame(&self, from: (f64, f64), to: (f64, f64)) -> Result<(), PlotError> {
         self.line(&[from, (to.0, from.1), to, (from.0, to.1), from], BOUNDARY, 1.0, false)
     }
 
     /// A text, its vertical middle at `y`, `size` px high.
-    pub(super) fn text(
+    pub(crate) fn text(
         &self,
         (x, y): (f64, f64),
         size: f64,
@@ -113,7 +118,7 @@ impl Canvas<'_> {
     }
 
     /// A heading, its vertical middle at `y`.
-    pub(super) fn heading(&self, at: (f64, f64), size: f64, text: &str) -> Result<(), PlotError> {
+    pub(crate) fn heading(&self, at: (f64, f64), size: f64, text: &str) -> Result<(), PlotError> {
         let font = ("sans-serif", size * LINE * FINE).into_font().style(FontStyle::Bold);
         self.write(at, font, Anchor::Start, INK, text)
     }
@@ -147,7 +152,7 @@ fn failed(error: impl Display) -> PlotError {
 }
 
 /// At most this many characters, with an ellipsis where some are left out.
-pub(super) fn shorten(text: &str, most: usize) -> String {
+pub(crate) fn shorten(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }

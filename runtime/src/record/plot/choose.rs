@@ -14,12 +14,14 @@ use crate::record::history::{self, is_structure};
 use crate::record::run::Run;
 use crate::record::table::record_units;
 
+/// Mixtures with a panel at most.
+const MIXTURES: usize = 12;
+
 /// Boundaries drawn at most; more would hide the curves.
 const BOUNDARIES: usize = 40;
 
 /// All blocks of the page: temperatures, contents, other quantities, records, strips, steps.
 pub(super) fn blocks(run: &Run<'_>) -> Vec<Block> {
-    let model = &run.program.model;
     let columns = Column::all(run);
     let (temperatures, others): (Vec<Panel>, Vec<Panel>) = by_unit(run)
         .into_iter()
@@ -32,11 +34,34 @@ pub(super) fn blocks(run: &Run<'_>) -> Vec<Block> {
             }
             (warm, rest)
         });
-    let contents = model.mixtures.iter().flat_map(|m| contents(run, m));
+    let contents = all_contents(run);
     let panels = temperatures.into_iter().chain(contents).chain(others).chain(records(run)).map(Block::Panel);
     let strips =
         [strips::colours(run, &columns), strips::discrete(run, &columns), strips::processes(run), strips::steps(run)];
     panels.chain(strips.into_iter().flatten()).collect()
+}
+
+/// Panels of the first mixtures whose contents change; of a plate with many wells the rest is only named.
+fn all_contents(run: &Run<'_>) -> Vec<Panel> {
+    let mut panels: Vec<Panel> = Vec::new();
+    let (mut drawn, mut rest) = (0, Vec::new());
+    for mixture in &run.program.model.mixtures {
+        if drawn == MIXTURES {
+            rest.push(name_of(run, mixture).to_owned());
+            continue;
+        }
+        let found = contents(run, mixture);
+        drawn += usize::from(!found.is_empty());
+        panels.extend(found);
+    }
+    if let Some(last) = panels.last_mut() {
+        last.left_out.extend(rest);
+    }
+    panels
+}
+
+fn name_of<'r>(run: &Run<'r>, mixture: &Mixture) -> &'r str {
+    run.program.scene.instances.get(mixture.instance.0 as usize).map_or("", |i| &i.name)
 }
 
 /// Times at which steps began or ended and events fired, s; only steps, or none, where there are too many.
@@ -171,7 +196,7 @@ fn hidden_states(model: &Model) -> BTreeSet<u32> {
 /// Concentrations of a mixture, or amounts where the library gives no concentration; one panel a unit.
 fn contents(run: &Run<'_>, mixture: &Mixture) -> Vec<Panel> {
     let model = &run.program.model;
-    let name = run.program.scene.instances.get(mixture.instance.0 as usize).map_or("", |i| &i.name);
+    let name = name_of(run, mixture);
     let given = mixture.concentrations.iter().map(|&i| Column::observable(run, i as usize));
     let columns: Vec<Option<Column<'_>>> = if mixture.concentrations.is_empty() {
         mixture.contents.iter().map(|c| Column::state(run, c.state as usize)).collect()

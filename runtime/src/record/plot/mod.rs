@@ -1,7 +1,7 @@
 //! One page of plots a run, as SVG: panels over one time axis, strips of what was on, the steps at the bottom.
 
-mod axis;
-mod canvas;
+pub(crate) mod axis;
+pub(crate) mod canvas;
 mod choose;
 mod draw;
 mod series;

@@ -47,6 +47,10 @@ pub(super) fn discrete(run: &Run<'_>, columns: &[Column<'_>]) -> Option<Block> {
                 let value = values.get(sample).copied().filter(|v| *v >= 0.0)?;
                 Some((PALETTE[(value as usize + 3) % PALETTE.len()], run.instance_name(value).to_owned()))
             }),
+            Shown::Enum(words) => stretches(run, |sample| {
+                let value = values.get(sample).copied()? as usize;
+                Some((PALETTE[(value + 1) % PALETTE.len()], words.get(value)?.clone()))
+            }),
             Shown::Quantity(_) => Vec::new(),
         };
         Row { label: column.name.to_owned(), bars }

@@ -3,7 +3,7 @@
 mod build;
 mod human;
 mod ledger;
-mod text;
+pub(crate) mod text;
 
 use std::collections::BTreeMap;
 

@@ -4,7 +4,7 @@ use matterix_ir::quantity::show_number;
 
 /// How a column is aligned.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Align {
+pub(crate) enum Align {
     /// Names.
     Left,
     /// Numbers.
@@ -12,24 +12,24 @@ pub(super) enum Align {
 }
 
 /// Rows of cells under an optional head.
-pub(super) struct Table {
+pub(crate) struct Table {
     columns: Vec<Align>,
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
     /// No rows yet.
-    pub(super) fn new(columns: &[Align]) -> Self {
+    pub(crate) fn new(columns: &[Align]) -> Self {
         Table { columns: columns.to_vec(), rows: Vec::new() }
     }
 
     /// Adds a row.
-    pub(super) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
+    pub(crate) fn row<S: Into<String>>(&mut self, cells: impl IntoIterator<Item = S>) {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
     /// The rows, indented by two blanks, columns two blanks apart.
-    pub(super) fn print(&self) -> String {
+    pub(crate) fn print(&self) -> String {
         let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let mut out = String::new();
@@ -52,22 +52,22 @@ impl Table {
 }
 
 /// A number and its unit.
-pub(super) fn quantity(value: f64, unit: &str) -> String {
+pub(crate) fn quantity(value: f64, unit: &str) -> String {
     if unit.is_empty() { show_number(value) } else { format!("{} {unit}", show_number(value)) }
 }
 
 /// Seconds to a hundredth.
-pub(super) fn seconds(time: f64) -> String {
+pub(crate) fn seconds(time: f64) -> String {
     format!("{time:.2}")
 }
 
 /// Amount of substance in the prefix that suits it.
-pub(super) fn amount(mol: f64) -> String {
+pub(crate) fn amount(mol: f64) -> String {
     scaled(mol, &[(1.0, "mol"), (1e-3, "mmol"), (1e-6, "µmol"), (1e-9, "nmol")])
 }
 
 /// Mass, given in g, in the prefix that suits it.
-pub(super) fn mass(g: f64) -> String {
+pub(crate) fn mass(g: f64) -> String {
     scaled(g, &[(1000.0, "kg"), (1.0, "g"), (1e-3, "mg"), (1e-6, "µg")])
 }
 
@@ -83,7 +83,7 @@ fn scaled(value: f64, units: &[(f64, &str)]) -> String {
 }
 
 /// Four significant digits.
-pub(super) fn digits(value: f64) -> String {
+pub(crate) fn digits(value: f64) -> String {
     let rounded = format!("{value:.3e}").parse().unwrap_or(value);
     show_number(rounded)
 }

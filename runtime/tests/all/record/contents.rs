@@ -38,6 +38,7 @@ fn the_table_reads_back_to_the_last_bit() {
                     assert_eq!(row[at].parse::<f64>(), Ok(unit.of_si(column[sample])), "{}", state.name)
                 }
                 Domain::Bool => assert_eq!(row[at], if column[sample] == 1.0 { "true" } else { "false" }),
+                Domain::Enum(words) => assert_eq!(row[at], words[column[sample] as usize]),
                 Domain::Instance => assert_eq!(row[at], if column[sample] == 1.0 { "hotplate" } else { "table" }),
             }
         }

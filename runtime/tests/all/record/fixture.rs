@@ -188,6 +188,8 @@ fn plan(model: &mut Model) -> Plan {
         steps,
         root: StepId(0),
         locals: vec![local("grow.start"), local("grow.end")],
+        limits: Vec::new(),
+        ends: Vec::new(),
     }
 }
 
@@ -261,7 +263,8 @@ fn recording(program: &Program) -> Recording {
 pub(super) fn lab() -> Lab {
     let mut model = model();
     let plan = plan(&mut model);
-    let program = Program { version: 1, files: vec!["sn1.mtx".into()], scene: scene(), model, plan };
+    let program =
+        Program { version: 1, files: vec!["sn1.mtx".into()], scene: scene(), model, plan, stock: Default::default() };
     let mut sources = Sources::default();
     sources.add("sn1.mtx", TEXT);
     let info = RunInfo {
