@@ -1,6 +1,7 @@
 //! What can be typed.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -39,6 +40,14 @@ pub enum Command {
     Fmt(FmtArgs),
     /// Run a workflow on the digital twin and judge its expectations.
     Run(RunArgs),
+    /// Run the tests of files and judge their expectations.
+    Test(TestArgs),
+    /// Say what a run uses up and occupies: reagents, tips, vessels, waste, device time.
+    Bill(BillArgs),
+    /// Write a workflow as a protocol that a person can follow by hand.
+    Doc(DocArgs),
+    /// Schedule a workflow: who has which instance when, so that the whole ends early.
+    Plan(PlanArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
     /// Create a small project that checks, runs and passes.
@@ -86,6 +95,9 @@ pub struct RunArgs {
     /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     pub set: Vec<(String, String)>,
+    /// The lab, for a workflow that runs in any.
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
     /// Where all randomness of the run starts.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -101,6 +113,38 @@ pub struct RunArgs {
     /// Walk through the steps without simulating what they cause.
     #[arg(long)]
     pub dry: bool,
+    /// Let claims take turns as in a schedule: one made before the run, or one that `plan --format json` has written.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    pub plan: Option<Option<PathBuf>>,
+}
+
+/// `matterixc plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The file.
+    pub file: PathBuf,
+    /// The workflow, where the file has several.
+    #[arg(long, value_name = "NAME")]
+    pub workflow: Option<String>,
+
+    /// The lab, for a workflow that runs in any
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
+    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
+    /// Form of the schedule.
+    #[arg(long, value_enum, default_value_t = RunFormat::Human)]
+    pub format: RunFormat,
+    /// Where to write a picture of it.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// How long to look for a shorter schedule, by the clock.
+    #[arg(long, value_name = "TIME", default_value = "30 s", value_parser = time)]
+    pub time_limit: Duration,
+    /// Where all randomness of the search starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
 }
 
 /// How closely motions are simulated.
@@ -117,6 +161,90 @@ pub enum RunFormat {
     Human,
     /// The contents of `report.json`.
     Json,
+}
+
+/// `matterixc test`.
+#[derive(Debug, Args)]
+pub struct TestArgs {
+    /// Files, and folders that are searched for them.
+    #[arg(default_value = ".", value_name = "FILE|DIR")]
+    pub paths: Vec<PathBuf>,
+    /// Only tests whose name contains this.
+    #[arg(long, value_name = "TEXT")]
+    pub only: Option<String>,
+    /// Where all randomness of each run starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Form of the results.
+    #[arg(long, value_enum, default_value_t = TestFormat::Human)]
+    pub format: TestFormat,
+}
+
+/// Form of the results of tests.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TestFormat {
+    /// A line each, then the counts.
+    Human,
+    /// One JSON object per line.
+    Json,
+}
+
+/// `matterixc bill`.
+#[derive(Debug, Args)]
+pub struct BillArgs {
+    /// The file.
+    pub file: PathBuf,
+    /// The workflow, where the file has several.
+    #[arg(long, value_name = "NAME")]
+    pub workflow: Option<String>,
+    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
+    /// The lab, for a workflow that runs in any.
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
+    /// For so many runs.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
+    pub runs: u64,
+    /// Where all randomness of the run starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Prices, as a CSV table with the columns item,price,currency,quantity,unit.
+    #[arg(long, value_name = "FILE")]
+    pub prices: Option<PathBuf>,
+    /// Form of the bill.
+    #[arg(long, value_enum, default_value_t = BillFormat::Human)]
+    pub format: BillFormat,
+}
+
+/// Form of a bill.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BillFormat {
+    /// A page to read.
+    Human,
+    /// One JSON object, described in docs/bill.md.
+    Json,
+    /// One row per number.
+    Csv,
+}
+
+/// `matterixc doc`.
+#[derive(Debug, Args)]
+pub struct DocArgs {
+    /// The file.
+    pub file: PathBuf,
+    /// The workflow, where the file has several.
+    #[arg(long, value_name = "NAME")]
+    pub workflow: Option<String>,
+    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
+    /// The lab, for a workflow that runs in any.
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
+    /// Where to write it; to standard output without it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// `matterixc explain`.
@@ -143,4 +271,18 @@ fn setting(text: &str) -> Result<(String, String), String> {
         }
         _ => Err("write NAME=VALUE, as in \"target=40 degC\"".to_string()),
     }
+}
+
+fn time(text: &str) -> Result<Duration, String> {
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let size = match unit.trim() {
+        "ms" => 1e-3,
+        "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err("write a time with its unit, as in \"30 s\" or \"5 min\"".to_string()),
+    };
+    let number: f64 = number.parse().map_err(|_| format!("`{number}` is not a number"))?;
+    Duration::try_from_secs_f64(number * size).map_err(|_| "this time is too long".to_string())
 }

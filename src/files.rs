@@ -13,6 +13,52 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|e| format!("cannot read `{}`: {}", path.display(), reason(&e)))
 }
 
+/// Files that were found, and in words what was not.
+pub struct Found {
+    /// Each once, in the order of the paths; those of a folder by name.
+    pub files: Vec<PathBuf>,
+    /// What cannot be read.
+    pub missing: Vec<String>,
+}
+
+/// The files that paths name, and all with an extension in the folders they name. Hidden folders and links to folders
+/// are left out.
+pub fn with_extension(paths: &[PathBuf], extension: &str) -> Found {
+    let mut found = Found { files: Vec::new(), missing: Vec::new() };
+    for path in paths {
+        if path.is_dir() {
+            search(path, extension, &mut found);
+        } else {
+            found.files.push(path.clone());
+        }
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    found.files.retain(|path| seen.insert(path.clone()));
+    found
+}
+
+fn search(dir: &Path, extension: &str, found: &mut Found) {
+    let mut entries: Vec<PathBuf> = match fs::read_dir(dir) {
+        Ok(entries) => entries.flatten().map(|e| e.path()).collect(),
+        Err(e) => {
+            found.missing.push(format!("cannot read `{}`: {}", dir.display(), reason(&e)));
+            return;
+        }
+    };
+    entries.sort();
+    for path in entries {
+        let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        if path.is_dir() {
+            if !hidden && !path.is_symlink() {
+                search(&path, extension, found);
+            }
+        } else if path.extension().is_some_and(|e| e == extension) {
+            let path = path.strip_prefix(".").map_or_else(|_| path.clone(), Path::to_path_buf);
+            found.files.push(path);
+        }
+    }
+}
+
 /// What standard input holds, or in words why it cannot be read.
 pub fn read_stdin() -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
@@ -38,6 +84,18 @@ pub fn replace(path: &Path, text: &str) -> Result<(), String> {
         // What is left of a failed attempt is of no use; that it cannot be removed either changes nothing.
         let _ = fs::remove_file(&beside);
         failed(e)
+    })
+}
+
+/// Writes a file, new or not; a reader sees the old text or the new, never a part.
+pub fn write(path: &Path, text: &str) -> Result<(), String> {
+    if path.exists() {
+        return replace(path, text);
+    }
+    let beside = beside(path);
+    fill(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|e| {
+        let _ = fs::remove_file(&beside);
+        format!("cannot write `{}`: {}", path.display(), reason(&e))
     })
 }
 

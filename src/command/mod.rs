@@ -1,16 +1,24 @@
 //! One file per subcommand.
 
+mod bill;
 mod check;
+mod doc;
 mod explain;
 mod fmt;
 mod new;
+mod plan;
 mod run;
+mod test;
 
+pub use bill::bill;
 pub use check::check;
+pub use doc::doc;
 pub use explain::explain;
 pub use fmt::fmt;
 pub use new::new;
+pub use plan::plan;
 pub use run::run;
+pub use test::test;
 
 use crate::Exit;
 use crate::terminal::{Stream, print};

@@ -2,11 +2,13 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
-use matterix_ir::Severity;
+use matterix_ir::{Diagnostic, Program, Severity};
+use matterix_runtime::exec::Turn;
 
 use crate::args::{Color, RunArgs, RunFormat};
-use crate::pipeline::{self, Choices, Input};
+use crate::pipeline::{self, Choices, Input, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
 use crate::terminal::{self, Stream, complain, print};
@@ -30,7 +32,8 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         create(dir)?;
     }
     let mut findings = Findings::new(args.format, color);
-    let (sources, program, diagnostics) = pipeline::compile(&input, args.workflow.as_deref(), &args.set);
+    let (sources, program, diagnostics) =
+        pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
     let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {
@@ -39,8 +42,16 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     };
 
     let cancel = cancel::on_interrupt()?;
+    let turns = match turns(args, &program, cancel)? {
+        Ok(turns) => turns,
+        Err(found) => {
+            findings.show(&sources, vec![*found]);
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    };
     let mut progress = Progress::new(&program.plan, kind(args.format));
-    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry };
+    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 
@@ -56,13 +67,29 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     Ok(if ran.passed { Exit::Fine } else { Exit::Findings })
 }
 
+/// The turns of claims, from a schedule in a file or one made now; none without `--plan`.
+fn turns(args: &RunArgs, program: &Program, cancel: &AtomicBool) -> Result<Result<Vec<Turn>, Box<Diagnostic>>, String> {
+    match &args.plan {
+        None => Ok(Ok(Vec::new())),
+        Some(None) => match pipeline::schedule(program, Search::Fixed { seed: args.seed }, cancel) {
+            Ok(schedule) => schedule.turns(program).map(Ok),
+            Err(found) => Ok(Err(found)),
+        },
+        Some(Some(path)) => {
+            let bytes = files::read(path)?;
+            let text = String::from_utf8(bytes).map_err(|_| format!("`{}` is not text", path.display()))?;
+            pipeline::turns(path, &text, program).map(Ok)
+        }
+    }
+}
+
 /// Findings of compiler and run, on standard error.
-struct Findings {
+pub(super) struct Findings {
     reporter: Reporter,
 }
 
 impl Findings {
-    fn new(format: RunFormat, color: Color) -> Self {
+    pub(super) fn new(format: RunFormat, color: Color) -> Self {
         let format = match format {
             RunFormat::Human => Format::Human,
             RunFormat::Json => Format::Json,
@@ -70,11 +97,11 @@ impl Findings {
         Findings { reporter: Reporter::new(format, terminal::look(Stream::Err, color)) }
     }
 
-    fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<matterix_ir::Diagnostic>) {
+    pub(super) fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<matterix_ir::Diagnostic>) {
         print(Stream::Err, &self.reporter.render(sources, diagnostics));
     }
 
-    fn end(&self) {
+    pub(super) fn end(&self) {
         if self.reporter.tally() != Default::default() {
             print(Stream::Err, &self.reporter.summary());
         }

@@ -1,6 +1,8 @@
 //! Every call into the compiler and the runtime.
 
+mod bill;
 mod neighbours;
+mod plan;
 mod run;
 
 use std::path::{Path, PathBuf};
@@ -9,6 +11,9 @@ use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
 use neighbours::Neighbours;
 
+pub use bill::{Prices, bill};
+pub use matterix_lang::Test;
+pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 
 /// A text to compile, and where its neighbours are.
@@ -51,6 +56,11 @@ impl Input {
         }
     }
 
+    /// Whether a line begins like a test.
+    pub fn mentions_tests(&self) -> bool {
+        self.bytes.split(|b| *b == b'\n').any(|line| line.starts_with(b"test "))
+    }
+
     fn neighbours(&self) -> Neighbours {
         Neighbours::of(&self.dir)
     }
@@ -70,17 +80,48 @@ pub fn check(input: &Input) -> (Sources, Vec<Diagnostic>) {
 pub fn compile(
     input: &Input,
     workflow: Option<&str>,
+    lab: Option<&str>,
     set: &[(String, String)],
 ) -> (Sources, Option<Program>, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let (program, found) = match file {
         Ok(file) => {
-            let options = matterix_lang::Options { workflow: workflow.map(str::to_string), set: set.to_vec() };
+            let (workflow, lab) = (workflow.map(str::to_string), lab.map(str::to_string));
+            let options = matterix_lang::Options { workflow, set: set.to_vec(), lab };
             matterix_lang::compile(&mut sources, file, &input.neighbours(), &options)
         }
         Err(found) => (None, vec![found]),
     };
     (sources, program, found)
+}
+
+/// A workflow of a file as a protocol for people, with findings; no text where there is an error.
+pub fn document(
+    input: &Input,
+    workflow: Option<&str>,
+    lab: Option<&str>,
+    set: &[(String, String)],
+) -> (Sources, Option<String>, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let (text, found) = match file {
+        Ok(file) => {
+            let (workflow, lab) = (workflow.map(str::to_string), lab.map(str::to_string));
+            let options = matterix_lang::Options { workflow, set: set.to_vec(), lab };
+            matterix_lang::document(&mut sources, file, &input.neighbours(), &options)
+        }
+        Err(found) => (None, vec![found]),
+    };
+    (sources, text, found)
+}
+
+/// The tests of a file whose names hold `wanted`, with what is wrong with the file beside them.
+pub fn tests(input: &Input, wanted: &str) -> (Sources, Vec<Test>, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let (tests, found) = match file {
+        Ok(file) => matterix_lang::tests(&mut sources, file, &input.neighbours(), wanted),
+        Err(found) => (Vec::new(), vec![found]),
+    };
+    (sources, tests, found)
 }
 
 /// A file in the one style, or why it has none.

@@ -5,7 +5,9 @@ use std::sync::atomic::AtomicBool;
 
 use matterix_ir::plan::{Condition, StepId};
 use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
-use matterix_runtime::exec::{self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Verdict};
+use matterix_runtime::exec::{
+    self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
+};
 use matterix_runtime::process::{Engine, Observer};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
@@ -24,6 +26,8 @@ pub struct Choices {
     pub fidelity: args::Fidelity,
     /// Steps without what they cause.
     pub dry: bool,
+    /// The turns of claims, where a schedule is followed.
+    pub turns: Vec<Turn>,
 }
 
 impl Choices {
@@ -44,7 +48,7 @@ pub fn run<'a>(
     progress: &mut Progress<'_>,
 ) -> Ran<'a> {
     let fidelity = choices.fidelity();
-    let limits = Limits { cancel: Some(cancel), ..Limits::default() };
+    let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
     let options = RunOptions { seed: choices.seed, fidelity, limits, ..RunOptions::default() };
     let mut follower = Follower { recording: Recording::new(program), progress };
     let outcome = matterix_runtime::run::run(program, &options, &mut follower);
@@ -70,6 +74,11 @@ pub struct Ran<'a> {
 }
 
 impl Ran<'_> {
+    /// When it ended, s of lab time.
+    pub fn end_time(&self) -> f64 {
+        self.recording.end
+    }
+
     /// The report to read.
     pub fn page(&self) -> String {
         record::human(&self.report)
@@ -200,7 +209,7 @@ fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
 }
 
 /// What ended the run is an error, and so is an expectation that did not hold; what else failed is a warning.
-fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> {
+pub(super) fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> {
     let missed = outcome.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
     let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
     found.extend(outcome.failure.iter().map(exec::diagnostic));

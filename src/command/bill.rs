@@ -1,0 +1,64 @@
+//! `matterixc bill`.
+
+use std::path::Path;
+
+use matterix_ir::{Diagnostic, Severity, Sources};
+
+use crate::args::{BillArgs, BillFormat, Color};
+use crate::pipeline::{self, Input, Prices};
+use crate::report::{Format, Reporter};
+use crate::terminal::{self, Stream, complain, print};
+use crate::{Exit, cancel, files};
+
+/// Compiles, executes once and prints what that uses up; findings go to standard error.
+pub fn bill(args: &BillArgs, color: Color) -> Exit {
+    match attempt(args, color) {
+        Ok(exit) => exit,
+        Err(message) => {
+            complain(&message);
+            Exit::Usage
+        }
+    }
+}
+
+/// The bill; `Err` says in words what is wrong with usage or files.
+fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
+    let input = Input::file(&args.file, files::read(&args.file)?);
+    let prices = args.prices.as_deref().map(prices).transpose()?;
+    let (sources, program, found) = pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
+    let wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let Some(program) = program.filter(|_| !wrong) else {
+        show(&sources, found, color);
+        return Ok(Exit::Findings);
+    };
+    let cancel = cancel::on_interrupt()?;
+    let mut billed = pipeline::bill(&program, &sources, args.seed, args.runs, cancel);
+    show(&sources, found.into_iter().chain(billed.diagnostics.clone()).collect(), color);
+    if let Some(prices) = &prices {
+        billed.price(prices);
+    }
+    let text = match args.format {
+        BillFormat::Human => billed.page(),
+        BillFormat::Json => billed.json()?,
+        BillFormat::Csv => billed.csv()?,
+    };
+    print(Stream::Out, &text);
+    Ok(if billed.complete { Exit::Fine } else { Exit::Findings })
+}
+
+fn prices(path: &Path) -> Result<Prices, String> {
+    let bytes = files::read(path)?;
+    let text = String::from_utf8(bytes).map_err(|_| format!("`{}` is not text in UTF-8", path.display()))?;
+    Prices::read(&text).map_err(|e| format!("cannot read the prices in `{}`: {e}", path.display()))
+}
+
+/// Findings on standard error, counted below.
+pub(super) fn show(sources: &Sources, found: Vec<Diagnostic>, color: Color) {
+    if found.is_empty() {
+        return;
+    }
+    let mut reporter = Reporter::new(Format::Human, terminal::look(Stream::Err, color));
+    let text = reporter.render(sources, found);
+    print(Stream::Err, &text);
+    print(Stream::Err, &reporter.summary());
+}

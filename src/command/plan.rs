@@ -1,0 +1,53 @@
+//! `matterixc plan`.
+
+use matterix_ir::Severity;
+
+use crate::args::{Color, PlanArgs, RunFormat};
+use crate::pipeline::{self, Input, Search};
+use crate::terminal::{self, Stream, complain, print};
+use crate::{Exit, cancel, files};
+
+use super::run::Findings;
+
+/// Compiles and schedules; findings go to standard error, the schedule to standard output.
+pub fn plan(args: &PlanArgs, color: Color) -> Exit {
+    match attempt(args, color) {
+        Ok(exit) => exit,
+        Err(message) => {
+            complain(&message);
+            Exit::Usage
+        }
+    }
+}
+
+/// The schedule; `Err` says in words what is wrong with usage or files.
+fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
+    let input = Input::file(&args.file, files::read(&args.file)?);
+    let mut findings = Findings::new(args.format, color);
+    let (sources, program, diagnostics) =
+        pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
+    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    findings.show(&sources, diagnostics);
+    let Some(program) = program.filter(|_| !is_wrong) else {
+        findings.end();
+        return Ok(Exit::Findings);
+    };
+    let search = Search::Clock { time: args.time_limit, seed: args.seed };
+    let schedule = match pipeline::schedule(&program, search, cancel::on_interrupt()?) {
+        Ok(schedule) => schedule,
+        Err(found) => {
+            findings.show(&sources, vec![*found]);
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    };
+    findings.end();
+    match args.format {
+        RunFormat::Human => print(Stream::Out, &pipeline::chart(&schedule, terminal::width(Stream::Out))),
+        RunFormat::Json => print(Stream::Out, &pipeline::schedule_json(&schedule)?),
+    }
+    if let Some(path) = &args.svg {
+        files::write(path, &pipeline::picture(&schedule)?)?;
+    }
+    Ok(Exit::Fine)
+}
