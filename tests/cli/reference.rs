@@ -121,6 +121,9 @@ fn offered(text: &str) -> Vec<String> {
             ItemKind::Fn { name, .. } | ItemKind::Relation { name, .. } => out.push(format!("`{}(", name.text)),
             ItemKind::Process(p) => out.push(format!("`{}`", p.name.text)),
             ItemKind::Event(e) => out.push(format!("`{}`", e.name.text)),
+            ItemKind::ReactiveGroup { name, .. } | ItemKind::Material { name, .. } | ItemKind::Hazard { name, .. } => {
+                out.push(format!("`{}`", name.text))
+            }
             ItemKind::Dimension { name, .. } => out.push(format!("`{}`", name.text)),
             ItemKind::Unit { name, .. } => out.push(format!("`{}`", name.text)),
             _ => {}
@@ -155,10 +158,8 @@ fn what_would_have_no_effect_is_reported() {
         ("capability A { param x: Ratio = 3 { at_leats: 0 } }", "unknown-field"),
         ("capability A { reading x: Ratio = 3 { settle: 2 s } }", "unknown-field"),
         ("capability A { derived x: Ratio = 3 { hiden: true } }", "unknown-field"),
-        ("skill go(a: Body, b: Body) { wait 1 s }", "unsupported"),
-        ("skill go(a: Body) to(b: Body, c: Body) { wait 1 s }", "unsupported"),
-        ("capability A { command go(a: Mass, b: Mass) }", "unsupported"),
-        ("reaction r: EtOH -> EtOH { rate: 1 1/s, order: { EtOH: 1 }, requires: true }", "unsupported"),
+        ("reaction r: EtOH -> EtOH { rate: 1 1/s, order: { EtOH: 1 }, requires: true and 3 }", "type-mismatch"),
+        ("fn f(x: Ratio) -> Ratio = x { at_laest: 0 }", "unknown-field"),
         ("dimension Mass = Length", "duplicate-name"),
     ];
     for (index, (text, code)) in cases.iter().enumerate() {
