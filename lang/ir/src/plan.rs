@@ -28,6 +28,23 @@ pub struct Condition {
     pub refusal: Option<Refusal>,
 }
 
+impl Condition {
+    /// The failure raised where it does not hold.
+    pub fn failure(&self) -> &str {
+        self.refusal.as_ref().map_or("need", |r| &r.failure)
+    }
+
+    /// The kind of finding where it does not hold.
+    pub fn code(&self) -> Code {
+        self.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code)
+    }
+
+    /// How to mend it, where it says so.
+    pub fn advice(&self) -> Option<String> {
+        self.refusal.as_ref().and_then(|r| r.help.clone())
+    }
+}
+
 /// A member that a condition reads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Term {

@@ -610,11 +610,6 @@ impl<'a> Elaborator<'a> {
         Action::Move { fraction, from, to, span }
     }
 
-    /// Index of a mixture in the model.
-    pub fn mixture_index(&self, id: InstanceId) -> u32 {
-        self.mixtures.partition_point(|m| *m < id) as u32
-    }
-
     /// `place = value` as an action; with a condition the place keeps its value where it does not hold.
     pub fn assignment(
         &mut self,

@@ -10,6 +10,7 @@ pub mod instances;
 pub mod lab;
 pub mod laws;
 mod lineage;
+pub mod mixtures;
 pub mod prune;
 pub mod reach;
 pub mod reactions;

@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::Op;
-use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Limit, Refusal, Step};
 use matterix_ir::scene::InstanceId;
 
 use super::Planner;
 use crate::ast::MemberKind;
+use crate::elaborate::mixtures::written;
 use crate::eval::Scope;
 
 impl Planner<'_, '_> {
@@ -43,24 +43,11 @@ impl Planner<'_, '_> {
                 }
             }
         }
-        let mixtures: Vec<InstanceId> = (0..self.lab.instances.len() as u32)
-            .map(InstanceId)
-            .filter(|i| self.lab.per_species(*i).is_some())
-            .collect();
-        let held = |m: u32| {
-            let id = mixtures.get(m as usize).copied();
-            self.lab.extensive.iter().filter(move |(k, _)| Some(k.instance) == id).map(|(_, s)| *s)
-        };
+        let extensive = self.lab.extensive_by_mixture();
         for step in &mut self.steps {
             let Step::Operation(o) = &mut step.step else { continue };
-            let mut states = BTreeSet::new();
-            for action in o.at_start.iter().chain(&o.at_end) {
-                match action {
-                    Action::Assign { state, .. } => drop(states.insert(*state)),
-                    Action::Move { from, to, .. } => states.extend(held(*from).chain(held(*to))),
-                }
-            }
-            let due: BTreeSet<u32> = states.iter().filter_map(|s| of.get(s)).flatten().copied().collect();
+            let due: BTreeSet<u32> =
+                written(o, &extensive).iter().filter_map(|s| of.get(s)).flatten().copied().collect();
             o.limits = due.into_iter().collect();
         }
     }

@@ -2,7 +2,7 @@
 
 use matterix_ir::NodeId;
 use matterix_ir::codes;
-use matterix_ir::plan::{Condition, Refusal, Step, StepId, Takes};
+use matterix_ir::plan::{Condition, Step, StepId, Takes};
 use matterix_ir::quantity::show_number;
 
 use super::Executor;
@@ -56,10 +56,7 @@ impl Executor<'_, '_> {
 
     /// What a need or limit that does not hold raises.
     pub(super) fn refused(&mut self, condition: &Condition, text: String) -> Raised {
-        let name = condition.refusal.as_ref().map_or("need", |r| &r.failure);
-        let code = condition.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
-        let help = condition.refusal.as_ref().and_then(|r| r.help.clone());
-        Raised { help, ..self.unmet(condition, name, code, text) }
+        Raised { help: condition.advice(), ..self.unmet(condition, condition.failure(), condition.code(), text) }
     }
 
     /// What a breach of an invariant raises.

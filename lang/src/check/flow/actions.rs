@@ -23,7 +23,7 @@ impl Flow<'_, '_> {
             match value.truth() {
                 Some(true) => continue,
                 Some(false) => {
-                    let name = need.refusal.as_ref().map_or("need", |r| &r.failure);
+                    let name = need.failure();
                     if !self.is_taken(name) {
                         self.unmet(label, need, facts, false);
                     }
@@ -36,7 +36,7 @@ impl Flow<'_, '_> {
                 }
                 None => {
                     if value.why() == Some(Why::Paths) && !self.is_shared(need.node) {
-                        let name = need.refusal.as_ref().map_or("need", |r| &r.failure);
+                        let name = need.failure();
                         if !self.is_taken(name) {
                             self.unmet(label, need, facts, true);
                         }
@@ -132,7 +132,7 @@ impl Flow<'_, '_> {
                 None if value.why() == Some(Why::Paths) && !self.is_shared(limit.condition.node) => true,
                 None => continue,
             };
-            let name = limit.condition.refusal.as_ref().map_or("need", |r| &r.failure);
+            let name = limit.condition.failure();
             if !self.is_taken(name) {
                 self.passed(limit, facts, some);
             }

@@ -20,7 +20,6 @@ use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
-use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 
 pub use self::evolve::Window;
@@ -126,26 +125,13 @@ impl<'l, 'a> Flow<'l, 'a> {
         events: &'l [Event],
         derivatives: &'l [Derivative],
     ) -> Self {
-        let mut mixtures: Vec<Vec<(ExtensiveKey, u32)>> = Vec::new();
-        let mut of: BTreeMap<InstanceId, usize> = BTreeMap::new();
-        for i in 0..lab.instances.len() as u32 {
-            if lab.per_species(InstanceId(i)).is_some() {
-                of.insert(InstanceId(i), mixtures.len());
-                mixtures.push(Vec::new());
-            }
-        }
-        for (key, state) in &lab.extensive {
-            if let Some(m) = of.get(&key.instance) {
-                mixtures[*m].push((key.clone(), *state));
-            }
-        }
         let mut flow = Flow {
             lab,
             sources,
             plan,
             events,
             derivatives,
-            mixtures,
+            mixtures: lab.extensive_by_mixture(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: HashMap::new(),
             values: vec![Known::Point(0.0); lab.graph.ops().len()],

@@ -1,7 +1,7 @@
 //! Findings with their history.
 
 use matterix_ir::model::Domain;
-use matterix_ir::plan::{Condition, Limit, Refusal, Term};
+use matterix_ir::plan::{Condition, Limit, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Span, codes};
 
@@ -83,7 +83,7 @@ impl Flow<'_, '_> {
     }
 
     fn demand(&mut self, what: String, need: &Condition, facts: &Facts, some: bool) {
-        let code = need.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
+        let code = need.code();
         let some = some || self.doubt > 0;
         let headline = if some { format!("{what}, on some ways through the plan") } else { what };
         let measured = self.measured(need, facts);
@@ -97,7 +97,7 @@ impl Flow<'_, '_> {
             d = d.because(need.span, format!("needed here: `{}`", need.text));
         }
         d = self.with_history(d, need.node, &need.terms, facts);
-        d.help.extend(need.refusal.as_ref().and_then(|r| r.help.clone()));
+        d.help.extend(need.advice());
         self.found(d, need.span);
     }
 
@@ -107,7 +107,7 @@ impl Flow<'_, '_> {
         if let Some(label) = self.sites.last().map(|s| s.label.clone()) {
             return self.unmet(&label, condition, facts, some);
         }
-        let code = condition.refusal.as_ref().map_or(codes::NEED_UNMET, Refusal::code);
+        let code = condition.code();
         // Where too many things stand somewhere, the last of them is what is wrong.
         let owner = self.too_many(condition, facts).map(|s| self.lab.state_owner[s as usize]);
         let about = owner.unwrap_or(limit.instance);
@@ -118,7 +118,7 @@ impl Flow<'_, '_> {
         if span != condition.span {
             d = d.because(condition.span, format!("needed here: `{}`", condition.text));
         }
-        d.help.extend(condition.refusal.as_ref().and_then(|r| r.help.clone()));
+        d.help.extend(condition.advice());
         self.found(d, condition.span);
     }
 
@@ -166,7 +166,7 @@ impl Flow<'_, '_> {
             let headline = format!("`{}` ends, and `{name}` is {how}", plan.workflow);
             let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
             d = d.because(end.span, format!("looked for here: `{}`", end.text));
-            d.help.extend(end.refusal.as_ref().and_then(|r| r.help.clone()));
+            d.help.extend(end.advice());
             self.found(d, end.span);
         }
     }

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::model::Action;
 use matterix_ir::plan::{Caught, Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId};
 
@@ -11,6 +10,7 @@ use super::facts::Facts;
 use super::report::Finding;
 use super::value::{Known, Why};
 use super::{Flow, MOST_STEPS, Site};
+use crate::elaborate::mixtures::written;
 
 /// Turns of a loop followed one by one.
 const MOST_TURNS: usize = 2000;
@@ -287,16 +287,7 @@ impl Flow<'_, '_> {
         while let Some(id) = todo.pop() {
             let step = &self.plan.get(id).step;
             if let Step::Operation(o) = step {
-                for action in o.at_start.iter().chain(&o.at_end) {
-                    match action {
-                        Action::Assign { state, .. } => drop(out.insert(*state)),
-                        Action::Move { from, to, .. } => {
-                            for m in [from, to] {
-                                out.extend(self.mixtures[*m as usize].iter().map(|(_, s)| *s));
-                            }
-                        }
-                    }
-                }
+                out.extend(written(o, &self.mixtures));
             }
             todo.extend(step.children());
         }
