@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::pipeline::Options;
+
 use crate::report::Format;
 
 /// Checks, runs and explains robotic chemistry protocols written in .mtx.
@@ -84,9 +86,9 @@ pub struct FmtArgs {
     pub stdout: bool,
 }
 
-/// `matterixc run`.
+/// A workflow of a file, with what it is given from outside.
 #[derive(Debug, Args)]
-pub struct RunArgs {
+pub struct Subject {
     /// The file.
     pub file: PathBuf,
     /// The workflow, where the file has several.
@@ -98,6 +100,21 @@ pub struct RunArgs {
     /// The lab, for a workflow that runs in any.
     #[arg(long, value_name = "NAME")]
     pub lab: Option<String>,
+}
+
+impl Subject {
+    /// The same, as the compiler takes it.
+    pub fn options(&self) -> Options {
+        Options { workflow: self.workflow.clone(), set: self.set.clone(), lab: self.lab.clone() }
+    }
+}
+
+/// `matterixc run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
     /// Where all randomness of the run starts.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -121,18 +138,9 @@ pub struct RunArgs {
 /// `matterixc plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// The file.
-    pub file: PathBuf,
-    /// The workflow, where the file has several.
-    #[arg(long, value_name = "NAME")]
-    pub workflow: Option<String>,
-
-    /// The lab, for a workflow that runs in any
-    #[arg(long, value_name = "NAME")]
-    pub lab: Option<String>,
-    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
-    pub set: Vec<(String, String)>,
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
     /// Form of the schedule.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,
@@ -192,17 +200,9 @@ pub enum TestFormat {
 /// `matterixc bill`.
 #[derive(Debug, Args)]
 pub struct BillArgs {
-    /// The file.
-    pub file: PathBuf,
-    /// The workflow, where the file has several.
-    #[arg(long, value_name = "NAME")]
-    pub workflow: Option<String>,
-    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
-    pub set: Vec<(String, String)>,
-    /// The lab, for a workflow that runs in any.
-    #[arg(long, value_name = "NAME")]
-    pub lab: Option<String>,
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
     /// For so many runs.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1_000_000_000))]
     pub runs: u64,
@@ -231,17 +231,9 @@ pub enum BillFormat {
 /// `matterixc doc`.
 #[derive(Debug, Args)]
 pub struct DocArgs {
-    /// The file.
-    pub file: PathBuf,
-    /// The workflow, where the file has several.
-    #[arg(long, value_name = "NAME")]
-    pub workflow: Option<String>,
-    /// A parameter of the workflow, as written in the language: `--set "target=40 degC"`.
-    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
-    pub set: Vec<(String, String)>,
-    /// The lab, for a workflow that runs in any.
-    #[arg(long, value_name = "NAME")]
-    pub lab: Option<String>,
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
     /// Where to write it; to standard output without it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,

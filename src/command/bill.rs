@@ -7,25 +7,19 @@ use matterix_ir::{Diagnostic, Severity, Sources};
 use crate::args::{BillArgs, BillFormat, Color};
 use crate::pipeline::{self, Input, Prices};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes once and prints what that uses up; findings go to standard error.
 pub fn bill(args: &BillArgs, color: Color) -> Exit {
-    match attempt(args, color) {
-        Ok(exit) => exit,
-        Err(message) => {
-            complain(&message);
-            Exit::Usage
-        }
-    }
+    super::or_complain(attempt(args, color))
 }
 
 /// The bill; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
-    let input = Input::file(&args.file, files::read(&args.file)?);
+    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let prices = args.prices.as_deref().map(prices).transpose()?;
-    let (sources, program, found) = pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
+    let (sources, program, found) = pipeline::compile(&input, &args.subject.options());
     let wrong = found.iter().any(|d| d.severity == Severity::Error);
     let Some(program) = program.filter(|_| !wrong) else {
         show(&sources, found, color);

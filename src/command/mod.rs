@@ -21,11 +21,19 @@ pub use run::run;
 pub use test::test;
 
 use crate::Exit;
-use crate::terminal::{Stream, print};
+use crate::terminal::{Stream, complain, print};
 
 /// Prints the versions of the command, the language and the compiled program.
 pub fn version() -> Exit {
     let version = env!("CARGO_PKG_VERSION");
     print(Stream::Out, &format!("matterixc {version} (mtx 1, program {})\n", matterix_ir::program::PROGRAM_VERSION));
     Exit::Fine
+}
+
+/// How a command ended; what is wrong with usage or files is said on standard error.
+fn or_complain(ended: Result<Exit, String>) -> Exit {
+    ended.unwrap_or_else(|message| {
+        complain(&message);
+        Exit::Usage
+    })
 }

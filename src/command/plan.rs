@@ -4,28 +4,21 @@ use matterix_ir::Severity;
 
 use crate::args::{Color, PlanArgs, RunFormat};
 use crate::pipeline::{self, Input, Search};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, print};
 use crate::{Exit, cancel, files};
 
 use super::run::Findings;
 
 /// Compiles and schedules; findings go to standard error, the schedule to standard output.
 pub fn plan(args: &PlanArgs, color: Color) -> Exit {
-    match attempt(args, color) {
-        Ok(exit) => exit,
-        Err(message) => {
-            complain(&message);
-            Exit::Usage
-        }
-    }
+    super::or_complain(attempt(args, color))
 }
 
 /// The schedule; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
-    let input = Input::file(&args.file, files::read(&args.file)?);
+    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let mut findings = Findings::new(args.format, color);
-    let (sources, program, diagnostics) =
-        pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
+    let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
     let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {

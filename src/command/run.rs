@@ -11,29 +11,22 @@ use crate::args::{Color, RunArgs, RunFormat};
 use crate::pipeline::{self, Choices, Input, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes and reports; findings and progress go to standard error, the report to standard output.
 pub fn run(args: &RunArgs, color: Color) -> Exit {
-    match attempt(args, color) {
-        Ok(exit) => exit,
-        Err(message) => {
-            complain(&message);
-            Exit::Usage
-        }
-    }
+    super::or_complain(attempt(args, color))
 }
 
 /// The run; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
-    let input = Input::file(&args.file, files::read(&args.file)?);
+    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
         create(dir)?;
     }
     let mut findings = Findings::new(args.format, color);
-    let (sources, program, diagnostics) =
-        pipeline::compile(&input, args.workflow.as_deref(), args.lab.as_deref(), &args.set);
+    let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
     let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {

@@ -12,7 +12,7 @@ use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
-pub use matterix_lang::Test;
+pub use matterix_lang::{Options, Test};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 
@@ -77,38 +77,20 @@ pub fn check(input: &Input) -> (Sources, Vec<Diagnostic>) {
 }
 
 /// A file as a program, with findings; no program where there is an error.
-pub fn compile(
-    input: &Input,
-    workflow: Option<&str>,
-    lab: Option<&str>,
-    set: &[(String, String)],
-) -> (Sources, Option<Program>, Vec<Diagnostic>) {
+pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let (program, found) = match file {
-        Ok(file) => {
-            let (workflow, lab) = (workflow.map(str::to_string), lab.map(str::to_string));
-            let options = matterix_lang::Options { workflow, set: set.to_vec(), lab };
-            matterix_lang::compile(&mut sources, file, &input.neighbours(), &options)
-        }
+        Ok(file) => matterix_lang::compile(&mut sources, file, &input.neighbours(), options),
         Err(found) => (None, vec![found]),
     };
     (sources, program, found)
 }
 
 /// A workflow of a file as a protocol for people, with findings; no text where there is an error.
-pub fn document(
-    input: &Input,
-    workflow: Option<&str>,
-    lab: Option<&str>,
-    set: &[(String, String)],
-) -> (Sources, Option<String>, Vec<Diagnostic>) {
+pub fn document(input: &Input, options: &Options) -> (Sources, Option<String>, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let (text, found) = match file {
-        Ok(file) => {
-            let (workflow, lab) = (workflow.map(str::to_string), lab.map(str::to_string));
-            let options = matterix_lang::Options { workflow, set: set.to_vec(), lab };
-            matterix_lang::document(&mut sources, file, &input.neighbours(), &options)
-        }
+        Ok(file) => matterix_lang::document(&mut sources, file, &input.neighbours(), options),
         Err(found) => (None, vec![found]),
     };
     (sources, text, found)
