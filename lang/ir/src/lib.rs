@@ -16,6 +16,7 @@ pub mod model;
 pub mod plan;
 pub mod program;
 pub mod quantity;
+pub mod robot;
 pub mod scene;
 pub mod span;
 pub mod stock;
