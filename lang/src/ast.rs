@@ -712,6 +712,15 @@ pub enum Effect {
     Assign(Expr, Expr),
     /// `move(v, from: a, to: b)`.
     Call(Expr),
+    /// `each(c in channels: rinse(c), c.tip = nothing)`.
+    Each {
+        /// Stands for one of the set after another.
+        var: Name,
+        /// A finite set.
+        set: Expr,
+        /// What is done with each.
+        effects: Vec<Effect>,
+    },
 }
 
 /// A line of a driver.

@@ -196,3 +196,19 @@ workflow run in bench { rest 1 s }
     let codes: Vec<_> = findings("misplaced", text).into_iter().map(|f| f.0).collect();
     assert_eq!(codes.first().map(String::as_str), Some("misplaced"));
 }
+
+#[test]
+fn a_run_that_leaves_something_on_does_not_pass() {
+    let text = "mtx 1\nuse std::heating::IkaRetControl\n\
+        lab bench { ambient: 22 degC, plate = IkaRetControl at (0, 0, 0) m }\n\
+        workflow w in bench {\n    heat plate to 30 degC\n    wait 1 s\n}\n";
+    let path = write(&folder("devices_left_on"), "bench.mtx", text);
+    let ended = matterixc(&["run", &path, "--format", "json"]);
+    let found = ended.err_lines();
+    let last = found.last().expect("a finding");
+    assert_eq!((ended.code, &last["code"], &last["severity"]), (1, &"unfinished".into(), &"error".into()));
+    assert_eq!(last["span"]["start"]["line"], 5);
+    let mended = text.replace("wait 1 s\n}", "wait 1 s\n} finally { stop heating plate }");
+    let path = write(&folder("devices_switched_off"), "bench.mtx", mended);
+    assert_eq!(matterixc(&["run", &path]).code, 0);
+}

@@ -140,7 +140,7 @@ fn what_goes_wrong_with_tips_and_volumes_has_a_name() {
         ("no_tip", "drop tip by ot2.left".to_string()),
         ("tip_on_tip", format!("{pick}pick up tip tips[H12] by ot2.left")),
         ("tip_used", format!("{pick}drop tip into bin by ot2.left\npick up tip tips[A1] by ot2.left")),
-        ("tip_used", "pick up tip tips[C3] by ot2.left\nreturn tip to tips[C3] by ot2.left\npick up tip tips[C3] by ot2.left".to_string()),
+        ("tip_used", "pick up tip tips[C3] by ot2.left\nreturn tip to tips[C3] by ot2.left\npick up tip tips[C3] by ot2.left\ndrop tip by ot2.left\npick up tip tips[C3] by ot2.left".to_string()),
         ("out_of_tips", format!("for t in tips.tips {{ {pick}\ndrop tip by ot2.left }}\n{pick}")),
         ("below_minimum", format!("{pick}aspirate 19 uL from stock[A1] by ot2.left")),
         ("tip_overflow", format!("{pick}repeat 4 times {{ aspirate 80 uL from stock[A1] by ot2.left }}")),
@@ -149,6 +149,8 @@ fn what_goes_wrong_with_tips_and_volumes_has_a_name() {
         ("volume_underflow", format!("{dye}dispense 31 uL into plate[A1] by ot2.left")),
         ("volume_overflow", "transfer 90 uL from stock[A1] to [plate[A1], plate[A1], plate[A1], plate[A1], plate[A1]] by ot2.left using tips { tips: each }".to_string()),
         ("contamination", format!("{dye}aspirate 30 uL from stock[A1] by ot2.left")),
+        ("contamination", format!("{pick}aspirate 60 uL from stock[A2] by ot2.left\nblow out into plate[A1] by ot2.left\nreturn tip to tips[A1] by ot2.left\npick up tip tips[A1] by ot2.left\naspirate 30 uL from stock[A1] by ot2.left")),
+        ("wrong_column", format!("{pick}aspirate 60 uL from stock[A1 .. A2] by ot2.left")),
         ("wrong_spot", format!("{pick}return tip to tips[B1] by ot2.left")),
         ("tip_not_empty", format!("{dye}return tip to tips[A1] by ot2.left")),
     ] {

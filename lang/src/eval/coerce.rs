@@ -63,6 +63,7 @@ impl Elaborator<'_> {
                 }
             }
             (Value::List(items), Type::List(inner)) => {
+                let items = flattened(items, inner);
                 let items: Vec<Value> = items.into_iter().map(|i| self.coerce(i, inner, span, what)).collect();
                 if items.contains(&Value::Error) { Value::Error } else { Value::List(items) }
             }
@@ -190,4 +191,16 @@ impl Elaborator<'_> {
         self.report(d);
         Value::Error
     }
+}
+
+/// Lists of lists as one list, where elements are no lists themselves: `plate.columns` are wells, column by column.
+fn flattened(items: Vec<Value>, inner: &Type) -> Vec<Value> {
+    if matches!(inner, Type::List(_) | Type::Any) || !items.iter().any(|i| matches!(i, Value::List(_))) {
+        return items;
+    }
+    let one = |item| match item {
+        Value::List(items) => flattened(items, inner),
+        other => vec![other],
+    };
+    items.into_iter().flat_map(one).collect()
 }

@@ -4,8 +4,8 @@ use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, Name, Unary, UnitText};
-use crate::elaborate::Elaborator;
 use crate::elaborate::units::unit_error;
+use crate::elaborate::{Asked, Elaborator};
 use crate::names::near;
 use crate::units::Dimension;
 
@@ -64,7 +64,7 @@ impl<'a> Elaborator<'a> {
                 value.map_or(Value::Error, |n| Value::Bool(self.graph.unary(UnaryOp::Not, n)))
             }
             ExprKind::Binary(op, a, b) => self.binary(*op, a, b, e.span, scope),
-            ExprKind::Of(inner, species) => self.of(inner, species, scope),
+            ExprKind::Of(inner, substance) => self.of(inner, substance, e.span, scope),
             ExprKind::Range(a, b) => {
                 let (low, high) = (self.expr(a, scope), self.expr(b, scope));
                 self.range(low, high, a.span, b.span)
@@ -382,9 +382,16 @@ impl<'a> Elaborator<'a> {
     }
 
     /// `X of S` outside a recipe only says what is meant: the quantity is X.
-    fn of(&mut self, inner: &'a Expr, species: &'a Name, scope: &mut Scope) -> Value {
+    /// `50 uL of dye` outside the contents of a vessel: a quantity, of which a call says what it is taken of.
+    fn of(&mut self, inner: &'a Expr, substance: &'a Name, at: Span, scope: &mut Scope) -> Value {
         let value = self.expr(inner, scope);
-        let _ = self.name_of(species, scope);
+        if self.substance(substance, scope.module).is_some() && !self.looked_into.contains(&at) {
+            let headline = format!("nothing looks whether this is `{}`", substance.text);
+            self.report(
+                Diagnostic::warning(codes::MISPLACED, at, headline, "no source is named with it")
+                    .help("`of` is looked at in a call with `from` and a vessel: `transfer 50 uL of dye from a to b`"),
+            );
+        }
         value
     }
 
@@ -427,10 +434,27 @@ impl<'a> Elaborator<'a> {
         let items = self.set(set, scope);
         let Some(items) = items else { return Value::Error };
         let mut result: Option<Value> = None;
+        let single =
+            fold.text == "all" && items.len() > 1 && self.open_members.is_empty() && self.open_calls.is_empty();
         for item in items {
+            let of = if single { self.spoken(&item) } else { None };
+            let outer = of.is_some().then(|| (std::mem::take(&mut self.comparisons), std::mem::take(&mut self.terms)));
             scope.bind(var.text.clone(), item);
             let value = self.expr(body, scope);
             scope.vars.pop();
+            if let (Some(of), Some((mut compared, mut terms))) = (of, outer) {
+                std::mem::swap(&mut compared, &mut self.comparisons);
+                std::mem::swap(&mut terms, &mut self.terms);
+                self.comparisons.extend(compared.iter().cloned());
+                for term in &terms {
+                    if !self.terms.iter().any(|t| t.node == term.node) {
+                        self.terms.push(term.clone());
+                    }
+                }
+                if let Value::Bool(node) = value {
+                    self.asked_of.push(Asked { of, node, compared, terms });
+                }
+            }
             result = Some(match result {
                 None => value,
                 Some(so_far) => match self.fold_two(&fold.text, so_far, value, body.span) {
@@ -481,7 +505,12 @@ impl<'a> Elaborator<'a> {
         let value = self.expr(e, scope);
         match self.listed(value) {
             Value::List(items) => Some(items),
-            Value::Kind(kind) => Some(self.instances_of(kind).into_iter().map(Value::Instance).collect()),
+            Value::Kind(kind) => {
+                if scope.lab {
+                    self.gone_through.insert(kind);
+                }
+                Some(self.instances_of(kind).into_iter().map(Value::Instance).collect())
+            }
             Value::Error => None,
             other => {
                 self.report(

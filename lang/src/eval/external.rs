@@ -39,6 +39,10 @@ enum Bound {
     Nth,
     /// Each of one list with each of another.
     Paired,
+    /// A list in groups of a number.
+    Grouped,
+    /// Where a part of a thing is, seen from another part of it.
+    Displacement,
     /// What the lab placed the instance on, by one of these prepositions.
     Placed,
     /// Whether one mixture has touched something that another has not.
@@ -58,6 +62,8 @@ const TABLE: &[(&str, Bound)] = &[
     ("abs", Bound::Abs),
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
+    ("displacement", Bound::Displacement),
+    ("grouped", Bound::Grouped),
     ("having", Bound::Having),
     ("nth", Bound::Nth),
     ("owner", Bound::Owner),
@@ -144,6 +150,8 @@ impl Elaborator<'_> {
             },
             (Bound::Nth, [Value::List(items), Value::Num(n)]) => self.nth(items, n.node, at),
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
+            (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
+            (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
             (_, values) if values.contains(&Value::Error) => Value::Error,
@@ -156,6 +164,13 @@ impl Elaborator<'_> {
     }
 
     fn choose(&mut self, c: NodeId, a: Value, b: Value, at: Span) -> Value {
+        let (a, b) = (self.listed(a), self.listed(b));
+        // Lists cannot be chosen between in a run; where the arguments decide, they need not be.
+        if let (Value::List(_), Value::List(_)) = (&a, &b)
+            && let Some(truth) = if self.prototype { Some(1.0) } else { self.known(c) }
+        {
+            return if truth != 0.0 { a } else { b };
+        }
         match (a, b) {
             (Value::Num(a), Value::Num(b)) => {
                 if !a.dimension.agrees(&b.dimension)

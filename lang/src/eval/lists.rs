@@ -59,6 +59,36 @@ impl Elaborator<'_> {
         }
     }
 
+    /// A list in groups of a whole number of elements; the last may have fewer.
+    pub fn grouped(&mut self, items: &[Value], n: NodeId, at: Span) -> Value {
+        match self.known(n) {
+            Some(size) if size >= 1.0 && size.fract() == 0.0 => {
+                Value::List(items.chunks(size as usize).map(|group| Value::List(group.to_vec())).collect())
+            }
+            _ if self.prototype => Value::List(vec![Value::List(items.to_vec())]),
+            _ => {
+                self.report(Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    at,
+                    "the size of a group is a whole number from 1 that is known before the run",
+                    "not one",
+                ));
+                Value::Error
+            }
+        }
+    }
+
+    /// How far right, back and up one part of a thing is from another, m; infinitely far for parts of different things,
+    /// which can be moved.
+    pub fn displacement(&mut self, from: InstanceId, to: InstanceId) -> Value {
+        let (a, b) = (&self.instances[from.0 as usize], &self.instances[to.0 as usize]);
+        let together = a.owner.is_some() && a.owner == b.owner;
+        let (a, b) = (a.pose.position, b.pose.position);
+        let length = self.tables.units.named("Length");
+        let far = |axis: usize| if together { b[axis] - a[axis] } else { f64::INFINITY };
+        Value::Tuple((0..3).map(|axis| self.number(far(axis), length.clone(), false)).collect())
+    }
+
     /// An element of a list in words, where it has a name.
     pub fn spoken(&self, value: &Value) -> Option<String> {
         match value {

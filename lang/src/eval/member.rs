@@ -148,6 +148,9 @@ impl<'a> Elaborator<'a> {
         if let (Some(part), None) = (answering.next(), answering.next()) {
             return self.instance_member(part, name);
         }
+        if let Some(part) = self.instances[id.0 as usize].only_part().filter(|p| self.has_member(*p, &name.text)) {
+            return self.instance_member(part, name);
+        }
         self.unknown_member(id, name)
     }
 
@@ -318,12 +321,15 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The name of the thing that answers for an instance: the vessel for its only part.
-    pub fn spoken_name(&self, id: InstanceId) -> String {
-        let inst = &self.instances[id.0 as usize];
-        match inst.owner.map(|o| &self.instances[o.0 as usize]) {
-            Some(owner) if owner.parts.len() == 1 => owner.name.clone(),
-            _ => inst.name.clone(),
+    pub fn spoken_name(&self, mut id: InstanceId) -> String {
+        let owner = |id: InstanceId| self.instances[id.0 as usize].owner;
+        if let Some(above) = owner(id).filter(|o| self.instances[o.0 as usize].parts.len() == 1) {
+            id = above;
         }
+        while let Some(above) = owner(id).filter(|o| self.instances[o.0 as usize].only_part() == Some(id)) {
+            id = above;
+        }
+        self.instances[id.0 as usize].name.clone()
     }
 
     fn make_member(&mut self, id: InstanceId, m: MemberRef<'a>) -> Value {
@@ -529,12 +535,18 @@ impl<'a> Elaborator<'a> {
                     return Value::Error;
                 };
                 match self.species_named(species, word, scope) {
-                    Some(s) => Value::Concentration(target, s),
+                    Some(s) => {
+                        self.note_asked(target, s);
+                        Value::Concentration(target, s)
+                    }
                     None => Value::Error,
                 }
             }
             Value::Method(of, member) => match (*of, self.species_named(species, word, scope)) {
-                (Value::Instance(id), Some(s)) => self.amount(id, &member, s),
+                (Value::Instance(id), Some(s)) => {
+                    self.note_asked(id, s);
+                    self.amount(id, &member, s)
+                }
                 _ => Value::Error,
             },
             list @ (Value::List(_) | Value::Tuple(_)) => {
@@ -708,6 +720,13 @@ impl<'a> Elaborator<'a> {
             None => self.graph.number(0.0),
         };
         self.num(node, dimension)
+    }
+
+    /// Notes a species asked for that can never get into this mixture.
+    fn note_asked(&mut self, mixture: InstanceId, s: SpeciesId) {
+        if !self.instances[mixture.0 as usize].amounts.keys().any(|(_, there)| *there == s) {
+            self.absent.push((mixture, s));
+        }
     }
 
     fn species_property(&mut self, s: SpeciesId, name: &Name) -> Value {

@@ -16,6 +16,8 @@ pub mod types;
 pub mod value;
 pub mod words;
 
+use std::cell::Cell;
+
 use matterix_ir::scene::InstanceId;
 
 pub use types::Type;
@@ -34,6 +36,8 @@ pub struct Scope {
     pub lab: bool,
     /// Local names, innermost last.
     pub vars: Vec<(String, Value)>,
+    /// Which of them were read, by position: a bit each, the last one for all that are further in.
+    pub reads: Cell<u64>,
 }
 
 impl Scope {
@@ -54,7 +58,14 @@ impl Scope {
 
     /// The innermost local with this name.
     pub fn var(&self, name: &str) -> Option<&Value> {
-        self.vars.iter().rev().find(|(n, _)| n == name).map(|(_, v)| v)
+        let at = self.vars.iter().rposition(|(n, _)| n == name)?;
+        self.reads.set(self.reads.get() | Self::read_bit(at));
+        Some(&self.vars[at].1)
+    }
+
+    /// The bit in `reads` of a position.
+    pub fn read_bit(position: usize) -> u64 {
+        1 << position.min(63)
     }
 
     /// Adds a local.

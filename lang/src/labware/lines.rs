@@ -82,7 +82,12 @@ impl<'d> Writer<'d> {
             }
         };
         let volume = self.quantity(well.total_liquid_volume, "uL");
-        let fields = vec![self.field("max_volume", volume), shape];
+        let mut fields = vec![self.field("max_volume", volume), shape];
+        if !self.definition.is_tip_rack() {
+            let (Opening::Circular { diameter: across } | Opening::Rectangular { y_dimension: across, .. }) =
+                well.opening;
+            fields.push(self.field("mouth", self.quantity(across, "mm")));
+        }
         let ty = Path { segments: vec![self.name(kind)], span: self.at };
         Some(Grid {
             name: self.name(grid),

@@ -74,7 +74,7 @@ pub fn stock(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], 
     species.extend(mixtures.iter().flat_map(|m| &m.contents).map(|c| SpeciesId(c.species)));
     let at = |id: InstanceId| mixtures.iter().position(|m| m.instance == id).map(|i| i as u32);
     let streams: BTreeSet<(u32, u32)> =
-        lab.streams.iter().filter_map(|(_, from, to)| Some((at(*from)?, at(*to)?))).collect();
+        lab.streams.keys().filter_map(|(_, from, to)| Some((at(*from)?, at(*to)?))).collect();
     Stock {
         holdings,
         recipes,

@@ -212,6 +212,17 @@ impl Units {
             .map(|(n, u)| Unit { symbol: n.clone(), factor: u.factor, offset: u.offset.unwrap_or(0.0) })
     }
 
+    /// The units that differ from one only by an SI prefix for small amounts: `L`, `mL`, `uL`, `nL` for any of them.
+    pub fn prefixed(&self, unit: &Resolved) -> Vec<Unit> {
+        let alike = |(name, def): &(&String, &UnitDef)| {
+            let prefix = unit.unit.symbol.strip_suffix(name.as_str());
+            let known = |p: &str| p.is_empty() || PREFIXES.iter().any(|(q, _)| *q == p);
+            def.prefixes && def.dimension == unit.dimension && prefix.is_some_and(known)
+        };
+        let Some((name, _)) = self.units.iter().find(alike) else { return Vec::new() };
+        ["", "m", "u", "n"].iter().filter_map(|p| self.resolve(&format!("{p}{name}")).ok()).map(|r| r.unit).collect()
+    }
+
     /// How a found dimension differs from the expected one, where one named quantity makes the difference.
     pub fn hint(&self, found: &Dimension, expected: &Dimension) -> Option<String> {
         if found.times(expected).is_one() {

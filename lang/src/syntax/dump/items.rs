@@ -196,6 +196,16 @@ fn demand(word: &str, cond: &Expr, failure: Option<&Name>, help: Option<&str>) -
     node(word).with([expr(cond)]).with(named)
 }
 
+fn effect(of: &Effect) -> Sexp {
+    match of {
+        Effect::Assign(target, value) => node("=").with([expr(target), expr(value)]),
+        Effect::Call(call) => expr(call),
+        Effect::Each { var, set, effects } => {
+            node("each").with([name(var), expr(set)]).with(effects.iter().map(effect))
+        }
+    }
+}
+
 fn clause(clause: &Clause) -> Sexp {
     match &clause.kind {
         ClauseKind::Needs { cond, failure, help } => demand("needs", cond, failure.as_ref(), help.as_deref()),
@@ -205,10 +215,7 @@ fn clause(clause: &Clause) -> Sexp {
         }
         ClauseKind::While(cond) => node("while").with([expr(cond)]),
         ClauseKind::Fails(all) => node("fails").with(names(all)),
-        ClauseKind::Effect(effects) => node("effect").with(effects.iter().map(|effect| match effect {
-            Effect::Assign(target, value) => node("=").with([expr(target), expr(value)]),
-            Effect::Call(call) => expr(call),
-        })),
+        ClauseKind::Effect(effects) => node("effect").with(effects.iter().map(effect)),
         ClauseKind::Takes { nominal, bounds } => node("takes").with([expr(nominal)]).with(maybe("in", bounds.as_ref())),
         ClauseKind::Until(cond) => node("until").with([expr(cond)]),
         ClauseKind::Says { text, when } => {

@@ -149,6 +149,13 @@ impl Lower<'_> {
 
     fn effect(&mut self, node: Node) -> Effect {
         let kids = &mut Kids::of(node);
+        if let Some(each) = kids.eat(Rule::each) {
+            let kids = &mut Kids::of(each);
+            kids.has(Rule::kw_each);
+            let (var, set) = (self.name_in(kids), self.expr_in(kids));
+            let changes = kids.all(Rule::change);
+            return Effect::Each { var, set, effects: changes.into_iter().map(|c| self.effect(c)).collect() };
+        }
         let target = self.expr_in(kids);
         match kids.eat(Rule::cond) {
             Some(value) => Effect::Assign(target, self.expr(value)),
