@@ -45,6 +45,8 @@ pub struct Outcome {
     pub failure: Option<FailureTrace>,
     /// Failures that did not decide the end: in a `finally`, or in branches that were being stopped.
     pub suppressed: Vec<FailureTrace>,
+    /// What the run has left on or in hand, with the steps that used it last.
+    pub unfinished: Vec<FailureTrace>,
     /// In the order of their judgement.
     pub expectations: Vec<ExpectationResult>,
     /// Conditions that were taken to hold.
@@ -123,6 +125,7 @@ fn refused(program: &Program, fault: Fault) -> Outcome {
         status: RunStatus::Fault,
         failure: Some(FailureTrace::of_fault(fault)),
         suppressed: Vec::new(),
+        unfinished: Vec::new(),
         expectations: Vec::new(),
         assumptions: Vec::new(),
         steps: vec![StepRecord::default(); program.plan.steps.len()],
@@ -132,7 +135,19 @@ fn refused(program: &Program, fault: Fault) -> Outcome {
 }
 
 fn outcome(execution: Execution, params: Vec<f64>, states: Vec<Option<f64>>) -> Outcome {
-    let Execution { status, failure, suppressed, expectations, assumptions, steps, end_time } = execution;
+    let Execution { status, failure, suppressed, unfinished, expectations, assumptions, steps, end_time } = execution;
     let balances = Vec::new();
-    Outcome { status, failure, suppressed, expectations, assumptions, steps, end_time, params, states, balances }
+    Outcome {
+        status,
+        failure,
+        suppressed,
+        unfinished,
+        expectations,
+        assumptions,
+        steps,
+        end_time,
+        params,
+        states,
+        balances,
+    }
 }

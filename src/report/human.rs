@@ -37,6 +37,7 @@ fn header(diagnostic: &Diagnostic, look: Look, out: &mut String) {
     let color = match diagnostic.severity {
         Severity::Error => "1;31",
         Severity::Warning => "1;33",
+        Severity::Advice => "1;34",
     };
     let painted = paint(&head, color, look);
     let mut lines = wrap(&harmless_line(&diagnostic.headline), look.width, head.chars().count(), 2).into_iter();
@@ -166,6 +167,7 @@ fn theme(marks: &[Mark], severity: Severity, look: Look) -> GraphicalTheme {
     let cause = match severity {
         Severity::Error => base.error,
         Severity::Warning => base.warning,
+        Severity::Advice => base.advice,
     };
     let highlights = marks.iter().map(|m| if m.primary { cause } else { base.advice }).collect();
     GraphicalTheme { characters, styles: ThemeStyles { highlights, ..base } }

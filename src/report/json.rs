@@ -35,7 +35,8 @@ pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut S
     out.push_str(&format!("{object}\n"));
 }
 
-fn span(span: Span, texts: &mut Texts<'_>) -> Value {
+/// A span; null in no known file.
+pub(super) fn span(span: Span, texts: &mut Texts<'_>) -> Value {
     let Some(text) = texts.get(span.file) else { return Value::Null };
     json!({ "file": text.name(), "start": position(span.start, text), "end": position(span.end, text) })
 }

@@ -3,6 +3,7 @@
 mod concise;
 mod human;
 mod json;
+pub mod points;
 mod text;
 
 use std::collections::BTreeSet;
@@ -119,7 +120,7 @@ impl Reporter {
         for diagnostic in &diagnostics {
             match diagnostic.severity {
                 Severity::Error => self.tally.errors += 1,
-                Severity::Warning => self.tally.warnings += 1,
+                Severity::Warning | Severity::Advice => self.tally.warnings += 1,
             }
         }
         diagnostics
@@ -130,6 +131,7 @@ fn word(severity: Severity) -> &'static str {
     match severity {
         Severity::Error => "error",
         Severity::Warning => "warning",
+        Severity::Advice => "advice",
     }
 }
 

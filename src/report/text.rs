@@ -61,6 +61,11 @@ impl Text {
         &self.name
     }
 
+    /// How many lines there are.
+    pub(super) fn lines(&self) -> usize {
+        self.starts.len()
+    }
+
     /// One-based line and column (in characters) of a byte.
     pub(super) fn position(&self, byte: usize) -> (usize, usize) {
         let byte = self.clamp(byte);

@@ -1,6 +1,7 @@
 //! The command from outside: what is typed, what comes back, what is left on disk.
 
 mod bill;
+mod contents;
 mod determinism;
 mod devices;
 mod doc;
@@ -18,6 +19,7 @@ mod plan;
 mod reference;
 mod science;
 mod screening;
+mod slips;
 mod strict;
 mod time;
 mod types;

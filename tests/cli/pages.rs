@@ -71,7 +71,7 @@ impl<'a> Page<'a> {
 }
 
 /// Codes of the findings of a file, from the command that can find this kind.
-fn found(code: &Code, text: &str, name: &str) -> (Vec<String>, Ended) {
+fn found(code: &Code, text: &str, name: &str, strict: bool) -> (Vec<String>, Ended) {
     let dir = folder(&format!("pages_{}_{name}", code.name));
     write(&dir, "example.mtx", text);
     let while_running = code.family.starts_with('X');
@@ -80,7 +80,9 @@ fn found(code: &Code, text: &str, name: &str) -> (Vec<String>, Ended) {
         let lines = ended.err_lines();
         (ended, lines)
     } else {
-        let ended = matterixc_in(&dir, &["check", "example.mtx", "--format", "json"]);
+        let mut args = vec!["check", "example.mtx", "--format", "json"];
+        args.extend(strict.then_some("--strict"));
+        let ended = matterixc_in(&dir, &args);
         let lines = ended.out_lines();
         (ended, lines)
     };
@@ -93,11 +95,13 @@ fn found(code: &Code, text: &str, name: &str) -> (Vec<String>, Ended) {
 fn verify(code: &Code) -> Result<(), String> {
     let page = Page::parse(code.page)?;
     let Some((faulty, mended)) = page.examples(code.name)? else { return Ok(()) };
-    let (codes, ended) = found(code, faulty, "example");
+    // An advice says on its page when it is shown.
+    let strict = page.sections[0].1.prose.contains("advice, shown as a warning with `--strict`");
+    let (codes, ended) = found(code, faulty, "example", strict);
     if codes != [code.name] {
         return Err(format!("the example yields {codes:?}\n{}{}", ended.out, ended.err));
     }
-    let (codes, ended) = found(code, mended, "mended");
+    let (codes, ended) = found(code, mended, "mended", strict);
     if !codes.is_empty() || ended.code != 0 {
         return Err(format!("the mended example yields {codes:?}\n{}{}", ended.out, ended.err));
     }

@@ -181,7 +181,7 @@ fn what_the_run_itself_raises_can_be_handled_by_name() {
         sequence { boastful plate } on promise { note \"promise\" }\n\
         sequence { parallel { heat plate to 30 degC; heat plate to 40 degC } } on claimed { note \"claimed\" }\n\
         start a = { wait 9 s }\n\
-        sequence { start a = { wait 9 s } } on job { note \"job\" }\n}\n";
+        sequence { start a = { wait 9 s } } on job { note \"job\" }\n} finally { stop heating plate }\n";
     let dir = folder("reference_failures");
     write(&dir, "example.mtx", text);
     let ended = matterixc_in(&dir, &["run", "example.mtx"]);

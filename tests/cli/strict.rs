@@ -1,15 +1,7 @@
 //! Mistakes that would otherwise pass in silence or show later as something else.
 
 use crate::harness::{folder, matterixc_in, write};
-
-/// Codes and headlines of `check` on a text.
-fn findings(name: &str, text: &str) -> Vec<String> {
-    let dir = folder(&format!("strict_{name}"));
-    write(&dir, "bench.mtx", format!("mtx 1\n{text}"));
-    let lines = matterixc_in(&dir, &["check", "bench.mtx", "--format", "json"]).out_lines();
-    let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
-    lines.iter().map(|l| format!("{}: {}", text(&l["code"]), text(&l["headline"]))).collect()
-}
+use crate::slips::{self, findings};
 
 const BENCH: &str = "
 use std::heating::IkaRetControl
@@ -41,7 +33,7 @@ workflow w(n: Int = 2) in bench {
 #[test]
 fn each_slip_is_one_finding() {
     assert_eq!(findings("none", BENCH), [] as [&str; 0]);
-    for (name, from, to, wanted) in [
+    let slips = [
         ("ring", "= 0.4 m", "= 0.5 stride", "circular: the unit `stride` is defined by itself"),
         ("bound", "conductance: 3", "conductance: -3", "out-of-range: `conductance` cannot be -3 W/K"),
         ("relation", "piped: true", "piped: 3", "type-mismatch: `piped` expects a truth value, found a plain number"),
@@ -61,12 +53,8 @@ fn each_slip_is_one_finding() {
         ("handlers", "on failure", "on timeout", "duplicate-name: `timeout` is handled twice here"),
         ("one", "go (cup, plate)", "go cup", "wrong-arguments: `go` takes 2 values here, found an instance"),
         ("three", "go (cup, plate)", "go (cup, cup, cup)", "wrong-arguments: `go` takes 2 values here, found 3 values"),
-    ] {
-        let found = findings(name, &BENCH.replacen(from, to, 1));
-        let wanted: Vec<&str> = Some(wanted).filter(|w| !w.is_empty()).into_iter().collect();
-        let first: Vec<&str> = found.iter().map(String::as_str).take(1).collect();
-        assert_eq!(first, wanted, "{name}: {found:?}");
-    }
+    ];
+    slips::each("bench", BENCH, &slips, slips::first);
 }
 
 #[test]

@@ -71,6 +71,7 @@ codes! {
     LABEL_MISMATCH "label-mismatch" "U5" "a label does not agree with its recipe";
     INVALID_RECIPE "invalid-recipe" "U5" "a recipe does not add up";
     REACTION_NEVER_STARTS "reaction-never-starts" "K1" "a reaction whose reactants never meet";
+    NEVER_MADE "never-made" "K3" "something waits for or expects a substance that nothing makes";
     UNBALANCED "unbalanced" "K2" "atoms or charge differ between the sides of an equation";
     FORMULA_INVALID "formula-invalid" "K2" "a formula, structure or molar mass is wrong";
     TEMPLATE_MISMATCH "template-mismatch" "K2" "a template does not give the declared products";
@@ -85,7 +86,11 @@ codes! {
     VOLUME_UNDERFLOW "volume-underflow" "V2" "more is taken from a vessel than there is";
     WRONG_TIP "wrong-tip" "T1" "a tip that does not fit the pipette";
     DEAD_BRANCH "dead-branch" "F2" "constants decide a branch, so that a part of the plan is never done";
+    UNDECLARED_FAILURE "undeclared-failure" "F1" "a skill fails with what its `fails` does not name";
+    UNHANDLED_FAILURE "unhandled-failure" "F1" "a workflow has no handler for what a device may report";
+    UNUSED "unused" "F4" "a thing or a reagent is declared and never used";
     NOT_REACHED "not-reached" "D2" "a device cannot bring about what is waited for";
+    WRONG_REAGENT "wrong-reagent" "C2" "a call says of what it takes something, and the source holds none of it";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a pipette is asked for less than its smallest volume";
     TIP_OVERFLOW "tip-overflow" "V3" "a tip takes up more than it holds";
@@ -96,6 +101,7 @@ codes! {
     UNFINISHED "unfinished" "P1" "a workflow ends while a device is on or something is in hand";
     TIP_USED "tip-used" "T2" "a tip is picked up that was taken before";
     TIP_NOT_EMPTY "tip-not-empty" "T1" "a tip goes back to its rack with liquid in it";
+    WRONG_COLUMN "wrong-column" "T1" "the channels of a pipette do not stand where they would have to";
     WRONG_SPOT "wrong-spot" "T1" "a tip goes back to another place than it came from";
     HAND_FULL "hand-full" "T1" "an arm that holds something is to take something else";
     NOT_IN_HAND "not-in-hand" "T1" "an arm puts down or pours what it does not hold";
@@ -118,6 +124,7 @@ codes! {
     UNSCHEDULABLE "unschedulable" "S1" "no schedule of a workflow can be made or found";
     TAKES_CONTRADICTED "takes-contradicted" "D3" "a command or skill cannot take as long as its bounds say";
     FLOW_UNBALANCED "flow-unbalanced" "E1" "what one body loses the other does not gain";
+    NOT_LUMPED "not-lumped" "E2" "a body gives off heat faster than it can have one temperature";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";

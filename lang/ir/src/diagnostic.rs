@@ -12,6 +12,8 @@ pub enum Severity {
     Error,
     /// The program runs; something may go wrong.
     Warning,
+    /// Worth a thought; shown where it is asked for.
+    Advice,
 }
 
 /// A remark attached to a place in the text: the cause (primary) or a step of its history.
@@ -48,7 +50,7 @@ pub struct Fix {
 pub struct Diagnostic {
     /// The registered kind of finding.
     pub code: Code,
-    /// Error or warning.
+    /// Error, warning or advice.
     pub severity: Severity,
     /// One sentence, lower case, no full stop, user text in backticks.
     pub headline: String,
@@ -76,6 +78,11 @@ impl Diagnostic {
     /// A warning at `span`, whose label says `label`.
     pub fn warning(code: Code, span: Span, headline: impl Into<String>, label: impl Into<String>) -> Self {
         Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, span, headline, label) }
+    }
+
+    /// A remark at `span`, whose label says `label`.
+    pub fn advice(code: Code, span: Span, headline: impl Into<String>, label: impl Into<String>) -> Self {
+        Diagnostic { severity: Severity::Advice, ..Diagnostic::error(code, span, headline, label) }
     }
 
     /// Adds a step of the history.

@@ -1,10 +1,12 @@
 //! Hazards on the instances of a lab: conditions that must not come about.
 
 use matterix_ir::plan::Term;
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op, Span};
 
 use super::Elaborator;
 use crate::ast::ItemKind;
+use crate::eval::Value;
 use crate::names::DeclId;
 
 /// A hazard over instances of the lab.
@@ -16,9 +18,11 @@ pub struct Hazard {
     pub shown: String,
     /// An error, not a warning.
     pub grave: bool,
+    /// The first thing it is about.
+    pub about: Option<InstanceId>,
     /// When it is there.
     pub when: NodeId,
-    /// The states it depends on.
+    /// The states it depends on; one that depends on none is there from the start or never.
     pub states: Vec<u32>,
     /// The members it names.
     pub terms: Vec<Term>,
@@ -48,10 +52,15 @@ impl Elaborator<'_> {
                     _ => None,
                 });
                 let states: Vec<u32> = states.collect();
+                let about = scope.vars.iter().find_map(|(_, v)| match v {
+                    Value::Instance(id) => Some(*id),
+                    _ => None,
+                });
                 out.push(Hazard {
                     name: name.text.clone(),
                     shown,
                     grave: *grave,
+                    about,
                     when: node,
                     states,
                     terms,

@@ -78,6 +78,14 @@ impl<'a> Instance<'a> {
     pub fn setting(&self, name: &str) -> Option<Setting<'a>> {
         self.settings.iter().find(|s| s.field.key.text == name).copied()
     }
+
+    /// What stands in its grid, where it has no parts and one place.
+    pub fn only_part(&self) -> Option<InstanceId> {
+        match (self.parts.is_empty(), self.grids.as_slice()) {
+            (true, [grid]) if grid.children.len() == 1 => grid.children.values().next().copied(),
+            _ => None,
+        }
+    }
 }
 
 impl<'a> Elaborator<'a> {
@@ -267,11 +275,14 @@ impl<'a> Elaborator<'a> {
     /// All instances that have a kind.
     pub fn instances_of(&self, kind: DeclId) -> Vec<InstanceId> {
         let count = self.instances.len();
-        if let Some((_, found)) = self.by_kind.borrow().get(&kind).filter(|(then, _)| *then == count) {
-            return found.clone();
+        let known = self.by_kind.read().ok().and_then(|known| known.get(&kind).cloned());
+        if let Some((_, found)) = known.filter(|(then, _)| *then == count) {
+            return found;
         }
         let found: Vec<_> = (0..count as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect();
-        self.by_kind.borrow_mut().insert(kind, (count, found.clone()));
+        if let Ok(mut known) = self.by_kind.write() {
+            known.insert(kind, (count, found.clone()));
+        }
         found
     }
 

@@ -8,7 +8,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
 use super::tables::MemberRef;
 use super::{Contribution, Elaborator, ProcessInstance, SpeciesId};
-use crate::ast::{self, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
+use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
 use crate::eval::{Num, ReactionId, Scope, Type, Value};
 use crate::names::DeclId;
 
@@ -19,6 +19,9 @@ struct Job<'a> {
     scope: Scope,
     name: String,
 }
+
+/// What is made of an assignment or a call in a law, given the condition around it.
+type Line<'l, 'a> = dyn FnMut(&mut Elaborator<'a>, &'a Law, Option<NodeId>, &mut Scope) + 'l;
 
 /// What a law body contributes to.
 enum Target {
@@ -181,7 +184,7 @@ impl<'a> Elaborator<'a> {
         self.law_body(&job.process.laws, &mut scope, &mut found);
         if self.touched_flow && !self.flows_sealed {
             self.processes.truncate(index);
-            self.streams.retain(|s| s.0 < index);
+            self.streams.retain(|s, _| s.0 < index);
             self.touched_flow = false;
             return false;
         }
@@ -195,7 +198,8 @@ impl<'a> Elaborator<'a> {
         true
     }
 
-    fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+    /// Goes through the lines of a law; each assignment and call comes with what the `if` around it ask for.
+    fn each_law(&mut self, laws: &'a [Law], guard: Option<NodeId>, scope: &mut Scope, line: &mut Line<'_, 'a>) {
         let depth = scope.vars.len();
         for law in laws {
             match &law.kind {
@@ -207,31 +211,37 @@ impl<'a> Elaborator<'a> {
                 LawKind::For { var, set, body } => {
                     for item in self.set(set, scope).unwrap_or_default() {
                         scope.bind(var.text.clone(), item);
-                        self.law_body(body, scope, out);
+                        self.each_law(body, guard, scope, line);
                         scope.vars.pop();
                     }
                 }
                 LawKind::If { cond, then, otherwise } => {
                     let Some(c) = self.truth(cond, scope) else { continue };
-                    let zero = self.graph.number(0.0);
-                    for (laws, positive) in [(then, true), (otherwise, false)] {
-                        let mut inner = Vec::new();
-                        self.law_body(laws, scope, &mut inner);
-                        for (target, node) in inner {
-                            let node = if positive {
-                                self.graph.select(c, node, zero)
-                            } else {
-                                self.graph.select(c, zero, node)
-                            };
-                            out.push((target, node));
-                        }
+                    let not = self.graph.unary(UnaryOp::Not, c);
+                    for (laws, c) in [(then, c), (otherwise, not)] {
+                        let both = guard.map_or(c, |g| self.graph.binary(BinaryOp::And, g, c));
+                        self.each_law(laws, Some(both), scope, line);
                     }
                 }
-                LawKind::Assign { target, op, value } => self.law_assign(target, *op, value, law.span, scope, out),
-                LawKind::Call(call) => self.law_move(call, scope, out),
+                LawKind::Assign { .. } | LawKind::Call(_) => line(self, law, guard, scope),
             }
         }
         scope.vars.truncate(depth);
+    }
+
+    /// What the lines of a process contribute.
+    fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+        self.each_law(laws, None, scope, &mut |this, law, guard, scope| {
+            let first = out.len();
+            match &law.kind {
+                LawKind::Assign { target, op, value } => this.law_assign(target, *op, value, law.span, scope, out),
+                LawKind::Call(call) => this.law_move(call, guard, scope, out),
+                _ => {}
+            }
+            let Some(g) = guard else { return };
+            let zero = this.graph.number(0.0);
+            out[first..].iter_mut().for_each(|(_, node)| *node = this.graph.select(g, *node, zero));
+        });
     }
 
     fn law_assign(
@@ -356,10 +366,16 @@ impl<'a> Elaborator<'a> {
     }
 
     /// `move(q, from: a, to: b)` as a flow of everything: the fraction per second of each extensive quantity.
-    fn law_move(&mut self, call: &'a Expr, scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+    fn law_move(&mut self, call: &'a Expr, guard: Option<NodeId>, scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
         let Some((rate, from, to)) = self.move_call(call, true, scope) else { return };
         self.moves.insert((from, to));
-        self.streams.insert((self.processes.len().saturating_sub(1), from, to));
+        let zero = self.graph.number(0.0);
+        let flows = self.graph.binary(BinaryOp::Lt, zero, rate);
+        let flows = guard.map_or(flows, |g| self.graph.binary(BinaryOp::And, g, flows));
+        let stream = (self.processes.len().saturating_sub(1), from, to);
+        let before = self.streams.get(&stream).copied();
+        let either = before.map_or(flows, |b| self.graph.binary(BinaryOp::Or, b, flows));
+        self.streams.insert(stream, either);
         let keys: Vec<_> =
             self.extensive.iter().filter(|(k, _)| k.instance == from).map(|(k, i)| (k.clone(), *i)).collect();
         for (key, index) in keys {
@@ -398,10 +414,55 @@ impl<'a> Elaborator<'a> {
                 }
             };
         }
+        if let ExprKind::Call(callee, args) = &*call.kind
+            && matches!(&*callee.kind, ExprKind::Name(n) if n.text == "soil")
+        {
+            return self.soil_call(call, args, span, scope);
+        }
         match self.move_call(call, false, scope) {
             Some((fraction, from, to)) => self.transfer_actions(fraction, from, to, span),
             None => Vec::new(),
         }
+    }
+
+    /// `soil(a, from: b)`: the walls of `a` have touched what those of `b` have.
+    fn soil_call(&mut self, call: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Vec<Action> {
+        let [to, from] = args else {
+            return self.soil_form(call.span);
+        };
+        if to.name.is_some() || from.name.as_ref().is_none_or(|n| n.text != "from") {
+            return self.soil_form(call.span);
+        }
+        let mut ends = Vec::new();
+        for arg in [from, to] {
+            match self.expr(&arg.value, scope) {
+                Value::Instance(i) => ends.push(self.walls_of(i)),
+                Value::Error => return Vec::new(),
+                other => {
+                    self.expected("a thing with walls", &other, arg.value.span);
+                    return Vec::new();
+                }
+            }
+        }
+        self.soiled.insert((ends[0], ends[1]));
+        self.inherit(ends[0], ends[1], span)
+    }
+
+    fn soil_form(&mut self, at: Span) -> Vec<Action> {
+        self.report(
+            Diagnostic::error(codes::WRONG_ARGUMENTS, at, "`soil` needs a thing and `from` another", "soil what?")
+                .help("write `soil(thing, from: other)`"),
+        );
+        Vec::new()
+    }
+
+    /// What remembers for a thing what it has touched: its contents, or itself where it has none.
+    pub fn walls_of(&self, id: InstanceId) -> InstanceId {
+        if self.per_species(id).is_some() {
+            return id;
+        }
+        let parts = &self.instances[id.0 as usize].parts;
+        parts.values().copied().find(|p| self.per_species(*p).is_some()).unwrap_or(id)
     }
 
     /// A transfer with what it does to the lineage of its destination.
@@ -527,7 +588,7 @@ impl<'a> Elaborator<'a> {
                 continue;
             }
             let mut actions = Vec::new();
-            self.event_body(&e.laws, None, &mut scope, &mut actions);
+            self.event_body(&e.laws, &mut scope, &mut actions);
             if !actions.is_empty() {
                 events.push(Event { name, when, actions, span: e.name.span });
             }
@@ -535,57 +596,28 @@ impl<'a> Elaborator<'a> {
         events
     }
 
-    fn event_body(&mut self, laws: &'a [Law], guard: Option<NodeId>, scope: &mut Scope, out: &mut Vec<Action>) {
-        let depth = scope.vars.len();
-        for law in laws {
-            match &law.kind {
-                LawKind::Error => {}
-                LawKind::Let { name, value } => {
-                    let v = self.expr(value, scope);
-                    scope.bind(name.text.clone(), v);
-                }
-                LawKind::For { var, set, body } => {
-                    for item in self.set(set, scope).unwrap_or_default() {
-                        scope.bind(var.text.clone(), item);
-                        self.event_body(body, guard, scope, out);
-                        scope.vars.pop();
-                    }
-                }
-                LawKind::If { cond, then, otherwise } => {
-                    let Some(c) = self.truth(cond, scope) else { continue };
-                    let both = |this: &mut Self, c: NodeId| match guard {
-                        Some(g) => this.graph.binary(BinaryOp::And, g, c),
-                        None => c,
-                    };
-                    let yes = both(self, c);
-                    self.event_body(then, Some(yes), scope, out);
-                    let not = self.graph.unary(UnaryOp::Not, c);
-                    let no = both(self, not);
-                    self.event_body(otherwise, Some(no), scope, out);
-                }
-                LawKind::Assign { target, op, value } => {
-                    if *op != AssignOp::Set {
-                        self.report(
-                            Diagnostic::error(
-                                codes::INVALID_LAW,
-                                law.span,
-                                "an event is an instant: it assigns, it does not flow",
-                                "not an assignment",
-                            )
-                            .help("write `x = x + ...`"),
-                        );
-                        continue;
-                    }
-                    out.extend(self.assignment(target, value, guard, scope));
-                }
-                LawKind::Call(call) => {
-                    for action in self.call_actions(call, law.span, scope) {
-                        out.push(self.guarded_action(action, guard));
-                    }
+    /// What the lines of an event do.
+    fn event_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<Action>) {
+        self.each_law(laws, None, scope, &mut |this, law, guard, scope| match &law.kind {
+            LawKind::Assign { op: AssignOp::Set, target, value } => {
+                out.extend(this.assignment(target, value, guard, scope));
+            }
+            LawKind::Assign { .. } => this.report(
+                Diagnostic::error(
+                    codes::INVALID_LAW,
+                    law.span,
+                    "an event is an instant: it assigns, it does not flow",
+                    "not an assignment",
+                )
+                .help("write `x = x + ...`"),
+            ),
+            LawKind::Call(call) => {
+                for action in this.call_actions(call, law.span, scope) {
+                    out.push(this.guarded_action(action, guard));
                 }
             }
-        }
-        scope.vars.truncate(depth);
+            _ => {}
+        });
     }
 
     /// An action that does nothing where a condition does not hold.
@@ -716,6 +748,6 @@ impl<'a> Elaborator<'a> {
     pub fn check_event(&mut self, e: &'a ast::Event, scope: &mut Scope) {
         self.truth(&e.when, scope);
         let mut actions = Vec::new();
-        self.event_body(&e.laws, None, scope, &mut actions);
+        self.event_body(&e.laws, scope, &mut actions);
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! States are made only where a law or a clause asks for them, and only for the reagents that can get there.
 
-use matterix_ir::model::{Action, Domain, State};
+use matterix_ir::model::{Action, Domain, Event, State};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 
@@ -11,7 +11,7 @@ use super::Elaborator;
 
 impl Elaborator<'_> {
     /// Whether a mixture has touched a reagent; absent where that reagent cannot get there.
-    fn touched(&mut self, mixture: InstanceId, origin: &str) -> Option<NodeId> {
+    pub fn touched(&mut self, mixture: InstanceId, origin: &str) -> Option<NodeId> {
         if !self.reach.origins(&self.instances[mixture.0 as usize].name).any(|o| o == origin) {
             return None;
         }
@@ -57,6 +57,31 @@ impl Elaborator<'_> {
             let value = self.graph.binary(BinaryOp::Or, here, there);
             if let Op::State(state) = self.graph.op(here) {
                 out.push(Action::Assign { state, value, span });
+            }
+        }
+        out
+    }
+
+    /// What the flows of processes do to the lineage of where they go: as soon as something flows from where a reagent
+    /// has been to where it has not.
+    pub fn stream_events(&mut self) -> Vec<Event> {
+        let mut out = Vec::new();
+        for ((process, from, to), flows) in self.streams.clone() {
+            let (name, span) = (format!("{}.origins", self.processes[process].name), self.processes[process].span);
+            let mut new = self.graph.number(0.0);
+            for origin in self.origins_of(from) {
+                let (Some(there), Some(here)) = (self.touched(from, &origin), self.touched(to, &origin)) else {
+                    continue;
+                };
+                let clean = self.graph.unary(UnaryOp::Not, here);
+                let comes = self.graph.binary(BinaryOp::And, there, clean);
+                new = self.graph.binary(BinaryOp::Or, new, comes);
+            }
+            let runs = self.processes[process].guard.map_or(flows, |g| self.graph.binary(BinaryOp::And, g, flows));
+            let when = self.graph.binary(BinaryOp::And, runs, new);
+            let actions = self.inherit(from, to, span);
+            if !actions.is_empty() && self.graph.constant(when) != Some(0.0) {
+                out.push(Event { name, when, actions, span });
             }
         }
         out

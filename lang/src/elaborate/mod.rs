@@ -20,13 +20,13 @@ pub mod states;
 pub mod tables;
 pub mod units;
 
-use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::RwLock;
 
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Env, Graph, NodeId, Op, Span};
+use matterix_ir::{Diagnostic, Graph, NodeId, Op, Span};
 
 use crate::ast::{self, Expr, FieldValue};
 pub use crate::eval::SpeciesId;
@@ -93,6 +93,19 @@ pub struct ExtensiveKey {
     pub species: Option<SpeciesId>,
 }
 
+/// What a condition asks of one of several things.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// The thing.
+    pub of: String,
+    /// Not 0 if it holds.
+    pub node: NodeId,
+    /// What is compared.
+    pub compared: Vec<(Span, Comparison)>,
+    /// The members that are named.
+    pub terms: Vec<Term>,
+}
+
 /// Working state of the elaboration of one lab (or of a prototype).
 pub struct Elaborator<'a> {
     /// What is declared.
@@ -101,6 +114,8 @@ pub struct Elaborator<'a> {
     pub graph: Graph,
     /// Findings so far.
     pub diagnostics: Vec<Diagnostic>,
+    /// How often something was found, known findings included.
+    pub reported: usize,
     /// Instances; parts after owners.
     pub instances: Vec<Instance<'a>>,
     /// Those of them that count amounts per species, in order.
@@ -148,8 +163,10 @@ pub struct Elaborator<'a> {
     pub reach: reach::Reach,
     /// Transfers found between mixtures.
     pub moves: BTreeSet<(InstanceId, InstanceId)>,
-    /// Transfers that processes make: the process, from, to.
-    pub streams: BTreeSet<(usize, InstanceId, InstanceId)>,
+    /// What has touched what another thing has touched, without a transfer: from, to.
+    pub soiled: BTreeSet<(InstanceId, InstanceId)>,
+    /// Transfers that processes make: the process, from, to, and whether anything flows while the process runs.
+    pub streams: BTreeMap<(usize, InstanceId, InstanceId), NodeId>,
     /// Where each substance that something holds at the start is written, by the name of what holds it.
     pub held_at: BTreeMap<(String, SpeciesId), Span>,
     /// The instance each state belongs to.
@@ -172,6 +189,14 @@ pub struct Elaborator<'a> {
     pub comparisons: Vec<(Span, Comparison)>,
     /// The members that the expression evaluated last names.
     pub terms: Vec<Term>,
+    /// Where a call says of what it takes something, and its sources are looked into.
+    pub looked_into: BTreeSet<Span>,
+    /// What the expression evaluated last asks of each of several things.
+    pub asked_of: Vec<Asked>,
+    /// The species that the expression evaluated last asks for, and that can never get into the mixture asked.
+    pub absent: Vec<(InstanceId, SpeciesId)>,
+    /// The same by the place of the condition.
+    pub absent_in: BTreeMap<Span, Vec<(InstanceId, SpeciesId)>>,
     /// Values are those at the start of the run.
     pub initial_mode: bool,
     /// Readings are what the device reports, not the true values behind them.
@@ -182,12 +207,14 @@ pub struct Elaborator<'a> {
     pub rate_prefix: Option<String>,
     /// Calls of skills being written out, outermost first.
     pub calls: Vec<Span>,
+    /// Kinds of which the text of the lab or the workflow goes through all instances.
+    pub gone_through: BTreeSet<DeclId>,
     /// What a node that picks an instance may give.
     pub picks: BTreeMap<NodeId, Vec<InstanceId>>,
     /// Values of functions of instances, as far as they were asked for.
     pub known_calls: BTreeMap<KnownCall, Value>,
     /// Instances by kind, and how many there were when they were looked for.
-    pub by_kind: RefCell<BTreeMap<DeclId, (usize, Vec<InstanceId>)>>,
+    pub by_kind: RwLock<BTreeMap<DeclId, (usize, Vec<InstanceId>)>>,
     /// Members being evaluated.
     pub open_members: Vec<(InstanceId, MemberKey)>,
     /// Functions being evaluated.
@@ -203,6 +230,7 @@ impl<'a> Elaborator<'a> {
             tables,
             graph: Graph::default(),
             diagnostics: Vec::new(),
+            reported: 0,
             instances: Vec::new(),
             mixtures: Vec::new(),
             lab_name: Span::default(),
@@ -226,7 +254,8 @@ impl<'a> Elaborator<'a> {
             readings: Vec::new(),
             reach,
             moves: BTreeSet::new(),
-            streams: BTreeSet::new(),
+            soiled: BTreeSet::new(),
+            streams: BTreeMap::new(),
             held_at: BTreeMap::new(),
             state_owner: Vec::new(),
             flow_sums: BTreeMap::new(),
@@ -238,14 +267,19 @@ impl<'a> Elaborator<'a> {
             view_values: BTreeMap::new(),
             comparisons: Vec::new(),
             terms: Vec::new(),
+            looked_into: BTreeSet::new(),
+            asked_of: Vec::new(),
+            absent: Vec::new(),
+            absent_in: BTreeMap::new(),
             initial_mode: false,
             readings_live: false,
             prototype: false,
             rate_prefix: None,
             calls: Vec::new(),
+            gone_through: BTreeSet::new(),
             picks: BTreeMap::new(),
             known_calls: BTreeMap::new(),
-            by_kind: RefCell::default(),
+            by_kind: RwLock::default(),
             open_members: Vec::new(),
             open_calls: Vec::new(),
             open_consts: Vec::new(),
@@ -254,6 +288,7 @@ impl<'a> Elaborator<'a> {
 
     /// Adds a finding, once.
     pub fn report(&mut self, diagnostic: Diagnostic) {
+        self.reported += 1;
         if !self.diagnostics.contains(&diagnostic) {
             self.diagnostics.push(diagnostic);
         }
@@ -300,9 +335,11 @@ impl<'a> Elaborator<'a> {
         if self.graph.depends(node, live) {
             return None;
         }
-        let params: Vec<f64> = self.params.iter().map(|p| p.value).collect();
-        let env = Env { time: 0.0, states: &[], params: &params, locals: &[], readings: &[] };
-        Some(self.graph.eval(node, env))
+        Some(self.graph.eval_on(node, |leaf| match leaf {
+            Op::Const(v) => v,
+            Op::Param(i) => self.params[i as usize].value,
+            _ => f64::NAN,
+        }))
     }
 
     /// A diagnostic-free look at a field that must be an expression.

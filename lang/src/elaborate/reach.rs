@@ -76,7 +76,7 @@ fn origins(lab: &Elaborator<'_>) -> BTreeMap<InstanceId, BTreeSet<String>> {
     }
     loop {
         let mut changed = false;
-        for (from, to) in &lab.moves {
+        for (from, to) in lab.moves.iter().chain(&lab.soiled) {
             let moved = sets.get(from).cloned().unwrap_or_default();
             let there = sets.entry(*to).or_default();
             let before = there.len();

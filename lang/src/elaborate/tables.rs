@@ -1,14 +1,14 @@
 //! What all elaboration looks up: units, kinds with their inherited members, species, reactions.
 
-use std::collections::BTreeMap;
-use std::sync::RwLock;
+use std::collections::{BTreeMap, HashSet};
+use std::sync::{Arc, RwLock};
 
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 
 use super::species::SpeciesTable;
 use super::units;
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
-use crate::names::{DeclId, Names};
+use crate::names::{DeclId, Names, verb_text};
 use crate::screen::Screen;
 use crate::units::text::UnitError;
 use crate::units::{Dimension, Resolved, Units};
@@ -88,8 +88,12 @@ pub struct Tables<'a> {
     read: RwLock<BTreeMap<String, Resolved>>,
     /// SI units of dimensions that were asked for before.
     si: RwLock<BTreeMap<Dimension, Unit>>,
+    /// Words of modules outside their labs, for the modules that were asked for.
+    pub spoken: RwLock<BTreeMap<usize, Arc<HashSet<String>>>>,
     /// Capabilities and assets.
     pub kinds: BTreeMap<DeclId, Kind<'a>>,
+    /// Commands by the words of their verbs, in order of capability.
+    commands: BTreeMap<String, Vec<MemberRef<'a>>>,
     /// Species.
     pub species: SpeciesTable<'a>,
     /// Reactions whose species are all known.
@@ -110,7 +114,9 @@ impl<'a> Tables<'a> {
             units,
             read: RwLock::default(),
             si: RwLock::default(),
+            spoken: RwLock::default(),
             kinds: BTreeMap::new(),
+            commands: BTreeMap::new(),
             species: SpeciesTable::default(),
             reactions: Vec::new(),
             screen: Screen::default(),
@@ -120,6 +126,13 @@ impl<'a> Tables<'a> {
             tables.kind(DeclId(index), &mut Vec::new(), &mut diagnostics);
             if let ItemKind::Process(p) = &names.decl(DeclId(index)).item.kind {
                 tables.processes.push((DeclId(index), p));
+            }
+        }
+        for (id, kind) in &tables.kinds {
+            for m in kind.members.iter().filter(|m| m.owner == *id) {
+                if let MemberKind::Command { sig, .. } = &m.member.kind {
+                    tables.commands.entry(verb_text(&sig.verb)).or_default().push(*m);
+                }
             }
         }
         tables.species = SpeciesTable::new(names, &tables.units, &mut diagnostics);
@@ -258,6 +271,11 @@ impl<'a> Tables<'a> {
     /// The members of a kind that a name means; more than one is ambiguous.
     pub fn members(&self, kind: DeclId, name: &str) -> &[MemberRef<'a>] {
         self.kinds.get(&kind).and_then(|info| info.by_name.get(name)).map_or(&[], Vec::as_slice)
+    }
+
+    /// The commands of all capabilities that a verb may mean.
+    pub fn commands(&self, verb: &str) -> &[MemberRef<'a>] {
+        self.commands.get(verb).map_or(&[], Vec::as_slice)
     }
 
     /// The name under which a capability or asset is known, for messages.

@@ -14,6 +14,7 @@
 
 mod claims;
 mod end;
+mod ends;
 mod enter;
 mod failure;
 mod frame;
@@ -76,7 +77,7 @@ impl Default for Limits<'_> {
 pub enum RunStatus {
     /// To its end, all expectations met.
     Passed,
-    /// To its end, but not all expectations met.
+    /// To its end, but not all expectations met, or with something left on or in hand.
     ExpectationFailed,
     /// With a failure that nothing handled.
     Failed,
@@ -108,6 +109,8 @@ pub struct Execution {
     pub failure: Option<FailureTrace>,
     /// Failures that did not decide the end: in a `finally`, or in branches that were being stopped.
     pub suppressed: Vec<FailureTrace>,
+    /// What the run has left on or in hand, with the steps that used it last.
+    pub unfinished: Vec<FailureTrace>,
     /// In the order of their judgement.
     pub expectations: Vec<ExpectationResult>,
     /// Conditions that were taken to hold.
@@ -184,6 +187,7 @@ struct Executor<'p, 'b> {
     /// How the whole plan ended.
     end: Option<End>,
     suppressed: Vec<FailureTrace>,
+    unfinished: Vec<FailureTrace>,
     expectations: Vec<ExpectationResult>,
     assumptions: Vec<Assumption>,
 }
@@ -216,6 +220,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             abort: None,
             end: None,
             suppressed: Vec::new(),
+            unfinished: Vec::new(),
             expectations: Vec::new(),
             assumptions: Vec::new(),
         }
@@ -223,6 +228,7 @@ impl<'p, 'b> Executor<'p, 'b> {
 
     /// Runs to the end: tasks first, then time.
     fn drive(&mut self) {
+        let begun = self.in_order();
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);
@@ -236,6 +242,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             }
             self.pass_time();
         }
+        self.judge_ends(&begun);
     }
 
     /// Works off all tasks.
@@ -342,13 +349,14 @@ impl<'p, 'b> Executor<'p, 'b> {
             (Some(Abort::Fault(trace)), _) => (RunStatus::Fault, Some(*trace)),
             (Some(Abort::Cancelled), _) => (RunStatus::Cancelled, None),
             (None, Some(End::Failed(trace))) => (RunStatus::Failed, Some(*trace)),
-            (None, _) if unmet => (RunStatus::ExpectationFailed, None),
+            (None, _) if unmet || !self.unfinished.is_empty() => (RunStatus::ExpectationFailed, None),
             (None, _) => (RunStatus::Passed, None),
         };
         Execution {
             status,
             failure,
             suppressed: self.suppressed,
+            unfinished: self.unfinished,
             expectations: self.expectations,
             assumptions: self.assumptions,
             steps: self.steps,

@@ -1,5 +1,7 @@
 //! Skills and `keep`: what must hold before, during and after a body.
 
+use std::sync::Arc;
+
 use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::plan::{Condition, Step, StepId, Takes};
@@ -14,7 +16,7 @@ impl Executor<'_, '_> {
     /// Checks needs and invariants, then runs the body under watch.
     pub(super) fn begin_monitored(&mut self, id: FrameId, step: StepId) -> Result<(), Fault> {
         let plan = self.plan;
-        let (needs, kept, body): (&[Condition], &[Condition], StepId) = match &plan.get(step).step {
+        let (needs, kept, body): (&[Arc<Condition>], &[Condition], StepId) = match &plan.get(step).step {
             Step::Skill { needs, invariants, body, .. } => (needs, invariants, *body),
             Step::Keep { condition, body } => (&[], std::slice::from_ref(condition), *body),
             Step::During { invariants, body } => (&[], invariants, *body),
@@ -41,7 +43,7 @@ impl Executor<'_, '_> {
     }
 
     /// Raises a failure for the first need that is not met; whether all are.
-    pub(super) fn needs_met(&mut self, id: FrameId, step: StepId, needs: &[Condition]) -> Result<bool, Fault> {
+    pub(super) fn needs_met(&mut self, id: FrameId, step: StepId, needs: &[Arc<Condition>]) -> Result<bool, Fault> {
         for need in needs {
             if !self.judge(step, need)? {
                 let label = &self.plan.get(step).label;

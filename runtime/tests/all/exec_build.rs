@@ -1,5 +1,7 @@
 //! Small programs by hand, and a listener that keeps what it is told.
 
+use std::sync::Arc;
+
 use matterix_ir::model::{Action, Derivative, Domain, Reading, State};
 use matterix_ir::plan::{Caught, Comparison, Condition, Local, Operation, Plan, PlanStep, Step, StepId, Takes};
 use matterix_ir::program::PROGRAM_VERSION;
@@ -133,6 +135,7 @@ impl Lab {
             compared,
             terms: Vec::new(),
             refusal: None,
+            each: Vec::new(),
         }
     }
 
@@ -192,7 +195,7 @@ impl Lab {
     }
 
     pub fn skill(&mut self, needs: &[Condition], promises: &[Condition], body: StepId) -> StepId {
-        let (needs, promises) = (needs.to_vec(), promises.to_vec());
+        let (needs, promises) = (needs.iter().cloned().map(Arc::new).collect(), promises.to_vec());
         self.step(Step::Skill { verb: "do".into(), needs, invariants: Vec::new(), promises, takes: None, body })
     }
 

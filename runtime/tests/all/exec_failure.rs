@@ -116,7 +116,7 @@ fn an_operations_unmet_need_shows_the_condition() {
     let mut lab = Lab::new();
     let need = lab.constant(false);
     let operation = lab.operation("heat");
-    let root = lab.op(Operation { needs: vec![need], ..operation });
+    let root = lab.op(Operation { needs: vec![need.into()], ..operation });
     let run = lab.run(root);
     assert_eq!(run.failed(), "need");
     assert!(run.log.operations.is_empty());

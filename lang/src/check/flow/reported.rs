@@ -1,0 +1,95 @@
+//! Failures that only a device reports: the way followed is the one without them, so what their handlers and the
+//! `finally` behind them do is looked at beside it. What goes wrong there goes wrong on some ways only, and nothing of
+//! it is known afterwards.
+
+use matterix_ir::plan::{Caught, Operation, Step, StepId};
+
+use super::facts::Facts;
+use super::value::Why;
+use super::{Flow, Raised};
+
+impl Flow<'_, '_> {
+    /// Notes what is known where a device may report a failure: as before the operation.
+    pub fn may_report(&mut self, operation: &Operation, facts: &Facts) {
+        if let Some(open) = self.reported.last_mut() {
+            open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
+        }
+    }
+
+    /// Follows the handlers of what devices may have reported in a body, then its `finally`; what nothing takes goes on
+    /// outwards.
+    pub fn after_report(
+        &mut self,
+        base: &Facts,
+        mut reported: Vec<Raised>,
+        handlers: &[(Caught, StepId)],
+        finally: Option<StepId>,
+    ) {
+        if reported.is_empty() || self.quiet > 0 {
+            return;
+        }
+        let known = std::mem::take(&mut self.findings);
+        self.doubt += 1;
+        self.cleaning += 1;
+        let mut names: Vec<String> = reported.iter().map(|(name, _)| name.clone()).collect();
+        names.sort();
+        names.dedup();
+        for (caught, handler) in handlers {
+            let takes = |name: &str| match caught {
+                Caught::Named(n) => n == name,
+                Caught::Any => true,
+            };
+            let (taken, rest): (Vec<_>, Vec<_>) = reported.into_iter().partition(|(name, _)| takes(name));
+            reported = rest;
+            let Some(entry) = self.joined(base, &taken) else { continue };
+            let end = self.walk(*handler, entry);
+            // When its turns are used up, the failure goes on.
+            if self.retries(*handler) {
+                reported.extend(taken);
+            } else if let (Some(finally), Some(end)) = (finally, end) {
+                self.unnoted(finally, end);
+            }
+        }
+        if let (Some(finally), Some(entry)) = (finally, self.joined(base, &reported)) {
+            let end = self.unnoted(finally, entry);
+            reported = end.map_or(Vec::new(), |end| reported.into_iter().map(|(n, _)| (n, end.clone())).collect());
+        }
+        self.doubt -= 1;
+        self.cleaning -= 1;
+        let new = std::mem::replace(&mut self.findings, known);
+        for mut finding in new {
+            if !self.findings.iter().any(|f| f.is_like(&finding)) {
+                finding.only_where_reported(&names);
+                self.findings.push(finding);
+            }
+        }
+        if let Some(outer) = self.reported.last_mut() {
+            outer.extend(reported);
+        }
+    }
+
+    /// Follows a `finally` without a note of what is known after it: what is told is the way without these failures.
+    fn unnoted(&mut self, finally: StepId, facts: Facts) -> Option<Facts> {
+        let notes = self.notes.take();
+        let end = self.walk(finally, facts);
+        self.notes = notes;
+        end
+    }
+
+    fn joined(&self, base: &Facts, raised: &[Raised]) -> Option<Facts> {
+        let facts = raised.iter().map(|(_, facts)| facts.clone());
+        facts.reduce(|a, b| base.join(a, &b, self.site(), Why::Paths))
+    }
+
+    /// Whether a handler begins its body again.
+    fn retries(&self, handler: StepId) -> bool {
+        let mut todo = vec![handler];
+        while let Some(id) = todo.pop() {
+            match &self.plan.get(id).step {
+                Step::Retry { .. } => return true,
+                step => todo.extend(step.children()),
+            }
+        }
+        false
+    }
+}

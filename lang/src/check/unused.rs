@@ -1,0 +1,173 @@
+//! What a file sets out and then never needs: things of a lab that no workflow has to do with, and reagents that stand
+//! in no recipe, no vessel and no step.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::sync::Arc;
+
+use matterix_ir::plan::{Argument, Plan, Step};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Severity, Sources, Span, codes};
+
+use crate::ast::{Item, ItemKind, LabLineKind};
+use crate::elaborate::{Elaborator, Tables};
+use crate::names::{DeclId, Names, item_name};
+
+/// The things of a lab by the place of their names, each with whether a workflow has to do with it.
+pub type Uses = BTreeMap<Span, bool>;
+
+/// What one workflow has to do with the things of its lab; nothing where it is not whole.
+pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan) -> Option<Uses> {
+    if lab.diagnostics.iter().any(|d| d.severity == Severity::Error) {
+        return None;
+    }
+    let decl = lab.tables.names.decl(lab_id);
+    let spoken = words_outside_labs(lab.tables, sources, decl.module);
+    let mut used: BTreeSet<InstanceId> = BTreeSet::new();
+    let tops =
+        || (0..lab.instances.len() as u32).map(InstanceId).filter(|i| lab.instances[i.0 as usize].owner.is_none());
+    for id in tops() {
+        let name = &lab.instances[id.0 as usize].name;
+        let named = name.rsplit('.').next().is_some_and(|n| spoken.contains(n));
+        if named || lab.gone_through.iter().any(|kind| lab.instance_is(id, *kind)) {
+            used.insert(id);
+        }
+    }
+    for step in &plan.steps {
+        if let Step::Operation(o) = &step.step {
+            let arguments = o.arguments.iter().filter_map(|(_, a)| match a {
+                Argument::Instance(id) => Some(*id),
+                _ => None,
+            });
+            used.extend(o.claims.iter().copied().chain(o.device).chain(arguments).map(|id| top(lab, id)));
+        }
+    }
+    let bonds = bonds(lab, sources, decl.item);
+    loop {
+        let more: BTreeSet<InstanceId> = bonds
+            .iter()
+            .filter(|(from, _)| used.contains(from))
+            .map(|(_, to)| *to)
+            .filter(|t| !used.contains(t))
+            .collect();
+        if more.is_empty() {
+            break;
+        }
+        used.extend(more);
+    }
+    let carriers: BTreeSet<InstanceId> = tops().flat_map(|id| carriers(lab, id)).collect();
+    let own = |id: &InstanceId| {
+        let inst = &lab.instances[id.0 as usize];
+        // Included labs are judged where they run alone; what carries something is there for that.
+        inst.span.file == decl.item.span.file && !inst.name.contains('.') && !carriers.contains(id)
+    };
+    Some(tops().filter(own).map(|id| (lab.instances[id.0 as usize].span, used.contains(&id))).collect())
+}
+
+/// Things that no workflow of the file has to do with.
+pub fn things(sources: &Sources, uses: &[Uses]) -> Vec<Diagnostic> {
+    let mut all = Uses::new();
+    for (span, used) in uses.iter().flatten() {
+        *all.entry(*span).or_default() |= *used;
+    }
+    let idle = all.into_iter().filter(|(_, used)| !used);
+    idle.map(|(span, _)| {
+        let headline = format!("`{}` is not used by any workflow of this file", sources.slice(span));
+        Diagnostic::advice(codes::UNUSED, span, headline, "nothing has to do with it")
+            .help("take it out, or use it: was another thing meant in one of the steps?")
+    })
+    .collect()
+}
+
+/// Species and solutions of a module that nothing in its file names.
+pub fn reagents(names: &Names<'_>, sources: &Sources, module: usize) -> Vec<Diagnostic> {
+    let items: Vec<&Item> = names.declared_by(module).map(|id| names.decl(id).item).collect();
+    // Each word with the first item that has it, and whether others have it as well.
+    let mut named: HashMap<&str, (usize, bool)> = HashMap::new();
+    for (index, item) in items.iter().enumerate() {
+        for word in words(sources.slice(item.span)) {
+            let known = named.entry(word).or_insert((index, false));
+            known.1 |= known.0 != index;
+        }
+    }
+    let mut out = Vec::new();
+    for (index, item) in items.iter().enumerate() {
+        let what = match item.kind {
+            ItemKind::Species { .. } => "species",
+            ItemKind::Solution { .. } => "solution",
+            _ => continue,
+        };
+        let Some((name, span)) = item_name(item) else { continue };
+        let word = name.trim_end_matches(|c: char| !is_word(c));
+        if named.get(word).is_some_and(|(first, several)| *several || *first != index) {
+            continue;
+        }
+        let headline = format!("the {what} `{name}` is not used in this file");
+        let d = Diagnostic::warning(codes::UNUSED, span, headline, "nothing contains or names it");
+        out.push(d.help("take it out, or use it: does a vessel hold another one instead?"));
+    }
+    out
+}
+
+/// Which things are needed for which: what carries them, what their fields name, what a law couples them with.
+fn bonds(lab: &Elaborator<'_>, sources: &Sources, item: &Item) -> BTreeSet<(InstanceId, InstanceId)> {
+    let mut out = BTreeSet::new();
+    for i in 0..lab.instances.len() as u32 {
+        let id = InstanceId(i);
+        out.extend(carriers(lab, id).into_iter().map(|c| (top(lab, id), c)));
+    }
+    if let ItemKind::Lab { lines, .. } = &item.kind {
+        for line in lines {
+            let LabLineKind::Instance { name, literal, .. } = &line.kind else { continue };
+            let Some(id) = lab.find_instance(&name.text) else { continue };
+            let named = words(sources.slice(literal.span)).filter_map(|w| lab.find_instance(w));
+            out.extend(named.map(|other| (id, top(lab, other))));
+        }
+    }
+    let mut coupled: BTreeMap<usize, BTreeSet<InstanceId>> = BTreeMap::new();
+    for ((id, ..), parts) in &lab.flows {
+        parts.iter().for_each(|c| coupled.entry(c.process).or_default().extend([top(lab, *id)]));
+    }
+    for (state, parts) in &lab.rates {
+        let owner = top(lab, lab.state_owner[*state as usize]);
+        parts.iter().for_each(|c| coupled.entry(c.process).or_default().extend([owner]));
+    }
+    for together in coupled.values() {
+        out.extend(together.iter().flat_map(|a| together.iter().map(|b| (*a, *b))));
+    }
+    out
+}
+
+/// What a thing stands on or in.
+fn carriers(lab: &Elaborator<'_>, id: InstanceId) -> Vec<InstanceId> {
+    lab.instances[id.0 as usize].placed.iter().map(|(_, on)| top(lab, *on)).collect()
+}
+
+fn top(lab: &Elaborator<'_>, mut id: InstanceId) -> InstanceId {
+    while let Some(owner) = lab.instances[id.0 as usize].owner {
+        id = owner;
+    }
+    id
+}
+
+/// The words of a module's items that are no labs; put together once, for all workflows.
+fn words_outside_labs(tables: &Tables<'_>, sources: &Sources, module: usize) -> Arc<HashSet<String>> {
+    if let Some(known) = tables.spoken.read().ok().and_then(|all| all.get(&module).cloned()) {
+        return known;
+    }
+    let items = tables.names.declared_by(module).map(|id| tables.names.decl(id).item);
+    let outside = items.filter(|i| !matches!(i.kind, ItemKind::Lab { .. }));
+    let found: Arc<HashSet<String>> =
+        Arc::new(outside.flat_map(|i| words(sources.slice(i.span))).map(str::to_string).collect());
+    if let Ok(mut all) = tables.spoken.write() {
+        all.insert(module, found.clone());
+    }
+    found
+}
+
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|c: char| !is_word(c)).filter(|w| !w.is_empty())
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}

@@ -1,0 +1,68 @@
+//! What should hold when a workflow has come to its end, if it held at its start: nothing is left on or in hand.
+
+use matterix_ir::codes;
+use matterix_ir::plan::{Limit, Step, StepId};
+use matterix_ir::scene::InstanceId;
+
+use super::failure::FailureTrace;
+use super::frame::End;
+use super::{Executor, tree};
+
+impl<'p> Executor<'p, '_> {
+    /// What of it holds now, at the start.
+    pub(super) fn in_order(&mut self) -> Vec<&'p Limit> {
+        let plan = self.plan;
+        plan.ends.iter().filter(|end| matches!(self.holds(&end.condition), Ok(Some(true)))).collect()
+    }
+
+    /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are.
+    pub(super) fn judge_ends(&mut self, begun: &[&Limit]) {
+        if self.abort.is_some() || !matches!(self.end, Some(End::Done)) {
+            return;
+        }
+        for end in begun {
+            if !matches!(self.holds(&end.condition), Ok(Some(false))) {
+                continue;
+            }
+            let how = end.condition.refusal.as_ref().map_or("unfinished".to_owned(), |r| r.failure.replace('_', " "));
+            let text = format!("`{}` has ended, and `{}` is {how}", self.plan.workflow, self.instance(end.instance));
+            let steps = self.last_use(end.instance);
+            let trace = FailureTrace {
+                name: codes::UNFINISHED.name.to_owned(),
+                text,
+                code: codes::UNFINISHED,
+                fault: false,
+                span: steps.first().map_or(end.condition.span, |s| self.plan.get(*s).span),
+                time: self.now,
+                measured: self.measured(&end.condition.compared),
+                help: end.condition.advice().into_iter().collect(),
+                steps: steps
+                    .into_iter()
+                    .map(|s| FailureTrace::entry(self.plan, s, self.steps[s.0 as usize].started.unwrap_or(self.now)))
+                    .collect(),
+            };
+            self.unfinished.push(trace);
+        }
+    }
+
+    /// The latest operation that used a thing and the steps around it, innermost first.
+    fn last_use(&self, thing: InstanceId) -> Vec<StepId> {
+        let owner = |id: &InstanceId| self.scene.instances.get(id.0 as usize).and_then(|i| i.owner);
+        let wholes: Vec<InstanceId> = std::iter::successors(Some(thing), owner).collect();
+        let mut above = vec![None; self.plan.steps.len()];
+        let mut last: Option<(f64, StepId)> = None;
+        for id in tree::subtree(self.plan, self.plan.root) {
+            let step = &self.plan.get(id).step;
+            step.children().into_iter().for_each(|c| above[c.0 as usize] = Some(id));
+            let Step::Operation(operation) = step else { continue };
+            let Some(started) = self.steps[id.0 as usize].started else { continue };
+            let later = last.is_none_or(|(time, other)| (time, other) < (started, id));
+            if later && operation.claims.iter().any(|c| wholes.contains(c)) {
+                last = Some((started, id));
+            }
+        }
+        let steps = std::iter::successors(last.map(|(_, id)| id), |id| above[id.0 as usize]);
+        // The workflow itself says nothing.
+        steps.filter(|id| *id != self.plan.root).collect()
+    }
+}
