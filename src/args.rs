@@ -8,6 +8,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::pipeline::Options;
 
 use crate::report::Format;
+use crate::report::points::Place;
 
 /// Checks, runs and explains robotic chemistry protocols written in .mtx.
 #[derive(Debug, Parser)]
@@ -67,9 +68,15 @@ pub struct CheckArgs {
     /// Form of the findings.
     #[arg(long, value_enum, default_value_t = Format::Human)]
     pub format: Format,
-    /// Take warnings for errors.
+    /// Take warnings for errors, and show advice as warnings.
     #[arg(long)]
     pub strict: bool,
+    /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
+    #[arg(long)]
+    pub contents: bool,
+    /// Say everything that is known after the statement at this place.
+    #[arg(long, value_name = "LINE[:COLUMN]", requires = "contents")]
+    pub at: Option<Place>,
 }
 
 /// `matterixc fmt`.

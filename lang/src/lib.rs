@@ -15,6 +15,7 @@ pub mod library;
 pub mod loader;
 pub mod lower;
 pub mod names;
+pub mod points;
 pub mod program;
 pub mod prose;
 pub mod screen;
@@ -24,4 +25,4 @@ pub mod task;
 pub mod units;
 
 pub use loader::{LibraryOnly, Loader};
-pub use program::{Options, Test, check, compile, document, tests};
+pub use program::{Options, Test, check, compile, contents, document, tests};

@@ -7,6 +7,7 @@ mod run;
 
 use std::path::{Path, PathBuf};
 
+use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
 use neighbours::Neighbours;
@@ -74,6 +75,16 @@ pub fn check(input: &Input) -> (Sources, Vec<Diagnostic>) {
         Err(found) => vec![found],
     };
     (sources, found)
+}
+
+/// Findings of a file, and what is known at every statement of its workflows.
+pub fn contents(input: &Input) -> (Sources, Vec<Diagnostic>, Vec<Points>) {
+    let (mut sources, file) = input.source();
+    let (found, points) = match file {
+        Ok(file) => matterix_lang::contents(&mut sources, file, &input.neighbours()),
+        Err(found) => (vec![found], Vec::new()),
+    };
+    (sources, found, points)
 }
 
 /// A file as a program, with findings; no program where there is an error.

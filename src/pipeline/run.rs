@@ -67,7 +67,7 @@ pub struct Ran<'a> {
     recording: Recording,
     info: RunInfo,
     report: Report,
-    /// What ended it, what else failed on the way, and expectations that did not hold, each on its line of the source.
+    /// What ended it, what else failed on the way, and expectations that did not hold and what is left on, each on its line of the source.
     pub diagnostics: Vec<Diagnostic>,
     /// Whether it came to its end and every expectation held.
     pub passed: bool,
@@ -208,11 +208,11 @@ fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
     }
 }
 
-/// What ended the run is an error, and so is an expectation that did not hold; what else failed is a warning.
+/// What ended the run is an error, and so are an expectation that did not hold and what is left on; what else failed is a warning.
 pub(super) fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> {
     let missed = outcome.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
     let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
-    found.extend(outcome.failure.iter().map(exec::diagnostic));
+    found.extend(outcome.failure.iter().chain(&outcome.unfinished).map(exec::diagnostic));
     let others = outcome.suppressed.iter().map(exec::diagnostic);
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found.into_iter().map(|d| led_by_the_user(d, sources)).collect()

@@ -123,6 +123,22 @@ pub struct Env<'a> {
     pub readings: &'a [f64],
 }
 
+impl Env<'_> {
+    /// The value of an operation without operands; not a number for others.
+    #[inline]
+    pub fn leaf(&self, op: Op) -> f64 {
+        match op {
+            Op::Const(v) => v,
+            Op::Time => self.time,
+            Op::State(i) => self.states[i as usize],
+            Op::Param(i) => self.params[i as usize],
+            Op::Local(i) => self.locals[i as usize],
+            Op::Reading(i) => self.readings[i as usize],
+            Op::Unary(..) | Op::Binary(..) | Op::Select(..) => f64::NAN,
+        }
+    }
+}
+
 /// A list of operations in which every operand stands before its user.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Graph {
@@ -311,11 +327,23 @@ impl Graph {
 
     /// Evaluates one node by evaluating what it depends on. For occasional use; hot paths keep a schedule of their own.
     pub fn eval(&self, node: NodeId, env: Env<'_>) -> f64 {
-        let mut values = vec![0.0; node.0 as usize + 1];
-        for n in self.schedule([node]) {
-            values[n.0 as usize] = eval_op(self.op(n), env, &values);
+        self.eval_on(node, |leaf| env.leaf(leaf))
+    }
+
+    /// The same on leaves that are asked for one by one. Costs nothing for the rest of the graph.
+    pub fn eval_on(&self, node: NodeId, leaf: impl Fn(Op) -> f64) -> f64 {
+        let op = self.op(node);
+        if op.operands().next().is_none() {
+            return leaf(op);
         }
-        values[node.0 as usize]
+        let order = self.schedule([node]);
+        let mut values: Vec<f64> = Vec::with_capacity(order.len());
+        for n in &order {
+            // Operands stand before their user.
+            let value = apply(self.op(*n), &leaf, |o| values[order.partition_point(|other| *other < o)]);
+            values.push(value);
+        }
+        values.last().copied().unwrap_or(f64::NAN)
     }
 
     /// The operations `roots` depend on, operands first, each once.
@@ -378,14 +406,13 @@ impl Graph {
 
 /// The value of one operation, given the leaves and the values of all operations before it.
 pub fn eval_op(op: Op, env: Env<'_>, values: &[f64]) -> f64 {
-    let at = |n: NodeId| values[n.0 as usize];
+    apply(op, |leaf| env.leaf(leaf), |n| values[n.0 as usize])
+}
+
+/// The value of one operation, given what leaves and operands are worth.
+#[inline]
+pub fn apply(op: Op, leaf: impl Fn(Op) -> f64, at: impl Fn(NodeId) -> f64) -> f64 {
     match op {
-        Op::Const(v) => v,
-        Op::Time => env.time,
-        Op::State(i) => env.states[i as usize],
-        Op::Param(i) => env.params[i as usize],
-        Op::Local(i) => env.locals[i as usize],
-        Op::Reading(i) => env.readings[i as usize],
         Op::Unary(o, a) => unary(o, at(a)),
         Op::Binary(o, a, b) => binary(o, at(a), at(b)),
         Op::Select(c, a, b) => {
@@ -395,6 +422,7 @@ pub fn eval_op(op: Op, env: Env<'_>, values: &[f64]) -> f64 {
                 at(b)
             }
         }
+        other => leaf(other),
     }
 }
 

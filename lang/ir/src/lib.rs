@@ -7,6 +7,7 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+//! - [`points`]: what is known of all that at every statement, before the run.
 
 pub mod codes;
 pub mod diagnostic;
@@ -14,6 +15,7 @@ pub mod graph;
 pub mod math;
 pub mod model;
 pub mod plan;
+pub mod points;
 pub mod program;
 pub mod quantity;
 pub mod robot;

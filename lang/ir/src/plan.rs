@@ -1,5 +1,7 @@
 //! What is done: the tree of the workflow. Leaves are operations, every node keeps its span.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::codes::{self, Code};
@@ -26,6 +28,9 @@ pub struct Condition {
     pub terms: Vec<Term>,
     /// The failure raised where it does not hold, if it names one.
     pub refusal: Option<Refusal>,
+    /// Where it asks the same of each of several things: the thing (as text) and what is asked of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub each: Vec<Condition>,
 }
 
 impl Condition {
@@ -139,7 +144,7 @@ pub struct Operation {
     /// By parameter name, in order of declaration.
     pub arguments: Vec<(String, Argument)>,
     /// Must hold when it starts.
-    pub needs: Vec<Condition>,
+    pub needs: Vec<Arc<Condition>>,
     /// Looked at before the run only: what holds on no way through the plan is a mistake in it.
     pub presumes: Vec<Presumption>,
     /// Applied when it starts (commands).
@@ -197,7 +202,7 @@ pub enum Step {
         /// Its verb.
         verb: String,
         /// Must hold when it starts.
-        needs: Vec<Condition>,
+        needs: Vec<Arc<Condition>>,
         /// Must hold all the time.
         invariants: Vec<Condition>,
         /// Must hold when it ends: the promised effects.

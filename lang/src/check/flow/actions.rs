@@ -1,6 +1,7 @@
 //! What operations need and do.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use matterix_ir::NodeId;
 use matterix_ir::model::Action;
@@ -16,7 +17,7 @@ const MOST_EVENTS: usize = 200;
 impl Flow<'_, '_> {
     /// Looks at needs; whether none fails for certain. What a failed need looks at counts as unknown from here on, so
     /// that one mistake is one message.
-    pub fn needs(&mut self, label: &str, needs: &[Condition], facts: &mut Facts) -> bool {
+    pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut Facts) -> bool {
         let mut met = true;
         for need in needs {
             let value = self.eval(need.node, facts);

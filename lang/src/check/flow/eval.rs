@@ -12,7 +12,7 @@ use super::{Flow, Raised};
 #[derive(Debug, Default)]
 pub struct Parts {
     /// Operations, operands first.
-    pub order: Vec<NodeId>,
+    pub order: Rc<[NodeId]>,
     /// States, those behind readings included.
     pub states: Vec<u32>,
     /// Whether time or a kept value is among them.
@@ -22,13 +22,13 @@ pub struct Parts {
 impl Flow<'_, '_> {
     /// What a node depends on; found once.
     pub fn parts(&mut self, node: NodeId) -> Rc<Parts> {
-        if let Some(parts) = self.parts.get(&node) {
+        if let Some(parts) = &self.parts[node.0 as usize] {
             return parts.clone();
         }
         let graph = &self.lab.graph;
-        let mut parts = Parts { order: graph.schedule([node]), ..Parts::default() };
+        let mut parts = Parts { order: graph.schedule([node]).into(), ..Parts::default() };
         let mut readings = Vec::new();
-        for n in &parts.order {
+        for n in parts.order.iter() {
             match graph.op(*n) {
                 Op::State(s) => parts.states.push(s),
                 Op::Reading(r) => readings.push(r),
@@ -44,14 +44,14 @@ impl Flow<'_, '_> {
         parts.states.sort_unstable();
         parts.states.dedup();
         let parts = Rc::new(parts);
-        self.parts.insert(node, parts.clone());
+        self.parts[node.0 as usize] = Some(parts.clone());
         parts
     }
 
     /// The value of a node.
     pub fn eval(&mut self, node: NodeId, facts: &Facts) -> Known {
         let parts = self.parts(node);
-        for n in &parts.order {
+        for n in parts.order.iter() {
             let value = match self.lab.graph.op(*n) {
                 Op::Const(v) => Known::point(v),
                 Op::Time => facts.time.clone(),

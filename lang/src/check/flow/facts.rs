@@ -5,6 +5,7 @@ use std::rc::Rc;
 
 use matterix_ir::{NodeId, Span};
 
+use super::super::pages::Pages;
 use super::evolve::Barrier;
 use super::value::{Known, Why};
 
@@ -26,7 +27,7 @@ pub type History = Option<Rc<Event>>;
 #[derive(Clone, Debug)]
 pub struct Facts {
     /// By state index, SI.
-    pub states: Vec<Known>,
+    pub states: Pages<Known>,
     /// By local index, SI.
     pub locals: Vec<Known>,
     /// Seconds since the run began.
@@ -85,7 +86,7 @@ impl Facts {
     pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
         let mut out = self.clone();
         let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
-        for (i, (x, y)) in a.states.iter().zip(&b.states).enumerate() {
+        for (i, (x, y)) in a.states.iter().zip(b.states.iter()).enumerate() {
             let both = x.join(y, why);
             if both == self.states[i] {
                 continue;

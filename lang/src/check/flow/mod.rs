@@ -2,20 +2,23 @@
 //!
 //! Numbers are followed exactly, as one of a few, or within bounds, over every way through the plan (abstract
 //! interpretation); where ways meet, what is known is what holds on all of them. The way followed is the one on which
-//! devices do what they are told: failures that only a device can report (`fails`) are not assumed to happen, those the
-//! plan itself raises are. A need that fails on every way is an error, one that fails on some a warning; what only a
+//! devices do what they are told: failures that only a device can report (`fails`) are looked at beside it, those the
+//! plan itself raises are on it. A need that fails on every way is an error, one that fails on some a warning; what only a
 //! run can tell is left to the run.
 
 mod actions;
+mod beside;
 mod eval;
 mod evolve;
 mod facts;
 mod otherwise;
+mod points;
 mod report;
+mod reported;
 mod value;
 mod walk;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
@@ -24,7 +27,8 @@ use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 
 pub use self::evolve::Window;
 use self::facts::Facts;
-use self::value::Known;
+pub use self::points::{After, Seen};
+pub use self::value::Known;
 use crate::elaborate::{Elaborator, ExtensiveKey};
 use crate::eval::ReactionId;
 
@@ -53,7 +57,7 @@ struct Flow<'l, 'a> {
     mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
     params: Vec<Known>,
     /// What a node depends on: operations in order, and states.
-    parts: HashMap<NodeId, Rc<eval::Parts>>,
+    parts: Vec<Option<Rc<eval::Parts>>>,
     /// Values of the operations of the node evaluated last.
     values: Vec<Known>,
     /// Derivatives that depend on a state.
@@ -75,6 +79,8 @@ struct Flow<'l, 'a> {
     findings: Vec<report::Finding>,
     /// Failures raised inside each open body with handlers, innermost last.
     guards: Vec<Vec<Raised>>,
+    /// Failures that devices may report inside each open body with handlers, innermost last.
+    reported: Vec<Vec<Raised>>,
     /// Names of failures that handlers around take; none for every one.
     caught: Vec<Vec<Option<String>>>,
     /// The user's statements around, innermost last.
@@ -88,18 +94,35 @@ struct Flow<'l, 'a> {
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
     steps: usize,
+    /// What is known after each statement, where it is asked for.
+    notes: Option<points::Notes>,
 }
 
-/// Follows the plan and reports what would go wrong.
+/// What following the plan brings.
+pub struct Followed {
+    /// What would go wrong.
+    pub found: Vec<Diagnostic>,
+    /// What is known of the conditions of reactions.
+    pub windows: BTreeMap<ReactionId, Window>,
+    /// What is known of the nodes asked for: at the start, and after each statement.
+    pub seen: Vec<Seen>,
+}
+
+/// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement.
 pub fn check(
     lab: &Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
     events: &[Event],
     derivatives: &[Derivative],
-) -> (Vec<Diagnostic>, BTreeMap<ReactionId, Window>) {
+    asked: Option<&[NodeId]>,
+) -> Followed {
     let mut flow = Flow::new(lab, sources, plan, events, derivatives);
+    if let Some(asked) = asked {
+        flow.take_notes(asked);
+    }
     flow.follow();
+    let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
@@ -114,7 +137,7 @@ pub fn check(
                 .collect::<Vec<_>>(),
         );
     }
-    (found, windows)
+    Followed { found, windows, seen }
 }
 
 impl<'l, 'a> Flow<'l, 'a> {
@@ -133,7 +156,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             derivatives,
             mixtures: lab.extensive_by_mixture(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
-            parts: HashMap::new(),
+            parts: vec![None; lab.graph.ops().len()],
             values: vec![Known::Point(0.0); lab.graph.ops().len()],
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
@@ -145,6 +168,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             branches: BTreeMap::new(),
             findings: Vec::new(),
             guards: Vec::new(),
+            reported: Vec::new(),
             caught: Vec::new(),
             sites: Vec::new(),
             quiet: 0,
@@ -152,6 +176,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             cleaning: 0,
             shared: Vec::new(),
             steps: 0,
+            notes: None,
         };
         for (i, d) in derivatives.iter().enumerate() {
             for state in flow.parts(d.rate).states.clone() {
@@ -185,6 +210,7 @@ impl<'l, 'a> Flow<'l, 'a> {
         self.fire((0..self.events.len() as u32).collect(), &mut facts);
         self.limits((0..self.plan.limits.len() as u32).collect(), &mut facts);
         let begun = facts.clone();
+        self.note_start(&begun);
         // What a mistake cut short is not finished for another reason.
         if let Some(ended) = self.walk(self.plan.root, facts)
             && !self.findings.iter().any(report::Finding::is_error)
@@ -197,7 +223,7 @@ impl<'l, 'a> Flow<'l, 'a> {
     /// What is known when the run begins.
     fn start(&mut self) -> Facts {
         let mut facts = Facts {
-            states: vec![Known::nothing(); self.lab.states.len()],
+            states: self.lab.states.iter().map(|_| Known::nothing()).collect(),
             locals: vec![Known::nothing(); self.plan.locals.len()],
             time: Known::Point(0.0),
             history: None,

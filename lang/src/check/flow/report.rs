@@ -1,7 +1,7 @@
 //! Findings with their history.
 
-use matterix_ir::model::Domain;
-use matterix_ir::plan::{Condition, Limit, Term};
+use matterix_ir::model::{Action, Domain};
+use matterix_ir::plan::{Condition, Limit, Step, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Span, codes};
 
@@ -25,11 +25,21 @@ impl Finding {
             && self.about == other.about
     }
 
+    /// Says that it holds only where a device reports one of these failures.
+    pub fn only_where_reported(&mut self, names: &[String]) {
+        let names: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+        self.diagnostic.severity = Severity::Warning;
+        self.diagnostic.help.push(format!("so it is where a device reports {}", names.join(" or ")));
+    }
+
     /// Whether it is an error.
     pub fn is_error(&self) -> bool {
         self.diagnostic.severity == Severity::Error
     }
 }
+
+/// So many things are named of which the same is asked in vain.
+const THINGS_SHOWN: usize = 8;
 
 /// So many steps of the history are shown for one quantity.
 const STEPS_SHOWN: usize = 3;
@@ -86,8 +96,16 @@ impl Flow<'_, '_> {
         let code = need.code();
         let some = some || self.doubt > 0;
         let headline = if some { format!("{what}, on some ways through the plan") } else { what };
-        let measured = self.measured(need, facts);
-        let said = if measured.is_empty() { "not possible".to_string() } else { measured.join(", ") };
+        let failing = self.failing(need, facts);
+        let asked = failing.first().copied().unwrap_or(need);
+        let measured = self.measured(asked, facts);
+        let named = !failing.is_empty() && failing.len() < need.each.len();
+        let said = match (named, measured.is_empty()) {
+            (true, true) => format!("not for {}", listed(&failing)),
+            (true, false) => format!("not for {}: {}", listed(&failing), measured.join(", ")),
+            (false, true) => "not possible".to_string(),
+            (false, false) => measured.join(", "),
+        };
         let mut d = self.at_site(code, headline, said, some);
         // The first that is missing ends a call; what its later steps lack follows from that.
         if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == d.span() && f.about != need.span) {
@@ -96,9 +114,14 @@ impl Flow<'_, '_> {
         if d.span() != need.span {
             d = d.because(need.span, format!("needed here: `{}`", need.text));
         }
-        d = self.with_history(d, need.node, &need.terms, facts);
+        d = self.with_history(d, asked.node, &asked.terms, facts);
         d.help.extend(need.advice());
         self.found(d, need.span);
+    }
+
+    /// Of several things of which the same is asked, those for which it does not hold, or may not.
+    fn failing<'c>(&mut self, need: &'c Condition, facts: &Facts) -> Vec<&'c Condition> {
+        need.each.iter().filter(|asked| self.eval(asked.node, facts).truth() != Some(true)).collect()
     }
 
     /// A limit of a thing that is passed by what is done, or from the start.
@@ -145,9 +168,14 @@ impl Flow<'_, '_> {
         let headline = format!("`{}` does not hold{ways}", condition.text);
         let measured = self.measured(condition, facts);
         let said = if measured.is_empty() { "expected here".to_string() } else { measured.join(", ") };
-        let d = Diagnostic { ..Diagnostic::error(codes::EXPECTATION_FAILED, condition.span, headline, said) };
-        let d = Diagnostic { severity: severity(codes::EXPECTATION_FAILED, some), ..d };
+        let (code, headline) = match self.not_made(condition, facts) {
+            Some(absent) => (codes::NEVER_MADE, format!("{headline}: {absent}")),
+            None => (codes::EXPECTATION_FAILED, headline),
+        };
+        let d = Diagnostic::error(code, condition.span, headline, said);
+        let d = Diagnostic { severity: severity(code, some), ..d };
         let d = self.with_history(d, condition.node, &condition.terms, facts);
+        let d = if code == codes::NEVER_MADE { self.with_makers(d, condition) } else { d };
         self.found(d, condition.span);
     }
 
@@ -175,16 +203,46 @@ impl Flow<'_, '_> {
     pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &Facts, after: &Facts) {
         let still = self.eval(condition.node, before) == self.eval(condition.node, after)
             && condition.compared.iter().all(|c| self.eval(c.value, before) == self.eval(c.value, after));
-        let (code, headline) = match (still, limited) {
-            (true, _) => (codes::WAITS_FOR_EVER, format!("`{}` never comes true: nothing changes it", condition.text)),
-            (false, true) => (codes::NOT_REACHED, format!("`{}` cannot come true in the time given", condition.text)),
-            (false, false) => (codes::NOT_REACHED, format!("`{}` is never reached", condition.text)),
+        let absent = self.not_made(condition, after);
+        let text = &condition.text;
+        let (code, headline) = match (&absent, still, limited) {
+            (Some(absent), ..) => (codes::NEVER_MADE, format!("`{text}` never comes true: {absent}")),
+            (None, true, _) => (codes::WAITS_FOR_EVER, format!("`{text}` never comes true: nothing changes it")),
+            (None, false, true) => (codes::NOT_REACHED, format!("`{text}` cannot come true in the time given")),
+            (None, false, false) => (codes::NOT_REACHED, format!("`{text}` is never reached")),
         };
         let measured = self.measured(condition, after);
         let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
         let d = self.at_site(code, headline, said, self.doubt > 0);
         let d = self.with_history(d, condition.node, &condition.terms, before);
+        let d = if absent.is_some() { self.with_makers(d, condition) } else { d };
         self.found(d, condition.span);
+    }
+
+    /// Which species a condition wants more of than none, where nothing brings or makes any.
+    fn not_made(&mut self, condition: &Condition, facts: &Facts) -> Option<String> {
+        let (mixture, s) = *self.lab.absent_in.get(&condition.span)?.first()?;
+        let none = condition.compared.iter().any(|c| {
+            let some = c.low.is_some_and(|n| condition.compared.len() == 1 || self.eval(n, facts).bounds().0 > 0.0);
+            some && self.eval(c.value, facts).bounds() == (0.0, 0.0)
+        });
+        let name = &self.lab.tables.species.get(s).name;
+        none.then(|| format!("nothing brings or makes `{name}` in `{}`", self.lab.spoken_name(mixture)))
+    }
+
+    /// Adds the reactions that would make what is missing.
+    fn with_makers(&self, mut d: Diagnostic, condition: &Condition) -> Diagnostic {
+        let Some((_, s)) = self.lab.absent_in.get(&condition.span).and_then(|all| all.first()) else { return d };
+        let name = &self.lab.tables.species.get(*s).name;
+        let all = self.lab.tables.reactions.iter().filter(|r| r.products.iter().any(|(p, _)| p == s));
+        let makers: Vec<_> = all.take(STEPS_SHOWN).collect();
+        for r in &makers {
+            d = d.because(r.span, format!("`{}` makes it, and its reactants never meet there", r.name));
+        }
+        match makers.is_empty() {
+            true => d.help(format!("no reaction makes `{name}`: declare it, or ask for what is made")),
+            false => d.help(format!("bring together what makes `{name}`, or ask for what is made")),
+        }
     }
 
     /// Branches that constants alone decide, whatever the run does.
@@ -272,14 +330,24 @@ impl Flow<'_, '_> {
 
     /// The changes of states behind a condition that names no member itself, as one that calls a function.
     fn changes_behind(&mut self, node: NodeId, facts: &Facts) -> Vec<(Span, String)> {
-        let order = self.parts(node).order.clone();
+        let mut order = self.parts(node).order.to_vec();
         let mut said = Vec::new();
-        for node in order {
+        let mut at = 0;
+        while let Some(node) = order.get(at).copied() {
+            at += 1;
             let Op::State(s) = self.lab.graph.op(node) else { continue };
             let state = &self.lab.states[s as usize];
             let term = Term { name: state.name.clone(), node, domain: state.domain.clone() };
             let touched = self.lab.lineage.iter().find(|(_, state)| **state == s).map(|(key, _)| key.clone());
-            let latest = self.history(&term, facts).into_iter().take(1);
+            let latest: Vec<_> = self.history(&term, facts).into_iter().take(1).collect();
+            // What came from another thing has a story there.
+            if touched.is_some()
+                && let Some((span, _)) = latest.first()
+            {
+                let from = self.sources_of(s, *span);
+                order.extend(from.into_iter().filter(|n| !order.contains(n)).collect::<Vec<_>>());
+            }
+            let latest = latest.into_iter();
             said.extend(latest.map(|(span, text)| match &touched {
                 Some((mixture, reagent)) => {
                     (span, format!("`{}` has touched `{reagent}` after this", self.lab.spoken_name(*mixture)))
@@ -292,6 +360,26 @@ impl Flow<'_, '_> {
         }
         said.sort_by_key(|(span, _)| *span);
         said
+    }
+
+    /// What a statement looked at when it changed a state, other than that state.
+    fn sources_of(&self, state: u32, statement: Span) -> Vec<NodeId> {
+        let graph = &self.lab.graph;
+        let mut out = Vec::new();
+        for step in self.plan.steps.iter().filter(|s| s.span == statement) {
+            let Step::Operation(operation) = &step.step else { continue };
+            for action in operation.at_start.iter().chain(&operation.at_end) {
+                if let Action::Assign { state: s, value, .. } = action
+                    && *s == state
+                {
+                    let looked_at = graph.schedule([*value]);
+                    out.extend(
+                        looked_at.into_iter().filter(|n| matches!(graph.op(*n), Op::State(from) if from != state)),
+                    );
+                }
+            }
+        }
+        out
     }
 
     /// The latest statements that changed a member, latest first, each once.
@@ -307,7 +395,8 @@ impl Flow<'_, '_> {
                 for (state, before) in concerned {
                     then.states[state as usize] = before;
                 }
-                if self.eval(term.node, &then) != after && !steps.iter().any(|(s, _)| *s == event.span) {
+                let told = event.span.is_empty() || steps.iter().any(|(s, _)| *s == event.span);
+                if self.eval(term.node, &then) != after && !told {
                     if steps.len() == STEPS_SHOWN {
                         break;
                     }
@@ -342,6 +431,15 @@ impl Flow<'_, '_> {
                 None => "?".to_string(),
             },
         })
+    }
+}
+
+/// Things by name, the first few of many.
+fn listed(things: &[&Condition]) -> String {
+    let names: Vec<String> = things.iter().take(THINGS_SHOWN).map(|t| format!("`{}`", t.text)).collect();
+    match things.len() - names.len() {
+        0 => names.join(", "),
+        more => format!("{} and {more} more", names.join(", ")),
     }
 }
 

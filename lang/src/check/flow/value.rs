@@ -29,7 +29,7 @@ pub enum Known {
 const MOST: usize = 8;
 
 /// Numbers closer than this, relative to the larger, are not told apart.
-const CLOSE: f64 = 1e-9;
+const CLOSE: f64 = 1e-10;
 
 impl Known {
     /// Nothing is known.

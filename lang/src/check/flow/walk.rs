@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Caught, Condition, Step, StepId};
-use matterix_ir::{BinaryOp, NodeId};
+use matterix_ir::{BinaryOp, NodeId, Op};
 
 use super::facts::Facts;
 use super::report::Finding;
@@ -32,7 +32,11 @@ impl Flow<'_, '_> {
             let calls = matches!(node.step, Step::Operation(_) | Step::Skill { .. });
             self.sites.push(Site { span: node.span, label: node.label.clone(), calls });
         }
+        let noted = self.begin(id, node, &facts);
         let after = self.step(id, facts);
+        if let Some(begun) = noted {
+            self.end(node, begun, after.as_ref());
+        }
         if own {
             self.sites.pop();
         }
@@ -50,7 +54,10 @@ impl Flow<'_, '_> {
                 Some(facts)
             }
             Step::Parallel(branches) => self.parallel(branches, facts),
-            Step::Operation(operation) => Some(self.operation(&node.label, operation, facts)),
+            Step::Operation(operation) => {
+                self.may_report(operation, &facts);
+                Some(self.operation(&node.label, operation, facts))
+            }
             Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
             Step::Retry { .. } => None,
             Step::Try(alternatives) => self.alternatives(id, alternatives, facts),
@@ -115,7 +122,17 @@ impl Flow<'_, '_> {
                 let max = self.eval(*max, &facts);
                 self.repeat_while(id, condition, &max, *body, facts)
             }
-            Step::Claim { body, .. } | Step::Start { body, .. } => self.walk(*body, facts),
+            Step::Claim { body, .. } => self.walk(*body, facts),
+            Step::Start { job, body } => {
+                self.begin_job(*body);
+                let after = self.walk(*body, facts);
+                self.begun_job(job, *body);
+                after
+            }
+            Step::Await { job } => {
+                self.end_job(job);
+                Some(facts)
+            }
             Step::Fail { name, .. } => {
                 self.raise(name, facts);
                 None
@@ -129,7 +146,7 @@ impl Flow<'_, '_> {
                 }
                 Some(facts)
             }
-            Step::Await { .. } | Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
+            Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
         }
     }
 
@@ -140,11 +157,15 @@ impl Flow<'_, '_> {
         }
         let parts = self.parts(condition.node);
         let shared = self.is_shared(condition.node);
-        let before = facts.clone();
         let longest = match timeout {
             Some(node) => self.eval(node, &facts).bounds().1,
             None => f64::INFINITY,
         };
+        if let Some(wait) = self.until(condition.node, &facts).filter(|wait| *wait <= longest) {
+            self.pass(&Known::Point(wait), &mut facts);
+            return Some(facts);
+        }
+        let before = facts.clone();
         self.pass(&Known::Range(0.0, longest, Why::Unknown), &mut facts);
         if timeout.is_some() {
             self.raise("timeout", facts.clone());
@@ -167,6 +188,15 @@ impl Flow<'_, '_> {
         }
         self.assume(condition.node, true, &mut facts);
         Some(facts)
+    }
+
+    /// How long it is until a point in time that a condition waits for, s.
+    fn until(&mut self, condition: NodeId, facts: &Facts) -> Option<f64> {
+        let graph = &self.lab.graph;
+        let Op::Binary(BinaryOp::Le, due, time) = graph.op(condition) else { return None };
+        let clock = graph.op(time) == Op::Time;
+        let due = self.eval(due, facts).exact().filter(|_| clock)?;
+        Some(due - facts.time.exact()?).filter(|wait| *wait >= 0.0)
     }
 
     fn choice(
@@ -210,7 +240,7 @@ impl Flow<'_, '_> {
 
     fn repeat(&mut self, id: StepId, times: &Known, body: StepId, mut facts: Facts) -> Option<Facts> {
         let (low, high) = times.bounds();
-        let before_all = facts.clone();
+        let begun = Moment::of(&facts);
         for turn in 0..MOST_TURNS {
             let done = turn as f64;
             if done >= high {
@@ -220,11 +250,14 @@ impl Flow<'_, '_> {
             let after = self.walk(body, facts);
             facts = if done >= low { self.meet(id, &before, Some(before.clone()), after)? } else { after? };
             if facts.states == before.states {
-                return Some(later(facts, &before));
+                self.more_turns(body, true, &facts);
+                let left = (low == high).then_some(high - done - 1.0);
+                return Some(after_turns(left, facts, &Moment::of(&before)));
             }
         }
+        self.more_turns(body, false, &facts);
         self.widen(body, &mut facts);
-        Some(later(facts, &before_all))
+        Some(later(facts, &begun))
     }
 
     fn repeat_while(
@@ -261,15 +294,17 @@ impl Flow<'_, '_> {
             let Some(after) = after else { return ends };
             facts = after;
             if facts.states == before.states {
+                self.more_turns(body, true, &facts);
                 self.raise("max", facts.clone());
                 // A loop that changes nothing it looks at ends by what only a run can tell.
-                let facts = later(facts, &before);
+                let facts = later(facts, &Moment::of(&before));
                 return match ends {
                     Some(ends) => self.meet(id, &start, Some(ends), Some(facts)),
                     None => Some(facts),
                 };
             }
         }
+        self.more_turns(body, false, &facts);
         self.widen(body, &mut facts);
         self.meet(id, &start, ends, Some(facts))
     }
@@ -281,7 +316,7 @@ impl Flow<'_, '_> {
     }
 
     /// The states that the operations below a step change.
-    fn writes(&self, id: StepId) -> BTreeSet<u32> {
+    pub fn writes(&self, id: StepId) -> BTreeSet<u32> {
         let mut out = BTreeSet::new();
         let mut todo = vec![id];
         while let Some(id) = todo.pop() {
@@ -306,7 +341,9 @@ impl Flow<'_, '_> {
             return first;
         }
         let one: Vec<Finding> = self.findings.split_off(mark);
+        self.once_more(true);
         let second = self.in_order(branches, &backward, &writes, facts.clone());
+        self.once_more(false);
         let other: Vec<Finding> = self.findings.split_off(mark);
         let both = one.iter().any(|f| other.iter().any(|o| o.is_like(f)));
         // Something goes wrong in either order, if not at the same place: the first order tells it.
@@ -329,10 +366,13 @@ impl Flow<'_, '_> {
         let mut longest = start.clone();
         for i in order {
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
-            self.shared.push(others.flat_map(|(_, w)| w.iter().copied()).collect());
+            let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
+            self.begin_branch(&others);
+            self.shared.push(others);
             facts.time = start.clone();
             let after = self.walk(branches[*i], facts);
             self.shared.pop();
+            self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
         }
@@ -356,8 +396,10 @@ impl Flow<'_, '_> {
         let library = self.in_library(self.plan.get(id).span);
         self.caught.push(if library { Vec::new() } else { names.collect() });
         self.guards.push(Vec::new());
+        self.reported.push(Vec::new());
         let mut after = self.walk(body, facts.clone());
         let mut raised = self.guards.pop().unwrap_or_default();
+        let reported = self.reported.pop().unwrap_or_default();
         self.caught.pop();
         for (caught, handler) in handlers {
             let (taken, rest): (Vec<_>, Vec<_>) = raised.into_iter().partition(|(name, _)| match caught {
@@ -384,6 +426,7 @@ impl Flow<'_, '_> {
             }
             (None, after) => after,
         };
+        self.after_report(&facts, reported, handlers, finally);
         if let Some(outer) = self.guards.last_mut() {
             outer.extend(raised);
         }
@@ -420,8 +463,31 @@ impl Flow<'_, '_> {
     }
 }
 
+/// What tells turns of a loop apart that leave all states as they were.
+struct Moment {
+    time: Known,
+    locals: Vec<Known>,
+}
+
+impl Moment {
+    fn of(facts: &Facts) -> Self {
+        Moment { time: facts.time.clone(), locals: facts.locals.clone() }
+    }
+}
+
+/// The same after as many more turns as are `left`, where that is known: each takes as long as the last one.
+fn after_turns(left: Option<f64>, mut facts: Facts, before: &Moment) -> Facts {
+    match (left, facts.time.exact(), before.time.exact()) {
+        (Some(left), Some(now), Some(then)) if left.is_finite() && facts.locals == before.locals => {
+            facts.time = Known::Point(now + left * (now - then));
+            facts
+        }
+        _ => later(facts, before),
+    }
+}
+
 /// The same after more turns, of which only the time is told apart.
-fn later(mut facts: Facts, before: &Facts) -> Facts {
+fn later(mut facts: Facts, before: &Moment) -> Facts {
     if facts.time != before.time || facts.locals != before.locals {
         let (since, _) = facts.time.bounds();
         facts.time = Known::Range(since, f64::INFINITY, Why::Unknown);

@@ -1,0 +1,143 @@
+//! What notes leave open: what happens beside a statement, and in turns of a loop that are not followed.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::Span;
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Step, StepId};
+
+use super::Flow;
+use super::facts::Facts;
+use super::points::{Notes, at_least};
+use super::value::Known;
+use crate::elaborate::mixtures::written;
+
+impl Notes {
+    /// The innermost branch, or the job that is followed, has ended.
+    fn idle(&mut self) {
+        if let Some(last) = self.busy.iter().rposition(|(job, _)| job.is_none()) {
+            self.busy.remove(last);
+        }
+    }
+}
+
+impl Flow<'_, '_> {
+    /// The same steps are followed once more, or no longer.
+    pub fn once_more(&mut self, more: bool) {
+        if let Some(notes) = &mut self.notes {
+            notes.again = if more { notes.again + 1 } else { notes.again.saturating_sub(1) };
+        }
+    }
+
+    /// What other branches change is not known while one is followed.
+    pub fn begin_branch(&mut self, others: &BTreeSet<u32>) {
+        if self.notes.is_some() {
+            let states = self.behind(others);
+            self.notes.iter_mut().for_each(|n| n.busy.push((None, states.clone())));
+        }
+    }
+
+    /// The branch ends.
+    pub fn end_branch(&mut self) {
+        self.notes.iter_mut().for_each(Notes::idle);
+    }
+
+    /// A loop may go on for more turns than were followed: what its body changes then is not known, unless the turns
+    /// are all alike.
+    pub fn more_turns(&mut self, body: StepId, alike: bool, facts: &Facts) {
+        if self.notes.is_none() {
+            return;
+        }
+        let mut states = BTreeSet::new();
+        if !alike {
+            states = self.behind(&self.writes(body));
+            states.extend(facts.moving.iter().map(|i| self.derivatives[*i as usize].state));
+        }
+        let states: Vec<u32> = states.into_iter().collect();
+        let spans: BTreeSet<Span> = self.below(body).into_iter().map(|id| self.plan.get(id).span).collect();
+        for span in spans {
+            let Some(note) = self.notes.as_mut().and_then(|n| n.by_span.get_mut(&span)) else { continue };
+            note.times = note.times.max(2);
+            note.locals.values_mut().for_each(|known| *known = Known::nothing());
+            let Some(mut after) = note.last.clone() else { continue };
+            after.forget(&states);
+            after.time = at_least(&after.time);
+            self.known_after(span, None, after);
+        }
+    }
+
+    /// A job begins: what the rest of the plan changes is not known in it.
+    pub fn begin_job(&mut self, body: StepId) {
+        if self.notes.is_none() {
+            return;
+        }
+        let below = self.below(body);
+        let others: BTreeSet<u32> = (0..self.plan.steps.len() as u32)
+            .map(StepId)
+            .filter(|id| !below.contains(id))
+            .filter_map(|id| match &self.plan.get(id).step {
+                Step::Operation(o) => Some(o),
+                _ => None,
+            })
+            .flat_map(|o| written(o, &self.mixtures))
+            .collect();
+        let states = self.behind(&others);
+        if let Some(notes) = &mut self.notes {
+            notes.untimed = true;
+            notes.busy.push((None, states));
+        }
+    }
+
+    /// Its steps have been followed: from now until it is waited for, what they change is not known.
+    pub fn begun_job(&mut self, job: &str, body: StepId) {
+        if self.notes.is_none() {
+            return;
+        }
+        let states = self.behind(&self.writes(body));
+        let moved: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| states.contains(s)).collect();
+        if let Some(notes) = &mut self.notes {
+            notes.idle();
+            notes.lost.extend(moved);
+            notes.busy.push((Some(job.to_string()), states));
+        }
+    }
+
+    /// A job has been waited for.
+    pub fn end_job(&mut self, job: &str) {
+        if let Some(notes) = &mut self.notes {
+            notes.busy.retain(|(name, _)| name.as_deref() != Some(job));
+        }
+    }
+
+    fn below(&self, id: StepId) -> BTreeSet<StepId> {
+        let mut out = BTreeSet::new();
+        let mut todo = vec![id];
+        while let Some(id) = todo.pop() {
+            todo.extend(self.plan.get(id).step.children());
+            out.insert(id);
+        }
+        out
+    }
+
+    /// States, and all that laws and events change by them.
+    fn behind(&self, states: &BTreeSet<u32>) -> BTreeSet<u32> {
+        let mut out = states.clone();
+        let mut todo: Vec<u32> = states.iter().copied().collect();
+        while let Some(state) = todo.pop() {
+            let rates = self.rates_of.get(&state).into_iter().flatten();
+            let moved = rates.map(|i| self.derivatives[*i as usize].state);
+            let events = self.events_of.get(&state).into_iter().flatten();
+            let set = events.flat_map(|i| &self.events[*i as usize].actions).flat_map(|action| match action {
+                Action::Assign { state, .. } => vec![*state],
+                Action::Move { from, to, .. } => {
+                    let both = [from, to].map(|m| &self.mixtures[*m as usize]);
+                    both.into_iter().flatten().map(|(_, state)| *state).collect()
+                }
+            });
+            let new: Vec<u32> = moved.chain(set).filter(|s| !out.contains(s)).collect();
+            out.extend(&new);
+            todo.extend(new);
+        }
+        out
+    }
+}

@@ -1,0 +1,73 @@
+//! The units in which the user wrote quantities: what is known is shown in them.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::plan::{Argument, Condition, Plan, Step};
+use matterix_ir::{Sources, Span, Unit};
+
+use crate::elaborate::Elaborator;
+
+/// Units by symbol, as written by the user.
+pub struct Written(BTreeMap<String, Unit>);
+
+impl Written {
+    /// The units of the workflow's arguments and conditions and of the lab's contents and parameters.
+    pub fn of(lab: &Elaborator<'_>, sources: &Sources, plan: &Plan) -> Self {
+        let own = |span: Span| sources.get(span.file).is_some_and(|f| !f.name.contains("::"));
+        let mut units: Vec<Unit> = lab.held.iter().filter_map(|h| h.quantity.unit.clone()).collect();
+        units.extend(lab.params.iter().filter(|p| own(p.span)).map(|p| p.unit.clone()));
+        for step in plan.steps.iter().filter(|s| own(s.span)) {
+            let compared = |c: &Condition| c.compared.iter().map(|c| c.unit.clone()).collect::<Vec<_>>();
+            match &step.step {
+                Step::Operation(o) => units.extend(o.arguments.iter().filter_map(|(_, a)| match a {
+                    Argument::Quantity(_, unit) => Some(unit.clone()),
+                    _ => None,
+                })),
+                Step::WaitUntil { condition, .. }
+                | Step::If { condition, .. }
+                | Step::RepeatWhile { condition, .. } => {
+                    units.extend(compared(condition));
+                }
+                Step::Expect(conditions) => units.extend(conditions.iter().flat_map(compared)),
+                _ => {}
+            }
+        }
+        Written(units.into_iter().map(|u| (u.symbol.clone(), u)).collect())
+    }
+
+    /// The largest of the written units of the same dimension in which a magnitude, SI, is not less than one. Where none
+    /// was written or none fits well, a prefix is chosen.
+    pub fn best(&self, lab: &Elaborator<'_>, unit: &Unit, magnitude: f64) -> Unit {
+        let Ok(wanted) = lab.tables.unit(&unit.symbol) else { return unit.clone() };
+        if unit.offset != 0.0 {
+            let same = |u: &&Unit| {
+                u.offset != 0.0 && lab.tables.unit(&u.symbol).is_ok_and(|r| r.dimension == wanted.dimension)
+            };
+            return self.0.values().find(same).unwrap_or(unit).clone();
+        }
+        let same =
+            |u: &&Unit| u.offset == 0.0 && lab.tables.unit(&u.symbol).is_ok_and(|r| r.dimension == wanted.dimension);
+        let written: Vec<Unit> = self.0.values().filter(same).cloned().collect();
+        if magnitude == 0.0 {
+            let used = written.iter().any(|w| w.symbol == unit.symbol);
+            return written.first().filter(|_| !used).unwrap_or(unit).clone();
+        }
+        let reads_well = |u: &Unit| WELL.contains(&(magnitude / u.factor));
+        largest(&written, magnitude)
+            .filter(|u| reads_well(u))
+            .or_else(|| largest(&lab.tables.units.prefixed(&wanted), magnitude))
+            .unwrap_or_else(|| unit.clone())
+    }
+}
+
+/// Numbers that read well in a unit somebody chose.
+const WELL: std::ops::Range<f64> = 0.01..1e5;
+
+/// The largest unit in which a magnitude is not less than one, or the smallest.
+fn largest(units: &[Unit], magnitude: f64) -> Option<Unit> {
+    let mut all: Vec<&Unit> = units.iter().collect();
+    all.sort_by(|a, b| a.factor.total_cmp(&b.factor));
+    // What is a whole number but for rounding is one.
+    let fits = |u: &&&Unit| magnitude >= u.factor * (1.0 - 1e-9);
+    all.iter().rev().find(fits).or(all.first()).map(|u| (*u).clone())
+}

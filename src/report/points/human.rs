@@ -1,0 +1,174 @@
+//! Statements with what they change, for people.
+
+use matterix_ir::Span;
+use matterix_ir::points::{After, Fact, Point, Points, Thing, Value};
+
+use super::things::together;
+use super::values::{fact, time, value};
+use crate::report::text::{Texts, harmless_line};
+
+/// Columns of a statement before the time.
+const STATEMENT: usize = 72;
+
+/// So many species of a mixture are listed in the table, those of which there is most.
+const MOST_SPECIES: usize = 4;
+
+/// So many groups of things that a statement changes are listed in the table.
+const MOST_GROUPS: usize = 8;
+
+/// A statement, or the end of one with a block, in the order in which a reader comes by.
+struct Row<'p> {
+    point: &'p Point,
+    ends: bool,
+}
+
+/// Every statement with what it changes.
+pub(super) fn table(points: &Points, texts: &mut Texts<'_>) -> String {
+    let mut out = format!("{} in {}\n", points.workflow, points.lab);
+    let holding = points.start.iter().filter(|t| !t.species.is_empty()).filter_map(|t| held(t, |_| true));
+    out.push_str("  at the start\n");
+    write(holding.collect(), usize::MAX, &mut out);
+    let mut before: Option<&After> = None;
+    for row in rows(points) {
+        let place = line(if row.ends { end_of(row.point.span) } else { row.point.span }, texts);
+        let label = harmless_line(&row.point.label);
+        let label = if row.ends { format!("end of {label}") } else { label };
+        let Some(after) = &row.point.after else {
+            let why = if row.point.reached { "nothing is done behind it" } else { "no way leads here" };
+            head(&place, &label, why, &mut out);
+            continue;
+        };
+        let said = changes(after, before.filter(|_| row.ends));
+        if row.ends && said.is_empty() {
+            continue;
+        }
+        let often = if row.point.repeated { "each time, " } else { "" };
+        head(&place, &label, &format!("{often}{}", time(&after.elapsed)), &mut out);
+        write(said, MOST_GROUPS, &mut out);
+        before = Some(after);
+    }
+    out
+}
+
+/// Everything that is known after one statement.
+pub(super) fn all(points: &Points, index: usize, texts: &mut Texts<'_>) -> String {
+    let mut out = format!("{} in {}\n", points.workflow, points.lab);
+    let Some(point) = points.points.get(index) else { return out };
+    let label = harmless_line(&point.label);
+    let place = line(point.span, texts);
+    let Some(after) = &point.after else {
+        let why = if point.reached { "nothing is done behind it" } else { "no way leads here" };
+        head(&place, &label, why, &mut out);
+        return out;
+    };
+    let often = if point.repeated { "each time, " } else { "" };
+    head(&place, &label, &format!("{often}{}", time(&after.elapsed)), &mut out);
+    write(after.kept.iter().map(|f| (f.name.clone(), value(&f.value))).collect(), usize::MAX, &mut out);
+    let (holding, others): (Vec<&Thing>, Vec<&Thing>) = after.things.iter().partition(|t| !t.species.is_empty());
+    write(holding.into_iter().filter_map(|t| held(t, |_| true)).collect(), usize::MAX, &mut out);
+    write(others.into_iter().filter_map(|t| said_of(t, |_| true, usize::MAX)).collect(), usize::MAX, &mut out);
+    out
+}
+
+/// Statements, and the ends of those with blocks, in the order of the text.
+fn rows(points: &Points) -> Vec<Row<'_>> {
+    let mut out: Vec<Row<'_>> = points
+        .points
+        .iter()
+        .filter(|p| !p.block || p.after.is_none())
+        .map(|point| Row { point, ends: false })
+        .chain(points.points.iter().filter(|p| p.block && p.after.is_some()).map(|point| Row { point, ends: true }))
+        .collect();
+    out.sort_by_key(|r| {
+        let span = r.point.span;
+        // An inner block ends before the outer one.
+        (span.file, if r.ends { span.end } else { span.start }, std::cmp::Reverse(span.start))
+    });
+    out
+}
+
+/// What a statement changes, by thing; at the end of a block only what has not been said by the statement before it.
+fn changes(after: &After, before: Option<&After>) -> Vec<(String, String)> {
+    let new = |name: &str, f: &Fact| {
+        let told = before.and_then(|b| b.things.iter().find(|t| t.name == name));
+        let told = told.and_then(|t| t.facts.iter().chain(&t.species).find(|o| o.name == f.name));
+        // What only rounding tells apart reads the same.
+        f.changed && told.is_none_or(|o| value(&o.value) != value(&f.value))
+    };
+    let kept = after.kept.iter().filter(|_| before.is_none()).map(|f| (f.name.clone(), value(&f.value)));
+    let things = after.things.iter().filter_map(|t| said_of(t, |f| new(&t.name, f), MOST_SPECIES));
+    kept.chain(things).collect()
+}
+
+/// What a mixture holds; nothing of an empty one.
+fn held(thing: &Thing, show: impl Fn(&Fact) -> bool) -> Option<(String, String)> {
+    let there = thing.species.iter().any(|s| !is_nothing(&s.value));
+    if there { said_of(thing, show, usize::MAX) } else { None }
+}
+
+/// The facts to be shown of a thing: its members, then its species, then its reagents.
+fn said_of(thing: &Thing, show: impl Fn(&Fact) -> bool, most: usize) -> Option<(String, String)> {
+    let facts: Vec<String> = thing.facts.iter().filter(|f| show(f)).map(fact).collect();
+    let mut species: Vec<&Fact> = thing.species.iter().filter(|f| show(f)).collect();
+    // What is not there is worth saying only where it just went.
+    species.retain(|f| f.changed || !is_nothing(&f.value));
+    if facts.is_empty() && species.is_empty() {
+        return None;
+    }
+    species.sort_by(|a, b| size(&b.value).total_cmp(&size(&a.value)));
+    let rest = species.len().saturating_sub(most);
+    let mut names: Vec<String> = species.iter().take(most).map(|f| fact(f)).collect();
+    if rest > 0 {
+        names.push(format!("{rest} more"));
+    }
+    let touched: Vec<String> =
+        thing.reagents.iter().map(|r| if r.certain { r.name.clone() } else { format!("perhaps {}", r.name) }).collect();
+    let touched = if touched.is_empty() { String::new() } else { format!("touched {}", touched.join(", ")) };
+    let parts = [facts.join(", "), names.join(", "), touched];
+    Some((thing.name.clone(), parts.into_iter().filter(|p| !p.is_empty()).collect::<Vec<_>>().join("; ")))
+}
+
+fn is_nothing(value: &Value) -> bool {
+    matches!(value, Value::Exact(v, _) if *v == 0.0)
+}
+
+/// The largest magnitude that a value may have; what is not known comes last.
+fn size(value: &Value) -> f64 {
+    match value {
+        Value::Exact(v, _) => v.abs(),
+        Value::OneOf(all, _) => all.iter().map(|v| v.abs()).fold(0.0, f64::max),
+        Value::Between(low, high, _) => high.or(*low).map_or(0.0, f64::abs),
+        Value::Words(_) | Value::Unknown => -1.0,
+    }
+}
+
+fn end_of(span: Span) -> Span {
+    Span { start: span.end.saturating_sub(1), ..span }
+}
+
+fn line(span: Span, texts: &mut Texts<'_>) -> String {
+    let Some(text) = texts.get(span.file) else { return String::new() };
+    let (line, _) = text.position(span.start as usize);
+    if span.file.0 == 0 { line.to_string() } else { format!("{}:{line}", text.name()) }
+}
+
+fn head(place: &str, label: &str, time: &str, out: &mut String) {
+    let label = match label.char_indices().nth(STATEMENT) {
+        Some((cut, _)) => format!("{}…", &label[..cut]),
+        None => label.to_string(),
+    };
+    out.push_str(format!("{place:>5}  {label:<width$}  {time}", width = STATEMENT + 1).trim_end());
+    out.push('\n');
+}
+
+/// Names and what is said of them, those of which the same is said together.
+fn write(rows: Vec<(String, String)>, most: usize, out: &mut String) {
+    let groups = together(rows);
+    let shown = if groups.len() > most { most - 1 } else { groups.len() };
+    for (names, said) in &groups[..shown] {
+        out.push_str(&format!("         {names}: {said}\n"));
+    }
+    if shown < groups.len() {
+        out.push_str(&format!("         ... and {} more; `--at` shows all\n", groups.len() - shown));
+    }
+}

@@ -1,0 +1,34 @@
+//! What is known at the statements of a file, shown to people and tools.
+
+mod at;
+mod human;
+mod json;
+mod things;
+mod values;
+
+use matterix_ir::Sources;
+use matterix_ir::points::Points;
+
+pub use at::{Found, Place};
+
+use super::text::Texts;
+
+/// A table of all statements with what each changes.
+pub fn table(points: &Points, sources: &Sources) -> String {
+    human::table(points, &mut Texts::new(sources))
+}
+
+/// Everything that is known after one statement, by its index.
+pub fn all(points: &Points, index: usize, sources: &Sources) -> String {
+    human::all(points, index, &mut Texts::new(sources))
+}
+
+/// One JSON object on a line: what each statement changes, or everything that is known after one.
+pub fn json(points: &Points, only: Option<usize>, sources: &Sources) -> String {
+    json::render(points, only, &mut Texts::new(sources))
+}
+
+/// The statement at a place.
+pub fn find(points: &Points, place: Place, sources: &Sources) -> Found {
+    at::find(points, place, &mut Texts::new(sources))
+}
