@@ -78,7 +78,9 @@ impl Original {
         for d in matterix_lang::check(&mut sources, file, self) {
             match d.severity {
                 Severity::Error => return Err(d.code.name.to_string()),
-                _ => *warnings.entry(d.code.name).or_default() += 1,
+                // Said whether there is a mistake or not.
+                Severity::Advice => {}
+                Severity::Warning => *warnings.entry(d.code.name).or_default() += 1,
             }
         }
         Ok(warnings)

@@ -6,6 +6,7 @@
 
 mod generate;
 mod models;
+mod plate;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,10 +22,10 @@ use matterix_runtime::run::RunOptions;
 fn main() {
     // Cargo adds `--bench`.
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
-    if let [flag, lines] = arguments.as_slice()
+    if let [flag, what] = arguments.as_slice()
         && flag == "generate"
     {
-        print!("{}", generate::program(lines.parse().unwrap()));
+        print!("{}", if what == "plate" { plate::program() } else { generate::program(what.parse().unwrap()) });
         return;
     }
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
@@ -79,6 +80,11 @@ fn check(dir: &Path) {
         let what = format!("matterixc check, {} generated lines", text.lines().count());
         show(&what, &time(repeats, || command(&["check", file.to_str().unwrap()])));
     }
+    let file = dir.join("plate.mtx");
+    let text = plate::program();
+    fs::write(&file, &text).unwrap();
+    let what = format!("matterixc check, {} lines on a plate of 96 wells", text.lines().count());
+    show(&what, &time(31, || command(&["check", file.to_str().unwrap()])));
 }
 
 fn example(name: &str) -> PathBuf {

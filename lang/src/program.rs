@@ -1,6 +1,7 @@
 //! The whole front end: from a file to a program.
 
 use matterix_ir::model::{Content, Mixture, Model, Observable};
+use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, InstanceId, Pose, Scene, Shape};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
@@ -13,6 +14,7 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::names::{self, DeclId, Names, near};
+use crate::points::Questions;
 use crate::task::{self, Given, Task};
 
 /// What a compilation is asked for.
@@ -41,6 +43,16 @@ pub struct Test {
 
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
+    examine(sources, file, loader, Wanted::Findings).0
+}
+
+/// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
+/// A workflow with mistakes that keep it from being followed is left out.
+pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
+    examine(sources, file, loader, Wanted::Contents)
+}
+
+fn examine(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: Wanted) -> (Vec<Diagnostic>, Vec<Points>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -50,7 +62,7 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
     diagnostics.extend(checks::declarations(&tables, sources, root));
     let items = runnable(&names, root);
-    let mut starts = Vec::new();
+    let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
     for item in items.iter().copied() {
         match task::labs(&tables, sources, root, item, &[]) {
@@ -64,12 +76,21 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     for task in &tasks {
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
-    for built in judge(&tables, sources, &tasks) {
+    let mut points = Vec::new();
+    for (task, built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
         diagnostics.extend(built.findings);
         starts.extend(built.starts);
+        // The statements of a test of a workflow are the workflow's.
+        let tests = matches!(names.decl(task.item).item.kind, ItemKind::Test { lab: None, .. });
+        points.extend(built.points.filter(|_| !tests));
+        uses.extend(built.uses);
     }
     if found_all && starts.len() == tasks.len() {
         diagnostics.extend(checks::never_starts(&tables, root, &starts));
+    }
+    if found_all && uses.len() == tasks.len() {
+        diagnostics.extend(checks::things(sources, &uses));
+        diagnostics.extend(checks::reagents(&names, sources, root));
     }
     if items.is_empty() {
         for id in names.declared_by(root) {
@@ -78,7 +99,7 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
             }
         }
     }
-    finish(diagnostics, sources)
+    (finish(diagnostics, sources), points)
 }
 
 /// Compiles one workflow of a file; no program where there is an error.
@@ -134,7 +155,7 @@ fn compile_and<T>(
         }
     };
     let task = Task { item, lab, given };
-    let built = build(&tables, sources, &task, true);
+    let built = build(&tables, sources, &task, Wanted::Program);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -170,7 +191,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let mut program = None;
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
-                let built = build(&tables, sources, &Task { item, lab, given }, true);
+                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program);
                 found.extend(built.findings);
                 program = built.program;
             }
@@ -277,17 +298,30 @@ fn choose_workflow(
     }
 }
 
+/// What a workflow is built for, beside its findings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    /// Nothing more.
+    Findings,
+    /// To be run.
+    Program,
+    /// What is known at every statement.
+    Contents,
+}
+
 /// One workflow, built.
 struct Built {
     program: Option<Program>,
+    points: Option<Points>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
+    uses: Option<checks::Uses>,
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
-fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>]) -> Vec<Built> {
+fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], wanted: Wanted) -> Vec<Built> {
     let judge =
-        |tasks: &[Task<'a>]| -> Vec<Built> { tasks.iter().map(|task| build(tables, sources, task, false)).collect() };
+        |tasks: &[Task<'a>]| -> Vec<Built> { tasks.iter().map(|task| build(tables, sources, task, wanted)).collect() };
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     let share = workflows.len().div_ceil(processors).max(1);
     let (own, others) = workflows.split_at(share.min(workflows.len()));
@@ -307,24 +341,28 @@ fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>]) 
     })
 }
 
-/// Elaborates the lab and lowers the workflow; first to learn what is moved where, then for good. A program comes
-/// of it only where it is `to_run`.
-fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, to_run: bool) -> Built {
+/// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
+/// of it only where it is wanted.
+fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
+    let to_run = wanted == Wanted::Program;
     let lab = task.lab;
     let mut reach = Reach::default();
+    let mut draft = true;
     loop {
         let mut elaborator = Elaborator::new(tables, reach.clone());
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
+        planner.draft = draft;
         let plan = planner.task(task);
         elaborator.initialise();
         elaborator.close_holds();
-        let events = elaborator.events();
+        let mut events = elaborator.events();
         elaborator.close_holds();
         elaborator.processes();
+        events.extend(elaborator.stream_events());
         let next = Reach::compute(&elaborator);
-        if next != reach {
+        if std::mem::take(&mut draft) || next != reach {
             reach = next;
             continue;
         }
@@ -332,10 +370,20 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, to_run:
         let observables = observables(&mut elaborator);
         let mut starts = checks::starts(&elaborator, lab);
         checks::model(&mut elaborator);
-        starts.windows = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events);
+        let questions = (wanted == Wanted::Contents)
+            .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
+        let asked = questions.as_ref().map(|q| q.nodes.as_slice());
+        let (windows, seen) = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
+        starts.windows = windows;
+        let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
         if !to_run {
-            return Built { program: None, findings: elaborator.diagnostics, starts };
+            let item = tables.names.decl(task.item).item;
+            if let ItemKind::Workflow { name, .. } = &item.kind {
+                elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
+            }
+            let uses = checks::uses(&elaborator, sources, lab, &plan);
+            return Built { program: None, points, findings: elaborator.diagnostics, starts, uses };
         }
         let mixtures = mixtures(&elaborator, &observables);
         let scene = scene(&mut elaborator, lab);
@@ -360,7 +408,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, to_run:
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
-        return Built { program: Some(program), findings: elaborator.diagnostics, starts };
+        return Built { program: Some(program), points: None, findings: elaborator.diagnostics, starts, uses: None };
     }
 }
 

@@ -1,27 +1,34 @@
 //! What would go wrong, one family of checks a file.
 
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 
 mod consequences;
 mod declarations;
+mod failures;
 mod flow;
 mod ignored;
 mod kinetics;
 mod mixing;
+mod pages;
 mod time;
+mod unused;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::Plan;
-use matterix_ir::{Diagnostic, Severity, Sources};
+use matterix_ir::{Diagnostic, NodeId, Severity, Sources};
 
 use self::flow::Window;
+pub use self::flow::{After, Known, Seen};
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::ReactionId;
-use crate::names::DeclId;
+use crate::names::{self, DeclId};
 
 pub use consequences::without_consequences;
 pub use declarations::{bind, declarations};
+pub use failures::{undeclared, unhandled};
+pub use unused::{Uses, reagents, things, uses};
 
 /// Checks a lab that no workflow of its file uses.
 pub fn lab(tables: &Tables<'_>, id: DeclId) -> Vec<Diagnostic> {
@@ -50,24 +57,58 @@ pub fn model(lab: &mut Elaborator<'_>) {
 
 pub use kinetics::{Starts, never_starts, starts};
 
-/// Checks the plan against what is known before the run.
+/// Checks the plan against what is known before the run. What is known of the nodes in `asked` is given back for the
+/// start and for every statement.
 pub fn plan(
     lab: &mut Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
     derivatives: &[Derivative],
     events: &[Event],
-) -> Option<BTreeMap<ReactionId, Window>> {
-    mixing::mixing(lab, plan);
-    time::plan(lab, plan, derivatives, events);
+    asked: Option<&[NodeId]>,
+) -> (Option<BTreeMap<ReactionId, Window>>, Vec<Seen>) {
     // What is not whole cannot be followed.
     let whole = |d: &Diagnostic| d.severity != Severity::Error || matches!(d.code.family, "S1" | "H1" | "M1");
+    let is_whole = lab.diagnostics.iter().all(whole);
+    let ready = mixing::ready(lab);
+    let about = &*lab;
+    let meets = move || {
+        let mut found = ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, ready));
+        found.extend(time::plan(about, plan, derivatives, events));
+        found
+    };
+    let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
+    let (found, followed) = match plan.steps.len() >= LARGE {
+        true => side_by_side(meets, follow),
+        false => (meets(), None),
+    };
+    found.into_iter().for_each(|d| lab.report(d));
     if !lab.diagnostics.iter().all(whole) {
-        return None;
+        return (None, Vec::new());
     }
-    let (found, windows) = flow::check(lab, sources, plan, events, derivatives);
+    let about = &*lab;
+    let follow = || flow::check(about, sources, plan, events, derivatives, asked);
+    let flow::Followed { found, windows, seen } = followed.unwrap_or_else(follow);
     for d in found {
         lab.report(d);
     }
-    Some(windows)
+    (Some(windows), seen)
+}
+
+/// Plans of fewer steps are judged faster by one thread than a second one starts.
+const LARGE: usize = 300;
+
+/// Does two things at the same time, or one after the other where there is no thread to be had.
+fn side_by_side<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
+    let task = Mutex::new(Some(one));
+    let perform = || task.lock().ok().and_then(|mut task| task.take()).map(|one| one()).unwrap_or_default();
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(names::STACK).spawn_scoped(scope, perform);
+        let other = other();
+        match thread.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(one)) => (one, other),
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => (perform(), other),
+        }
+    })
 }

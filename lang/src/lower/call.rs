@@ -1,5 +1,7 @@
 //! Calls: which skill or command a verb means, and its arguments.
 
+use std::sync::Arc;
+
 use matterix_ir::plan::{Argument, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 
@@ -28,6 +30,7 @@ impl<'a> Planner<'a, '_> {
     /// Lowers a call; gives its node and, for a skill with a result, the value.
     pub fn call(&mut self, call: &'a Call, span: Span, scope: &mut Scope) -> Option<(StepId, Option<Value>)> {
         let (verbs, count) = self.find_verb(call, scope)?;
+        let said = self.said_of_sources(call, scope);
         let bare = call.words.get(count);
         let object = match (bare, &call.object) {
             (Some(word), None) => {
@@ -47,6 +50,7 @@ impl<'a> Planner<'a, '_> {
         let verb_span = call.words.first().map_or(call.span, |w| w.span.to(call.words[count - 1].span));
         let verb = self.choose(&verbs, &object, call, verb_span, scope)?;
         self.lab.verbs.insert(call.span, verb.clone());
+        self.said = said;
         match verb {
             Verb::Skill(id) => self.skill(id, call, object, span, scope),
             Verb::Command(owner, m) => self.command(owner, m, call, object, span, scope).map(|s| (s, None)),
@@ -83,15 +87,7 @@ impl<'a> Planner<'a, '_> {
         {
             out.push(Verb::Skill(id));
         }
-        for (id, kind) in &self.lab.tables.kinds {
-            for m in kind.members.iter().filter(|m| m.owner == *id) {
-                if let MemberKind::Command { sig, .. } = &m.member.kind
-                    && verb_text(&sig.verb) == verb
-                {
-                    out.push(Verb::Command(*id, *m));
-                }
-            }
-        }
+        out.extend(self.lab.tables.commands(verb).iter().map(|m| Verb::Command(m.owner, *m)));
         out
     }
 
@@ -555,15 +551,18 @@ impl<'a> Planner<'a, '_> {
         let declares = slot.is_some();
         self.results.push(slot);
         let outer_handlers = std::mem::take(&mut self.handlers);
+        let said = std::mem::take(&mut self.said);
         let asked = self.asked(sig, clauses, inner);
         let (needs, invariants, promises, takes) = self.contract(clauses, inner);
         let needs: Vec<_> = asked.into_iter().chain(needs).collect();
-        // What can never begin is not written out: its steps may make no sense.
+        // What can never begin is not written out: its steps may make no sense. What is in the sources is known only once
+        // all steps are.
         let never = !self.lab.prototype && needs.iter().any(|n| self.lab.graph.constant(n.node) == Some(0.0));
         let steps = match never {
             true => self.add("sequence", body.span, Step::Sequence(Vec::new())),
             false => self.block(body, inner),
         };
+        let needs: Vec<_> = said.into_iter().map(Arc::new).chain(needs).collect();
         let verb = verb_text(&sig.verb);
         let step = Step::Skill { verb: verb.clone(), needs, invariants, promises, takes, body: steps };
         let id = self.add(label, span, step);

@@ -19,7 +19,7 @@ impl Planner<'_, '_> {
             let id = InstanceId(i);
             for m in self.lab.all_members(id) {
                 let MemberKind::Limit { at_end: when, cond, failure, help } = &m.member.kind else { continue };
-                if *when != at_end {
+                if *when != at_end || self.is_drafted(cond.span) {
                     continue;
                 }
                 let Some(condition) = self.condition(cond, &mut Scope::of_member(id, m)) else { continue };

@@ -1,6 +1,8 @@
 //! Lowering: a workflow becomes the plan, skills written out where they are called.
 
 mod call;
+mod clauses;
+mod holds;
 mod limits;
 mod operation;
 pub mod roles;
@@ -11,9 +13,10 @@ pub use call::Verb;
 
 use std::collections::BTreeSet;
 
-use matterix_ir::plan::{Local, Plan, PlanStep, Step, StepId};
+use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Sources, Span, Unit};
 
+use self::clauses::Clauses;
 use crate::ast::{Block, Handlers, ItemKind};
 use crate::elaborate::Elaborator;
 use crate::eval::{Scope, Type, Value};
@@ -42,6 +45,13 @@ pub struct Planner<'a, 'e> {
     pub failures: BTreeSet<String>,
     /// Jobs started so far.
     pub jobs: BTreeSet<String>,
+    /// What the call that is being written out says of its sources.
+    pub said: Vec<Condition>,
+    /// Only what the plan moves where is asked for, not how it reads or what it needs.
+    pub draft: bool,
+    clauses: Clauses,
+    /// Clauses and limits that a draft has looked at.
+    drafted: BTreeSet<Span>,
 }
 
 /// Where a skill's result goes.
@@ -76,6 +86,10 @@ impl<'a, 'e> Planner<'a, 'e> {
             handlers: 0,
             failures,
             jobs: BTreeSet::new(),
+            said: Vec::new(),
+            draft: false,
+            clauses: Clauses::default(),
+            drafted: BTreeSet::new(),
         }
     }
 
@@ -111,7 +125,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         self.lab.readings_live = false;
         let name = crate::names::item_name(decl.item).map(|n| n.0).unwrap_or_default();
         let limits = self.limits(false);
-        self.note_limits(&limits);
+        if !self.draft {
+            self.note_limits(&limits);
+        }
         // A test may leave things as it likes.
         let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
         Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
@@ -131,6 +147,11 @@ impl<'a, 'e> Planner<'a, 'e> {
         *shown = self.workflow_parameters(params, given, scope);
         self.lab.readings_live = true;
         self.guarded(&name.text, name.span, body, handlers, scope)
+    }
+
+    /// Whether a draft need not look at a clause or limit: it has seen it elsewhere, which tells it what is asked for.
+    fn is_drafted(&mut self, clause: Span) -> bool {
+        self.draft && !self.drafted.insert(clause)
     }
 
     /// Adds a node.

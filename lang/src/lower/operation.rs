@@ -1,6 +1,7 @@
 //! Leaves: commands of devices and primitive skills, with what they need, change and take.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption, Step, StepId, Takes};
@@ -9,6 +10,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Planner;
 use super::call::Bound;
+use super::clauses::Outcome;
 use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, MemberKind, Sig};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
@@ -76,12 +78,13 @@ impl<'a> Planner<'a, '_> {
         inner: &mut Scope,
     ) -> Option<(Operation, Vec<Condition>)> {
         let mut invariants = Vec::new();
+        let said = std::mem::take(&mut self.said);
         let mut operation = Operation {
             verb: verb_text(&sig.verb),
             capability: None,
             device: None,
             arguments: self.driver_arguments(bound),
-            needs: self.asked(sig, clauses, inner),
+            needs: said.into_iter().map(Arc::new).chain(self.asked(sig, clauses, inner)).collect(),
             presumes: Vec::new(),
             at_start: Vec::new(),
             at_end: Vec::new(),
@@ -91,45 +94,84 @@ impl<'a> Planner<'a, '_> {
             fails: Vec::new(),
             limits: Vec::new(),
         };
+        // What can never begin is written out in silence: what it would do may make no sense.
+        let mut sound = None;
         for clause in clauses {
-            match &clause.kind {
-                ClauseKind::Needs { .. } => operation.needs.push(self.need(clause, inner)?),
-                ClauseKind::Presumes { ever, .. } => {
-                    let condition = self.need(clause, inner)?;
-                    operation.presumes.push(Presumption { condition, ever: *ever });
-                }
-                ClauseKind::While(e) => invariants.push(self.condition(e, inner)?),
-                ClauseKind::Fails(names) => operation.fails.extend(names.iter().map(|n| n.text.clone())),
-                ClauseKind::Until(e) => operation.until = Some(self.condition(e, inner)?),
-                ClauseKind::Takes { nominal, bounds } => {
-                    operation.takes = Some(self.takes(nominal, bounds.as_ref(), inner)?);
-                }
-                ClauseKind::Effect(effects) => {
-                    for effect in effects {
-                        operation.at_end.extend(self.effect(effect, clause.span, inner));
+            if matches!(clause.kind, ClauseKind::Option(_) | ClauseKind::Says { .. }) {
+                continue;
+            }
+            if let ClauseKind::Fails(names) = &clause.kind {
+                operation.fails.extend(names.iter().map(|n| n.text.clone()));
+                continue;
+            }
+            if !matches!(clause.kind, ClauseKind::Effect(_)) && self.is_drafted(clause.span) {
+                continue;
+            }
+            match (self.outcome(clause, inner, |this, inner| this.clause(clause, inner))?, &clause.kind) {
+                (Outcome::Condition(need), ClauseKind::Needs { .. }) => {
+                    let never = !self.lab.prototype && self.lab.graph.constant(need.node) == Some(0.0);
+                    operation.needs.push(need);
+                    if never && sound.is_none() {
+                        sound = Some(self.lab.diagnostics.len());
                     }
                 }
-                ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
+                (Outcome::Condition(c), ClauseKind::Presumes { ever, .. }) => {
+                    operation.presumes.push(Presumption { condition: Arc::unwrap_or_clone(c), ever: *ever });
+                }
+                (Outcome::Condition(c), ClauseKind::Until(_)) => operation.until = Some(Arc::unwrap_or_clone(c)),
+                (Outcome::Condition(c), _) => invariants.push(Arc::unwrap_or_clone(c)),
+                (Outcome::Takes(takes), _) => operation.takes = Some(takes),
+                (Outcome::Effect(actions), _) => operation.at_end.extend(actions),
             }
+        }
+        if let Some(sound) = sound {
+            self.lab.diagnostics.truncate(sound);
         }
         operation.claims = self.claims(&operation.at_end);
         Some((operation, invariants))
     }
 
+    /// What comes of a clause of an operation that says something of it; none where it is wrong.
+    fn clause(&mut self, clause: &'a Clause, inner: &mut Scope) -> Option<Outcome> {
+        Some(match &clause.kind {
+            ClauseKind::Needs { .. } | ClauseKind::Presumes { .. } => {
+                Outcome::Condition(Arc::new(self.need(clause, inner)?))
+            }
+            ClauseKind::While(e) | ClauseKind::Until(e) => Outcome::Condition(Arc::new(self.condition(e, inner)?)),
+            ClauseKind::Takes { nominal, bounds } => Outcome::Takes(self.takes(nominal, bounds.as_ref(), inner)?),
+            ClauseKind::Effect(effects) => {
+                Outcome::Effect(effects.iter().flat_map(|e| self.effect(e, clause.span, inner)).collect())
+            }
+            ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => return None,
+        })
+    }
+
     /// What the types of the parameters ask for with `where`.
-    pub fn asked(&mut self, sig: &'a Sig, clauses: &'a [Clause], inner: &mut Scope) -> Vec<Condition> {
+    pub fn asked(&mut self, sig: &'a Sig, clauses: &'a [Clause], inner: &mut Scope) -> Vec<Arc<Condition>> {
         let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
         let options = clauses.iter().filter_map(|c| match &c.kind {
             ClauseKind::Option(p) => Some(p),
             _ => None,
         });
-        groups.chain(options).filter_map(super::roles::condition_of).filter_map(|e| self.condition(e, inner)).collect()
+        let asked = groups.chain(options).filter_map(super::roles::condition_of);
+        asked.filter_map(|e| self.condition(e, inner)).map(Arc::new).collect()
     }
 
     fn effect(&mut self, effect: &'a Effect, span: Span, inner: &mut Scope) -> Vec<Action> {
         match effect {
             Effect::Assign(target, value) => self.lab.assignment(target, value, None, inner).into_iter().collect(),
             Effect::Call(call) => self.lab.call_actions(call, span, inner),
+            Effect::Each { var, set, effects } => {
+                let mut out = Vec::new();
+                for item in self.lab.set(set, inner).unwrap_or_default() {
+                    inner.bind(var.text.clone(), item);
+                    for effect in effects {
+                        out.extend(self.effect(effect, span, inner));
+                    }
+                    inner.vars.pop();
+                }
+                out
+            }
         }
     }
 
@@ -186,11 +228,11 @@ impl<'a> Planner<'a, '_> {
         &mut self,
         clauses: &'a [Clause],
         inner: &mut Scope,
-    ) -> (Vec<Condition>, Vec<Condition>, Vec<Condition>, Option<Takes>) {
+    ) -> (Vec<Arc<Condition>>, Vec<Condition>, Vec<Condition>, Option<Takes>) {
         let (mut needs, mut invariants, mut promises, mut takes) = (Vec::new(), Vec::new(), Vec::new(), None);
         for clause in clauses {
             match &clause.kind {
-                ClauseKind::Needs { .. } => needs.extend(self.need(clause, inner)),
+                ClauseKind::Needs { .. } => needs.extend(self.need(clause, inner).map(Arc::new)),
                 ClauseKind::Presumes { .. } => self.lab.report(Diagnostic::error(
                     codes::MISPLACED,
                     clause.span,
@@ -218,17 +260,22 @@ impl<'a> Planner<'a, '_> {
 
     /// An effect of a skill with a body is a promise: the place has the value when the body ends.
     fn promise(&mut self, effect: &'a Effect, inner: &mut Scope) -> Option<Condition> {
-        let Effect::Assign(target, value) = effect else {
-            if let Effect::Call(e) = effect {
-                let d = crate::eval::types::unsupported(e.span, "promised transfers");
-                self.lab.report(d);
+        let (target, value) = match effect {
+            Effect::Assign(target, value) => (target, value),
+            Effect::Call(e) => {
+                self.lab.report(crate::eval::types::unsupported(e.span, "promised transfers"));
+                return None;
             }
-            return None;
+            Effect::Each { set, .. } => {
+                self.lab.report(crate::eval::types::unsupported(set.span, "promises of each of a set"));
+                return None;
+            }
         };
         let (a, b) = self.lab.sides(target, value, inner);
         let Value::Bool(node) = self.lab.compare(Binary::Eq, a, b, target.span, value.span) else { return None };
         let span = target.span.to(value.span);
-        Some(Condition { node, text: self.text(span), span, compared: Vec::new(), terms: Vec::new(), refusal: None })
+        let text = self.text(span);
+        Some(Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() })
     }
 }
 
@@ -269,8 +316,12 @@ impl<'a> Planner<'a, '_> {
             }
             Some(body) => {
                 self.open.push(id);
-                self.skill_body(sig, clauses, body, handlers, "", sig.span, &mut scope);
+                let lowered = self.skill_body(sig, clauses, body, handlers, "", sig.span, &mut scope);
                 self.open.pop();
+                if let Some((root, _)) = lowered {
+                    let found = crate::check::undeclared(sig, clauses, decl.item.span, &self.steps, root);
+                    found.into_iter().for_each(|d| self.lab.report(d));
+                }
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::plan::{Condition, Refusal};
+use matterix_ir::plan::{Comparison, Condition, Refusal};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, Text, TextPart, codes};
 
@@ -13,7 +13,8 @@ use crate::eval::{Scope, Value};
 use crate::names::{Names, near, verb_text};
 
 /// Failures the executor itself raises, and `failure`, which stands for all.
-const BUILT_IN: &[&str] = &["timeout", "broken", "late", "max", "need", "promise", "claimed", "job", "failure"];
+const BUILT_IN: &[&str] =
+    &["timeout", "broken", "late", "max", "need", "promise", "claimed", "job", "wrong_reagent", "failure"];
 
 /// Every failure that a `fails` clause declares.
 pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
@@ -50,6 +51,9 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
 impl<'a> Planner<'a, '_> {
     /// The source under a span on one line, shortened.
     pub fn text(&self, span: Span) -> String {
+        if self.draft {
+            return String::new();
+        }
         let text = self.sources.slice(span).split_whitespace().collect::<Vec<_>>().join(" ");
         if text.chars().count() <= 100 { text } else { text.chars().take(97).chain("...".chars()).collect() }
     }
@@ -57,7 +61,7 @@ impl<'a> Planner<'a, '_> {
     /// A call in a skill with its arguments in place of the parameters' names; none where that cannot be said before
     /// the run, and outside skills, where the text says it.
     pub fn call_label(&self, sig: &Sig, bound: &Bound, device: Option<(InstanceId, bool)>) -> Option<String> {
-        if self.open.is_empty() || self.lab.prototype {
+        if self.open.is_empty() || self.lab.prototype || self.draft {
             return None;
         }
         let shown = |p: &Param| {
@@ -96,17 +100,29 @@ impl<'a> Planner<'a, '_> {
     pub fn condition(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Condition> {
         self.lab.comparisons.clear();
         self.lab.terms.clear();
+        self.lab.asked_of.clear();
+        self.lab.absent.clear();
         let node = self.lab.truth(e, scope)?;
+        let absent = std::mem::take(&mut self.lab.absent);
+        if !absent.is_empty() {
+            self.lab.absent_in.insert(e.span, absent);
+        }
         let compared = std::mem::take(&mut self.lab.comparisons);
-        let compared = compared
-            .into_iter()
-            .map(|(span, mut c)| {
-                c.text = self.text(span);
-                c
-            })
-            .collect();
         let terms = std::mem::take(&mut self.lab.terms);
-        Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None })
+        let each = std::mem::take(&mut self.lab.asked_of);
+        let each = each.into_iter().map(|asked| {
+            let compared = self.in_words(asked.compared);
+            let (node, text, terms) = (asked.node, asked.of, asked.terms);
+            Condition { node, text, span: e.span, compared, terms, refusal: None, each: Vec::new() }
+        });
+        let each = each.collect();
+        let compared = self.in_words(compared);
+        Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None, each })
+    }
+
+    /// Comparisons with what is compared as it is written.
+    fn in_words(&self, compared: Vec<(Span, Comparison)>) -> Vec<Comparison> {
+        compared.into_iter().map(|(span, c)| Comparison { text: self.text(span), ..c }).collect()
     }
 
     /// What a `needs` or `presumes` clause asks, with the failure and the help it names.

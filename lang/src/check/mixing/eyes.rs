@@ -2,9 +2,11 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
+use matterix_ir::graph::apply;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Env, NodeId, Op, graph};
+use matterix_ir::{NodeId, Op};
 
 use super::world::World;
 use crate::elaborate::{Elaborator, SpeciesId};
@@ -14,8 +16,12 @@ pub struct Eyes<'l, 'a> {
     /// The lab.
     pub lab: &'l Elaborator<'a>,
     params: Vec<f64>,
-    readings: Vec<f64>,
-    values: RefCell<Vec<f64>>,
+    /// Operations below nodes, operands first, as far as they were asked for.
+    cones: RefCell<Vec<Option<Rc<[NodeId]>>>>,
+    /// Values of the operations of the node evaluated last, and whether they are known.
+    values: RefCell<(Vec<f64>, Vec<bool>)>,
+    /// By state: whether time changes it.
+    moving: Vec<bool>,
     /// The mixtures in the order in which actions number them.
     pub order: Vec<InstanceId>,
     /// The amount states of each mixture.
@@ -44,8 +50,9 @@ impl<'l, 'a> Eyes<'l, 'a> {
         Eyes {
             lab,
             params: lab.params.iter().map(|p| p.value).collect(),
-            readings: vec![f64::NAN; lab.readings.len()],
-            values: RefCell::new(vec![0.0; lab.graph.ops().len()]),
+            cones: RefCell::new(vec![None; lab.graph.ops().len()]),
+            values: RefCell::new((vec![0.0; lab.graph.ops().len()], vec![false; lab.graph.ops().len()])),
+            moving: (0..lab.states.len() as u32).map(|state| lab.rates.contains_key(&state)).collect(),
             order,
             counted: amounts.values().flatten().map(|a| a.1).collect(),
             lineage: lab.lineage.iter().map(|((m, _), state)| (*state, *m)).collect(),
@@ -56,45 +63,55 @@ impl<'l, 'a> Eyes<'l, 'a> {
 
     /// A value at a point of the plan; not a number where it depends on what only a run knows.
     pub fn value(&self, node: NodeId, world: &World) -> f64 {
-        let env = Env {
-            time: f64::NAN,
-            states: &world.states,
-            params: &self.params,
-            locals: &world.locals,
-            readings: &self.readings,
-        };
-        let mut values = self.values.borrow_mut();
-        for n in self.lab.graph.schedule([node]) {
-            values[n.0 as usize] = graph::eval_op(self.lab.graph.op(n), env, &values);
-        }
-        values[node.0 as usize]
+        self.look(node, world, |_| false).0
     }
 
     /// Whether a condition holds at a point of the plan, if that is known there.
     pub fn truth(&self, node: NodeId, world: &World) -> Option<bool> {
-        self.truth_where(node, world, |state| self.moving(state))
+        let (value, known) = self.look(node, world, |state| self.moving(state));
+        known.then_some(value != 0.0)
     }
 
     /// The same, with the amounts that transfers have left, whatever has reacted since.
     pub fn nominal_truth(&self, node: NodeId, world: &World) -> Option<bool> {
-        self.truth_where(node, world, |state| self.moving(state) && !self.counted.contains(&state))
+        let (value, known) = self.look(node, world, |state| self.moving(state) && !self.counted.contains(&state));
+        known.then_some(value != 0.0)
     }
 
-    fn truth_where(&self, node: NodeId, world: &World, moving: impl Fn(u32) -> bool) -> Option<bool> {
-        // A comparison with what is not known is false, which says nothing.
-        let unknown = |op: &Op| match op {
-            Op::Time | Op::Reading(_) => true,
-            Op::State(i) => world.states[*i as usize].is_nan() || moving(*i),
-            Op::Local(i) => world.locals.get(*i as usize).is_none_or(|v| v.is_nan()),
-            Op::Param(i) => self.params[*i as usize].is_nan(),
-            _ => false,
+    /// A value, and whether it is known: a comparison with what is not known is false, which says nothing.
+    fn look(&self, node: NodeId, world: &World, moving: impl Fn(u32) -> bool) -> (f64, bool) {
+        let leaf = |op: Op| match op {
+            Op::Const(v) => v,
+            Op::State(i) => world.states[i as usize],
+            Op::Param(i) => self.params[i as usize],
+            Op::Local(i) => world.locals.get(i as usize).copied().unwrap_or(f64::NAN),
+            _ => f64::NAN,
         };
-        (!self.lab.graph.depends(node, unknown)).then(|| self.value(node, world) != 0.0)
+        let graph = &self.lab.graph;
+        let (values, known) = &mut *self.values.borrow_mut();
+        for n in self.cone(node).iter() {
+            let op = graph.op(*n);
+            let value = apply(op, leaf, |o| values[o.0 as usize]);
+            let is_known = match op {
+                Op::Const(_) => true,
+                Op::State(i) => !value.is_nan() && !moving(i),
+                Op::Time | Op::Reading(_) | Op::Local(_) | Op::Param(_) => !value.is_nan(),
+                _ => op.operands().all(|o| known[o.0 as usize]),
+            };
+            (values[n.0 as usize], known[n.0 as usize]) = (value, is_known);
+        }
+        (values[node.0 as usize], known[node.0 as usize])
+    }
+
+    /// What a node depends on; found once.
+    fn cone(&self, node: NodeId) -> Rc<[NodeId]> {
+        let find = || self.lab.graph.schedule([node]).into();
+        self.cones.borrow_mut()[node.0 as usize].get_or_insert_with(find).clone()
     }
 
     /// Whether time changes a state.
     fn moving(&self, state: u32) -> bool {
-        self.lab.rates.contains_key(&state)
+        self.moving.get(state as usize).copied().unwrap_or_default()
     }
 
     /// Sum of the masses in a mixture, kg.

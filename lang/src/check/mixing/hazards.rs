@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Domain;
-use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_ir::{Diagnostic, Severity, Span, codes};
 
 use super::Walk;
 use super::world::World;
@@ -30,6 +30,24 @@ impl Hazards {
 }
 
 impl Walk<'_, '_> {
+    /// Judges the hazards that are there whatever is done: of things as they are, said once for each declaration.
+    pub(super) fn endangered(&mut self, world: &World) {
+        for hazard in self.hazards.all.iter().filter(|h| h.states.is_empty()) {
+            let mut thing = hazard.about;
+            while let Some(owner) = thing.and_then(|id| self.eyes.lab.instances[id.0 as usize].owner) {
+                thing = Some(owner);
+            }
+            let place = thing.map_or(self.place(), |id| self.eyes.lab.instances[id.0 as usize].span);
+            if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
+                continue;
+            }
+            let d = self.hazard(hazard, world, place, "declared here");
+            if !self.found.iter().any(|f| f.span() == d.span() && f.code == d.code) {
+                self.found.push(d);
+            }
+        }
+    }
+
     /// Judges the hazards that depend on states that a step changed.
     pub(super) fn endanger(&mut self, world: &mut World) {
         let changed = world.take_changed();
@@ -44,7 +62,7 @@ impl Walk<'_, '_> {
             if self.hazards.present.contains(&i) {
                 continue;
             }
-            let d = self.hazard(hazard, world);
+            let d = self.hazard(hazard, world, self.place(), "brings it about");
             self.hazards.present.insert(i);
             if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
                 self.found.push(d);
@@ -52,14 +70,13 @@ impl Walk<'_, '_> {
         }
     }
 
-    fn hazard(&self, hazard: &Hazard, world: &World) -> Diagnostic {
-        let place = self.place();
+    fn hazard(&self, hazard: &Hazard, world: &World, place: Span, said: &str) -> Diagnostic {
         let words = hazard.name.replace('_', " ");
         let code = codes::find(&hazard.name.replace('_', "-")).unwrap_or(codes::HAZARD);
         let about = hazard.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
         let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
         let headline = format!("{words}: {}", things.join(" and "));
-        let mut d = Diagnostic::error(code, place, headline, "brings it about");
+        let mut d = Diagnostic::error(code, place, headline, said);
         if !hazard.grave {
             d.severity = Severity::Warning;
         }

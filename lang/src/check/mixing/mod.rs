@@ -40,25 +40,34 @@ pub fn contents(lab: &mut Elaborator<'_>) {
         limits: Vec::new(),
         ends: Vec::new(),
     };
-    mixing(lab, &plan);
+    if let Some(ready) = ready(lab) {
+        let found = mixing(lab, &plan, ready);
+        found.into_iter().for_each(|d| lab.report(d));
+    }
+}
+
+/// What is looked up in a lab before a plan is followed.
+pub struct Ready {
+    materials: BTreeMap<InstanceId, DeclId>,
+    hazards: Hazards,
+}
+
+/// Makes a lab ready; none where contents and transfers are not right, as one cannot tell then what meets.
+pub fn ready(lab: &mut Elaborator<'_>) -> Option<Ready> {
+    let right = !lab.diagnostics.iter().any(|d| d.severity == Severity::Error);
+    right.then(|| Ready { materials: materials(lab), hazards: Hazards::new(lab.hazards()) })
 }
 
 /// Judges what a plan brings together.
-pub fn mixing(lab: &mut Elaborator<'_>, plan: &Plan) {
-    // Contents and transfers must be right before one can tell what meets.
-    if lab.diagnostics.iter().any(|d| d.severity == Severity::Error) {
-        return;
-    }
-    let materials = materials(lab);
-    let hazards = Hazards::new(lab.hazards());
+pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, ready: Ready) -> Vec<Diagnostic> {
     let eyes = Eyes::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
     let mut walk = Walk {
-        silent: moves_of_plan(plan, &eyes.order),
+        by_event: moves_of_events(&eyes, plan),
         eyes: &eyes,
-        materials,
-        hazards,
+        materials: ready.materials,
+        hazards: ready.hazards,
         plan,
         library,
         places: vec![plan.get(plan.root).span],
@@ -71,12 +80,10 @@ pub fn mixing(lab: &mut Elaborator<'_>, plan: &Plan) {
     };
     let mut world = World::initial(&eyes, plan.locals.len());
     walk.begin(&mut world);
+    walk.endangered(&world);
     walk.endanger(&mut world);
     walk.step(plan.root, world);
-    let found = walk.found;
-    for d in found {
-        lab.report(d);
-    }
+    walk.found
 }
 
 /// The transfers between mixtures that operations make themselves.
@@ -93,6 +100,13 @@ fn moves_of_plan(plan: &Plan, order: &[InstanceId]) -> BTreeSet<(InstanceId, Ins
         }
     }
     out
+}
+
+/// The transfers that events make between mixtures.
+fn moves_of_events(eyes: &Eyes<'_, '_>, plan: &Plan) -> BTreeSet<(InstanceId, InstanceId)> {
+    let by_plan = moves_of_plan(plan, &eyes.order);
+    let by_process: BTreeSet<_> = eyes.lab.streams.keys().map(|(_, from, to)| (*from, *to)).collect();
+    eyes.lab.moves.iter().filter(|m| !by_process.contains(m) && !by_plan.contains(m)).copied().collect()
 }
 
 /// What the walls around mixtures are made of: the first parameter that is a material of what holds them.
@@ -127,8 +141,8 @@ struct Walk<'w, 'a> {
     materials: BTreeMap<InstanceId, DeclId>,
     hazards: Hazards,
     plan: &'w Plan,
-    /// Transfers that operations make; the others are made by processes and events.
-    silent: BTreeSet<(InstanceId, InstanceId)>,
+    /// Transfers that events make: those that neither operations nor processes do.
+    by_event: BTreeSet<(InstanceId, InstanceId)>,
     library: BTreeSet<FileId>,
     /// Places in the user's text around the current step, innermost last.
     places: Vec<Span>,
@@ -300,17 +314,13 @@ impl Walk<'_, '_> {
     /// Transfers that processes and events make from now on.
     fn streams(&mut self, world: &mut World) {
         let lab = self.eyes.lab;
-        let mut active: BTreeSet<(InstanceId, InstanceId)> = BTreeSet::new();
-        let mut by_process: BTreeSet<(InstanceId, InstanceId)> = BTreeSet::new();
-        for (process, from, to) in &lab.streams {
-            by_process.insert((*from, *to));
+        let mut active = self.by_event.clone();
+        for (process, from, to) in lab.streams.keys() {
             let guard = lab.processes.get(*process).and_then(|p| p.guard);
             if guard.is_none_or(|g| self.eyes.truth(g, world) != Some(false)) {
                 active.insert((*from, *to));
             }
         }
-        let by_event = lab.moves.iter().filter(|m| !by_process.contains(m) && !self.silent.contains(m));
-        active.extend(by_event);
         // One stream may feed the next.
         for _ in 0..active.len() {
             let mut changed = false;

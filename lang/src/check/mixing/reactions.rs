@@ -1,5 +1,7 @@
 //! What reactions can make of what has met.
 
+use std::rc::Rc;
+
 use matterix_ir::Span;
 use matterix_ir::scene::InstanceId;
 
@@ -11,7 +13,8 @@ impl World {
     pub fn react(&mut self, lab: &Elaborator<'_>, m: InstanceId, step: Span) -> Vec<SpeciesId> {
         let mut made = Vec::new();
         loop {
-            let Some(entries) = self.mixtures.get_mut(&m) else { return made };
+            let Some(shared) = self.mixtures.get_mut(&m) else { return made };
+            let entries = &**shared;
             let mut new: Vec<(SpeciesId, Option<f64>)> = Vec::new();
             let mut used: Vec<SpeciesId> = Vec::new();
             for r in &lab.tables.reactions {
@@ -46,6 +49,10 @@ impl World {
                     used.extend(sources);
                 }
             }
+            if new.is_empty() && used.is_empty() {
+                return made;
+            }
+            let entries = Rc::make_mut(shared);
             for s in used {
                 // It may be used up by now.
                 if let Some(e) = entries.get_mut(&s) {

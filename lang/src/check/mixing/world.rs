@@ -1,11 +1,13 @@
 //! What each mixture holds while the plan is followed: every species that got there, how concentrated, and on which way.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use matterix_ir::Span;
 use matterix_ir::model::Action;
 use matterix_ir::scene::InstanceId;
 
+use super::super::pages::Pages;
 use super::eyes::Eyes;
 use crate::elaborate::SpeciesId;
 use crate::screen::Presence;
@@ -32,12 +34,15 @@ pub struct Entry {
     pub came: Vec<Came>,
 }
 
+/// What a mixture holds; shared between points of the plan as long as it stays the same.
+pub type Contents = Rc<BTreeMap<SpeciesId, Entry>>;
+
 /// What two mixtures held before a transfer.
 pub struct Before {
     /// Where it comes from.
-    pub source: BTreeMap<SpeciesId, Entry>,
+    pub source: Contents,
     /// Where it goes.
-    pub target: BTreeMap<SpeciesId, Entry>,
+    pub target: Contents,
 }
 
 /// A transfer of less is what rounding leaves, kg.
@@ -50,13 +55,13 @@ const HISTORY: usize = 4;
 #[derive(Clone, Debug)]
 pub struct World {
     /// By mixture.
-    pub mixtures: BTreeMap<InstanceId, BTreeMap<SpeciesId, Entry>>,
+    pub mixtures: BTreeMap<InstanceId, Contents>,
     /// By state index; not a number where it is not known.
-    pub states: Vec<f64>,
+    pub states: Pages<f64>,
     /// By the index of kept values; not a number where it is not known.
     pub locals: Vec<f64>,
-    /// The step that last assigned a state.
-    set: BTreeMap<u32, Span>,
+    /// The step that last assigned a state, by its index.
+    set: Pages<Option<Span>>,
     /// States changed since they were last asked for.
     changed: BTreeSet<u32>,
 }
@@ -67,9 +72,9 @@ impl World {
         let lab = eyes.lab;
         let mut world = World {
             mixtures: BTreeMap::new(),
-            states: vec![f64::NAN; lab.states.len()],
+            states: lab.states.iter().map(|_| f64::NAN).collect(),
             locals: vec![f64::NAN; locals],
-            set: BTreeMap::new(),
+            set: lab.states.iter().map(|_| None).collect(),
             changed: (0..lab.states.len() as u32).collect(),
         };
         // Initial values depend on parameters only.
@@ -90,7 +95,7 @@ impl World {
                 let came = vec![Came { span, into: m }];
                 entries.insert(*s, Entry { content: None, certain: true, residue: false, came });
             }
-            world.mixtures.insert(m, entries);
+            world.mixtures.insert(m, Rc::new(entries));
         }
         for &m in &eyes.order {
             world.weigh(eyes, m);
@@ -106,7 +111,7 @@ impl World {
 
     /// What is in a mixture, as the screen asks for it.
     pub fn present(&self, m: InstanceId) -> impl Iterator<Item = (Presence, &Entry)> {
-        self.mixtures.get(&m).into_iter().flatten().map(|(s, e)| ((*s, e.content), e))
+        self.mixtures.get(&m).into_iter().flat_map(|entries| entries.iter()).map(|(s, e)| ((*s, e.content), e))
     }
 
     /// Brings the contents of a mixture up to date with the amounts, where these are known.
@@ -115,7 +120,7 @@ impl World {
         if mass.is_nan() || mass <= 0.0 {
             return;
         }
-        let Some(entries) = self.mixtures.get_mut(&m) else { return };
+        let Some(entries) = self.mixtures.get_mut(&m).map(Rc::make_mut) else { return };
         for (s, state) in eyes.amounts.get(&m).map_or(&[][..], Vec::as_slice) {
             if let Some(entry) = entries.get_mut(s) {
                 let content = self.states[*state as usize] / mass;
@@ -134,7 +139,7 @@ impl World {
 
     /// The step that last assigned a state.
     pub fn set_at(&self, state: u32) -> Option<Span> {
-        self.set.get(&state).copied()
+        self.set[state as usize]
     }
 
     /// Keeps a value.
@@ -154,11 +159,12 @@ impl World {
                     && self.states[*state as usize] == 1.0
                     && let Some(m) = eyes.lineage.get(state)
                     && let Some(entries) = self.mixtures.get_mut(m)
+                    && entries.values().any(|e| e.residue)
                 {
-                    entries.retain(|_, e| !e.residue);
+                    Rc::make_mut(entries).retain(|_, e| !e.residue);
                 }
                 self.states[*state as usize] = value;
-                self.set.insert(*state, step);
+                self.set[*state as usize] = Some(step);
                 self.changed.insert(*state);
             }
             Action::Move { fraction, from, to, .. } => {
@@ -207,10 +213,10 @@ impl World {
         let source = self.mixtures.get(&from).cloned().unwrap_or_default();
         let emptied = share >= 1.0 - 1e-9;
         if emptied && let Some(entries) = self.mixtures.get_mut(&from) {
-            entries.values_mut().for_each(|e| e.residue = true);
+            Rc::make_mut(entries).values_mut().for_each(|e| e.residue = true);
         }
-        let target = self.mixtures.entry(to).or_default();
-        for (s, entry) in source {
+        let target = Rc::make_mut(self.mixtures.entry(to).or_default());
+        for (s, entry) in source.iter() {
             // What stuck to the walls of the source is not worth a history of its own.
             if entry.residue {
                 continue;
@@ -220,9 +226,9 @@ impl World {
                 came.push(Came { span: step, into: to });
             }
             let arrived = Entry { came, certain: entry.certain && certain, residue: false, content: entry.content };
-            match target.get_mut(&s) {
+            match target.get_mut(s) {
                 None => {
-                    target.insert(s, arrived);
+                    target.insert(*s, arrived);
                 }
                 Some(there) => {
                     there.content = greater(there.content, arrived.content);
@@ -239,31 +245,35 @@ impl World {
 
     /// What may be there after either of two ways.
     pub fn join(mut self, other: World) -> World {
-        for (value, o) in self.states.iter_mut().zip(&other.states) {
+        self.states.merge(&other.states, |value, o| {
             if *value != *o {
                 *value = f64::NAN;
             }
-        }
+        });
         for (value, o) in self.locals.iter_mut().zip(&other.locals) {
             if *value != *o {
                 *value = f64::NAN;
             }
         }
         self.changed.extend(other.changed);
-        self.set.extend(other.set);
+        self.set.merge(&other.set, |set, o| *set = o.or(*set));
         for (m, entries) in other.mixtures {
             let mine = self.mixtures.entry(m).or_default();
+            if Rc::ptr_eq(mine, &entries) {
+                continue;
+            }
+            let mine = Rc::make_mut(mine);
             for (s, entry) in mine.iter_mut() {
                 entry.certain &= entries.get(s).is_some_and(|e| e.certain);
             }
-            for (s, entry) in entries {
-                match mine.get_mut(&s) {
+            for (s, entry) in entries.iter() {
+                match mine.get_mut(s) {
                     Some(there) => {
                         there.content = greater(there.content, entry.content);
                         there.residue &= entry.residue;
                     }
                     None => {
-                        mine.insert(s, Entry { certain: false, ..entry });
+                        mine.insert(*s, Entry { certain: false, ..entry.clone() });
                     }
                 }
             }

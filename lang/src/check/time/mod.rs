@@ -21,12 +21,7 @@ use crate::elaborate::Elaborator;
 const MOST_SEARCHES: usize = 4000;
 
 /// Reports contradictions in the times of a plan and in the use of instances.
-pub fn plan(lab: &mut Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) {
-    let found = findings(lab, plan, derivatives, events);
-    found.into_iter().for_each(|d| lab.report(d));
-}
-
-fn findings(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
+pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
     let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
     let timing = Timing::of(plan, &known, Durations::Bounds);
