@@ -2,20 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A rigid placement: a translation in metres and a unit quaternion (x, y, z, w).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Placement {
-    /// x, y, z in metres.
-    pub position: [f64; 3],
-    /// Unit quaternion, x, y, z, w.
-    pub rotation: [f64; 4],
-}
-
-impl Default for Placement {
-    fn default() -> Self {
-        Self { position: [0.0; 3], rotation: [0.0, 0.0, 0.0, 1.0] }
-    }
-}
+pub use crate::pose::Pose as Placement;
 
 /// A solid, its own origin at its middle; metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -159,8 +146,88 @@ impl Robot {
         self.links.iter().position(|l| l.name == name).map(|i| i as u32)
     }
 
+    /// The robot without what a link carries.
+    pub fn cut_after(&self, tip: u32) -> Robot {
+        let mut gone = vec![false; self.links.len()];
+        for joint in &self.joints {
+            if joint.parent == tip || gone.get(joint.parent as usize) == Some(&true) {
+                gone[joint.child as usize] = true;
+            }
+        }
+        let kept = |link: u32| gone.get(link as usize) == Some(&false);
+        let links: Vec<u32> = (0..self.links.len() as u32).filter(|i| kept(*i)).collect();
+        let joints: Vec<u32> = (0..).zip(&self.joints).filter(|(_, j)| kept(j.child)).map(|(i, _)| i).collect();
+        let number = |of: &[u32], old: u32| of.iter().position(|i| *i == old).map(|i| i as u32);
+        let joint = |i: &u32| {
+            let joint = self.joints[*i as usize].clone();
+            let (parent, child) = (number(&links, joint.parent)?, number(&links, joint.child)?);
+            let mimic = match joint.mimic {
+                Some(m) => Some(Mimic { joint: number(&joints, m.joint)?, ..m }),
+                None => None,
+            };
+            Some(Joint { parent, child, mimic, ..joint })
+        };
+        Robot {
+            name: self.name.clone(),
+            links: links.iter().map(|i| self.links[*i as usize].clone()).collect(),
+            joints: joints.iter().filter_map(joint).collect(),
+            balls: self.balls.iter().filter_map(|b| Some(Ball { link: number(&links, b.link)?, ..*b })).collect(),
+            touching: self
+                .touching
+                .iter()
+                .filter_map(|[a, b]| Some([number(&links, *a)?, number(&links, *b)?]))
+                .collect(),
+        }
+    }
+
     /// The joint with this name.
     pub fn joint(&self, name: &str) -> Option<u32> {
         self.joints.iter().position(|j| j.name == name).map(|i| i as u32)
+    }
+
+    /// Puts a tool on a link: all its links and joints, their names after a prefix, its root fixed to the link. Returns
+    /// the index its root has now. What is rigidly connected by that may touch.
+    pub fn attach(&mut self, link: u32, tool: &Robot, at: Placement, prefix: &str) -> u32 {
+        let (links, joints) = (self.links.len() as u32, self.joints.len() as u32);
+        let mine = self.fixed_to(link);
+        let root = (0..tool.links.len() as u32).find(|&l| tool.joints.iter().all(|j| j.child != l)).unwrap_or(0);
+        let named = |name: &str| format!("{prefix}{name}");
+        self.joints.push(Joint {
+            name: named("mount"),
+            kind: JointKind::Fixed,
+            parent: link,
+            child: links + root,
+            origin: at,
+            axis: [1.0, 0.0, 0.0],
+            limits: None,
+            mimic: None,
+        });
+        self.links.extend(tool.links.iter().map(|l| Link { name: named(&l.name), ..l.clone() }));
+        self.joints.extend(tool.joints.iter().map(|joint| Joint {
+            name: named(&joint.name),
+            parent: links + joint.parent,
+            child: links + joint.child,
+            // The mount stands before the tool's joints.
+            mimic: joint.mimic.map(|m| Mimic { joint: joints + 1 + m.joint, ..m }),
+            ..joint.clone()
+        }));
+        self.balls.extend(tool.balls.iter().map(|ball| Ball { link: links + ball.link, ..*ball }));
+        self.touching.extend(tool.touching.iter().map(|[a, b]| [links + a, links + b]));
+        let solid = |l: &u32| !self.links[*l as usize].collision.is_empty();
+        let theirs: Vec<u32> = tool.fixed_to(root).into_iter().map(|l| links + l).filter(solid).collect();
+        let pairs = mine.into_iter().filter(solid).flat_map(|a| theirs.iter().map(move |&b| [a, b]));
+        let pairs: Vec<[u32; 2]> = pairs.collect();
+        self.touching.extend(pairs);
+        links + root
+    }
+
+    /// A link and those that no joint moves relative to it, in their order.
+    pub fn fixed_to(&self, link: u32) -> Vec<u32> {
+        let mut body: Vec<u32> = (0..self.links.len() as u32).collect();
+        for joint in self.joints.iter().filter(|j| j.kind == JointKind::Fixed) {
+            body[joint.child as usize] = body[joint.parent as usize];
+        }
+        let Some(&own) = body.get(link as usize) else { return Vec::new() };
+        (0..self.links.len() as u32).filter(|&l| body[l as usize] == own).collect()
     }
 }
