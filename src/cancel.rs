@@ -12,11 +12,20 @@ const INTERRUPTED: i32 = 130;
 
 /// From here on Ctrl-C and a request to terminate set the flag returned.
 pub fn on_interrupt() -> Result<&'static AtomicBool, String> {
-    let handler = || {
+    listen("\nstopping: what `finally` says is done first; Ctrl-C again ends at once\n")
+}
+
+/// The same for what can stop at once, with nothing to say.
+pub fn on_interrupt_quietly() -> Result<&'static AtomicBool, String> {
+    listen("\n")
+}
+
+fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
+    let handler = move || {
         if PRESSED.swap(true, Ordering::SeqCst) {
             std::process::exit(INTERRUPTED);
         }
-        print(Stream::Err, "\nstopping: what `finally` says is done first; Ctrl-C again ends at once\n");
+        print(Stream::Err, said);
         // Said before it is asked for: what `finally` does comes after it in the text.
         ASKED.store(true, Ordering::SeqCst);
     };
