@@ -358,6 +358,17 @@ pub struct AssetLiteral {
     pub span: Span,
 }
 
+/// `at (0, 0, 40) mm from grasp with rpy(0 deg, 90 deg, 0 deg)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct At {
+    /// Two or three lengths.
+    pub position: Expr,
+    /// The frame of the same thing it is given in; the thing's own without one.
+    pub from: Option<Name>,
+    /// Roll, pitch and yaw.
+    pub turned: Option<Expr>,
+}
+
 /// A line of an asset.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AssetLine {
@@ -370,8 +381,17 @@ pub enum AssetLine {
         /// Its name.
         name: Name,
         /// Its pose.
-        at: Expr,
+        at: At,
     },
+    /// `solid box(20 mm, 400 mm, 600 mm) at (-190, 0, 0) mm`: a piece of its body beside its `shape`.
+    Solid {
+        /// Like a `shape`.
+        shape: Expr,
+        /// Its pose; at the origin without one.
+        at: Option<At>,
+    },
+    /// Links and joints, from the file at this place.
+    Robot(Box<matterix_ir::robot::Robot>, Span),
     /// `lid = Lid { ... }`: a child asset.
     Part {
         /// Its name.
@@ -469,7 +489,7 @@ pub enum MemberKind {
         /// Its name.
         name: Name,
         /// Its pose.
-        at: Option<Expr>,
+        at: Option<At>,
     },
 }
 
@@ -702,6 +722,33 @@ pub enum ClauseKind {
         text: Text,
         /// When it is said; always without it.
         when: Option<Expr>,
+    },
+    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`.
+    Moves {
+        /// The robot.
+        mover: Expr,
+        /// Along a straight line.
+        straight: bool,
+        /// Where to.
+        to: Option<Expr>,
+        /// How far, instead.
+        by: Option<Expr>,
+    },
+    /// `grips item by arm`.
+    Grips {
+        /// What.
+        item: Expr,
+        /// The robot.
+        by: Expr,
+    },
+    /// `frees item on target by arm`.
+    Frees {
+        /// What.
+        item: Expr,
+        /// What it stands on then.
+        on: Option<Expr>,
+        /// The robot.
+        by: Expr,
     },
 }
 

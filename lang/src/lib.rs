@@ -10,7 +10,8 @@ pub mod chem;
 pub mod elaborate;
 pub mod eval;
 pub mod fmt;
-pub mod labware;
+pub mod import;
+mod labware;
 pub mod library;
 pub mod loader;
 pub mod lower;
@@ -25,4 +26,4 @@ pub mod task;
 pub mod units;
 
 pub use loader::{LibraryOnly, Loader};
-pub use program::{Options, Test, check, compile, contents, document, tests};
+pub use program::{Options, Test, check, check_and, compile, contents, document, tests};

@@ -9,21 +9,30 @@ macro_rules! modules {
 }
 
 macro_rules! files {
-    ($($name:literal)*) => {
+    ($($path:literal => $name:literal)*) => {
         /// Data files of the library with their texts.
-        const FILES: &[(&str, &str)] =
-            &[$((concat!($name, ".json"), include_str!(concat!("../../assets/labware/", $name, ".json")))),*];
+        const FILES: &[(&str, &str)] = &[$(($name, include_str!(concat!("../../assets/", $path, $name)))),*];
     };
 }
 
 files! {
-    "corning_96_wellplate_360ul_flat"
-    "nest_12_reservoir_15ml"
-    "opentrons_1_trash_1100ml_fixed"
-    "opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap"
-    "opentrons_96_tiprack_1000ul"
-    "opentrons_96_tiprack_20ul"
-    "opentrons_96_tiprack_300ul"
+    "labware/" => "corning_96_wellplate_360ul_flat.json"
+    "labware/" => "nest_12_reservoir_15ml.json"
+    "labware/" => "opentrons_1_trash_1100ml_fixed.json"
+    "labware/" => "opentrons_24_tuberack_eppendorf_1.5ml_safelock_snapcap.json"
+    "labware/" => "opentrons_96_tiprack_1000ul.json"
+    "labware/" => "opentrons_96_tiprack_20ul.json"
+    "labware/" => "opentrons_96_tiprack_300ul.json"
+    "robots/fr3/" => "fr3.urdf"
+    "robots/franka_hand/" => "franka_hand.urdf"
+    "robots/iiwa14/" => "iiwa14.urdf"
+    "robots/iiwa7/" => "iiwa7.urdf"
+    "robots/kmr_iiwa/" => "kmr_iiwa.urdf"
+    "robots/panda/" => "panda.urdf"
+    "robots/robotiq_2f85/" => "robotiq_2f85.urdf"
+    "robots/ur3e/" => "ur3e.urdf"
+    "robots/ur5e/" => "ur5e.urdf"
+    "robots/xm540_w150/" => "xm540_w150.urdf"
 }
 
 /// A data file of the library.

@@ -3,11 +3,12 @@
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
-use matterix_ir::scene::{Frame, InstanceId, Pose, Scene, Shape};
+use matterix_ir::scene::{InstanceId, Scene};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
-use crate::ast::{AssetLine, Expr, ExprKind, FieldValue, ItemKind, MemberKind, Name, Role};
+use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
+use crate::elaborate::geometry::Geometry;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
@@ -43,16 +44,32 @@ pub struct Test {
 
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings).0
+    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).0
+}
+
+/// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
+pub fn check_and(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+) -> Vec<Diagnostic> {
+    examine(sources, file, loader, Wanted::Motions, motions).0
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    examine(sources, file, loader, Wanted::Contents)
+    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new())
 }
 
-fn examine(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: Wanted) -> (Vec<Diagnostic>, Vec<Points>) {
+fn examine(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    wanted: Wanted,
+    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+) -> (Vec<Diagnostic>, Vec<Points>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -78,7 +95,9 @@ fn examine(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: Wan
     }
     let mut points = Vec::new();
     for (task, built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
+        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         diagnostics.extend(built.findings);
+        diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
         starts.extend(built.starts);
         // The statements of a test of a workflow are the workflow's.
         let tests = matches!(names.decl(task.item).item.kind, ItemKind::Test { lab: None, .. });
@@ -307,6 +326,8 @@ enum Wanted {
     Program,
     /// What is known at every statement.
     Contents,
+    /// A program too, where robots with joints are in the lab.
+    Motions,
 }
 
 /// One workflow, built.
@@ -377,13 +398,16 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         starts.windows = windows;
         let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
+        let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
             if let ItemKind::Workflow { name, .. } = &item.kind {
                 elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
             }
-            let uses = checks::uses(&elaborator, sources, lab, &plan);
-            return Built { program: None, points, findings: elaborator.diagnostics, starts, uses };
+            uses = checks::uses(&elaborator, sources, lab, &plan);
+            if wanted != Wanted::Motions || !elaborator.has_robots() {
+                return Built { program: None, points, findings: elaborator.diagnostics, starts, uses };
+            }
         }
         let mixtures = mixtures(&elaborator, &observables);
         let scene = scene(&mut elaborator, lab);
@@ -408,7 +432,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
-        return Built { program: Some(program), points: None, findings: elaborator.diagnostics, starts, uses: None };
+        return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses };
     }
 }
 
@@ -539,7 +563,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
         let support = inst.placed.first().map(|p| p.1);
-        let (frames, shape) = geometry(lab, id);
+        let Geometry { frames, shape, solids } = lab.geometry(id);
         instances.push(matterix_ir::scene::Instance {
             name,
             kind: lab.kind_names(id),
@@ -549,67 +573,10 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             pose,
             frames,
             shape,
+            solids,
+            articulation: lab.articulation(id).map(Box::new),
             span,
         });
     }
     Scene { lab: name.text.clone(), instances }
-}
-
-/// Frames and shape of an asset, from its lines.
-fn geometry(lab: &mut Elaborator<'_>, id: InstanceId) -> (Vec<Frame>, Option<Shape>) {
-    let mut frames: Vec<Frame> = Vec::new();
-    let lines: Vec<(usize, &AssetLine)> = lab.instances[id.0 as usize]
-        .kinds
-        .iter()
-        .filter_map(|k| lab.tables.kinds.get(k))
-        .flat_map(|k| k.lines.iter().copied())
-        .collect();
-    for (_, line) in lines {
-        let AssetLine::Frame { name, at } = line else { continue };
-        if frames.iter().any(|f| f.name == name.text) {
-            continue;
-        }
-        if let Some(position) = lengths(lab, at).and_then(|v| <[f64; 3]>::try_from(v).ok()) {
-            frames.push(Frame { name: name.text.clone(), pose: Pose { position, rpy: [0.0; 3] } });
-        }
-    }
-    let shape = lab.instances[id.0 as usize].setting("shape").and_then(|s| match s.value() {
-        FieldValue::Expr(e) => shape(lab, e),
-        _ => None,
-    });
-    (frames, shape)
-}
-
-fn shape(lab: &Elaborator<'_>, e: &Expr) -> Option<Shape> {
-    let ExprKind::Call(callee, args) = &*e.kind else { return None };
-    let ExprKind::Name(name) = &*callee.kind else { return None };
-    let values: Option<Vec<f64>> = args.iter().map(|a| length(lab, &a.value)).collect();
-    match (name.text.as_str(), values?.as_slice()) {
-        ("box", [x, y, z]) => Some(Shape::Box([*x, *y, *z])),
-        ("cylinder", [d, h]) => Some(Shape::Cylinder([*d, *h])),
-        _ => None,
-    }
-}
-
-fn length(lab: &Elaborator<'_>, e: &Expr) -> Option<f64> {
-    match &*e.kind {
-        ExprKind::Quantity(v, unit) => lab.tables.unit(&unit.text).ok().map(|u| u.unit.to_si(*v)),
-        _ => None,
-    }
-}
-
-fn lengths(lab: &Elaborator<'_>, e: &Expr) -> Option<Vec<f64>> {
-    let ExprKind::Tuple(items, Some(unit)) = &*e.kind else { return None };
-    let factor = lab.tables.unit(&unit.text).ok()?.unit.factor;
-    items
-        .iter()
-        .map(|i| match &*i.kind {
-            ExprKind::Number(v) => Some(v * factor),
-            ExprKind::Unary(crate::ast::Unary::Neg, inner) => match &*inner.kind {
-                ExprKind::Number(v) => Some(-v * factor),
-                _ => None,
-            },
-            _ => None,
-        })
-        .collect()
 }

@@ -42,6 +42,7 @@ codes! {
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
     LABWARE_FILE "labware-file" "N0" "a labware definition cannot be read";
+    URDF_FILE "urdf-file" "N0" "a description of a robot cannot be read";
     UNKNOWN_NAME "unknown-name" "N0" "a name is not declared";
     UNKNOWN_UNIT "unknown-unit" "N0" "a unit is not declared";
     UNKNOWN_MEMBER "unknown-member" "N0" "an instance, species or reaction has no such member";
@@ -62,6 +63,9 @@ codes! {
     UNBOUND_ROLE "unbound-role" "N0" "it is not decided which instance, or which lab, takes a role";
     MISPLACED "misplaced" "N0" "a statement that has no meaning at its place";
     EMPTY_RANGE "empty-range" "N0" "the lower end of a range is above its upper end";
+    OUT_OF_REACH "out-of-reach" "G1" "a robot does not get to where it is to go";
+    COLLISION "collision" "G2" "a robot, or what it holds, runs into something";
+    MISPLACED_GRIP "misplaced-grip" "G4" "a gripper is not where it would have to be to grip or let go";
     OUT_OF_RANGE "out-of-range" "D1" "a parameter outside what it may be";
     INVALID_LAW "invalid-law" "N0" "a law changes what it may not change";
     UNIT_MISMATCH "unit-mismatch" "U1" "quantities of different dimensions are mixed";

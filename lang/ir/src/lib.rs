@@ -16,6 +16,7 @@ pub mod math;
 pub mod model;
 pub mod plan;
 pub mod points;
+pub mod pose;
 pub mod program;
 pub mod quantity;
 pub mod robot;

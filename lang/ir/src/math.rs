@@ -34,3 +34,18 @@ pub fn sin(x: f64) -> f64 {
 pub fn cos(x: f64) -> f64 {
     libm::cos(x)
 }
+
+/// Sine and cosine of an angle in radians.
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    libm::sincos(x)
+}
+
+/// Angle in radians of the point (x, y), from the first axis.
+pub fn atan2(y: f64, x: f64) -> f64 {
+    libm::atan2(y, x)
+}
+
+/// Angle in radians between 0 and pi with this cosine; `x` between -1 and 1.
+pub fn acos(x: f64) -> f64 {
+    libm::acos(x)
+}

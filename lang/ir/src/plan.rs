@@ -132,6 +132,47 @@ pub enum Argument {
     Word(NodeId, Vec<String>),
 }
 
+/// What a robot does with its body, for planners and pictures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Motion {
+    /// Brings what it holds, or else its tool, to a frame.
+    To {
+        /// The robot.
+        mover: InstanceId,
+        /// Whose frame.
+        goal: InstanceId,
+        /// Its name; empty for the thing itself.
+        frame: String,
+        /// Along a straight line.
+        straight: bool,
+    },
+    /// Shifts its tool, in the axes of the lab.
+    By {
+        /// The robot.
+        mover: InstanceId,
+        /// x, y, z in metres.
+        shift: [NodeId; 3],
+        /// Along a straight line.
+        straight: bool,
+    },
+    /// Closes its gripper on a thing.
+    Grip {
+        /// The thing.
+        item: InstanceId,
+        /// The robot.
+        by: InstanceId,
+    },
+    /// Opens its gripper.
+    Free {
+        /// What it held.
+        item: InstanceId,
+        /// What carries it then, if it is known.
+        on: Option<InstanceId>,
+        /// The robot.
+        by: InstanceId,
+    },
+}
+
 /// A leaf: a command of a device or a primitive skill.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Operation {
@@ -161,6 +202,8 @@ pub struct Operation {
     pub fails: Vec<String>,
     /// Limits that its effects may pass, by index into [`Plan::limits`].
     pub limits: Vec<u32>,
+    /// What its robot does; `None` where nothing moves.
+    pub motion: Option<Motion>,
 }
 
 /// Which failures a handler takes.

@@ -3,36 +3,93 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Span;
+pub use crate::pose::Pose;
+use crate::robot::Robot;
 
 /// An instance, by its index in the [`Scene`]. The graph stores instances as this number, "nothing" as -1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct InstanceId(pub u32);
-
-/// Position in metres and roll, pitch, yaw in radians, relative to the parent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// x, y, z in metres.
-    pub position: [f64; 3],
-    /// Roll, pitch, yaw in radians.
-    pub rpy: [f64; 3],
-}
 
 /// A named point of an asset, for grasping, placing, pouring.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Name, as in `beaker.grasp`.
     pub name: String,
+    /// Relative to the asset, or to `from`.
+    pub pose: Pose,
+    /// Relative to where the asset last stood before it was picked up, instead of to the asset.
+    pub stand: bool,
+}
+
+/// Names of frames that have a meaning of their own.
+pub mod frame {
+    /// Where things are put down on a surface.
+    pub const PLACE: &str = "place";
+    /// Where a thing is gripped, its z axis towards the gripper.
+    pub const GRASP: &str = "grasp";
+    /// The point of a tool that meets the tip of the robot it is part of.
+    pub const MOUNT: &str = "mount";
+    /// Where a thing last stood before it was picked up.
+    pub const STAND: &str = "stand";
+}
+
+/// A shape, its origin at the middle of its base; metres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Shape {
+    /// Edge lengths x, y, z.
+    Box([f64; 3]),
+    /// Diameter and height.
+    Cylinder([f64; 2]),
+    /// Diameter.
+    Sphere(f64),
+    /// Turned on a lathe: radius and height along the outside and along the inside, each from the axis at the bottom
+    /// to the rim. Without an inside it is full.
+    Turned {
+        /// From the bottom up.
+        outside: Vec<[f64; 2]>,
+        /// From the bottom up.
+        inside: Vec<[f64; 2]>,
+    },
+}
+
+impl Shape {
+    /// Least box around it: x, y, z in metres.
+    pub fn size(&self) -> [f64; 3] {
+        match self {
+            Shape::Box(size) => *size,
+            Shape::Cylinder([d, h]) => [*d, *d, *h],
+            Shape::Sphere(d) => [*d; 3],
+            Shape::Turned { outside, .. } => {
+                let greatest = |k: usize| outside.iter().map(|p| p[k]).fold(0.0, f64::max);
+                [2.0 * greatest(0), 2.0 * greatest(0), greatest(1)]
+            }
+        }
+    }
+
+    /// Whether turning it about its own axis changes nothing.
+    pub fn is_round(&self) -> bool {
+        !matches!(self, Shape::Box(_))
+    }
+}
+
+/// A shape somewhere on an asset.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Solid {
+    /// What it is.
+    pub shape: Shape,
     /// Relative to the asset.
     pub pose: Pose,
 }
 
-/// A primitive shape for pictures; metres.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Shape {
-    /// Edge lengths x, y, z; the origin at the middle of the base.
-    Box([f64; 3]),
-    /// Diameter and height; the origin at the middle of the base.
-    Cylinder([f64; 2]),
+/// What moves an asset's links: its description, and how it was set up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Articulation {
+    /// Links, joints, limits.
+    pub robot: Robot,
+    /// The link that carries a tool, by index; the last one where none is named.
+    pub tip: u32,
+    /// Positions of the moving joints in the order of the description when the run begins, rad or m.
+    pub home: Vec<f64>,
 }
 
 /// One asset in the lab, or a part of one.
@@ -52,8 +109,12 @@ pub struct Instance {
     pub pose: Pose,
     /// Its named points.
     pub frames: Vec<Frame>,
-    /// For pictures.
+    /// Its body.
     pub shape: Option<Shape>,
+    /// More of its body.
+    pub solids: Vec<Solid>,
+    /// Its links and joints.
+    pub articulation: Option<Box<Articulation>>,
     /// Its declaration.
     pub span: Span,
 }

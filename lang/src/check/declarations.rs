@@ -190,7 +190,7 @@ static EMPTY: std::sync::LazyLock<Sources> = std::sync::LazyLock::new(Sources::d
 fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize) {
     let ItemKind::Asset { lines, source, .. } = &item.kind else { return };
     if let Some((word, _)) = source
-        && !crate::labware::is_known(word)
+        && !crate::import::is_known(word)
     {
         lab.report(unsupported(word.span, "assets from files"));
     }
@@ -209,6 +209,8 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     }
     let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
     lab.use_lines(this);
+    lab.geometry(this);
+    lab.articulation(this);
     for m in lab.all_members(this) {
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
             lab.member_value(this, m, name.span);

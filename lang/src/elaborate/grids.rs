@@ -503,6 +503,6 @@ impl Layout {
             _ => (f64::from(columns), 0.0),
         };
         let [x, y, z] = self.origin;
-        Pose { position: [x + right * self.pitch[0], y + back * self.pitch[1], z], rpy: [0.0; 3] }
+        Pose::at([x + right * self.pitch[0], y + back * self.pitch[1], z])
     }
 }

@@ -13,7 +13,10 @@ use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
 
 /// Fields every asset may have beside the members of its capabilities: geometry, of which only the shape is used yet.
-const GEOMETRY: &[&str] = &["shape", "mesh", "collision", "inertia", "friction"];
+const GEOMETRY: &[&str] = &["shape", "tip", "home", "mesh", "collision", "inertia", "friction"];
+
+/// Those of them that nothing uses yet.
+const UNUSED: &[&str] = &["mesh", "collision", "inertia", "friction"];
 
 impl<'a> Elaborator<'a> {
     /// Builds the instances of a lab, then their states.
@@ -146,7 +149,7 @@ impl<'a> Elaborator<'a> {
         for d in found {
             self.report(d);
         }
-        for f in fields.iter().filter(|f| f.key.text != "shape" && GEOMETRY.contains(&f.key.text.as_str())) {
+        for f in fields.iter().filter(|f| UNUSED.contains(&f.key.text.as_str())) {
             let d = unsupported(f.key.span, "meshes, collision shapes, inertia and friction");
             self.report(Diagnostic { severity: matterix_ir::Severity::Warning, ..d });
         }
@@ -154,12 +157,20 @@ impl<'a> Elaborator<'a> {
 
     fn place(&mut self, id: InstanceId, relations: &'a [(Name, Expr)], module: usize) {
         for (label, operand) in relations {
+            if label.text == "with" {
+                let mut scope = Scope { lab: true, ..Scope::module(module) };
+                if let Some(rpy) = self.turned(operand, &mut scope) {
+                    let pose = &mut self.instances[id.0 as usize].pose;
+                    *pose = Pose::turned(pose.position, rpy);
+                }
+                continue;
+            }
             let v = self.expr(operand, &mut Scope { lab: true, ..Scope::module(module) });
             match (label.text.as_str(), v) {
                 (_, Value::Error) => {}
                 ("at", Value::Tuple(items)) => {
                     if let Some(position) = self.position(&items, operand) {
-                        self.instances[id.0 as usize].pose = Pose { position, rpy: [0.0; 3] };
+                        self.instances[id.0 as usize].pose.position = position;
                     }
                 }
                 ("at", other) => {

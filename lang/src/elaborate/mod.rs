@@ -1,8 +1,10 @@
 //! Elaboration: a lab's instances, their parameters and states, and the laws that hold over them, as one flat model.
 
+pub mod articulation;
 pub mod balances;
 pub mod contents;
 pub mod fields;
+pub mod geometry;
 pub mod grids;
 pub mod hazards;
 pub mod include;

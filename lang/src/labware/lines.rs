@@ -14,8 +14,12 @@ const EVEN: f64 = 0.02;
 /// The lines a definition stands for; all of them point to where its file is named.
 pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
     let write = Writer { definition, at };
-    let mut lines: Vec<AssetLine> =
-        definition.size().map(|size| AssetLine::Field(write.shape("box", &size))).into_iter().collect();
+    let mut lines: Vec<AssetLine> = definition
+        .size()
+        .filter(|size| size.iter().all(|s| *s > 0.0))
+        .map(|size| AssetLine::Field(write.shape("box", &size)))
+        .into_iter()
+        .collect();
     lines.extend(write.grids().into_iter().map(AssetLine::Grid));
     lines
 }
@@ -75,14 +79,14 @@ impl<'d> Writer<'d> {
     fn line(&self, group: &Places<'d>, pitch: Option<[f64; 2]>) -> Option<Grid> {
         let ((from, well), (to, _)) = (group.first_key_value()?, group.last_key_value()?);
         let (grid, kind) = if self.definition.is_tip_rack() { ("tips", "Tip") } else { ("wells", "Well") };
-        let shape = match well.opening {
-            Opening::Circular { diameter } => self.shape("cylinder", &[diameter, well.depth]),
-            Opening::Rectangular { x_dimension, y_dimension } => {
-                self.shape("box", &[x_dimension, y_dimension, well.depth])
-            }
+        let (kind_of_shape, sizes) = match well.opening {
+            Opening::Circular { diameter } => ("cylinder", vec![diameter, well.depth]),
+            Opening::Rectangular { x_dimension, y_dimension } => ("box", vec![x_dimension, y_dimension, well.depth]),
         };
+        // A bin's definition gives its one place no depth.
+        let shape = sizes.iter().all(|s| *s > 0.0).then(|| self.shape(kind_of_shape, &sizes));
         let volume = self.quantity(well.total_liquid_volume, "uL");
-        let mut fields = vec![self.field("max_volume", volume), shape];
+        let mut fields: Vec<Field> = std::iter::once(self.field("max_volume", volume)).chain(shape).collect();
         if !self.definition.is_tip_rack() {
             let (Opening::Circular { diameter: across } | Opening::Rectangular { y_dimension: across, .. }) =
                 well.opening;

@@ -4,6 +4,7 @@ mod call;
 mod clauses;
 mod holds;
 mod limits;
+mod motion;
 mod operation;
 pub mod roles;
 mod stmt;

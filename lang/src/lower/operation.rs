@@ -93,6 +93,7 @@ impl<'a> Planner<'a, '_> {
             claims: Vec::new(),
             fails: Vec::new(),
             limits: Vec::new(),
+            motion: None,
         };
         // What can never begin is written out in silence: what it would do may make no sense.
         let mut sound = None;
@@ -102,6 +103,19 @@ impl<'a> Planner<'a, '_> {
             }
             if let ClauseKind::Fails(names) = &clause.kind {
                 operation.fails.extend(names.iter().map(|n| n.text.clone()));
+                continue;
+            }
+            if matches!(clause.kind, ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. }) {
+                if operation.motion.is_some() {
+                    self.lab.report(Diagnostic::error(
+                        codes::MISPLACED,
+                        clause.span,
+                        "one step of a robot is one motion",
+                        "a second motion",
+                    ));
+                    return None;
+                }
+                operation.motion = Some(self.motion(&clause.kind, inner)?);
                 continue;
             }
             if !matches!(clause.kind, ClauseKind::Effect(_)) && self.is_drafted(clause.span) {
@@ -142,7 +156,12 @@ impl<'a> Planner<'a, '_> {
             ClauseKind::Effect(effects) => {
                 Outcome::Effect(effects.iter().flat_map(|e| self.effect(e, clause.span, inner)).collect())
             }
-            ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => return None,
+            ClauseKind::Fails(_)
+            | ClauseKind::Option(_)
+            | ClauseKind::Says { .. }
+            | ClauseKind::Moves { .. }
+            | ClauseKind::Grips { .. }
+            | ClauseKind::Frees { .. } => return None,
         })
     }
 
@@ -252,6 +271,14 @@ impl<'a> Planner<'a, '_> {
                     "a skill with a body lasts as long as its steps",
                     "`until` belongs to a command",
                 )),
+                ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. } => {
+                    self.lab.report(Diagnostic::error(
+                        codes::MISPLACED,
+                        clause.span,
+                        "a skill with a body moves as its steps do",
+                        "belongs to an `extern skill` or a command",
+                    ));
+                }
                 ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => {}
             }
         }

@@ -99,7 +99,7 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
     }
     let used = used(&modules);
     for (module, _) in modules.iter_mut().zip(used).filter(|(_, used)| *used) {
-        diagnostics.extend(crate::labware::import(&mut module.tree, module.file, loader));
+        diagnostics.extend(crate::import::import(&mut module.tree, module.file, loader));
     }
     (modules, diagnostics)
 }

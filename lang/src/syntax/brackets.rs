@@ -390,7 +390,8 @@ const BLOCK_WORDS: &[&str] = &[
 ];
 
 /// The words that start a clause.
-const CLAUSE_WORDS: &[&str] = &["needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says"];
+const CLAUSE_WORDS: &[&str] =
+    &["needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees"];
 
 /// The head of a line: what stands before its bracket.
 fn title(code: &str) -> &str {

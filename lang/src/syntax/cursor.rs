@@ -160,6 +160,10 @@ fn is_noise(rule: Rule) -> bool {
             | kw_frame
             | kw_option
             | kw_says
+            | kw_moves
+            | kw_grips
+            | kw_frees
+            | kw_solid
             | kw_per
             | kw_also
             | kw_prefixes

@@ -7,9 +7,9 @@ use super::{
     steps::{block, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine, Holding,
-    Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Name, Process, Role, StudyLine,
-    Term, Wire, WireKind,
+    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine,
+    Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Name, Process, Role,
+    StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -147,7 +147,9 @@ fn asset_line(line: &AssetLine) -> Sexp {
     match line {
         AssetLine::Error(_) => leaf("error"),
         AssetLine::Field(of) => field(of),
-        AssetLine::Frame { name: word, at } => node("frame").with([name(word), expr(at)]),
+        AssetLine::Frame { name: word, at } => node("frame").with([name(word)]).with(place(at)),
+        AssetLine::Robot(robot, _) => node("robot").with([quoted(&robot.name)]),
+        AssetLine::Solid { shape, at } => node("solid").with([expr(shape)]).with(at.iter().flat_map(place)),
         AssetLine::Grid(of) => node("grid")
             .with([name(&of.name), name(&of.from)])
             .with(of.to.as_ref().map(|to| node("to").with([name(to)])))
@@ -174,7 +176,7 @@ fn member(of: &Member) -> Sexp {
             demand(if *at_end { "ends" } else { "keeps" }, cond, failure.as_ref(), help.as_deref())
         }
         MemberKind::Event(of) => event(of),
-        MemberKind::Frame { name: word, at } => node("frame").with([name(word)]).with(at.as_ref().map(expr)),
+        MemberKind::Frame { name: word, at } => node("frame").with([name(word)]).with(at.iter().flat_map(place)),
     };
     all.with(docs(&of.docs))
 }
@@ -194,6 +196,11 @@ fn role_word(role: Role) -> &'static str {
 fn demand(word: &str, cond: &Expr, failure: Option<&Name>, help: Option<&str>) -> Sexp {
     let named = failure.map(|f| node("else").with([name(f)]).with(help.map(quoted)));
     node(word).with([expr(cond)]).with(named)
+}
+
+fn place(at: &At) -> Vec<Sexp> {
+    let from = at.from.as_ref().map(|f| node("from").with([name(f)]));
+    std::iter::once(expr(&at.position)).chain(from).chain(maybe("with", at.turned.as_ref())).collect()
 }
 
 fn effect(of: &Effect) -> Sexp {
@@ -220,6 +227,14 @@ fn clause(clause: &Clause) -> Sexp {
         ClauseKind::Until(cond) => node("until").with([expr(cond)]),
         ClauseKind::Says { text, when } => {
             node("says").with([super::steps::filled(text)]).with(maybe("when", when.as_ref()))
+        }
+        ClauseKind::Moves { mover, straight, to, by } => node(if *straight { "moves straight" } else { "moves" })
+            .with([expr(mover)])
+            .with(maybe("to", to.as_ref()))
+            .with(maybe("by", by.as_ref())),
+        ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
+        ClauseKind::Frees { item, on, by } => {
+            node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])
         }
         ClauseKind::Option(of) => node("option").with([param(of)]),
     }

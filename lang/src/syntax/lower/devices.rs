@@ -8,8 +8,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Member, MemberKind,
-    Name, Path, Role, Term,
+    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Member,
+    MemberKind, Name, Path, Role, Term,
 };
 
 impl Lower<'_> {
@@ -56,7 +56,7 @@ impl Lower<'_> {
                 MemberKind::Limit { at_end, cond, failure, help }
             }
             Rule::frame_member => {
-                MemberKind::Frame { name: self.name_in(kids), at: kids.eat(Rule::operand).map(|o| self.expr(o)) }
+                MemberKind::Frame { name: self.name_in(kids), at: kids.eat(Rule::place_at).map(|n| self.at(n)) }
             }
             _ => MemberKind::Error,
         }
@@ -142,6 +142,27 @@ impl Lower<'_> {
             Rule::says => {
                 ClauseKind::Says { text: self.filled_in(kids)?, when: kids.eat(Rule::cond).map(|c| self.expr(c)) }
             }
+            Rule::moves => {
+                let mover = self.expr_in(kids);
+                let straight = kids.has(Rule::kw_straight);
+                let by = !kids.has(Rule::kw_to);
+                let goal = self.expr_in(kids);
+                let (to, by) = if by { (None, Some(goal)) } else { (Some(goal), None) };
+                ClauseKind::Moves { mover, straight, to, by }
+            }
+            Rule::grips => {
+                let item = self.expr_in(kids);
+                ClauseKind::Grips { item, by: self.expr_in(kids) }
+            }
+            Rule::frees => {
+                let item = self.expr_in(kids);
+                let first = self.expr_in(kids);
+                let (on, by) = match kids.eat(Rule::operand) {
+                    Some(by) => (Some(first), self.expr(by)),
+                    None => (None, first),
+                };
+                ClauseKind::Frees { item, on, by }
+            }
             Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
             _ => return None,
         })
@@ -192,18 +213,33 @@ impl Lower<'_> {
                 }
                 Rule::field => lines.push(AssetLine::Field(self.field(part))),
                 Rule::grid => lines.push(AssetLine::Grid(self.grid(part))),
+                Rule::solid => {
+                    let kids = &mut Kids::of(part);
+                    let shape = self.expr_in(kids);
+                    lines.push(AssetLine::Solid { shape, at: kids.eat(Rule::place_at).map(|n| self.at(n)) });
+                }
+                Rule::frame => {
+                    let kids = &mut Kids::of(part);
+                    let name = self.name_in(kids);
+                    let at = kids.eat(Rule::place_at).map(|n| self.at(n));
+                    lines.push(at.map_or(AssetLine::Error(span), |at| AssetLine::Frame { name, at }));
+                }
                 _ => {
                     let kids = &mut Kids::of(part);
                     let name = self.name_in(kids);
-                    lines.push(match rule {
-                        Rule::frame => AssetLine::Frame { name, at: self.expr_in(kids) },
-                        _ => AssetLine::Part { name, literal: self.literal_in(kids) },
-                    });
+                    lines.push(AssetLine::Part { name, literal: self.literal_in(kids) });
                 }
             }
             before = Some(start);
         }
         lines
+    }
+
+    fn at(&mut self, node: Node) -> At {
+        let kids = &mut Kids::of(node);
+        let position = self.expr_in(kids);
+        let from = kids.eat(Rule::ident).map(|n| self.name(&n));
+        At { position, from, turned: kids.eat(Rule::operand).map(|n| self.expr(n)) }
     }
 
     fn grid(&mut self, node: Node) -> Grid {

@@ -1,0 +1,311 @@
+//! Where things are and how they are shaped: poses, frames, shapes.
+
+use matterix_ir::scene::{Frame, InstanceId, Pose, Shape, Solid, frame};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::Elaborator;
+use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
+use crate::eval::{Scope, Type, Value};
+use crate::names::near::{nearest, question};
+
+/// The shapes and what they are given.
+const SHAPES: &[(&str, &str)] = &[
+    ("box", "three lengths: `box(x, y, z)`"),
+    ("cylinder", "diameter and height: `cylinder(70 mm, 95 mm)`"),
+    ("sphere", "a diameter: `sphere(20 mm)`"),
+    ("vessel", "diameter, height, wall and floor: `vessel(70 mm, 95 mm, 1.5 mm, 2 mm)`"),
+    (
+        "turned",
+        "radius and height along the outside and the inside: `turned([(0, 0) mm, (35, 0) mm, (35, 95) mm], [])`",
+    ),
+];
+
+/// Points that every shape has: the middle of its top, and of its body.
+const POINTS: &[&str] = &["top", "middle"];
+
+/// What an asset's body is made of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Geometry {
+    /// Named points.
+    pub frames: Vec<Frame>,
+    /// The main shape.
+    pub shape: Option<Shape>,
+    /// More of it.
+    pub solids: Vec<Solid>,
+}
+
+impl<'a> Elaborator<'a> {
+    /// Frames and shapes of an instance.
+    pub fn geometry(&mut self, id: InstanceId) -> Geometry {
+        let mut out = Geometry::default();
+        if let Some(setting) = self.instances[id.0 as usize].setting("shape")
+            && let FieldValue::Expr(e) = setting.value()
+        {
+            out.shape = self.shape(e, &mut setting.scope());
+        }
+        out.frames = self.frames(id, out.shape.as_ref());
+        for (module, line) in self.lines(id) {
+            let AssetLine::Solid { shape, at } = line else { continue };
+            let mut scope = Scope::of(id, module);
+            let Some(shape) = self.shape(shape, &mut scope) else { continue };
+            let pose = at.as_ref().map_or(Some(Pose::default()), |at| self.pose(at, &out, &mut scope).map(|f| f.0));
+            out.solids.extend(pose.map(|pose| Solid { shape, pose }));
+        }
+        out
+    }
+
+    fn lines(&self, id: InstanceId) -> Vec<(usize, &'a AssetLine)> {
+        let kinds = &self.instances[id.0 as usize].kinds;
+        kinds.iter().filter_map(|k| self.tables.kinds.get(k)).flat_map(|k| k.lines.iter().copied()).collect()
+    }
+
+    /// The frames of an asset's lines, then those its capabilities give where it gives none.
+    fn frames(&mut self, id: InstanceId, shape: Option<&Shape>) -> Vec<Frame> {
+        let mut given: Vec<(usize, &'a Name, &'a At)> = Vec::new();
+        for (module, line) in self.lines(id) {
+            if let AssetLine::Frame { name, at } = line {
+                given.push((module, name, at));
+            }
+        }
+        for m in self.all_members(id) {
+            if let MemberKind::Frame { name, at: Some(at) } = &m.member.kind {
+                given.push((m.module, name, at));
+            }
+        }
+        let mut first: Vec<(usize, &'a Name, &'a At)> = Vec::new();
+        for one in given {
+            if !first.iter().any(|f| f.1.text == one.1.text) {
+                first.push(one);
+            }
+        }
+        // A frame may be given in one that stands further down: as many rounds as there are frames settle all.
+        let mut done = Geometry { shape: shape.cloned(), ..Geometry::default() };
+        let mut waiting = first;
+        while !waiting.is_empty() {
+            let before = waiting.len();
+            let (ready, rest): (Vec<_>, Vec<_>) = waiting.into_iter().partition(|(_, _, at)| {
+                let given = |from: &Name| from.text == frame::STAND || done.frames.iter().any(|f| f.name == from.text);
+                at.from.as_ref().is_none_or(given)
+            });
+            for (module, name, at) in ready {
+                if let Some((pose, stand)) = self.pose(at, &done, &mut Scope::of(id, module)) {
+                    done.frames.push(Frame { name: name.text.clone(), pose, stand });
+                }
+            }
+            waiting = rest;
+            if waiting.len() == before {
+                break;
+            }
+        }
+        for (_, _, at) in waiting {
+            // Without an asset's own lines, the frame it starts from may be one that only an asset gives.
+            if let Some(from) = at.from.as_ref().filter(|f| self.frame_is_missing(id, f)) {
+                let close = nearest(&from.text, done.frames.iter().map(|f| f.name.as_str()));
+                let d = Diagnostic::error(
+                    codes::UNKNOWN_NAME,
+                    from.span,
+                    format!("no frame `{}` to start from", from.text),
+                    "not a frame of this asset",
+                );
+                self.report(match question(&close) {
+                    Some(asked) => d.help(asked),
+                    None => d,
+                });
+            }
+        }
+        done.frames
+    }
+
+    /// Whether nothing declares a frame.
+    fn frame_is_missing(&self, id: InstanceId, name: &Name) -> bool {
+        self.frame(id, &name.text).is_none()
+            && !self
+                .all_members(id)
+                .iter()
+                .any(|m| matches!(&m.member.kind, MemberKind::Frame { name: n, .. } if n.text == name.text))
+    }
+
+    /// A pose in the frame it names, and whether that is where the thing last stood.
+    fn pose(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<(Pose, bool)> {
+        let position = match (&*at.position.kind, &of.shape) {
+            (ExprKind::Name(name), shape) if POINTS.contains(&name.text.as_str()) => {
+                let height = shape.as_ref()?.size()[2];
+                [0.0, 0.0, if name.text == "top" { height } else { height / 2.0 }]
+            }
+            _ => match self.expr(&at.position, scope) {
+                Value::Tuple(items) => self.position(&items, &at.position)?,
+                other => {
+                    self.expected("a position `(x, y, z) mm`, `top` or `middle`", &other, at.position.span);
+                    return None;
+                }
+            },
+        };
+        let rpy = match &at.turned {
+            Some(turned) => self.turned(turned, scope)?,
+            None => [0.0; 3],
+        };
+        let local = Pose::turned(position, rpy);
+        match &at.from {
+            None => Some((local, false)),
+            Some(from) if from.text == frame::STAND => Some((local, true)),
+            Some(from) => {
+                let base = of.frames.iter().find(|f| f.name == from.text)?;
+                Some((base.pose.then(local), base.stand))
+            }
+        }
+    }
+
+    /// `rpy(0 deg, 0 deg, 90 deg)`: roll, pitch and yaw in rad.
+    pub fn turned(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<[f64; 3]> {
+        let wrong = |this: &mut Self| {
+            this.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                e.span,
+                "expected roll, pitch and yaw: `rpy(0 deg, 0 deg, 90 deg)`",
+                "not a rotation",
+            ));
+            None
+        };
+        let Some(("rpy", args)) = call(e) else { return wrong(self) };
+        if args.len() != 3 {
+            return wrong(self);
+        }
+        let mut out = [0.0; 3];
+        for (slot, arg) in out.iter_mut().zip(args) {
+            *slot = self.figure(&arg.value, "Angle", "rpy", scope)?;
+        }
+        Some(out)
+    }
+
+    fn shape(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
+        let found = call(e).and_then(|(name, args)| {
+            let known = SHAPES.iter().find(|(n, _)| *n == name);
+            known.map(|(name, given)| (*name, *given, args))
+        });
+        let Some((name, given, args)) = found else {
+            let names: Vec<String> = SHAPES.iter().map(|(n, _)| format!("`{n}`")).collect();
+            self.report(
+                Diagnostic::error(codes::TYPE_MISMATCH, e.span, "expected a shape", "not a shape")
+                    .help(format!("one of {}", names.join(", "))),
+            );
+            return None;
+        };
+        let shape = match name {
+            "turned" => match args {
+                [outside, inside] => {
+                    let outside = self.outline(&outside.value, scope)?;
+                    Some(Shape::Turned { outside, inside: self.outline(&inside.value, scope)? })
+                }
+                _ => None,
+            },
+            _ => {
+                let mut lengths = Vec::new();
+                for arg in args {
+                    lengths.push(self.extent(&arg.value, name, scope)?);
+                }
+                match (name, lengths.as_slice()) {
+                    ("box", [x, y, z]) => Some(Shape::Box([*x, *y, *z])),
+                    ("cylinder", [d, h]) => Some(Shape::Cylinder([*d, *h])),
+                    ("sphere", [d]) => Some(Shape::Sphere(*d)),
+                    ("vessel", [d, h, wall, floor]) => return self.vessel([*d, *h, *wall, *floor], e.span),
+                    _ => None,
+                }
+            }
+        };
+        if shape.is_none() {
+            self.report(Diagnostic::error(
+                codes::WRONG_ARGUMENTS,
+                e.span,
+                format!("`{name}` is given {given}"),
+                "not these",
+            ));
+        }
+        shape
+    }
+
+    /// A straight beaker: an open cylinder with a wall and a floor.
+    fn vessel(&mut self, [d, h, wall, floor]: [f64; 4], span: Span) -> Option<Shape> {
+        let (r, hole) = (d / 2.0, d / 2.0 - wall);
+        if hole <= 0.0 || floor >= h {
+            self.report(Diagnostic::error(
+                codes::OUT_OF_RANGE,
+                span,
+                "its wall and floor leave no room inside",
+                "nothing fits in",
+            ));
+            return None;
+        }
+        Some(Shape::Turned {
+            outside: vec![[0.0, 0.0], [r, 0.0], [r, h]],
+            inside: vec![[0.0, floor], [hole, floor], [hole, h]],
+        })
+    }
+
+    /// Points of radius and height, m, no radius below 0, from the bottom up.
+    fn outline(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<[f64; 2]>> {
+        let ExprKind::List(points) = &*e.kind else {
+            self.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                e.span,
+                "expected a list of points: `[(0, 0) mm, (35, 0) mm, (35, 95) mm]`",
+                "not a list",
+            ));
+            return None;
+        };
+        let mut out: Vec<[f64; 2]> = Vec::new();
+        for point in points {
+            let Value::Tuple(items) = self.expr(point, scope) else { return None };
+            let [r, z, _] = self.position(&items, point)?;
+            if r < 0.0 || items.len() != 2 || out.last().is_some_and(|last| z < last[1]) {
+                self.report(Diagnostic::error(
+                    codes::OUT_OF_RANGE,
+                    point.span,
+                    "a point of an outline is a radius and a height, from the bottom up",
+                    "not such a point",
+                ));
+                return None;
+            }
+            out.push([r, z]);
+        }
+        Some(out)
+    }
+
+    /// A length above 0, m.
+    fn extent(&mut self, e: &'a Expr, what: &str, scope: &mut Scope) -> Option<f64> {
+        let value = self.figure(e, "Length", what, scope)?;
+        if value > 0.0 && value.is_finite() {
+            return Some(value);
+        }
+        let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, format!("`{what}` has no such extent"), "not above 0 m");
+        self.report(d);
+        None
+    }
+
+    /// A number of a dimension that is known before the run, in SI.
+    fn figure(&mut self, e: &'a Expr, dimension: &str, what: &str, scope: &mut Scope) -> Option<f64> {
+        let ty = Type::Quantity { dimension: self.tables.units.named(dimension), point: false, optional: false };
+        let value = self.expr(e, scope);
+        match self.coerce(value, &ty, e.span, what) {
+            Value::Num(n) => match self.known(n.node) {
+                Some(value) => Some(value),
+                None => {
+                    self.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        e.span,
+                        "geometry must be known before the run",
+                        "changes while it runs",
+                    ));
+                    None
+                }
+            },
+            _ => None,
+        }
+    }
+}
+
+/// `NAME(...)`.
+fn call(e: &Expr) -> Option<(&str, &[Arg])> {
+    let ExprKind::Call(callee, args) = &*e.kind else { return None };
+    let ExprKind::Name(name) = &*callee.kind else { return None };
+    Some((name.text.as_str(), args))
+}

@@ -1,0 +1,75 @@
+//! What a robot does with its body in a primitive: `moves`, `grips`, `frees`.
+
+use matterix_ir::plan::Motion;
+use matterix_ir::scene::InstanceId;
+
+use super::Planner;
+use crate::ast::{ClauseKind, Expr};
+use crate::eval::{Scope, Type, Value};
+
+impl<'a> Planner<'a, '_> {
+    /// The motion of a clause; none where it has a mistake, which is reported.
+    pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
+        match clause {
+            ClauseKind::Moves { mover, straight, to, by } => {
+                let (mover, straight) = (self.thing(mover, scope)?, *straight);
+                if let Some(shift) = by {
+                    return Some(Motion::By { mover, shift: self.shift(shift, scope)?, straight });
+                }
+                let (goal, frame) = self.goal(to.as_ref()?, scope)?;
+                Some(Motion::To { mover, goal, frame, straight })
+            }
+            ClauseKind::Grips { item, by } => {
+                Some(Motion::Grip { item: self.thing(item, scope)?, by: self.thing(by, scope)? })
+            }
+            ClauseKind::Frees { item, on, by } => {
+                let on = match on {
+                    Some(on) => Some(self.thing(on, scope)?),
+                    None => None,
+                };
+                Some(Motion::Free { item: self.thing(item, scope)?, on, by: self.thing(by, scope)? })
+            }
+            _ => None,
+        }
+    }
+
+    fn thing(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<InstanceId> {
+        match self.lab.expr(e, scope) {
+            Value::Instance(id) | Value::Qualified(id, _) => Some(id),
+            other => {
+                self.lab.expected("a thing of the lab", &other, e.span);
+                None
+            }
+        }
+    }
+
+    fn goal(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, String)> {
+        match self.lab.expr(e, scope) {
+            Value::Frame(id, frame) => Some((id, frame)),
+            Value::Instance(id) | Value::Qualified(id, _) => Some((id, String::new())),
+            other => {
+                self.lab.expected("a frame", &other, e.span);
+                None
+            }
+        }
+    }
+
+    fn shift(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<[matterix_ir::NodeId; 3]> {
+        let ty = Type::Quantity { dimension: self.lab.tables.units.named("Length"), point: false, optional: false };
+        let value = self.lab.expr(e, scope);
+        let Value::Tuple(items) = value else {
+            self.lab.expected("a shift `(x, y, z) mm`", &value, e.span);
+            return None;
+        };
+        let mut nodes = Vec::new();
+        for item in items {
+            let Value::Num(n) = self.lab.coerce(item, &ty, e.span, "by") else { return None };
+            nodes.push(n.node);
+        }
+        let found = <[matterix_ir::NodeId; 3]>::try_from(nodes);
+        if found.is_err() {
+            self.lab.expected("a shift `(x, y, z) mm`", &Value::Tuple(Vec::new()), e.span);
+        }
+        found.ok()
+    }
+}
