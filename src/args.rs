@@ -51,6 +51,8 @@ pub enum Command {
     Doc(DocArgs),
     /// Schedule a workflow: who has which instance when, so that the whole ends early.
     Plan(PlanArgs),
+    /// Show a lab, or play a recording, on a page in three dimensions.
+    View(ViewArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
     /// Create a small project that checks, runs and passes.
@@ -71,6 +73,9 @@ pub struct CheckArgs {
     /// Take warnings for errors, and show advice as warnings.
     #[arg(long)]
     pub strict: bool,
+    /// How closely motions are looked at: with `motion` also what is out of reach of robots and what they run into.
+    #[arg(long, value_enum, default_value_t = Fidelity::Process)]
+    pub fidelity: Fidelity,
     /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
     #[arg(long)]
     pub contents: bool,
@@ -167,6 +172,8 @@ pub struct PlanArgs {
 pub enum Fidelity {
     /// Motions take their declared time.
     Process,
+    /// Robots move through space, around what stands there, in the time their joints need.
+    Motion,
 }
 
 /// Form of the report of a run.
@@ -244,6 +251,20 @@ pub struct DocArgs {
     /// Where to write it; to standard output without it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// `matterixc view`.
+#[derive(Debug, Args)]
+pub struct ViewArgs {
+    /// What is shown: a program, or the recording that a run has written (or the folder it is in).
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Port on this machine to serve the page at; 0 takes any that is free.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub port: u16,
+    /// Write the page to a file that opens by itself, and serve nothing.
+    #[arg(long, value_name = "FILE", conflicts_with = "port")]
+    pub export: Option<PathBuf>,
 }
 
 /// `matterixc explain`.

@@ -8,6 +8,7 @@ pub mod bill;
 pub mod exec;
 pub mod fault;
 pub mod ledger;
+pub mod motion;
 pub mod process;
 pub mod record;
 pub mod run;

@@ -8,6 +8,7 @@ use crate::exec::{
     self, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
 };
 use crate::fault::Fault;
+use crate::motion::Stage;
 use crate::process::{BalanceReport, Engine, Options};
 
 /// How closely the world is simulated.
@@ -17,6 +18,8 @@ pub enum Fidelity {
     /// Motions take their declared time.
     #[default]
     Process,
+    /// Robots move through space on ways without collision, in the time their joints need.
+    Motion,
     /// Nothing moves: the plan is walked with nominal durations.
     Dry,
 }
@@ -71,7 +74,7 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
         Err(fault) => return refused(program, fault),
     };
     match options.fidelity {
-        Fidelity::Process => simulate(program, options, params, out),
+        Fidelity::Process | Fidelity::Motion => simulate(program, options, params, out),
         Fidelity::Dry => {
             let mut dry = Dry::new(&program.model, &program.plan, params.clone());
             let execution = exec::execute(&program.plan, &program.scene, &mut dry, options.limits, out);
@@ -89,6 +92,12 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
         Err(fault) => return refused(program, fault),
     };
     let mut sim = Sim::new(engine, &prepared, options.seed);
+    if options.fidelity == Fidelity::Motion {
+        sim = match Stage::new(&program.scene) {
+            Ok(stage) => sim.with_motion(stage),
+            Err(message) => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
+        };
+    }
     let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
     let engine = sim.engine();
     let finished = engine.finish(out);

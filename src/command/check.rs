@@ -34,7 +34,7 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
         let (sources, mut diagnostics, known) = match args.contents {
             true => pipeline::contents(&input),
             false => {
-                let (sources, diagnostics) = pipeline::check(&input);
+                let (sources, diagnostics) = pipeline::check(&input, args.fidelity);
                 (sources, diagnostics, Vec::new())
             }
         };

@@ -9,6 +9,7 @@ mod new;
 mod plan;
 mod run;
 mod test;
+mod view;
 
 pub use bill::bill;
 pub use check::check;
@@ -19,6 +20,7 @@ pub use new::new;
 pub use plan::plan;
 pub use run::run;
 pub use test::test;
+pub use view::view;
 
 use crate::Exit;
 use crate::terminal::{Stream, complain, print};

@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
+use crate::args::Fidelity;
+use matterix_runtime::motion::preflight;
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
@@ -67,11 +69,14 @@ impl Input {
     }
 }
 
-/// Findings of a file.
-pub fn check(input: &Input) -> (Sources, Vec<Diagnostic>) {
+/// Findings of a file; at the fidelity `motion` also those in the way of robots.
+pub fn check(input: &Input, fidelity: Fidelity) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let found = match file {
-        Ok(file) => matterix_lang::check(&mut sources, file, &input.neighbours()),
+        Ok(file) => match fidelity {
+            Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
+            Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &input.neighbours(), &preflight),
+        },
         Err(found) => vec![found],
     };
     (sources, found)

@@ -8,6 +8,7 @@ use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
+use matterix_runtime::motion::Moment;
 use matterix_runtime::process::{Engine, Observer};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
@@ -35,6 +36,7 @@ impl Choices {
         match self.fidelity {
             _ if self.dry => Fidelity::Dry,
             args::Fidelity::Process => Fidelity::Process,
+            args::Fidelity::Motion => Fidelity::Motion,
         }
     }
 }
@@ -128,6 +130,10 @@ impl Listener for Follower<'_, '_> {
         }
     }
 
+    fn travels(&mut self, moments: &[Moment]) {
+        self.recording.travels(moments);
+    }
+
     fn expectation(&mut self, result: &ExpectationResult) {
         if result.verdict == Verdict::NotObserved {
             let text = format!("not observed: {}", result.text);
@@ -196,6 +202,7 @@ fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
     };
     let fidelity = match choices.fidelity() {
         Fidelity::Process => "process",
+        Fidelity::Motion => "motion",
         Fidelity::Dry => "dry",
     };
     RunInfo {

@@ -12,6 +12,7 @@ mod findings;
 mod formatting;
 mod grids;
 mod harness;
+mod motion;
 mod new;
 mod pages;
 mod pipeline_tests;

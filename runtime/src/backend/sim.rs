@@ -5,16 +5,19 @@ use std::collections::BTreeMap;
 use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::quantity::show_number;
+use matterix_ir::scene::InstanceId;
 
 use super::{Backend, Follow, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::Listener;
 use crate::fault::Fault;
+use crate::motion::{Refused, Stage, supported};
 use crate::process::{Advance, Engine, Watch};
 
-/// Simulates at `process` fidelity.
+/// Simulates at `process` fidelity, or with robots that move through space.
 pub struct Sim<'m> {
+    stage: Option<Stage<'m>>,
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
@@ -26,6 +29,9 @@ pub struct Sim<'m> {
     told: BTreeMap<u32, f64>,
 }
 
+/// Longest time between two recorded moments of a motion, s.
+const FRAME: f64 = 0.04;
+
 /// An operation that goes on.
 struct Running {
     ends: Ends,
@@ -36,6 +42,8 @@ struct Running {
 enum Ends {
     At(f64),
     When(NodeId),
+    /// It cannot be done: a failure's name and what it says.
+    Failed(String, String),
     /// Looked at when a reading reports.
     Polled {
         condition: NodeId,
@@ -48,7 +56,39 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Sim { engine, prepared, seed, running, started: 0, sampled, told }
+        Sim { stage: None, engine, prepared, seed, running, started: 0, sampled, told }
+    }
+
+    /// Robots move through space from now on: their motions take the time they need, and fail where there is no way.
+    pub fn with_motion(self, stage: Stage<'m>) -> Self {
+        Sim { stage: Some(stage), ..self }
+    }
+
+    /// Carries out the motion of an operation; how long it takes, if it takes time.
+    fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
+        let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
+        let shift = match motion {
+            Motion::By { shift, .. } => shift.map(|node| self.engine.eval(node)),
+            _ => [0.0; 3],
+        };
+        let performed = stage.perform(motion, shift)?;
+        Ok(performed.map(|performed| {
+            out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
+            performed.duration()
+        }))
+    }
+
+    /// Things stand where the states of the model say.
+    fn follow_supports(&mut self, actions: &[Action]) {
+        let Some(stage) = self.stage.as_mut() else { return };
+        for action in actions {
+            let Action::Assign { state, .. } = action else { continue };
+            let Some(value) = self.engine.states().get(*state as usize).copied() else { continue };
+            let Some(state) = self.prepared.model.states.get(*state as usize) else { continue };
+            if let Some(id) = supported(stage.scene, &state.name, &state.domain) {
+                stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
+            }
+        }
     }
 
     /// The engine, for its states and balances.
@@ -115,6 +155,7 @@ impl<'m> Sim<'m> {
         let (condition, periods) = match &self.running.get(&ticket)?.ends {
             Ends::At(at) if now >= *at => return None,
             Ends::At(at) => return Some(Status::Running { until: Some(*at), watch: None }),
+            Ends::Failed(..) => return None,
             Ends::When(node) if self.engine.truth(*node) => return None,
             Ends::When(node) => return Some(Status::Running { until: None, watch: Some(*node) }),
             Ends::Polled { next, .. } if now < *next => {
@@ -151,8 +192,17 @@ impl Backend for Sim<'_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
-        let ends = self.end_of(operation, out)?;
+        let ends = match self.perform(operation, out) {
+            Ok(Some(duration)) => Ends::At(self.engine.time() + duration),
+            Ok(None) => self.end_of(operation, out)?,
+            Err(refused) => {
+                let scene = self.stage.as_ref().map(|s| s.scene);
+                let text = scene.map(|scene| refused.text(scene, operation)).unwrap_or_default();
+                Ends::Failed(refused.failure().to_string(), text)
+            }
+        };
         self.engine.apply(&operation.at_start, out)?;
+        self.follow_supports(&operation.at_start);
         let ticket = Ticket(self.started);
         self.started += 1;
         self.running.insert(ticket, Running { ends, at_end: operation.at_end.clone() });
@@ -164,7 +214,11 @@ impl Backend for Sim<'_> {
             return Ok(status);
         }
         if let Some(running) = self.running.remove(&ticket) {
+            if let Ends::Failed(name, text) = running.ends {
+                return Ok(Status::Failed { name, text });
+            }
             self.engine.apply(&running.at_end, out)?;
+            self.follow_supports(&running.at_end);
         }
         Ok(Status::Done)
     }

@@ -4,6 +4,8 @@ use matterix_ir::plan::{Condition, Operation, StepId};
 use matterix_ir::{Span, Unit};
 use serde::{Deserialize, Serialize};
 
+use crate::motion::Moment;
+
 use super::failure::{FailureTrace, Measured};
 use crate::process::Observer;
 
@@ -98,6 +100,8 @@ pub trait Listener: Observer {
     fn record(&mut self, time: f64, step: StepId, name: &str, values: &[f64], unit: &Unit) {}
     /// What a device reported when it was looked at: the reading's index in the model, SI.
     fn reading(&mut self, time: f64, reading: usize, value: f64) {}
+    /// A robot begins to move: where it is from moment to moment until it stands still again.
+    fn travels(&mut self, moments: &[Moment]) {}
     /// A remark.
     fn note(&mut self, time: f64, step: StepId, text: &str) {}
     /// A person is asked.

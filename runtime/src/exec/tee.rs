@@ -5,6 +5,7 @@ use matterix_ir::plan::{Condition, Operation, StepId};
 
 use super::failure::FailureTrace;
 use super::listener::{ExpectationResult, Listener, OperationState, StepState};
+use crate::motion::Moment;
 use crate::process::{Engine, Observer};
 
 /// Tells both, the first one first.
@@ -31,6 +32,7 @@ impl Observer for Tee<'_> {
 impl Listener for Tee<'_> {
     both! {
         step(time: f64, step: StepId, state: StepState);
+        travels(moments: &[Moment]);
         operation(time: f64, step: StepId, operation: &Operation, state: OperationState);
         expectation(result: &ExpectationResult);
         failure(failure: &FailureTrace);

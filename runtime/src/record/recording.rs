@@ -4,6 +4,8 @@ use matterix_ir::plan::StepId;
 use matterix_ir::{Program, Span, Unit};
 use serde::Serialize;
 
+use crate::motion::Moment;
+
 /// Where a node of the plan stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -141,6 +143,8 @@ pub struct Recording {
     pub states: Vec<Vec<f64>>,
     /// By observable, then by component, then by sample.
     pub observables: Vec<Vec<Vec<f64>>>,
+    /// Where robots were while they moved, in order of time.
+    pub moments: Vec<Moment>,
     /// In order of occurrence.
     pub events: Vec<EventMark>,
     /// In order of occurrence.
@@ -160,6 +164,13 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// A robot moves.
+    pub fn travels(&mut self, moments: &[Moment]) {
+        self.moments.extend_from_slice(moments);
+        // Several robots move at once.
+        self.moments.sort_by(|a, b| a.time.total_cmp(&b.time));
+    }
+
     /// Empty columns for every state and observable of the program.
     pub fn new(program: &Program) -> Self {
         let model = &program.model;

@@ -52,6 +52,8 @@ impl Lab {
             pose: Pose::default(),
             frames: Vec::new(),
             shape: None,
+            solids: Vec::new(),
+            articulation: None,
             span: Span::default(),
         });
         InstanceId(self.program.scene.instances.len() as u32 - 1)
@@ -236,6 +238,7 @@ impl Lab {
             claims: Vec::new(),
             fails: Vec::new(),
             limits: Vec::new(),
+            motion: None,
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use matterix_ir::model::Domain;
-use matterix_ir::scene::{InstanceId, Shape};
+use matterix_ir::scene::{InstanceId, Pose, Shape};
 use mcap::McapResult;
 
 use super::Sink;
@@ -12,12 +12,13 @@ use super::foxglove::{
     self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, pose,
     quaternion, vector,
 };
+use super::robots::Robots;
 use crate::record::column::Column;
-use crate::record::pose::{self, Stand, Transform, height};
+use crate::record::pose::{self, Stand};
 use crate::record::run::Run;
 
 /// The frame everything stands in.
-const LAB: &str = "lab";
+pub(super) const LAB: &str = "lab";
 /// Of things that have no colour of their own.
 const GREY: [f64; 3] = [0.62, 0.66, 0.70];
 
@@ -29,28 +30,34 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let frames = sink.channel("/tf", "foxglove.FrameTransforms", &foxglove::transforms_schema(), &units)?;
     let tints = tints(run);
     let mut stands = pose::initial(scene);
-    let mut shown: Vec<Option<(Transform, Tint)>> = vec![None; scene.instances.len()];
+    let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
     let supports = supports(run);
     let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
+    let mut robots = Robots::begin(run, sink, entities, frames)?;
     let samples = run.recording.times.len().max(1);
     for sample in 0..samples {
         let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
+        let carried = robots.until(run, time, sink, frames)?;
         let mut moved = sample == 0;
         for (&(id, values), current) in supports.iter().zip(&mut supported) {
             let Some(&value) = values.get(sample) else { continue };
             if value != *current {
                 *current = value;
                 moved = true;
-                // Nothing below: it is held, and stays where it was until it is put down.
-                if value >= 0.0 {
-                    stands[id] = Stand::On(InstanceId(value as u32), Transform::IDENTITY);
+                // Nothing below: it is held, and stays where it was until it is put down. What a robot carried stays
+                // where it was let go.
+                match robots.left.remove(&id) {
+                    Some(at) => stands[id] = Stand::Lab(at),
+                    None if value >= 0.0 => stands[id] = Stand::On(InstanceId(value as u32), Pose::IDENTITY),
+                    None => {}
                 }
             }
         }
-        if !moved && tints.is_empty() {
+        if !moved && !carried && tints.is_empty() {
             continue;
         }
-        let poses = pose::in_lab(scene, &stands);
+        let mut poses = pose::in_lab(scene, &stands);
+        robots.held.iter().for_each(|(id, at)| poses[*id] = *at);
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
             let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));
@@ -113,21 +120,60 @@ fn tint(colour: [f64; 3]) -> Tint {
     colour.map(|v| (v * SHADES).round() as u8)
 }
 
-fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Transform, Tint)) -> Option<Entity<'a>> {
-    let instance = run.program.scene.instances.get(index)?;
-    let shape = instance.shape?;
-    let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
-    let color = Color { r, g, b, a: 0.85 };
-    let middle = pose(at.then(Transform::up(height(shape) / 2.0)));
-    let (mut cubes, mut cylinders) = (Vec::new(), Vec::new());
-    match shape {
-        Shape::Box(size) => cubes.push(Cube { pose: middle, size: vector(size), color }),
-        Shape::Cylinder([d, h]) => {
-            cylinders.push(Cylinder { pose: middle, size: vector([d, d, h]), bottom_scale: 1.0, top_scale: 1.0, color })
+/// The primitives of one thing.
+#[derive(Default)]
+pub(super) struct Pieces {
+    pub(super) color: Color,
+    pub(super) cubes: Vec<Cube>,
+    pub(super) spheres: Vec<Cube>,
+    pub(super) cylinders: Vec<Cylinder>,
+    /// Height of its main shape, m.
+    top: f64,
+}
+
+impl Pieces {
+    fn add(&mut self, shape: &Shape, at: Pose) {
+        let size = shape.size();
+        if self.top == 0.0 {
+            self.top = size[2];
+        }
+        let color = self.color;
+        let middle = pose(at.then(Pose::up(size[2] / 2.0)));
+        match shape {
+            Shape::Box(_) => self.cubes.push(Cube { pose: middle, size: vector(size), color }),
+            Shape::Sphere(_) => self.spheres.push(Cube { pose: middle, size: vector(size), color }),
+            Shape::Cylinder(_) => self.cone(middle, size, [1.0, 1.0]),
+            Shape::Turned { outside, .. } => {
+                for step in outside.windows(2) {
+                    let ([r0, z0], [r1, z1]) = (step[0], step[1]);
+                    let (wide, high) = (r0.max(r1), z1 - z0);
+                    if wide > 0.0 && high > 0.0 {
+                        let middle = pose(at.then(Pose::up((z0 + z1) / 2.0)));
+                        self.cone(middle, [2.0 * wide, 2.0 * wide, high], [r0 / wide, r1 / wide]);
+                    }
+                }
+            }
         }
     }
+
+    pub(super) fn cone(&mut self, pose: foxglove::Pose, size: [f64; 3], [bottom_scale, top_scale]: [f64; 2]) {
+        self.cylinders.push(Cylinder { pose, size: vector(size), bottom_scale, top_scale, color: self.color });
+    }
+}
+
+fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) -> Option<Entity<'a>> {
+    let instance = run.program.scene.instances.get(index)?;
+    let shape = instance.shape.iter().map(|shape| (shape, at));
+    let solids = instance.solids.iter().map(|solid| (&solid.shape, at.then(solid.pose)));
+    let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
+    let mut pieces = Pieces { color: Color { r, g, b, a: 0.85 }, ..Pieces::default() };
+    shape.chain(solids).for_each(|(shape, at)| pieces.add(shape, at));
+    let Pieces { cubes, spheres, cylinders, top, .. } = pieces;
+    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() {
+        return None;
+    }
     let label = Text {
-        pose: pose(at.then(Transform::up(height(shape) + 0.03))),
+        pose: pose(at.then(Pose::up(top + 0.03))),
         billboard: true,
         font_size: 0.025,
         scale_invariant: false,
@@ -143,7 +189,7 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Transform, Ti
         metadata: vec![KeyValue { key: "kind", value: &instance.kind }],
         arrows: [],
         cubes,
-        spheres: [],
+        spheres,
         cylinders,
         lines: [],
         triangles: [],
@@ -153,9 +199,9 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Transform, Ti
 }
 
 /// The instance in the lab, and its named points in the instance.
-fn transforms(run: &Run<'_>, index: usize, time: f64, at: Transform) -> Vec<FrameTransform> {
+fn transforms(run: &Run<'_>, index: usize, time: f64, at: Pose) -> Vec<FrameTransform> {
     let Some(instance) = run.program.scene.instances.get(index) else { return Vec::new() };
-    let transform = |parent: &str, child: String, at: Transform| FrameTransform {
+    let transform = |parent: &str, child: String, at: Pose| FrameTransform {
         timestamp: Time::new(time),
         parent_frame_id: parent.to_owned(),
         child_frame_id: child,
@@ -163,9 +209,7 @@ fn transforms(run: &Run<'_>, index: usize, time: f64, at: Transform) -> Vec<Fram
         rotation: quaternion(at.rotation),
     };
     let own = transform(LAB, instance.name.clone(), at);
-    let points = instance
-        .frames
-        .iter()
-        .map(|f| transform(&instance.name, format!("{}.{}", instance.name, f.name), Transform::of(f.pose)));
+    let points =
+        instance.frames.iter().map(|f| transform(&instance.name, format!("{}.{}", instance.name, f.name), f.pose));
     std::iter::once(own).chain(points).collect()
 }

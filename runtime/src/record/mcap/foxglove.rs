@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::schema::{count, list, number, object, text, truth};
-use crate::record::pose::Transform;
+use matterix_ir::scene::Pose as Stand;
 
 /// A time since the start of the run.
 #[derive(Clone, Copy, Serialize)]
@@ -58,7 +58,7 @@ pub(super) struct Pose {
 }
 
 /// Red, green, blue, opacity, each 0 to 1.
-#[derive(Clone, Copy, PartialEq, Serialize)]
+#[derive(Clone, Copy, Default, PartialEq, Serialize)]
 pub(super) struct Color {
     pub(super) r: f64,
     pub(super) g: f64,
@@ -109,7 +109,7 @@ pub(super) struct Entity<'a> {
     pub(super) metadata: Vec<KeyValue<'a>>,
     pub(super) arrows: [(); 0],
     pub(super) cubes: Vec<Cube>,
-    pub(super) spheres: [(); 0],
+    pub(super) spheres: Vec<Cube>,
     pub(super) cylinders: Vec<Cylinder>,
     pub(super) lines: [(); 0],
     pub(super) triangles: [(); 0],
@@ -134,6 +134,21 @@ pub(super) struct FrameTransform {
     pub(super) rotation: Quaternion,
 }
 
+/// An entry of `foxglove.JointStates`.
+#[derive(Serialize)]
+pub(super) struct JointState<'a> {
+    pub(super) name: &'a str,
+    /// rad or m.
+    pub(super) position: f64,
+}
+
+/// `foxglove.JointStates`.
+#[derive(Serialize)]
+pub(super) struct JointStates<'a> {
+    pub(super) timestamp: Time,
+    pub(super) joints: Vec<JointState<'a>>,
+}
+
 /// `foxglove.FrameTransforms`.
 #[derive(Serialize)]
 pub(super) struct FrameTransforms {
@@ -151,7 +166,7 @@ pub(super) fn quaternion([x, y, z, w]: [f64; 4]) -> Quaternion {
 }
 
 /// Where something stands.
-pub(super) fn pose(at: Transform) -> Pose {
+pub(super) fn pose(at: Stand) -> Pose {
     Pose { position: vector(at.position), orientation: quaternion(at.rotation) }
 }
 
@@ -220,14 +235,26 @@ fn entity_schema() -> Value {
             ("frame_locked", truth("Whether the entity should keep its location in the fixed frame or the given one")),
             ("metadata", list(key_value)),
             ("arrows", unused("foxglove.ArrowPrimitive")),
-            ("cubes", list(object("foxglove.CubePrimitive", cube))),
-            ("spheres", unused("foxglove.SpherePrimitive")),
+            ("cubes", list(object("foxglove.CubePrimitive", cube.clone()))),
+            ("spheres", list(object("foxglove.SpherePrimitive", cube.clone()))),
             ("cylinders", list(object("foxglove.CylinderPrimitive", cylinder))),
             ("lines", unused("foxglove.LinePrimitive")),
             ("triangles", unused("foxglove.TriangleListPrimitive")),
             ("texts", list(object("foxglove.TextPrimitive", label))),
             ("models", unused("foxglove.ModelPrimitive")),
         ],
+    )
+}
+
+/// Schema of [`JointStates`].
+pub(super) fn joints_schema() -> Value {
+    let joint = object(
+        "foxglove.JointState",
+        [("name", text("Name of the joint")), ("position", number("Position of the joint, in radians or metres"))],
+    );
+    object(
+        "foxglove.JointStates",
+        [("timestamp", time_schema("time", "Time of the positions")), ("joints", list(joint))],
     )
 }
 

@@ -5,6 +5,7 @@
 
 mod bench;
 mod foxglove;
+mod robots;
 mod schema;
 mod story;
 mod tables;

@@ -43,15 +43,17 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         capabilities: vec![],
         owner: None,
         support: support.map(InstanceId),
-        pose: Pose { position: at, rpy: [0.0; 3] },
+        pose: Pose::at(at),
         frames: vec![],
         shape,
+        solids: Vec::new(),
+        articulation: None,
         span: line(2),
     }
 }
 
 fn scene() -> Scene {
-    let place = Frame { name: "place".into(), pose: Pose { position: [0.0, 0.0, 0.13], rpy: [0.0; 3] } };
+    let place = Frame { name: "place".into(), pose: Pose::up(0.13), stand: false };
     let mut hotplate = instance("hotplate", "IkaRet", Some(0), [0.55, 0.2, 0.0], Some(Shape::Box([0.16, 0.27, 0.1])));
     hotplate.frames.push(place);
     let mut contents = instance("beaker.contents", "Mixture", None, [0.0; 3], None);

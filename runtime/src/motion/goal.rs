@@ -1,0 +1,92 @@
+//! Where a robot's tip is to go for a goal.
+
+use std::f64::consts::{FRAC_PI_4, PI};
+
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+
+use super::stage::{Stage, Stand};
+
+/// Poses of a robot's tip in the lab, any of which will do for bringing what it holds, or else its empty gripper, to a
+/// frame; none where the frame is unknown.
+///
+/// What is held comes with its origin to the frame. An empty gripper comes with its z axis against the frame's, its
+/// fingers closing along the frame's y axis. What is round may be turned about its own axis.
+pub fn targets(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &str) -> Vec<Pose> {
+    let Some(to) = stage.frame(goal, frame) else { return Vec::new() };
+    let own = |held: &InstanceId| *held == goal && !stage.is_stand(goal, frame);
+    let held = stage.held(robot).filter(|held| !own(held));
+    match held.map(|held| (held, stage.stands[held.0 as usize])) {
+        Some((held, Stand::Held(_, inner))) => {
+            let back = inner.inverse();
+            let to = to.then(spot(stage, held, goal));
+            turns(stage, held, 1).into_iter().map(|turn| to.then(turn).then(back)).collect()
+        }
+        _ => {
+            let over = Pose::turned([0.0; 3], [PI, 0.0, 0.0]);
+            turns(stage, goal, 2).into_iter().map(|turn| to.then(turn).then(over)).collect()
+        }
+    }
+}
+
+/// Distance of the places on a surface that are tried, m.
+const RASTER: f64 = 0.02;
+
+/// How far from the frame `place` of a surface a thing finds room beside what stands there already; nothing where it
+/// finds none, or where the surface is no larger than a place for one thing.
+pub fn spot(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Pose {
+    let scene = stage.scene;
+    let (Some(top), Some(own)) = (&scene.get(surface).shape, &scene.get(item).shape) else { return Pose::IDENTITY };
+    let place = stage.surface(surface).position;
+    let others: Vec<([f64; 3], [f64; 3])> = stage
+        .stands
+        .iter()
+        .enumerate()
+        .filter_map(|(index, stand)| match stand {
+            Stand::On(on, at) if *on == surface && index != item.0 as usize => {
+                Some((at.position, footprint(stage, InstanceId(index as u32))?))
+            }
+            _ => None,
+        })
+        .collect();
+    let (own, top) = (own.size(), top.size());
+    let free = |x: f64, y: f64| {
+        let apart = |(at, size): &([f64; 3], [f64; 3])| {
+            (at[0] - x).abs() >= (size[0] + own[0]) / 2.0 + RASTER
+                || (at[1] - y).abs() >= (size[1] + own[1]) / 2.0 + RASTER
+        };
+        others.iter().all(apart)
+    };
+    let inside = |x: f64, y: f64| {
+        (place[0] + x).abs() + own[0] / 2.0 <= top[0] / 2.0 && (place[1] + y).abs() + own[1] / 2.0 <= top[1] / 2.0
+    };
+    if free(0.0, 0.0) {
+        return Pose::IDENTITY;
+    }
+    let most = (top[0].max(top[1]) / RASTER) as i32;
+    let mut places: Vec<(f64, f64)> = (-most..=most)
+        .flat_map(|i| (-most..=most).map(move |j| (f64::from(i) * RASTER, f64::from(j) * RASTER)))
+        .filter(|(x, y)| inside(*x, *y))
+        .collect();
+    places.sort_by(|a, b| (a.0.hypot(a.1)).total_cmp(&b.0.hypot(b.1)));
+    let found = places.into_iter().find(|(x, y)| free(*x, *y));
+    found.map_or(Pose::IDENTITY, |(x, y)| Pose::at([x, y, 0.0]))
+}
+
+/// Room a thing takes where it stands, x, y, z in metres: that of its shape, or of the foot of a robot.
+fn footprint(stage: &Stage<'_>, id: InstanceId) -> Option<[f64; 3]> {
+    if let Some(shape) = &stage.scene.get(id).shape {
+        return Some(shape.size());
+    }
+    let robot = &stage.actors.get(&id)?.assembly.robot;
+    let foot = robot.balls.iter().filter(|b| robot.fixed_to(0).contains(&b.link));
+    let reach = foot.map(|b| b.center[0].hypot(b.center[1]) + b.radius).fold(0.0, f64::max);
+    Some([2.0 * reach; 3])
+}
+
+/// Turns about a thing's own axis that change nothing: of a round one eight, of another one so many.
+fn turns(stage: &Stage<'_>, id: InstanceId, others: u32) -> Vec<Pose> {
+    let round = stage.scene.get(id).shape.as_ref().is_some_and(|s| s.is_round());
+    let (count, step) = if round { (8, FRAC_PI_4) } else { (others, PI) };
+    (0..count).map(|k| Pose::turned([0.0; 3], [0.0, 0.0, f64::from(k) * step])).collect()
+}

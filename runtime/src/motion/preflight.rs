@@ -1,0 +1,284 @@
+//! Follows the motions of a plan before anything moves: what is out of reach, what collides, what cannot be gripped.
+//!
+//! Steps are followed in the order they are written, branches one after the other from the state before them, loops
+//! twice; where a condition decides, both ways are followed and the state after the first is kept. A motion that cannot
+//! be carried out is reported once, and the robot counts as where it was.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::{Action, Domain};
+use matterix_ir::plan::{Motion, Operation, Step, StepId};
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Program, Span, codes};
+use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::pose::pose;
+
+use super::perform::Refused;
+use super::stage::{Stage, Stand};
+
+/// How many motions are followed before a plan counts as too long to be looked at whole.
+const MOST: usize = 2000;
+
+/// What would go wrong with the motions of a program. Empty for labs without robots that have joints.
+pub fn preflight(program: &Program) -> Vec<Diagnostic> {
+    let Ok(stage) = Stage::new(&program.scene) else { return Vec::new() };
+    if stage.actors.is_empty() {
+        return Vec::new();
+    }
+    let mut walk =
+        Walk { program, stage, found: Vec::new(), told: BTreeSet::new(), site: Vec::new(), lost: false, left: MOST };
+    walk.step(program.plan.root);
+    walk.found
+}
+
+struct Walk<'p> {
+    program: &'p Program,
+    stage: Stage<'p>,
+    found: Vec<Diagnostic>,
+    /// Statements of the user that have been reported.
+    told: BTreeSet<Span>,
+    /// The statement of the user's file that is being followed, and the step of it.
+    site: Vec<(Span, StepId)>,
+    /// What is being followed cannot be done: its other motions are passed over.
+    lost: bool,
+    left: usize,
+}
+
+impl<'p> Walk<'p> {
+    fn step(&mut self, id: StepId) {
+        if self.left == 0 {
+            return;
+        }
+        let at = self.program.plan.get(id);
+        // The innermost statement of the user's own text is where a mistake is said.
+        if self.is_own(at.span) && !self.lost {
+            let before = self.stage.clone();
+            self.site.push((at.span, id));
+            self.inside(id);
+            self.site.pop();
+            // What failed in part counts as done where things stand, and robots as where they were before.
+            if self.lost
+                && self
+                    .program
+                    .plan
+                    .get(id)
+                    .step
+                    .children()
+                    .iter()
+                    .all(|c| !self.is_own(self.program.plan.get(*c).span))
+            {
+                self.lost = false;
+                let stands = std::mem::take(&mut self.stage.stands);
+                self.stage = before;
+                self.recover(&stands);
+            }
+            return;
+        }
+        self.inside(id);
+    }
+
+    /// Things are put where their states say, as far as that is not where they were.
+    fn recover(&mut self, after: &[Stand]) {
+        for (index, stand) in after.iter().enumerate() {
+            let id = InstanceId(index as u32);
+            let carrier = match stand {
+                Stand::On(below, _) | Stand::Held(below, _) => Some(*below),
+                _ => continue,
+            };
+            self.stage.follow(id, carrier);
+        }
+    }
+
+    /// Whether a place is in the user's own files.
+    fn is_own(&self, span: Span) -> bool {
+        self.program.files.get(span.file.0 as usize).is_some_and(|name| !name.starts_with("std::"))
+    }
+
+    fn inside(&mut self, id: StepId) {
+        let at = self.program.plan.get(id);
+        match &at.step {
+            Step::Operation(operation) => self.operation(operation, at.span),
+            Step::If { then, otherwise, .. } => {
+                let before = self.stage.clone();
+                self.step(*then);
+                if let Some(otherwise) = otherwise {
+                    let after = std::mem::replace(&mut self.stage, before);
+                    self.step(*otherwise);
+                    self.stage = after;
+                }
+            }
+            Step::Try(all) => {
+                let mut after = None;
+                for one in all {
+                    let before = self.stage.clone();
+                    self.step(*one);
+                    after.get_or_insert_with(|| self.stage.clone());
+                    self.stage = before;
+                }
+                self.stage = after.unwrap_or_else(|| self.stage.clone());
+            }
+            Step::Guarded { body, handlers, finally } => {
+                let before = self.stage.clone();
+                self.step(*body);
+                // Handlers begin somewhere in the body; what they do is followed from its beginning.
+                let after = std::mem::replace(&mut self.stage, before);
+                for (_, handler) in handlers {
+                    let before = self.stage.clone();
+                    self.step(*handler);
+                    self.stage = before;
+                }
+                self.stage = after;
+                finally.iter().for_each(|f| self.step(*f));
+            }
+            Step::Repeat { body, .. } | Step::RepeatWhile { body, .. } => {
+                self.step(*body);
+                self.step(*body);
+            }
+            other => other.children().into_iter().for_each(|child| self.step(child)),
+        }
+    }
+
+    fn operation(&mut self, operation: &Operation, span: Span) {
+        if let Some(motion) = &operation.motion {
+            self.left -= 1;
+            if !self.lost
+                && let Err(refused) = self.motion(motion)
+            {
+                self.lost = true;
+                let site = self.site.last().map_or(span, |(site, _)| *site);
+                if self.told.insert(site) {
+                    let found = self.finding(motion, &refused, site);
+                    self.found
+                        .extend(found.map(|d| if site == span { d } else { d.because(span, "on this step of it") }));
+                }
+            }
+        }
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let Some(state) = self.program.model.states.get(*state as usize) else { continue };
+            let Some(value) = self.program.model.graph.constant(*value) else { continue };
+            if let Some(id) = supported(&self.program.scene, &state.name, &state.domain) {
+                self.stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
+            }
+        }
+    }
+
+    fn motion(&mut self, motion: &Motion) -> Result<(), Refused> {
+        let shift = match motion {
+            Motion::By { shift, .. } => {
+                let known: Option<Vec<f64>> =
+                    shift.iter().map(|node| self.program.model.graph.constant(*node)).collect();
+                // What only a run can tell is left to the run.
+                let Some(known) = known.and_then(|k| <[f64; 3]>::try_from(k).ok()) else { return Ok(()) };
+                known
+            }
+            _ => [0.0; 3],
+        };
+        self.stage.perform(motion, shift).map(|_| ())
+    }
+
+    fn finding(&self, motion: &Motion, refused: &Refused, span: Span) -> Option<Diagnostic> {
+        let scene = &self.program.scene;
+        let (Motion::To { mover: robot, .. } | Motion::By { mover: robot, .. }) = motion else {
+            let (Motion::Grip { item, by } | Motion::Free { item, by, .. }) = motion else { return None };
+            let Refused::Misplaced(far, _) = refused else { return None };
+            let (item, by) = (&scene.get(*item).name, &scene.get(*by).name);
+            let headline = format!("`{by}` is not at `{item}`: {:.0} mm are between them", far * 1e3);
+            return Some(Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go"));
+        };
+        let name = &scene.get(*robot).name;
+        let goal = match motion {
+            Motion::To { goal, .. } => Some(*goal),
+            _ => None,
+        };
+        let to = goal.map_or("there".to_string(), |g| format!("`{}`", scene.get(g).name));
+        let found = match refused {
+            Refused::OutOfReach(far, _) => {
+                let headline = format!("`{name}` does not reach {to}");
+                let label = match far * 1e3 {
+                    mm if mm >= 1.0 => format!("its gripper stays {mm:.0} mm away"),
+                    _ => "it gets there, but not turned like this".to_string(),
+                };
+                let found = Diagnostic::error(codes::OUT_OF_REACH, span, headline, label);
+                match goal.and_then(|goal| self.nearer(*robot, motion, goal)) {
+                    Some(help) => found.help(help),
+                    None => found,
+                }
+            }
+            Refused::Collides(meeting) => {
+                let [x, y, z] = meeting.at.map(|v| v * 1e3);
+                let headline = format!("`{name}` runs into `{}` on its way to {to}", meeting.other);
+                let label = format!(
+                    "`{}` meets it at ({x:.0}, {y:.0}, {z:.0}) mm, {:.0} mm deep",
+                    meeting.mine,
+                    (meeting.depth * 1e3).max(1.0)
+                );
+                let found = Diagnostic::error(codes::COLLISION, span, headline, label);
+                match meeting.with {
+                    Some(with) => found.because(scene.get(with).span, format!("`{}` stands here", meeting.other)),
+                    None => found,
+                }
+            }
+            Refused::NoWay => Diagnostic::error(
+                codes::COLLISION,
+                span,
+                format!("no way was found for `{name}` to {to}"),
+                "nothing is in the way at its end, but between",
+            ),
+            Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
+        };
+        Some(match goal.filter(|g| scene.get(*g).span != span) {
+            Some(goal) => found.because(scene.get(goal).span, format!("`{}` stands here", scene.get(goal).name)),
+            None => found,
+        })
+    }
+
+    /// Where a thing out of reach could be reached: the nearest place on the line to the robot.
+    fn nearer(&self, robot: InstanceId, motion: &Motion, goal: InstanceId) -> Option<String> {
+        let Motion::To { frame, .. } = motion else { return None };
+        let robot = self.stage.actor_of(robot)?;
+        let targets = super::goal::targets(&self.stage, robot, goal, frame);
+        let base = self.stage.pose(robot);
+        let actor = self.stage.actors.get(&robot)?;
+        let mut solver = Solver::new(actor.chain.clone());
+        let now = actor.configuration();
+        for share in (1..20).map(|k| f64::from(k) * 0.05) {
+            for target in &targets {
+                let mut at = *target;
+                (0..2).for_each(|k| at.position[k] += share * (base.position[k] - at.position[k]));
+                let request = Request { attempts: 20, ..Request::new(pose(&base.inverse().then(at)), &now) };
+                if solver.solve(&request).is_ok() {
+                    let moved: Vec<f64> = (0..2).map(|k| (at.position[k] - target.position[k]) * 1e3).collect();
+                    let name = &self.program.scene.get(goal).name;
+                    return Some(format!(
+                        "`{name}` is within reach if it stands ({:.0}, {:.0}) mm from there",
+                        moved[0], moved[1]
+                    ));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The instance of which a state says what it stands on.
+pub fn supported(scene: &matterix_ir::scene::Scene, state: &str, domain: &Domain) -> Option<InstanceId> {
+    let owner = state.strip_suffix(".support").filter(|_| *domain == Domain::Instance)?;
+    scene.find(owner)
+}
+
+impl Stage<'_> {
+    /// Something else carries a thing from now on, as a state of the model says. Where that is not so already, the thing
+    /// comes to its new place at once.
+    pub fn follow(&mut self, id: InstanceId, by: Option<InstanceId>) {
+        let carrier = by.map(|by| self.actor_of(by).unwrap_or(by));
+        if self.below(id) == carrier || self.below(id) == by {
+            return;
+        }
+        match by.filter(|by| self.actor_of(*by).is_none()) {
+            Some(on) => self.put(id, on, Pose::IDENTITY),
+            None => self.carry(id, by),
+        }
+    }
+}

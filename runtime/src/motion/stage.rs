@@ -1,0 +1,279 @@
+//! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{InstanceId, Scene, frame};
+use matterix_motion::{Chain, Tree};
+
+use super::assembly::{Assembly, assemble};
+
+/// What a thing stands on and where on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stand {
+    /// In the lab.
+    Lab(Pose),
+    /// On the surface of an instance: in its frame `place`, else on the middle of its top.
+    On(InstanceId, Pose),
+    /// In the frame of the instance it is a part of.
+    PartOf(InstanceId, Pose),
+    /// In the hand of a robot, relative to its tip.
+    Held(InstanceId, Pose),
+}
+
+/// A robot and how it stands.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// All of it.
+    pub assembly: Assembly,
+    /// Every link.
+    pub tree: Tree,
+    /// From its foot to what is brought to a goal.
+    pub chain: Chain,
+    /// Positions of all that moves, rad or m.
+    pub joints: Vec<f64>,
+    /// Indices into `joints` of those that move the tip.
+    pub arm: Vec<usize>,
+}
+
+/// The lab at one moment.
+#[derive(Clone, Debug)]
+pub struct Stage<'p> {
+    /// What there is.
+    pub scene: &'p Scene,
+    /// By instance.
+    pub stands: Vec<Stand>,
+    /// Where things stood before they were picked up.
+    before: BTreeMap<InstanceId, Stand>,
+    /// By instance.
+    pub actors: BTreeMap<InstanceId, Actor>,
+    /// What each robot has let go and not yet drawn back from.
+    freed: BTreeMap<InstanceId, InstanceId>,
+}
+
+impl<'p> Stage<'p> {
+    /// The lab when the run begins. Robots whose description cannot be moved are named.
+    pub fn new(scene: &'p Scene) -> Result<Self, String> {
+        let stands = scene.instances.iter().map(|i| match (i.owner, i.support) {
+            (Some(owner), _) => Stand::PartOf(owner, i.pose),
+            (None, Some(support)) => Stand::On(support, i.pose),
+            (None, None) => Stand::Lab(i.pose),
+        });
+        let mut actors = BTreeMap::new();
+        for (index, instance) in scene.instances.iter().enumerate() {
+            let id = InstanceId(index as u32);
+            let mounted = instance.owner.is_some_and(|o| scene.get(o).articulation.is_some());
+            if instance.articulation.is_none() || mounted {
+                continue;
+            }
+            let Some(mut assembly) = assemble(scene, id) else { continue };
+            assembly
+                .robot
+                .touching
+                .extend(matterix_motion::touching::always_touching(&assembly.robot).unwrap_or_default());
+            let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
+            actors.insert(id, actor);
+        }
+        Ok(Stage { scene, stands: stands.collect(), before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+    }
+
+    /// The robot an instance is or is part of.
+    pub fn actor_of(&self, mut id: InstanceId) -> Option<InstanceId> {
+        loop {
+            if self.actors.contains_key(&id) {
+                return Some(id);
+            }
+            id = self.scene.get(id).owner?;
+        }
+    }
+
+    /// Where an instance is in the lab. Where supports form a ring, the ring is cut.
+    pub fn pose(&self, id: InstanceId) -> Pose {
+        let mut at = Pose::IDENTITY;
+        let mut next = id;
+        for _ in 0..=self.stands.len() {
+            let (below, inner) = match self.stands.get(next.0 as usize) {
+                Some(Stand::Lab(inner)) => return inner.then(at),
+                Some(Stand::On(below, inner)) => (*below, self.surface(*below).then(*inner)),
+                Some(Stand::PartOf(owner, inner)) => (*owner, *inner),
+                Some(Stand::Held(by, inner)) => return self.tip(*by).then(*inner).then(at),
+                None => return at,
+            };
+            at = inner.then(at);
+            next = below;
+        }
+        at
+    }
+
+    /// The surface things stand on, in the frame of its instance.
+    pub fn surface(&self, id: InstanceId) -> Pose {
+        let Some(instance) = self.scene.instances.get(id.0 as usize) else { return Pose::IDENTITY };
+        let place = instance.frames.iter().find(|f| f.name == frame::PLACE).map(|f| f.pose);
+        place.or_else(|| instance.shape.as_ref().map(|s| Pose::up(s.size()[2]))).unwrap_or_default()
+    }
+
+    /// Where the tip of a robot is in the lab.
+    pub fn tip(&self, robot: InstanceId) -> Pose {
+        let Some(actor) = self.actors.get(&robot) else { return self.pose(robot) };
+        let tip = matterix_motion::placement(&actor.chain.tip(&actor.configuration()));
+        self.pose(robot).then(tip)
+    }
+
+    /// A named point of an instance in the lab; the instance itself for an empty name.
+    pub fn frame(&self, id: InstanceId, name: &str) -> Option<Pose> {
+        if name.is_empty() {
+            return Some(self.pose(id));
+        }
+        let found = self.scene.get(id).frames.iter().find(|f| f.name == name)?;
+        let base = if found.stand { self.stood(id) } else { self.pose(id) };
+        Some(base.then(found.pose))
+    }
+
+    /// Whether a frame is given in where its thing last stood.
+    pub fn is_stand(&self, id: InstanceId, name: &str) -> bool {
+        self.scene.get(id).frames.iter().any(|f| f.name == name && f.stand)
+    }
+
+    /// Where a thing stood before it was picked up; where it is, if it never was.
+    fn stood(&self, id: InstanceId) -> Pose {
+        let Some(before) = self.before.get(&id) else { return self.pose(id) };
+        match before {
+            Stand::Lab(pose) => *pose,
+            Stand::On(below, inner) => self.pose(*below).then(self.surface(*below)).then(*inner),
+            Stand::PartOf(owner, inner) => self.pose(*owner).then(*inner),
+            Stand::Held(by, inner) => self.tip(*by).then(*inner),
+        }
+    }
+
+    /// A thing stands somewhere on a surface from now on.
+    pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
+        if let Some(stand) = self.stands.get_mut(id.0 as usize) {
+            *stand = Stand::On(on, at);
+        }
+    }
+
+    /// What a thing stood on before it was picked up, or else stands on.
+    pub fn stood_on(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.before.get(&id).or_else(|| self.stands.get(id.0 as usize))? {
+            Stand::On(below, _) | Stand::PartOf(below, _) => Some(*below),
+            _ => None,
+        }
+    }
+
+    /// What carries a thing, and what carries that, down to the floor.
+    pub fn carriers(&self, id: InstanceId) -> Vec<InstanceId> {
+        let mut out = Vec::new();
+        let mut next = id;
+        while let Some(below) = self.below(next).filter(|b| !out.contains(b)) {
+            out.push(below);
+            next = below;
+        }
+        out
+    }
+
+    /// What a thing stands on or is part of.
+    pub fn below(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.stands.get(id.0 as usize)? {
+            Stand::On(below, _) | Stand::PartOf(below, _) | Stand::Held(below, _) => Some(*below),
+            Stand::Lab(_) => None,
+        }
+    }
+
+    /// A robot's gripper still stands about what it has let go.
+    pub fn freed(&mut self, robot: InstanceId, item: InstanceId) {
+        self.freed.insert(robot, item);
+    }
+
+    /// What a robot's gripper still stands about.
+    pub fn just_freed(&self, robot: InstanceId) -> Option<InstanceId> {
+        self.freed.get(&robot).copied()
+    }
+
+    /// A robot goes away from what it let go.
+    pub fn leave(&mut self, robot: InstanceId) {
+        self.freed.remove(&robot);
+    }
+
+    /// The robot that holds an instance, or something it is part of or stands on.
+    pub fn held_by(&self, id: InstanceId) -> Option<InstanceId> {
+        let mut next = id;
+        for _ in 0..=self.stands.len() {
+            match self.stands.get(next.0 as usize)? {
+                Stand::Held(by, _) => return Some(*by),
+                Stand::On(below, _) | Stand::PartOf(below, _) => next = *below,
+                Stand::Lab(_) => return None,
+            }
+        }
+        None
+    }
+
+    /// Whether an instance is one of these or part of one.
+    pub fn is_in_any(&self, mut id: InstanceId, these: &[InstanceId]) -> bool {
+        loop {
+            if these.contains(&id) {
+                return true;
+            }
+            match self.scene.get(id).owner {
+                Some(owner) => id = owner,
+                None => return false,
+            }
+        }
+    }
+
+    /// Whether what it is part of has a shape, of which it is taken to be a part.
+    pub fn is_inside_a_shape(&self, id: InstanceId) -> bool {
+        let owner = self.scene.get(id).owner;
+        owner.is_some_and(|o| self.scene.get(o).shape.is_some() || self.is_inside_a_shape(o))
+    }
+
+    /// What a robot holds.
+    pub fn held(&self, robot: InstanceId) -> Option<InstanceId> {
+        let holds = |s: &Stand| matches!(s, Stand::Held(by, _) if *by == robot);
+        self.stands.iter().position(holds).map(|i| InstanceId(i as u32))
+    }
+
+    /// A thing is carried by something else from now on, without moving: a robot takes it, or it is put down.
+    pub fn carry(&mut self, id: InstanceId, by: Option<InstanceId>) {
+        let now = self.pose(id);
+        let index = id.0 as usize;
+        let Some(old) = self.stands.get(index).copied() else { return };
+        let stand = match by {
+            None => Stand::Lab(now),
+            Some(by) => match self.actor_of(by) {
+                Some(robot) => Stand::Held(robot, self.tip(robot).inverse().then(now)),
+                None => Stand::On(by, self.pose(by).then(self.surface(by)).inverse().then(now)),
+            },
+        };
+        if matches!(stand, Stand::Held(..)) && !matches!(old, Stand::Held(..)) {
+            self.before.insert(id, old);
+        }
+        self.stands[index] = stand;
+    }
+}
+
+impl Actor {
+    fn new(assembly: Assembly) -> Result<Self, String> {
+        let tree = Tree::new(&assembly.robot).map_err(|why| why.to_string())?;
+        let root = (0..assembly.robot.links.len() as u32)
+            .find(|link| assembly.robot.joints.iter().all(|j| j.child != *link))
+            .ok_or("it has no root")?;
+        let chain = Chain::new(&assembly.robot, root, assembly.tip).map_err(|why| why.to_string())?;
+        let joint = |v: &matterix_motion::Variable| v.joint;
+        let all: Vec<u32> = tree.variables().iter().map(joint).collect();
+        let arm = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
+        let joints = assembly.home.clone();
+        Ok(Actor { assembly, tree, chain, joints, arm })
+    }
+
+    /// The positions of the joints that move the tip.
+    pub fn configuration(&self) -> Vec<f64> {
+        self.arm.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
+    }
+
+    /// Moves the joints that move the tip.
+    pub fn set(&mut self, configuration: &[f64]) {
+        for (index, value) in self.arm.iter().zip(configuration) {
+            self.joints[*index] = *value;
+        }
+    }
+}

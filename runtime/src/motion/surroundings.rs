@@ -1,0 +1,120 @@
+//! What a robot must not run into, as solids, and what it holds, as balls.
+
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{InstanceId, Shape};
+use matterix_motion::pose::pose;
+use matterix_motion::spheres::Held;
+use matterix_motion::world::{Body, Shape as Solid, World};
+
+use super::stage::{Actor, Stage};
+
+/// How far balls may reach into what things stand on or in before it counts, m: shapes are nominal.
+pub const SLACK: f64 = 2e-3;
+
+/// Solids around a robot with the instance each belongs to.
+#[derive(Clone, Debug, Default)]
+pub struct Surroundings {
+    /// What is around.
+    pub world: World,
+    /// By body of the world.
+    pub owners: Vec<InstanceId>,
+}
+
+impl Surroundings {
+    /// Everything but the robot, what carries it, what it holds and the things left out.
+    pub fn of(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId]) -> Self {
+        let mut out = Surroundings::default();
+        for index in 0..stage.scene.instances.len() {
+            let id = InstanceId(index as u32);
+            let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
+            if mine || stage.is_in_any(id, without) {
+                continue;
+            }
+            if stage.actors.contains_key(&id) {
+                out.add_robot(stage, id);
+            } else if !stage.is_inside_a_shape(id) {
+                out.add_shapes(stage, id);
+            }
+        }
+        out
+    }
+
+    fn push(&mut self, owner: InstanceId, name: &str, at: Pose, shape: Solid) {
+        self.world.bodies.push(Body { name: name.to_string(), pose: pose(&at), shape });
+        self.owners.push(owner);
+    }
+
+    fn add_shapes(&mut self, stage: &Stage<'_>, id: InstanceId) {
+        let instance = stage.scene.get(id);
+        let at = stage.pose(id);
+        let main = instance.shape.iter().map(|shape| (shape, at));
+        let more = instance.solids.iter().map(|s| (&s.shape, at.then(s.pose)));
+        for (shape, at) in main.chain(more) {
+            let (solid, middle) = solid(shape);
+            self.push(id, &instance.name, at.then(Pose::up(middle)), solid);
+        }
+    }
+
+    /// Another robot as it stands now, ball by ball.
+    fn add_robot(&mut self, stage: &Stage<'_>, id: InstanceId) {
+        let Some(actor) = stage.actors.get(&id) else { return };
+        let base = stage.pose(id);
+        let links = actor.tree.poses(&actor.joints);
+        for ball in &actor.assembly.robot.balls {
+            let Some(link) = links.get(ball.link as usize) else { continue };
+            let at = base.then(matterix_motion::placement(link)).then(Pose::at(ball.center));
+            self.push(id, &stage.scene.get(id).name, at, Solid::Sphere(ball.radius));
+        }
+    }
+}
+
+/// A shape as a solid about its middle, and the height of that middle above its base, m.
+fn solid(shape: &Shape) -> (Solid, f64) {
+    let [x, y, z] = shape.size();
+    let solid = match shape {
+        Shape::Box(_) => Solid::Cuboid([x / 2.0, y / 2.0, z / 2.0]),
+        Shape::Cylinder(_) | Shape::Turned { .. } => Solid::Cylinder(x / 2.0, z / 2.0),
+        Shape::Sphere(_) => Solid::Sphere(x / 2.0),
+    };
+    (solid, z / 2.0)
+}
+
+/// What a robot holds, as balls in the frame of its tip.
+pub fn held(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Vec<Held> {
+    let Some(id) = stage.held(robot) else { return Vec::new() };
+    let instance = stage.scene.get(id);
+    let inner = stage.tip(robot).inverse().then(stage.pose(id));
+    let main = instance.shape.iter().map(|shape| (shape, inner));
+    let more = instance.solids.iter().map(|s| (&s.shape, inner.then(s.pose)));
+    let balls = main.chain(more).flat_map(|(shape, at)| balls(shape, at)).collect();
+    // The whole tool may touch what it holds.
+    let touching = (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
+    vec![Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching }]
+}
+
+/// Balls that fill a shape, no larger than it: a row of them along each of its edges and through its middle.
+fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
+    let [x, y, z] = shape.size();
+    let radius = (x.min(y).min(z) / 2.0).max(1e-3);
+    let along = |length: f64| -> Vec<f64> {
+        let free = length - 2.0 * radius;
+        let steps = (free / (1.5 * radius)).ceil().max(0.0) as u32;
+        (0..=steps).map(|i| if steps == 0 { 0.0 } else { free * (f64::from(i) / f64::from(steps) - 0.5) }).collect()
+    };
+    let inside = |px: f64, py: f64| match shape.is_round() {
+        true => (px * px + py * py).sqrt() + radius <= x / 2.0 + 1e-9,
+        false => true,
+    };
+    let mut out = Vec::new();
+    for px in along(x) {
+        for py in along(y) {
+            if !inside(px, py) {
+                continue;
+            }
+            for pz in along(z) {
+                out.push((at.point([px, py, z / 2.0 + pz]), radius - SLACK.min(radius / 2.0)));
+            }
+        }
+    }
+    out
+}

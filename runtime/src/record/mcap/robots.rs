@@ -1,0 +1,159 @@
+//! Robots with joints: an entity for every link in its own frame, the frames as they move, and the joints' positions.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use matterix_ir::pose::Pose;
+use matterix_ir::robot::{Piece, Solid};
+use matterix_ir::scene::InstanceId;
+use mcap::McapResult;
+
+use super::Sink;
+use super::bench::{LAB, Pieces};
+use super::foxglove::{
+    self, Color, Entity, FrameTransform, FrameTransforms, JointState, JointStates, KeyValue, SceneUpdate, Time, pose,
+    quaternion, vector,
+};
+use crate::motion::{Moment, Stage};
+use crate::record::run::Run;
+
+/// Of links that have no colour of their own.
+const GREY: [f64; 4] = [0.75, 0.77, 0.8, 1.0];
+
+/// The robots of a recording as it is written, from moment to moment.
+pub(super) struct Robots {
+    /// Names of the links of each robot, and of its joints.
+    names: BTreeMap<InstanceId, (Vec<String>, Vec<String>)>,
+    joints: u16,
+    /// The first moment that has not been written.
+    next: usize,
+    /// What is in hand, by instance, in the lab.
+    pub(super) held: BTreeMap<usize, Pose>,
+    /// Where things were when they were last in hand.
+    pub(super) left: BTreeMap<usize, Pose>,
+}
+
+impl Robots {
+    /// Writes all robots as they stand at the beginning.
+    pub(super) fn begin<W: Write + Seek>(
+        run: &Run<'_>,
+        sink: &mut Sink<W>,
+        entities: u16,
+        frames: u16,
+    ) -> McapResult<Self> {
+        let units = BTreeMap::new();
+        let mut out =
+            Robots { names: BTreeMap::new(), joints: 0, next: 0, held: BTreeMap::new(), left: BTreeMap::new() };
+        let Ok(stage) = Stage::new(&run.program.scene) else { return Ok(out) };
+        if stage.actors.is_empty() {
+            return Ok(out);
+        }
+        out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
+        for (id, actor) in &stage.actors {
+            let name = &run.program.scene.get(*id).name;
+            let robot = &actor.assembly.robot;
+            let links: Vec<String> = robot.links.iter().map(|l| format!("{name}.{}", l.name)).collect();
+            let moving = actor.tree.variables().iter().filter_map(|v| robot.joints.get(v.joint as usize));
+            let joints = moving.map(|j| format!("{name}.{}", j.name)).collect();
+            let kind = &run.program.scene.get(*id).kind;
+            let drawn: Vec<Entity<'_>> =
+                robot.links.iter().zip(&links).filter_map(|(link, id)| entity(&link.visual, id, kind)).collect();
+            sink.push(entities, 0.0, &SceneUpdate { deletions: [], entities: drawn })?;
+            out.names.insert(*id, (links, joints));
+            if let Some(moment) = stage.moment(*id, 0.0) {
+                out.write(&moment, sink, frames)?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Writes what moved up to a time, s; whether something is or was in hand.
+    pub(super) fn until<W: Write + Seek>(
+        &mut self,
+        run: &Run<'_>,
+        time: f64,
+        sink: &mut Sink<W>,
+        frames: u16,
+    ) -> McapResult<bool> {
+        let mut carried = false;
+        while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
+            self.next += 1;
+            self.write(moment, sink, frames)?;
+            self.held.clear();
+            if let Some((id, at)) = moment.held {
+                let index = id.0 as usize;
+                self.held.insert(index, at);
+                self.left.insert(index, at);
+                carried = true;
+                if let Some(instance) = run.program.scene.instances.get(index) {
+                    let transforms = vec![transform(moment.time, &instance.name, at)];
+                    sink.push(frames, moment.time, &FrameTransforms { transforms })?;
+                }
+            }
+        }
+        Ok(carried)
+    }
+
+    fn write<W: Write + Seek>(&self, moment: &Moment, sink: &mut Sink<W>, frames: u16) -> McapResult<()> {
+        let Some((links, joints)) = self.names.get(&moment.robot) else { return Ok(()) };
+        let transforms = links.iter().zip(&moment.links).map(|(name, at)| transform(moment.time, name, *at)).collect();
+        sink.push(frames, moment.time, &FrameTransforms { transforms })?;
+        let joints = joints.iter().zip(&moment.joints).map(|(name, position)| JointState { name, position: *position });
+        sink.push(
+            self.joints,
+            moment.time,
+            &JointStates { timestamp: Time::new(moment.time), joints: joints.collect() },
+        )
+    }
+}
+
+fn transform(time: f64, name: &str, at: Pose) -> FrameTransform {
+    FrameTransform {
+        timestamp: Time::new(time),
+        parent_frame_id: LAB.to_owned(),
+        child_frame_id: name.to_owned(),
+        translation: vector(at.position),
+        rotation: quaternion(at.rotation),
+    }
+}
+
+/// What is seen of a link, in the link's own frame.
+fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'a>> {
+    let mut pieces = Pieces::default();
+    for piece in visual {
+        let [r, g, b, a] = piece.color.unwrap_or(GREY);
+        pieces.color = Color { r, g, b, a };
+        let at = pose(piece.placement);
+        match piece.solid {
+            Solid::Cuboid(size) => {
+                pieces.cubes.push(foxglove::Cube { pose: at, size: vector(size), color: pieces.color })
+            }
+            Solid::Sphere(r) => {
+                pieces.spheres.push(foxglove::Cube { pose: at, size: vector([2.0 * r; 3]), color: pieces.color });
+            }
+            Solid::Cylinder([r, length]) => pieces.cone(at, [2.0 * r, 2.0 * r, length], [1.0, 1.0]),
+            // Meshes are not carried in recordings.
+            Solid::Mesh(..) => {}
+        }
+    }
+    let Pieces { cubes, spheres, cylinders, .. } = pieces;
+    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() {
+        return None;
+    }
+    Some(Entity {
+        timestamp: Time::new(0.0),
+        frame_id: name,
+        id: name,
+        lifetime: Time::new(0.0),
+        frame_locked: true,
+        metadata: vec![KeyValue { key: "kind", value: kind }],
+        arrows: [],
+        cubes,
+        spheres,
+        cylinders,
+        lines: [],
+        triangles: [],
+        texts: Vec::new(),
+        models: [],
+    })
+}

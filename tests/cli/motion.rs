@@ -1,0 +1,71 @@
+//! Robots that move through space: in runs, in recordings, and beforehand.
+
+use crate::harness::{folder, matterixc, matterixc_in, root, write};
+
+/// A Panda, a plate and a beaker at this place, mm.
+fn bench(beaker: &str) -> String {
+    format!(
+        "mtx 1\n\nuse std::furniture::OpticalTable\nuse std::glassware::Beaker250mL\nuse std::heating::IkaRetControl\n\
+         use std::robots::{{FrankaHand, FrankaPanda}}\n\nlab bench {{\n    ambient: 25 degC\n    table = OpticalTable\n    \
+         panda = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
+         plate = IkaRetControl on table at (450, 200) mm\n    beaker = Beaker250mL on table at {beaker} mm\n}}\n\n\
+         workflow carry in bench {{\n    place beaker on plate by panda\n    expect beaker.support == plate\n}}\n"
+    )
+}
+
+#[test]
+fn examples_with_arms_are_within_reach_and_free_of_collisions() {
+    for name in ["heat_network", "redox", "sn1", "titration"] {
+        let file = format!("examples/{name}.mtx");
+        let ended = matterixc(&["check", &file, "--fidelity", "motion", "--format", "concise"]);
+        assert_eq!(ended.code, 0, "{name}: {}", ended.out);
+        assert!(!ended.out.contains("error"), "{name}: {}", ended.out);
+    }
+}
+
+#[test]
+fn redox_reaches_the_same_ends_with_an_arm_that_moves() {
+    let dir = folder("motion_redox");
+    let args = ["run", "examples/redox.mtx", "--fidelity", "motion", "--out"];
+    let mut recordings = Vec::new();
+    for turn in ["first", "second"] {
+        let out = dir.join(turn);
+        let mut args = args.to_vec();
+        args.push(out.to_str().expect("text"));
+        let ended = matterixc_in(root(), &args);
+        assert_eq!(ended.code, 0, "{}", ended.err);
+        recordings.push(std::fs::read(out.join("recording.mcap")).expect("a recording"));
+    }
+    assert!(recordings[0] == recordings[1], "the same run gives the same bytes");
+    let report = std::fs::read_to_string(dir.join("first/report.json")).expect("a report");
+    assert!(report.contains("\"fidelity\": \"motion\""), "{report}");
+}
+
+#[test]
+fn a_thing_is_carried_in_the_time_that_the_joints_need() {
+    let dir = folder("motion_carry");
+    write(&dir, "near.mtx", bench("(450, -250)"));
+    let lasts = |args: &[&str]| -> f64 {
+        let ended = matterixc_in(&dir, args);
+        assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+        let (_, after) = ended.out.split_once("passed after ").expect("a passed run");
+        after.split(' ').next().and_then(|s| s.parse().ok()).expect("a time")
+    };
+    let declared = lasts(&["run", "near.mtx"]);
+    let moved = lasts(&["run", "near.mtx", "--fidelity", "motion"]);
+    assert_eq!(declared, 6.0);
+    assert!((2.0..6.0).contains(&moved), "{moved} s");
+}
+
+#[test]
+fn what_is_out_of_reach_fails_in_a_run_and_is_found_before_it() {
+    let dir = folder("motion_far");
+    write(&dir, "far.mtx", bench("(1200, -250)"));
+    let found = matterixc_in(&dir, &["check", "far.mtx", "--fidelity", "motion", "--format", "concise"]);
+    assert_eq!(found.code, 1);
+    assert!(found.out.contains("far.mtx:17:5: error[out-of-reach]"), "{}", found.out);
+    assert_eq!(found.out.matches("error[").count(), 1, "{}", found.out);
+    let ran = matterixc_in(&dir, &["run", "far.mtx", "--fidelity", "motion"]);
+    assert_eq!(ran.code, 1);
+    assert!(format!("{}{}", ran.out, ran.err).contains("short of it"), "{}{}", ran.out, ran.err);
+}
