@@ -69,3 +69,34 @@ fn what_is_out_of_reach_fails_in_a_run_and_is_found_before_it() {
     assert_eq!(ran.code, 1);
     assert!(format!("{}{}", ran.out, ran.err).contains("short of it"), "{}{}", ran.out, ran.err);
 }
+
+#[test]
+fn mistakes_in_geometry_are_reported_where_they_are() {
+    let dir = folder("motion_geometry");
+    let text = "mtx 1\nasset Hood: Body {\n    mass: 10 kg\n    shape: box(1 m, 1 m)\n    solid sphere(0 mm)\n    \
+                solid pyramid(1 m)\n    frame a at (0, 0, 1) mm from b\n    frame b at (0, 0, 1) mm from a\n    \
+                frame c at (0, 0, 1) mm from nowhere\n    frame d at (0, 0, 1) mm with rpy(0 deg, 90 deg)\n    \
+                frame e at top with rpy(0 deg, 0 deg, 90 deg)\n}\n\
+                asset Cut: Body from urdf \"panda.urdf\" { mass: 1 kg, tip: \"panda_link9\" }\n\
+                asset Folded: Body from urdf \"panda.urdf\" { mass: 1 kg }\n\
+                asset Short: Body from urdf \"ur3e.urdf\" { mass: 1 kg, home: (0, 1) deg }\n";
+    write(&dir, "hood.mtx", text);
+    let ended = matterixc_in(&dir, &["check", "hood.mtx", "--format", "concise"]);
+    let found: Vec<&str> = ended.out.lines().filter_map(|l| l.split_once("hood.mtx:")).map(|(_, l)| l).collect();
+    let expected = [
+        "4:12: error[wrong-arguments]",
+        "5:18: error[out-of-range]",
+        "6:11: error[type-mismatch]",
+        "7:34: error[circular]",
+        "8:34: error[circular]",
+        "9:34: error[unknown-name]",
+        "10:34: error[type-mismatch]",
+        "13:59: error[unknown-name]",
+        "14:30: error[missing-field]",
+        "15:61: error[wrong-arguments]",
+    ];
+    assert_eq!(found.len(), expected.len(), "{}", ended.out);
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(found.starts_with(expected), "{found} is not {expected}");
+    }
+}

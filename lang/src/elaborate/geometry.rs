@@ -97,7 +97,21 @@ impl<'a> Elaborator<'a> {
                 break;
             }
         }
-        for (_, _, at) in waiting {
+        for (_, name, at) in &waiting {
+            let next = |name: &str| {
+                let (.., at) = waiting.iter().find(|(_, n, _)| n.text == name)?;
+                at.from.as_ref().map(|from| from.text.as_str())
+            };
+            let leads = std::iter::successors(next(&name.text), |n| next(n)).take(waiting.len());
+            if let Some(from) = at.from.as_ref().filter(|_| leads.into_iter().any(|n| n == name.text)) {
+                self.report(Diagnostic::error(
+                    codes::CIRCULAR,
+                    from.span,
+                    format!("where `{}` is depends on itself", name.text),
+                    "leads back to it",
+                ));
+                continue;
+            }
             // Without an asset's own lines, the frame it starts from may be one that only an asset gives.
             if let Some(from) = at.from.as_ref().filter(|f| self.frame_is_missing(id, f)) {
                 let close = nearest(&from.text, done.frames.iter().map(|f| f.name.as_str()));
