@@ -1,7 +1,7 @@
 //! `matterixc view`.
 
 use matterix_ir::Severity;
-use matterix_view::{Document, from_program, from_recording, page, serve};
+use matterix_view::{Document, from_recording, page, serve};
 
 use crate::args::{Color, ViewArgs};
 use crate::pipeline::{self, Input};
@@ -45,9 +45,12 @@ fn document(args: &ViewArgs, color: Color) -> Result<Option<Document>, String> {
         let read = from_recording::from_recording(&bytes);
         return read.map(Some).map_err(|e| format!("cannot show `{}`: {e}", file.display()));
     }
+    if file.extension().is_some_and(|e| e == "mcap") {
+        return Err(format!("cannot show `{}`: it is no recording", file.display()));
+    }
     let input = Input::file(file, bytes);
     let (sources, program, found) = pipeline::compile(&input, &args.subject.options());
     let wrong = found.iter().any(|d| d.severity == Severity::Error);
     show(&sources, found, color);
-    Ok(program.filter(|_| !wrong).map(|program| from_program::from_program(&program, &sources)))
+    Ok(program.filter(|_| !wrong).map(|program| pipeline::still(&program, &sources)))
 }

@@ -4,6 +4,7 @@ mod bill;
 mod neighbours;
 mod plan;
 mod run;
+mod view;
 
 use std::path::{Path, PathBuf};
 
@@ -18,6 +19,7 @@ pub use bill::{Prices, bill};
 pub use matterix_lang::{Options, Test};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
+pub use view::still;
 
 /// A text to compile, and where its neighbours are.
 pub struct Input {

@@ -55,9 +55,11 @@ pub fn add(
             added.push(None);
             continue;
         }
+        // The whole robot goes by the name of the first of its links that is seen.
+        let first = added.iter().copied().flatten().next();
         document.bodies.push(Body {
             name: format!("{name}.{}", link.name),
-            parent,
+            parent: parent.or(first),
             pose: pose(at.get(i).copied().unwrap_or_default()),
             pieces,
             ..Body::default()

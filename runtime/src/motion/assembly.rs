@@ -52,7 +52,9 @@ impl Assembly {
         let instance = scene.get(part);
         let mount = instance.frames.iter().find(|f| f.name == frame::MOUNT).map(|f| f.pose).unwrap_or_default();
         let first = self.robot.links.len() as u32;
-        self.robot.attach(self.tip, &tool.robot, mount.inverse(), &format!("{}.", instance.name));
+        let whole = self.owners.first().map_or("", |robot| scene.get(*robot).name.as_str());
+        let name = instance.name.strip_prefix(whole).unwrap_or(&instance.name).trim_start_matches('.');
+        self.robot.attach(self.tip, &tool.robot, mount.inverse(), &format!("{name}."));
         // A tool's links meet each other as they work.
         let all = first..self.robot.links.len() as u32;
         self.robot.touching.extend(all.clone().flat_map(|a| (a + 1..all.end).map(move |b| [a, b])));
