@@ -4,7 +4,7 @@ use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Judge, Settings};
+use matterix_motion::plan::{self, Blocked, Judge, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
@@ -17,10 +17,8 @@ use super::surroundings::{Surroundings, held};
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 /// Distance of checked configurations along a way, rad or m.
 const FINENESS: f64 = 0.02;
-/// Steps along a straight line: m, and rad of turning.
-const STEP: (f64, f64) = (0.01, 0.05);
-/// No joint moves further than this from step to step of a straight line, rad or m.
-const JUMP: f64 = 0.35;
+/// Steps along a straight line.
+const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
 /// Samples drawn before a way counts as not found.
@@ -298,34 +296,16 @@ impl Stage<'_> {
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
         let around = Surroundings::of(self, robot, &without);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let base = pose(&self.pose(robot)).inverse();
-        let (from, to) = (base * pose(&self.tip(robot)), base * pose(to));
-        let (far, turned) = distance(&from, &to);
-        let steps = (far / STEP.0).max(turned / STEP.1).ceil().max(1.0) as u32;
-        let mut solver = Solver::new(actor.chain.clone());
-        let mut points = vec![actor.configuration()];
-        for step in 1..=steps {
-            let share = f64::from(step) / f64::from(steps);
-            let target = matterix_motion::Pose::from_parts(
-                from.translation.vector.lerp(&to.translation.vector, share).into(),
-                from.rotation.slerp(&to.rotation, share),
-            );
-            let last = points.last().cloned().unwrap_or_default();
-            let request = Request { attempts: 1, ..Request::new(target, &last) };
-            let next = solver.search(&request).map_err(|near| Refused::OutOfReach(near.linear, near.angular))?.q;
-            if next.iter().zip(&last).any(|(a, b)| (a - b).abs() > JUMP) {
-                return Err(Refused::NoWay);
-            }
-            points.push(next);
-        }
+        let to = pose(&self.pose(robot).inverse().then(*to));
         let figure = self.figure(robot, actor)?;
-        for point in &points[1..] {
-            let contacts = figure.contacts(&around.world, point);
-            if !contacts.is_empty() {
-                return Err(self.meeting(&figure, &around, &contacts));
-            }
-        }
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let mut solver = Solver::new(actor.chain.clone());
+        let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
+        let mut points = followed.map_err(|blocked| match blocked {
+            Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
+            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+            Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
+        })?;
         let part = timed(actor, &points, Some(&mut checker))?;
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
