@@ -3,7 +3,7 @@
 use matterix_ir::graph::eval_op;
 use matterix_ir::plan::{Plan, Step};
 use matterix_ir::robot::Placement;
-use matterix_ir::scene::{Instance, InstanceId, Scene, Shape};
+use matterix_ir::scene::{Instance, InstanceId, Shape};
 use matterix_ir::{Env, NodeId, Program, Sources, Span};
 
 use crate::bench::{self, Owners, Thing};
@@ -14,6 +14,7 @@ use crate::units;
 pub fn from_program(program: &Program, sources: &Sources) -> Document {
     let scene = &program.scene;
     let mixtures = &program.model.mixtures;
+    let stands = scene.stands();
     let holds = |i: usize| {
         let owner = |id: InstanceId| scene.instances.get(id.0 as usize).and_then(|part| part.owner).unwrap_or(id);
         mixtures.iter().any(|m| owner(m.instance).0 as usize == i)
@@ -22,7 +23,7 @@ pub fn from_program(program: &Program, sources: &Sources) -> Document {
         name: instance.name.clone(),
         kind: instance.kind.clone(),
         shapes: shapes(instance),
-        at: in_lab(scene, i),
+        at: scene.in_lab(InstanceId(i as u32), |id| stands.get(id.0 as usize).copied()),
         frames: instance.frames.iter().filter(|f| !f.stand).map(|f| (f.name.clone(), f.pose)).collect(),
         holds: holds(i),
         link: false,
@@ -46,33 +47,6 @@ pub fn from_program(program: &Program, sources: &Sources) -> Document {
 fn shapes(instance: &Instance) -> Vec<(Placement, Shape, Option<[f32; 4]>)> {
     let main = instance.shape.iter().map(|shape| (Placement::default(), shape.clone(), None));
     main.chain(instance.solids.iter().map(|s| (s.pose, s.shape.clone(), None))).collect()
-}
-
-/// An instance in the frame of the lab: on the frame `place` of its support, else in the middle of its top; a part in
-/// the frame of its owner. Where supports form a ring, the ring is cut.
-fn in_lab(scene: &Scene, index: usize) -> Placement {
-    let mut at = Placement::default();
-    let mut next = index;
-    for _ in 0..=scene.instances.len() {
-        let Some(instance) = scene.instances.get(next) else { return at };
-        at = instance.pose.then(at);
-        let below = match (instance.owner, instance.support) {
-            (Some(owner), _) => owner,
-            (None, Some(support)) => {
-                at = surface(scene, support).then(at);
-                support
-            }
-            (None, None) => return at,
-        };
-        next = below.0 as usize;
-    }
-    at
-}
-
-fn surface(scene: &Scene, id: InstanceId) -> Placement {
-    let Some(instance) = scene.instances.get(id.0 as usize) else { return Placement::default() };
-    let place = instance.frames.iter().find(|f| f.name == "place").map(|f| f.pose);
-    place.or_else(|| instance.shape.as_ref().map(|s| Placement::up(s.size()[2]))).unwrap_or_default()
 }
 
 /// What is in vessels before anything happens, as series of one value.

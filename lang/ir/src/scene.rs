@@ -119,6 +119,27 @@ pub struct Instance {
     pub span: Span,
 }
 
+/// What a thing stands on and where on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stand {
+    /// In the lab.
+    Lab(Pose),
+    /// On the surface of an instance: in its frame `place`, else on the middle of its top.
+    On(InstanceId, Pose),
+    /// In the frame of the instance it is a part of.
+    PartOf(InstanceId, Pose),
+}
+
+impl Stand {
+    /// What it stands on or is part of.
+    pub fn below(&self) -> Option<InstanceId> {
+        match self {
+            Stand::Lab(_) => None,
+            Stand::On(below, _) | Stand::PartOf(below, _) => Some(*below),
+        }
+    }
+}
+
 /// All instances of a lab, parts after their owners.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
@@ -137,5 +158,39 @@ impl Scene {
     /// The instance with this full name.
     pub fn find(&self, name: &str) -> Option<InstanceId> {
         self.instances.iter().position(|i| i.name == name).map(|i| InstanceId(i as u32))
+    }
+
+    /// Where every instance stands when the run begins.
+    pub fn stands(&self) -> Vec<Stand> {
+        let stand = |i: &Instance| match (i.owner, i.support) {
+            (Some(owner), _) => Stand::PartOf(owner, i.pose),
+            (None, Some(support)) => Stand::On(support, i.pose),
+            (None, None) => Stand::Lab(i.pose),
+        };
+        self.instances.iter().map(stand).collect()
+    }
+
+    /// The surface things stand on, in the frame of its instance.
+    pub fn surface(&self, id: InstanceId) -> Pose {
+        let Some(instance) = self.instances.get(id.0 as usize) else { return Pose::IDENTITY };
+        let place = instance.frames.iter().find(|f| f.name == frame::PLACE).map(|f| f.pose);
+        place.or_else(|| instance.shape.as_ref().map(|s| Pose::up(s.size()[2]))).unwrap_or_default()
+    }
+
+    /// An instance in the frame of the lab, where things stand as `stand` says. Where supports form a ring, the ring is cut.
+    pub fn in_lab(&self, id: InstanceId, stand: impl Fn(InstanceId) -> Option<Stand>) -> Pose {
+        let mut at = Pose::IDENTITY;
+        let mut next = id;
+        for _ in 0..=self.instances.len() {
+            let (below, inner) = match stand(next) {
+                Some(Stand::Lab(inner)) => return inner.then(at),
+                Some(Stand::On(below, inner)) => (below, self.surface(below).then(inner)),
+                Some(Stand::PartOf(owner, inner)) => (owner, inner),
+                None => return at,
+            };
+            at = inner.then(at);
+            next = below;
+        }
+        at
     }
 }

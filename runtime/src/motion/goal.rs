@@ -3,9 +3,9 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::InstanceId;
+use matterix_ir::scene::{InstanceId, Stand};
 
-use super::stage::{Stage, Stand};
+use super::stage::{Carried, Stage};
 
 /// Poses of a robot's tip in the lab, any of which will do for bringing what it holds, or else its empty gripper, to a
 /// frame; none where the frame is unknown.
@@ -16,8 +16,8 @@ pub fn targets(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &s
     let Some(to) = stage.frame(goal, frame) else { return Vec::new() };
     let own = |held: &InstanceId| *held == goal && !stage.is_stand(goal, frame);
     let held = stage.held(robot).filter(|held| !own(held));
-    match held.map(|held| (held, stage.stands[held.0 as usize])) {
-        Some((held, Stand::Held(_, inner))) => {
+    match held.map(|held| (held, stage.carried[held.0 as usize])) {
+        Some((held, Carried::Held(_, inner))) => {
             let back = inner.inverse();
             let to = to.then(spot(stage, held, goal));
             turns(stage, held, 1).into_iter().map(|turn| to.then(turn).then(back)).collect()
@@ -37,13 +37,13 @@ const RASTER: f64 = 0.02;
 pub fn spot(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Pose {
     let scene = stage.scene;
     let (Some(top), Some(own)) = (&scene.get(surface).shape, &scene.get(item).shape) else { return Pose::IDENTITY };
-    let place = stage.surface(surface).position;
+    let place = scene.surface(surface).position;
     let others: Vec<([f64; 3], [f64; 3])> = stage
-        .stands
+        .carried
         .iter()
         .enumerate()
-        .filter_map(|(index, stand)| match stand {
-            Stand::On(on, at) if *on == surface && index != item.0 as usize => {
+        .filter_map(|(index, carried)| match carried {
+            Carried::Stands(Stand::On(on, at)) if *on == surface && index != item.0 as usize => {
                 Some((at.position, footprint(stage, InstanceId(index as u32))?))
             }
             _ => None,

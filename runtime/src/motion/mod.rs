@@ -10,4 +10,4 @@ pub mod surroundings;
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
 pub use preflight::{preflight, supported};
-pub use stage::{Actor, Stage, Stand};
+pub use stage::{Actor, Carried, Stage};

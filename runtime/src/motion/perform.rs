@@ -4,7 +4,7 @@ use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Blocked, Judge, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
@@ -168,7 +168,7 @@ impl Stage<'_> {
                     return Err(Refused::NotHeld);
                 }
                 let to = match on {
-                    Some(on) => self.pose(*on).then(self.surface(*on)).then(spot(self, *item, *on)),
+                    Some(on) => self.surface(*on).then(spot(self, *item, *on)),
                     None => self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item)),
                 };
                 let (far, _) = distance(&pose(&self.pose(*item)), &pose(&to));
@@ -281,7 +281,7 @@ impl Stage<'_> {
                 plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
                 _ => Refused::NoWay,
             })?;
-        let part = timed(actor, &route.points, Some(&mut checker))?;
+        let part = timed(actor, &route.points, &mut checker)?;
         self.settle(robot, q);
         Ok(part)
     }
@@ -306,7 +306,7 @@ impl Stage<'_> {
             Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
             Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
         })?;
-        let part = timed(actor, &points, Some(&mut checker))?;
+        let part = timed(actor, &points, &mut checker)?;
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
         Ok(part)
@@ -315,7 +315,7 @@ impl Stage<'_> {
     fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
-        Figure::new(&actor.assembly.robot, &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
+        Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
     }
 
     fn settle(&mut self, robot: InstanceId, q: &[f64]) {
@@ -350,7 +350,7 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: Option<&mut Checker<'_>>) -> Result<Trajectory, Refused> {
+fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Trajectory, Refused> {
     let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
         actor.chain.variables().iter().map(|v| f(&v.limits)).collect()
     };
@@ -360,5 +360,5 @@ fn timed(actor: &Actor, points: &[Vec<f64>], checker: Option<&mut Checker<'_>>) 
         acceleration: limits(&acceleration),
         jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
     };
-    follow(points, &limits, checker.map(|c| c as &mut dyn Judge)).map_err(|_| Refused::NoWay)
+    follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)
 }

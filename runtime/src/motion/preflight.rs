@@ -9,13 +9,13 @@ use std::collections::BTreeSet;
 use matterix_ir::model::{Action, Domain};
 use matterix_ir::plan::{Motion, Operation, Step, StepId};
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::InstanceId;
+use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, Program, Span, codes};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
 use super::perform::Refused;
-use super::stage::{Stage, Stand};
+use super::stage::{Carried, Stage};
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
@@ -38,8 +38,8 @@ struct Walk<'p> {
     found: Vec<Diagnostic>,
     /// Statements of the user that have been reported.
     told: BTreeSet<Span>,
-    /// The statement of the user's file that is being followed, and the step of it.
-    site: Vec<(Span, StepId)>,
+    /// The statements of the user's file that are being followed, the innermost last.
+    site: Vec<Span>,
     /// What is being followed cannot be done: its other motions are passed over.
     lost: bool,
     left: usize,
@@ -54,7 +54,7 @@ impl<'p> Walk<'p> {
         // The innermost statement of the user's own text is where a mistake is said.
         if self.is_own(at.span) && !self.lost {
             let before = self.stage.clone();
-            self.site.push((at.span, id));
+            self.site.push(at.span);
             self.inside(id);
             self.site.pop();
             // What failed in part counts as done where things stand, and robots as where they were before.
@@ -69,9 +69,8 @@ impl<'p> Walk<'p> {
                     .all(|c| !self.is_own(self.program.plan.get(*c).span))
             {
                 self.lost = false;
-                let stands = std::mem::take(&mut self.stage.stands);
-                self.stage = before;
-                self.recover(&stands);
+                let after = std::mem::replace(&mut self.stage, before);
+                self.recover(&after);
             }
             return;
         }
@@ -79,14 +78,13 @@ impl<'p> Walk<'p> {
     }
 
     /// Things are put where their states say, as far as that is not where they were.
-    fn recover(&mut self, after: &[Stand]) {
-        for (index, stand) in after.iter().enumerate() {
-            let id = InstanceId(index as u32);
-            let carrier = match stand {
-                Stand::On(below, _) | Stand::Held(below, _) => Some(*below),
-                _ => continue,
+    fn recover(&mut self, after: &Stage<'p>) {
+        for (index, carried) in after.carried.iter().enumerate() {
+            let carrier = match carried {
+                Carried::Stands(Stand::On(below, _)) | Carried::Held(below, _) => *below,
+                Carried::Stands(_) => continue,
             };
-            self.stage.follow(id, carrier);
+            self.stage.follow(InstanceId(index as u32), Some(carrier));
         }
     }
 
@@ -146,7 +144,7 @@ impl<'p> Walk<'p> {
                 && let Err(refused) = self.motion(motion)
             {
                 self.lost = true;
-                let site = self.site.last().map_or(span, |(site, _)| *site);
+                let site = self.site.last().copied().unwrap_or(span);
                 if self.told.insert(site) {
                     let found = self.finding(motion, &refused, site);
                     self.found

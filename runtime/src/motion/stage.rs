@@ -1,22 +1,21 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
 use std::collections::BTreeMap;
+use std::sync::{Arc, OnceLock};
 
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::{InstanceId, Scene, frame};
+use matterix_ir::robot::Robot;
+use matterix_ir::scene::{InstanceId, Scene, Stand};
+use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 
 use super::assembly::{Assembly, assemble};
 
-/// What a thing stands on and where on it.
+/// What carries a thing and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stand {
-    /// In the lab.
-    Lab(Pose),
-    /// On the surface of an instance: in its frame `place`, else on the middle of its top.
-    On(InstanceId, Pose),
-    /// In the frame of the instance it is a part of.
-    PartOf(InstanceId, Pose),
+pub enum Carried {
+    /// It stands somewhere.
+    Stands(Stand),
     /// In the hand of a robot, relative to its tip.
     Held(InstanceId, Pose),
 }
@@ -34,6 +33,8 @@ pub struct Actor {
     pub joints: Vec<f64>,
     /// Indices into `joints` of those that move the tip.
     pub arm: Vec<usize>,
+    /// Shared by all copies of a stage.
+    to_plan: Arc<OnceLock<Robot>>,
 }
 
 /// The lab at one moment.
@@ -42,7 +43,7 @@ pub struct Stage<'p> {
     /// What there is.
     pub scene: &'p Scene,
     /// By instance.
-    pub stands: Vec<Stand>,
+    pub carried: Vec<Carried>,
     /// Where things stood before they were picked up.
     before: BTreeMap<InstanceId, Stand>,
     /// By instance.
@@ -54,11 +55,7 @@ pub struct Stage<'p> {
 impl<'p> Stage<'p> {
     /// The lab when the run begins. Robots whose description cannot be moved are named.
     pub fn new(scene: &'p Scene) -> Result<Self, String> {
-        let stands = scene.instances.iter().map(|i| match (i.owner, i.support) {
-            (Some(owner), _) => Stand::PartOf(owner, i.pose),
-            (None, Some(support)) => Stand::On(support, i.pose),
-            (None, None) => Stand::Lab(i.pose),
-        });
+        let carried = scene.stands().into_iter().map(Carried::Stands).collect();
         let mut actors = BTreeMap::new();
         for (index, instance) in scene.instances.iter().enumerate() {
             let id = InstanceId(index as u32);
@@ -66,15 +63,11 @@ impl<'p> Stage<'p> {
             if instance.articulation.is_none() || mounted {
                 continue;
             }
-            let Some(mut assembly) = assemble(scene, id) else { continue };
-            assembly
-                .robot
-                .touching
-                .extend(matterix_motion::touching::always_touching(&assembly.robot).unwrap_or_default());
+            let Some(assembly) = assemble(scene, id) else { continue };
             let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
             actors.insert(id, actor);
         }
-        Ok(Stage { scene, stands: stands.collect(), before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+        Ok(Stage { scene, carried, before: BTreeMap::new(), actors, freed: BTreeMap::new() })
     }
 
     /// The robot an instance is or is part of.
@@ -87,29 +80,22 @@ impl<'p> Stage<'p> {
         }
     }
 
-    /// Where an instance is in the lab. Where supports form a ring, the ring is cut.
+    /// Where an instance is in the lab.
     pub fn pose(&self, id: InstanceId) -> Pose {
-        let mut at = Pose::IDENTITY;
-        let mut next = id;
-        for _ in 0..=self.stands.len() {
-            let (below, inner) = match self.stands.get(next.0 as usize) {
-                Some(Stand::Lab(inner)) => return inner.then(at),
-                Some(Stand::On(below, inner)) => (*below, self.surface(*below).then(*inner)),
-                Some(Stand::PartOf(owner, inner)) => (*owner, *inner),
-                Some(Stand::Held(by, inner)) => return self.tip(*by).then(*inner).then(at),
-                None => return at,
-            };
-            at = inner.then(at);
-            next = below;
-        }
-        at
+        self.scene.in_lab(id, |id| self.stand(id))
     }
 
-    /// The surface things stand on, in the frame of its instance.
+    /// Where a thing stands; what is in hand, in the lab.
+    fn stand(&self, id: InstanceId) -> Option<Stand> {
+        Some(match self.carried.get(id.0 as usize)? {
+            Carried::Stands(stand) => *stand,
+            Carried::Held(by, inner) => Stand::Lab(self.tip(*by).then(*inner)),
+        })
+    }
+
+    /// Where something is put down on an instance, in the lab.
     pub fn surface(&self, id: InstanceId) -> Pose {
-        let Some(instance) = self.scene.instances.get(id.0 as usize) else { return Pose::IDENTITY };
-        let place = instance.frames.iter().find(|f| f.name == frame::PLACE).map(|f| f.pose);
-        place.or_else(|| instance.shape.as_ref().map(|s| Pose::up(s.size()[2]))).unwrap_or_default()
+        self.pose(id).then(self.scene.surface(id))
     }
 
     /// Where the tip of a robot is in the lab.
@@ -136,26 +122,21 @@ impl<'p> Stage<'p> {
 
     /// Where a thing stood before it was picked up; where it is, if it never was.
     fn stood(&self, id: InstanceId) -> Pose {
-        let Some(before) = self.before.get(&id) else { return self.pose(id) };
-        match before {
-            Stand::Lab(pose) => *pose,
-            Stand::On(below, inner) => self.pose(*below).then(self.surface(*below)).then(*inner),
-            Stand::PartOf(owner, inner) => self.pose(*owner).then(*inner),
-            Stand::Held(by, inner) => self.tip(*by).then(*inner),
-        }
+        let before = self.before.get(&id);
+        self.scene.in_lab(id, |i| before.filter(|_| i == id).copied().or_else(|| self.stand(i)))
     }
 
     /// A thing stands somewhere on a surface from now on.
     pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
-        if let Some(stand) = self.stands.get_mut(id.0 as usize) {
-            *stand = Stand::On(on, at);
+        if let Some(carried) = self.carried.get_mut(id.0 as usize) {
+            *carried = Carried::Stands(Stand::On(on, at));
         }
     }
 
     /// What a thing stood on before it was picked up, or else stands on.
     pub fn stood_on(&self, id: InstanceId) -> Option<InstanceId> {
-        match self.before.get(&id).or_else(|| self.stands.get(id.0 as usize))? {
-            Stand::On(below, _) | Stand::PartOf(below, _) => Some(*below),
+        match (self.before.get(&id), self.carried.get(id.0 as usize)) {
+            (Some(stand), _) | (None, Some(Carried::Stands(stand))) => stand.below(),
             _ => None,
         }
     }
@@ -171,11 +152,11 @@ impl<'p> Stage<'p> {
         out
     }
 
-    /// What a thing stands on or is part of.
+    /// What a thing stands on or is part of, or the robot that holds it.
     pub fn below(&self, id: InstanceId) -> Option<InstanceId> {
-        match self.stands.get(id.0 as usize)? {
-            Stand::On(below, _) | Stand::PartOf(below, _) | Stand::Held(below, _) => Some(*below),
-            Stand::Lab(_) => None,
+        match self.carried.get(id.0 as usize)? {
+            Carried::Stands(stand) => stand.below(),
+            Carried::Held(by, _) => Some(*by),
         }
     }
 
@@ -196,15 +177,10 @@ impl<'p> Stage<'p> {
 
     /// The robot that holds an instance, or something it is part of or stands on.
     pub fn held_by(&self, id: InstanceId) -> Option<InstanceId> {
-        let mut next = id;
-        for _ in 0..=self.stands.len() {
-            match self.stands.get(next.0 as usize)? {
-                Stand::Held(by, _) => return Some(*by),
-                Stand::On(below, _) | Stand::PartOf(below, _) => next = *below,
-                Stand::Lab(_) => return None,
-            }
-        }
-        None
+        std::iter::once(id).chain(self.carriers(id)).find_map(|i| match self.carried.get(i.0 as usize)? {
+            Carried::Held(by, _) => Some(*by),
+            Carried::Stands(_) => None,
+        })
     }
 
     /// Whether an instance is one of these or part of one.
@@ -228,41 +204,48 @@ impl<'p> Stage<'p> {
 
     /// What a robot holds.
     pub fn held(&self, robot: InstanceId) -> Option<InstanceId> {
-        let holds = |s: &Stand| matches!(s, Stand::Held(by, _) if *by == robot);
-        self.stands.iter().position(holds).map(|i| InstanceId(i as u32))
+        let holds = |c: &Carried| matches!(c, Carried::Held(by, _) if *by == robot);
+        self.carried.iter().position(holds).map(|i| InstanceId(i as u32))
     }
 
     /// A thing is carried by something else from now on, without moving: a robot takes it, or it is put down.
     pub fn carry(&mut self, id: InstanceId, by: Option<InstanceId>) {
         let now = self.pose(id);
         let index = id.0 as usize;
-        let Some(old) = self.stands.get(index).copied() else { return };
-        let stand = match by {
-            None => Stand::Lab(now),
+        let Some(old) = self.carried.get(index).copied() else { return };
+        let new = match by {
+            None => Carried::Stands(Stand::Lab(now)),
             Some(by) => match self.actor_of(by) {
-                Some(robot) => Stand::Held(robot, self.tip(robot).inverse().then(now)),
-                None => Stand::On(by, self.pose(by).then(self.surface(by)).inverse().then(now)),
+                Some(robot) => Carried::Held(robot, self.tip(robot).inverse().then(now)),
+                None => Carried::Stands(Stand::On(by, self.surface(by).inverse().then(now))),
             },
         };
-        if matches!(stand, Stand::Held(..)) && !matches!(old, Stand::Held(..)) {
+        if let (Carried::Held(..), Carried::Stands(old)) = (new, old) {
             self.before.insert(id, old);
         }
-        self.stands[index] = stand;
+        self.carried[index] = new;
     }
 }
 
 impl Actor {
     fn new(assembly: Assembly) -> Result<Self, String> {
         let tree = Tree::new(&assembly.robot).map_err(|why| why.to_string())?;
-        let root = (0..assembly.robot.links.len() as u32)
-            .find(|link| assembly.robot.joints.iter().all(|j| j.child != *link))
-            .ok_or("it has no root")?;
-        let chain = Chain::new(&assembly.robot, root, assembly.tip).map_err(|why| why.to_string())?;
+        let chain = Chain::new(&assembly.robot, 0, assembly.tip).map_err(|why| why.to_string())?;
         let joint = |v: &matterix_motion::Variable| v.joint;
         let all: Vec<u32> = tree.variables().iter().map(joint).collect();
         let arm = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
         let joints = assembly.home.clone();
-        Ok(Actor { assembly, tree, chain, joints, arm })
+        Ok(Actor { assembly, tree, chain, joints, arm, to_plan: Arc::default() })
+    }
+
+    /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
+    /// pictures and recordings do without.
+    pub fn to_plan(&self) -> &Robot {
+        self.to_plan.get_or_init(|| {
+            let mut robot = self.assembly.robot.clone();
+            robot.touching.extend(always_touching(&robot).unwrap_or_default());
+            robot
+        })
     }
 
     /// The positions of the joints that move the tip.

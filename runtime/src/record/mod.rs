@@ -6,7 +6,6 @@
 mod column;
 mod files;
 mod history;
-mod pose;
 mod recording;
 pub(crate) mod run;
 

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use matterix_ir::model::Domain;
-use matterix_ir::scene::{InstanceId, Pose, Shape};
+use matterix_ir::scene::{InstanceId, Pose, Shape, Stand};
 use mcap::McapResult;
 
 use super::Sink;
@@ -13,8 +12,8 @@ use super::foxglove::{
     quaternion, vector,
 };
 use super::robots::Robots;
+use crate::motion::supported;
 use crate::record::column::Column;
-use crate::record::pose::{self, Stand};
 use crate::record::run::Run;
 
 /// The frame everything stands in.
@@ -29,7 +28,7 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let entities = sink.channel("/scene", "foxglove.SceneUpdate", &foxglove::scene_schema(), &units)?;
     let frames = sink.channel("/tf", "foxglove.FrameTransforms", &foxglove::transforms_schema(), &units)?;
     let tints = tints(run);
-    let mut stands = pose::initial(scene);
+    let mut stands = scene.stands();
     let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
     let supports = supports(run);
     let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
@@ -56,7 +55,8 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
         if !moved && !carried && tints.is_empty() {
             continue;
         }
-        let mut poses = pose::in_lab(scene, &stands);
+        let stand = |id: InstanceId| stands.get(id.0 as usize).copied();
+        let mut poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
         robots.held.iter().for_each(|(id, at)| poses[*id] = *at);
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
@@ -85,8 +85,7 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
 fn supports<'a>(run: &Run<'a>) -> Vec<(usize, &'a [f64])> {
     let model = &run.program.model;
     let of = |(i, state): (usize, &matterix_ir::model::State)| {
-        let owner = state.name.strip_suffix(".support").filter(|_| state.domain == Domain::Instance)?;
-        let id = run.program.scene.find(owner)?;
+        let id = supported(&run.program.scene, &state.name, &state.domain)?;
         Some((id.0 as usize, run.recording.states.get(i)?.as_slice()))
     };
     model.states.iter().enumerate().filter_map(of).collect()
