@@ -4,12 +4,10 @@
 //! [`syntax`] text to tree, [`names`] modules and scopes, [`elaborate`] the lab's instances and laws as one flat model,
 //! [`lower`] the workflow as a plan, [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
-pub mod ast;
 pub mod check;
 pub mod chem;
 pub mod elaborate;
 pub mod eval;
-pub mod fmt;
 pub mod import;
 mod labware;
 pub mod library;
@@ -21,9 +19,10 @@ pub mod program;
 pub mod prose;
 pub mod screen;
 pub mod stock;
-pub mod syntax;
 pub mod task;
 pub mod units;
+
+pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
 pub use program::{Options, Test, check, check_and, compile, contents, document, tests};

@@ -136,7 +136,7 @@ fn offered(text: &str) -> Vec<String> {
 fn the_library_page_names_everything_the_library_offers() {
     let page = fs::read_to_string(root().join("docs/library.md")).expect("the page can be read");
     let mut missing = Vec::new();
-    for (module, text) in library::MODULES {
+    for library::Module { name: module, text, .. } in library::MODULES {
         let (_, section) =
             page.split_once(&format!("## `{module}`")).unwrap_or_else(|| panic!("no section on {module}"));
         let section = section.split("\n## ").next().unwrap_or_default();

@@ -3,8 +3,6 @@
 pub mod near;
 
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
 
@@ -56,13 +54,10 @@ pub struct Names<'a> {
 
 /// Parses the root file and everything it imports; the library comes first.
 pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Module>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics, mut read) = library_and(sources, root);
+    let (mut modules, mut diagnostics) = library(sources);
     let mut queue = vec![(String::new(), root)];
     while let Some((name, file)) = queue.pop() {
-        let (tree, found) = read.take().unwrap_or_else(|| {
-            let text = sources.get(file).map(|s| s.text.clone()).unwrap_or_default();
-            crate::syntax::parse(file, &text)
-        });
+        let (tree, found) = crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text));
         diagnostics.extend(found);
         for item in &tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
@@ -121,50 +116,18 @@ fn used(modules: &[Module]) -> Vec<bool> {
     used
 }
 
-/// A tree and what is wrong with its text.
-type Read = (ast::File, Vec<Diagnostic>);
-
-/// The library's modules, their findings, and the root file. They are read side by side: reading the library takes most
-/// of the time of a check of a small file.
-fn library_and(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, Option<Read>) {
-    let files: Vec<FileId> = library::MODULES.iter().map(|(name, text)| sources.add(*name, *text)).collect();
-    let library = library::MODULES.iter().zip(&files).map(|((_, text), file)| (*file, *text));
-    let root = sources.get(root).map(|s| (root, s.text.as_str()));
-    let texts: Vec<(FileId, &str)> = library.chain(root).collect();
-    let read: Vec<OnceLock<Read>> = texts.iter().map(|_| OnceLock::new()).collect();
-    // The longest first, so that all are ready at about the same time.
-    let mut order: Vec<usize> = (0..texts.len()).collect();
-    order.sort_by_key(|i| std::cmp::Reverse(texts[*i].1.len()));
-    let next = AtomicUsize::new(0);
-    let work = || {
-        while let Some(&i) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let (file, text) = texts[i];
-            read[i].get_or_init(|| crate::syntax::parse(file, text));
-        }
-    };
-    let helpers = std::thread::available_parallelism().map_or(1, usize::from).min(READERS) - 1;
-    std::thread::scope(|scope| {
-        for _ in 0..helpers {
-            // Where there is no thread to be had, this one does the work.
-            let _ = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, work);
-        }
-        work();
-    });
-    let mut read = read
-        .into_iter()
-        .zip(&texts)
-        .map(|(read, (file, text))| read.into_inner().unwrap_or_else(|| crate::syntax::parse(*file, text)));
-    let mut modules = Vec::new();
+/// The library's modules and their findings.
+fn library(sources: &mut Sources) -> (Vec<Module>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    for (((name, _), file), (tree, found)) in library::MODULES.iter().zip(files).zip(read.by_ref()) {
+    let read = |(index, module): (usize, &library::Module)| {
+        let file = sources.add(module.name, module.text);
+        let (tree, found) = library::read(index, file);
         diagnostics.extend(found);
-        modules.push(Module { name: (*name).to_string(), file, tree });
-    }
-    (modules, diagnostics, read.next())
+        Module { name: module.name.to_string(), file, tree }
+    };
+    let modules = library::MODULES.iter().enumerate().map(read).collect();
+    (modules, diagnostics)
 }
-
-/// More threads than this do not read the library any faster: one module is a third of it.
-const READERS: usize = 4;
 
 /// Bytes of stack of a thread: what the main one has.
 pub(crate) const STACK: usize = 8 << 20;

@@ -1,19 +1,21 @@
-//! Text to syntax tree. Everything that knows the grammar's rules is in here.
+//! The text of `.mtx` files: to a syntax [tree](ast), and in its one style ([`fmt`]). Everything that knows the grammar's rules is in here.
 //!
 //! Brackets and texts that were left open are closed first (`scan`, `brackets`, `repair`), so that the grammar sees whole groups; its error
 //! productions skip what is no form (`recovery.pest`), and the skipped line is read once more alone to find where it fails (`mistake`).
 
+pub mod ast;
 mod brackets;
 mod cursor;
 mod decode;
 mod dump;
+pub mod fmt;
 mod grammar;
 mod lower;
 mod mistake;
 mod repair;
 mod scan;
 mod spot;
-pub(crate) mod tokens;
+mod tokens;
 mod words;
 
 use matterix_ir::{Diagnostic, FileId, Span, codes};

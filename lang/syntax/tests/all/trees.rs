@@ -1,15 +1,15 @@
-//! The trees of the files of `tests/spec`, as they stand in `lang/tests/syntax/*.tree`.
+//! The trees of the files of `tests/spec`, as they stand in `lang/syntax/tests/trees/*.tree`.
 
 use std::path::PathBuf;
 
 use matterix_ir::FileId;
-use matterix_lang::syntax::{dump, parse};
+use matterix_syntax::{dump, parse};
 
-use crate::fmt_spec::spec_files;
+use crate::spec::spec_files;
 
 #[test]
 fn spec_files_have_their_trees() {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/syntax");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/trees");
     for (path, text) in spec_files() {
         let tree = dump(&parse(FileId(0), &text).0);
         let golden = folder.join(path.file_name().expect("a file has a name")).with_extension("tree");

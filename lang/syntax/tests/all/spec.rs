@@ -3,14 +3,12 @@
 use std::path::PathBuf;
 
 use matterix_ir::FileId;
-use matterix_lang::{
-    fmt::format,
-    syntax::{dump, parse},
-};
+use matterix_syntax::fmt::format;
+use matterix_syntax::{dump, parse};
 
 /// Paths and texts of the specification.
 pub fn spec_files() -> Vec<(PathBuf, String)> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/spec");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/spec");
     let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
         .expect("the folder is there")
         .map(|entry| entry.expect("it is readable").path())

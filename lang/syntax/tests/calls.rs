@@ -1,13 +1,13 @@
 //! The cost of nesting, counted in rule calls. Alone in its process: the limit of calls holds for all of it.
 
-#[path = "all/syntax_nested.rs"]
-mod syntax_nested;
+#[path = "all/nested.rs"]
+mod nested;
 
 use std::num::NonZeroUsize;
 
 use matterix_ir::FileId;
-use matterix_lang::syntax::parse;
-use syntax_nested::nested;
+use matterix_syntax::parse;
+use nested::nested;
 
 /// Whether the text is read with at most so many rule calls.
 fn is_read_with(calls: usize, text: &str) -> bool {

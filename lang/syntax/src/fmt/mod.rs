@@ -5,7 +5,7 @@ mod layout;
 
 use matterix_ir::{Diagnostic, FileId, Span, codes};
 
-use crate::syntax::tokens::{Kind, Token, tokens};
+use crate::tokens::{Kind, Token, tokens};
 use gap::Gap;
 
 /// The text in the one style; the findings where it has syntax mistakes.

@@ -2,6 +2,6 @@
 #![allow(missing_docs)]
 
 #[derive(pest_derive::Parser)]
-#[grammar = "../../grammar/mtx.pest"]
-#[grammar = "../../grammar/recovery.pest"]
+#[grammar = "../../../grammar/mtx.pest"]
+#[grammar = "../../../grammar/recovery.pest"]
 pub(super) struct Grammar;

@@ -1,13 +1,11 @@
 //! Any text is read without a panic; findings point into it; what is read can be formatted.
 
 use matterix_ir::FileId;
-use matterix_lang::{
-    fmt::format,
-    syntax::{decode, dump, parse},
-};
+use matterix_syntax::fmt::format;
+use matterix_syntax::{decode, dump, parse};
 use proptest::prelude::*;
 
-use crate::{fmt_spec::spec_files, syntax_generator};
+use crate::{generator, spec::spec_files};
 
 /// A text as pieces: words, blanks, texts, comments and single signs.
 fn pieces(text: &str) -> Vec<&str> {
@@ -165,7 +163,7 @@ proptest! {
     }
 
     #[test]
-    fn generated_files_have_no_mistakes(text in syntax_generator::file()) {
+    fn generated_files_have_no_mistakes(text in generator::file()) {
         let (_, found) = parse(FileId(0), &text);
         prop_assert_eq!(found, [], "{}", text);
         check(&text)?;

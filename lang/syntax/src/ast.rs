@@ -1,9 +1,10 @@
 //! The syntax tree: what was written, nothing resolved. Error nodes stand where something could not be read.
 
 use matterix_ir::Span;
+use serde::{Deserialize, Serialize};
 
 /// A word as written; for a species with its charge and phase: `EtOH`, `SO4^2-`, `KNO3(s)`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Name {
     /// The text.
     pub text: String,
@@ -12,7 +13,7 @@ pub struct Name {
 }
 
 /// `std::heating::IkaRet`, `jacket`, `left.table`: segments joined by `::` or `.`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Path {
     /// At least one.
     pub segments: Vec<Name>,
@@ -21,7 +22,7 @@ pub struct Path {
 }
 
 /// A unit as written: `degC`, `kg/(mol*s)`, `%w/w`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnitText {
     /// The text, without blanks.
     pub text: String,
@@ -30,7 +31,7 @@ pub struct UnitText {
 }
 
 /// One source file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct File {
     /// The `mtx` header's number; absent where the header is missing (which is reported).
     pub version: Option<u32>,
@@ -41,7 +42,7 @@ pub struct File {
 }
 
 /// A declaration.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Item {
     /// `///` lines, without the marker and one blank.
     pub docs: Vec<String>,
@@ -52,7 +53,7 @@ pub struct Item {
 }
 
 /// What an item declares.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ItemKind {
     /// Could not be read; reported already.
     Error,
@@ -300,7 +301,7 @@ pub enum ItemKind {
 }
 
 /// `labelled 0.04 mol/kg of KI +- 1 %`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Labelled {
     /// The concentration.
     pub value: Expr,
@@ -313,7 +314,7 @@ pub struct Labelled {
 }
 
 /// A species with its coefficient in an equation.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Term {
     /// 1 where none is written.
     pub coefficient: f64,
@@ -324,7 +325,7 @@ pub struct Term {
 }
 
 /// `key: value`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Field {
     /// A word or a species.
     pub key: Name,
@@ -335,7 +336,7 @@ pub struct Field {
 }
 
 /// What a field holds.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum FieldValue {
     /// `70 W/K`.
     Expr(Expr),
@@ -348,7 +349,7 @@ pub enum FieldValue {
 }
 
 /// `IkaRet { gain: 70 W/K }`, or the type alone.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AssetLiteral {
     /// The type.
     pub ty: Path,
@@ -359,7 +360,7 @@ pub struct AssetLiteral {
 }
 
 /// `at (0, 0, 40) mm from grasp with rpy(0 deg, 90 deg, 0 deg)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct At {
     /// Two or three lengths.
     pub position: Expr,
@@ -370,7 +371,7 @@ pub struct At {
 }
 
 /// A line of an asset.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum AssetLine {
     /// Could not be read.
     Error(Span),
@@ -404,7 +405,7 @@ pub enum AssetLine {
 }
 
 /// A grid of child assets, or a part of one: lines with the same name make one grid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Its name.
     pub name: Name,
@@ -423,7 +424,7 @@ pub struct Grid {
 }
 
 /// A member of a capability.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Member {
     /// `///` lines.
     pub docs: Vec<String>,
@@ -434,7 +435,7 @@ pub struct Member {
 }
 
 /// What a member is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum MemberKind {
     /// Could not be read.
     Error,
@@ -494,7 +495,7 @@ pub enum MemberKind {
 }
 
 /// Which kind of value a member is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
     /// Fixed for an instance.
     Param,
@@ -513,7 +514,7 @@ pub enum Role {
 }
 
 /// `process NAME(PARAMS) while COND { LAWS }`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Process {
     /// Its name.
     pub name: Name,
@@ -526,7 +527,7 @@ pub struct Process {
 }
 
 /// `event NAME(PARAMS) when COND { LAWS }`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
     /// Its name.
     pub name: Name,
@@ -539,7 +540,7 @@ pub struct Event {
 }
 
 /// A line of a law body.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Law {
     /// What it says.
     pub kind: LawKind,
@@ -548,7 +549,7 @@ pub struct Law {
 }
 
 /// What a law line says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LawKind {
     /// Could not be read.
     Error,
@@ -591,7 +592,7 @@ pub enum LawKind {
 }
 
 /// How a law changes its target.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AssignOp {
     /// `=`
     Set,
@@ -602,7 +603,7 @@ pub enum AssignOp {
 }
 
 /// A text with values in braces.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Text {
     /// In order.
     pub parts: Vec<TextPart>,
@@ -611,7 +612,7 @@ pub struct Text {
 }
 
 /// A piece of a [`Text`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TextPart {
     /// As written.
     Plain(String),
@@ -625,7 +626,7 @@ pub enum TextPart {
 }
 
 /// A type.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Type {
     /// `Heater & Surface`: one or more.
     pub paths: Vec<Path>,
@@ -642,7 +643,7 @@ pub struct Type {
 }
 
 /// `name: Type = default`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Param {
     /// Its name.
     pub name: Name,
@@ -653,7 +654,7 @@ pub struct Param {
 }
 
 /// `place(item: Graspable) on(target: Surface) by(arm: Arm)`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sig {
     /// One or more words.
     pub verb: Vec<Name>,
@@ -668,7 +669,7 @@ pub struct Sig {
 }
 
 /// A clause of a skill or command.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clause {
     /// What it says.
     pub kind: ClauseKind,
@@ -677,7 +678,7 @@ pub struct Clause {
 }
 
 /// What a clause says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ClauseKind {
     /// `needs t in limits`, with `else too_hot "cool it first"` a failure of its own.
     Needs {
@@ -753,7 +754,7 @@ pub enum ClauseKind {
 }
 
 /// One effect.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Effect {
     /// `active = true`.
     Assign(Expr, Expr),
@@ -771,7 +772,7 @@ pub enum Effect {
 }
 
 /// A line of a driver.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wire {
     /// What it maps.
     pub kind: WireKind,
@@ -780,7 +781,7 @@ pub struct Wire {
 }
 
 /// What a driver line maps.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum WireKind {
     /// Could not be read.
     Error,
@@ -817,7 +818,7 @@ pub enum WireKind {
 }
 
 /// A line of a lab.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabLine {
     /// What it says.
     pub kind: LabLineKind,
@@ -826,7 +827,7 @@ pub struct LabLine {
 }
 
 /// What a lab line says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LabLineKind {
     /// Could not be read.
     Error,
@@ -871,7 +872,7 @@ pub enum LabLineKind {
 }
 
 /// What an instance holds at the start.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Holding {
     /// `10 g of water + 12 mmol of EtOH`: an `of` sum, shaped as a binary expression.
     Expr(Expr),
@@ -880,7 +881,7 @@ pub enum Holding {
 }
 
 /// What some places of a grid hold at the start.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fill {
     /// The first place.
     pub from: Name,
@@ -891,7 +892,7 @@ pub struct Fill {
 }
 
 /// A line of a study.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum StudyLine {
     /// Could not be read.
     Error(Span),
@@ -916,7 +917,7 @@ pub enum StudyLine {
 }
 
 /// A line of a fit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum FitLine {
     /// Could not be read.
     Error(Span),
@@ -945,7 +946,7 @@ pub enum FitLine {
 }
 
 /// Steps in braces.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Block {
     /// In order.
     pub stmts: Vec<Stmt>,
@@ -954,7 +955,7 @@ pub struct Block {
 }
 
 /// `on slip { } finally { }`.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Handlers {
     /// In order.
     pub on: Vec<(Name, Block)>,
@@ -963,7 +964,7 @@ pub struct Handlers {
 }
 
 /// A step.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stmt {
     /// What it does.
     pub kind: StmtKind,
@@ -972,7 +973,7 @@ pub struct Stmt {
 }
 
 /// What a step does.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum StmtKind {
     /// Could not be read.
     Error,
@@ -1165,7 +1166,7 @@ pub enum StmtKind {
 }
 
 /// `transfer 100 uL from a to b by p { tips: once }`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Call {
     /// Bare words; the longest prefix that is a declared verb is the verb, and at most one word may follow it: the object.
     pub words: Vec<Name>,
@@ -1180,7 +1181,7 @@ pub struct Call {
 }
 
 /// `name: value`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedExpr {
     /// The name.
     pub name: Name,
@@ -1189,7 +1190,7 @@ pub struct NamedExpr {
 }
 
 /// An argument of a function.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Arg {
     /// `from:`.
     pub name: Option<Name>,
@@ -1198,7 +1199,7 @@ pub struct Arg {
 }
 
 /// An expression.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Expr {
     /// What it says.
     pub kind: Box<ExprKind>,
@@ -1207,7 +1208,7 @@ pub struct Expr {
 }
 
 /// What an expression says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ExprKind {
     /// Could not be read; stays silent later.
     Error,
@@ -1261,7 +1262,7 @@ pub enum ExprKind {
 }
 
 /// Prefix operators.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unary {
     /// `-`
     Neg,
@@ -1270,7 +1271,7 @@ pub enum Unary {
 }
 
 /// Infix operators, loosest first: `or`, `and`, comparisons (with `in`, `is`), `..`, `+-`, `+ -`, `* /`, `^` (to the right).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Binary {
     /// `or`
     Or,

@@ -1,11 +1,11 @@
-//! `lang/tests/syntax/recovery.txt`: texts with mistakes, each followed by what is said about it.
+//! `lang/syntax/tests/trees/recovery.txt`: texts with mistakes, each followed by what is said about it.
 //!
 //! A line `// error COLUMN: HEADLINE` is about the nearest line above that is no such line; every finding has one.
 
 use matterix_ir::FileId;
-use matterix_lang::syntax::parse;
+use matterix_syntax::parse;
 
-const CASES: &str = include_str!("../syntax/recovery.txt");
+const CASES: &str = include_str!("../trees/recovery.txt");
 
 /// Findings of a text as marker lines, by the number of the line that they are about.
 fn markers(text: &str) -> Vec<(usize, String)> {

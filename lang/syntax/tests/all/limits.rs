@@ -6,9 +6,9 @@
 use std::time::{Duration, Instant};
 
 use matterix_ir::FileId;
-use matterix_lang::syntax::{MAX_NESTING, MAX_SIZE, decode, parse};
+use matterix_syntax::{MAX_NESTING, MAX_SIZE, decode, parse};
 
-use crate::syntax_nested::nested;
+use crate::nested::nested;
 
 fn headlines(text: &str) -> Vec<String> {
     parse(FileId(0), text).1.into_iter().map(|f| f.headline).collect()
@@ -125,7 +125,7 @@ fn an_empty_file_lacks_its_header() {
 #[test]
 #[ignore = "says something with optimisation only"]
 fn speed_of_large_files() {
-    let spec: String = crate::fmt_spec::spec_files().iter().map(|(_, text)| text.replacen("mtx 1", "", 1)).collect();
+    let spec: String = crate::spec::spec_files().iter().map(|(_, text)| text.replacen("mtx 1", "", 1)).collect();
     let lines = 20_000;
     let text = format!("mtx 1\n{}", spec.repeat(lines / spec.lines().count() + 1));
     let start = Instant::now();
@@ -133,7 +133,7 @@ fn speed_of_large_files() {
     println!("{} lines, {} bytes: {:?}", text.lines().count(), text.len(), start.elapsed());
     assert!(start.elapsed() < Duration::from_millis(500));
     let start = Instant::now();
-    assert!(matterix_lang::fmt::format(FileId(0), &text).is_ok());
+    assert!(matterix_syntax::fmt::format(FileId(0), &text).is_ok());
     println!("formatted: {:?}", start.elapsed());
     for piece in [
         "{",

@@ -1,7 +1,7 @@
 //! Writes the tokens of a file with blanks and line ends between them.
 
 use super::gap::Gap;
-use crate::syntax::tokens::{Begins, Kind, Token};
+use crate::tokens::{Begins, Kind, Token};
 
 /// Blanks per level.
 const STEP: usize = 4;

@@ -1,0 +1,9 @@
+//! Tests of the whole crate.
+
+mod generator;
+mod limits;
+mod nested;
+mod properties;
+mod recovery;
+mod spec;
+mod trees;
