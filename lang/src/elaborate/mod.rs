@@ -29,6 +29,7 @@ use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Graph, NodeId, Op, Span};
+use rustc_hash::FxHashMap;
 
 use crate::ast::{self, Expr, FieldValue};
 pub use crate::eval::SpeciesId;
@@ -118,6 +119,8 @@ pub struct Elaborator<'a> {
     pub diagnostics: Vec<Diagnostic>,
     /// How often something was found, known findings included.
     pub reported: usize,
+    /// Types without findings, by their place in the tree and the module that reads them.
+    types: FxHashMap<(usize, usize), Type>,
     /// Instances; parts after owners.
     pub instances: Vec<Instance<'a>>,
     /// Those of them that count amounts per species, in order.
@@ -233,6 +236,7 @@ impl<'a> Elaborator<'a> {
             graph: Graph::default(),
             diagnostics: Vec::new(),
             reported: 0,
+            types: FxHashMap::default(),
             instances: Vec::new(),
             mixtures: Vec::new(),
             lab_name: Span::default(),
@@ -297,23 +301,35 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Resolves a type as written in a module.
-    pub fn resolve_type(&mut self, ty: &ast::Type, module: usize) -> Type {
-        let mut found = Vec::new();
-        let ty = self.tables.resolve_type(ty, module, &mut found);
-        for d in found {
-            self.report(d);
-        }
-        ty
+    pub fn resolve_type(&mut self, ty: &'a ast::Type, module: usize) -> Type {
+        self.resolve(ty, module, Tables::resolve_type)
     }
 
     /// Resolves the type of a parameter, without its `where`.
-    pub fn resolve_parameter_type(&mut self, ty: &ast::Type, module: usize) -> Type {
+    pub fn resolve_parameter_type(&mut self, ty: &'a ast::Type, module: usize) -> Type {
+        self.resolve(ty, module, Tables::resolve_parameter_type)
+    }
+
+    /// A type as it was resolved before, or as `how` resolves it: the same few stand in all calls of a command.
+    fn resolve(
+        &mut self,
+        ty: &'a ast::Type,
+        module: usize,
+        how: fn(&Tables<'a>, &ast::Type, usize, &mut Vec<Diagnostic>) -> Type,
+    ) -> Type {
+        let key = (std::ptr::from_ref(ty).addr(), module);
+        if let Some(known) = self.types.get(&key) {
+            return known.clone();
+        }
         let mut found = Vec::new();
-        let ty = self.tables.resolve_parameter_type(ty, module, &mut found);
+        let resolved = how(self.tables, ty, module, &mut found);
+        if found.is_empty() && ty.condition.is_none() {
+            self.types.insert(key, resolved.clone());
+        }
         for d in found {
             self.report(d);
         }
-        ty
+        resolved
     }
 
     /// A setting of the lab; on prototypes `ambient` stands for any temperature.

@@ -1,14 +1,14 @@
 //! Clauses of commands as they came out before. A clause depends on the device and on those arguments that it reads, so
 //! that what a pipette needs of a well is evaluated once, however often and with whatever volume it goes there.
 
-use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use matterix_ir::Span;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Takes};
 use matterix_ir::scene::InstanceId;
+use rustc_hash::{FxHashMap, FxHasher};
 
 use super::Planner;
 use crate::ast::Clause;
@@ -23,7 +23,7 @@ pub(super) enum Outcome {
 }
 
 /// Outcomes for different arguments that read the same ones of them; a hash of their values leads to the candidates.
-type Outcomes = HashMap<u64, Vec<(Vec<Value>, Outcome)>>;
+type Outcomes = FxHashMap<u64, Vec<(Vec<Value>, Outcome)>>;
 
 /// A clause and the device whose command it belongs to.
 type Key = (Span, Option<InstanceId>);
@@ -31,7 +31,7 @@ type Key = (Span, Option<InstanceId>);
 /// Outcomes by clause and device, then by which arguments were read.
 #[derive(Default)]
 pub(super) struct Clauses {
-    known: HashMap<Key, Vec<(u64, Outcomes)>>,
+    known: FxHashMap<Key, Vec<(u64, Outcomes)>>,
 }
 
 impl Clauses {
@@ -45,7 +45,7 @@ impl Clauses {
     fn keep(&mut self, key: Key, scope: &Scope, reads: u64, outcome: Outcome) {
         let all = self.known.entry(key).or_default();
         let index = all.iter().position(|(r, _)| *r == reads).unwrap_or_else(|| {
-            all.push((reads, Outcomes::new()));
+            all.push((reads, Outcomes::default()));
             all.len() - 1
         });
         let values: Vec<Value> = arguments(scope, reads).cloned().collect();
@@ -60,16 +60,22 @@ fn arguments(scope: &Scope, reads: u64) -> impl Iterator<Item = &Value> {
 
 /// A hash that tells apart most of what differs.
 fn hash<'v>(values: impl Iterator<Item = &'v Value>) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    for value in values {
-        match value {
-            Value::Num(n) => n.node.hash(&mut hasher),
-            Value::Bool(n) | Value::Enum(n, _) | Value::InstanceNode(n) => n.hash(&mut hasher),
-            Value::Instance(i) | Value::Qualified(i, _) | Value::Grid(i, _) => i.hash(&mut hasher),
-            _ => {}
-        }
-    }
+    let mut hasher = FxHasher::default();
+    values.for_each(|value| hash_into(value, &mut hasher));
     hasher.finish()
+}
+
+fn hash_into(value: &Value, hasher: &mut FxHasher) {
+    match value {
+        Value::Num(n) => n.node.hash(hasher),
+        Value::Bool(n) | Value::Enum(n, _) | Value::InstanceNode(n) => n.hash(hasher),
+        Value::Range(from, to) => (from.node, to.node).hash(hasher),
+        Value::Instance(i) | Value::Qualified(i, _) | Value::Grid(i, _) => i.hash(hasher),
+        Value::Species(s) | Value::Concentration(_, s) => s.hash(hasher),
+        Value::Text(text) | Value::Included(text) | Value::Frame(_, text) => text.hash(hasher),
+        Value::Tuple(values) | Value::List(values) => values.iter().for_each(|v| hash_into(v, hasher)),
+        _ => {}
+    }
 }
 
 impl<'a> Planner<'a, '_> {

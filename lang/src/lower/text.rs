@@ -54,7 +54,12 @@ impl<'a> Planner<'a, '_> {
         if self.draft {
             return String::new();
         }
-        let text = self.sources.slice(span).split_whitespace().collect::<Vec<_>>().join(" ");
+        let text = self.sources.slice(span);
+        let blanks = text.starts_with(' ') || text.ends_with(' ') || text.contains("  ");
+        if text.len() <= 100 && !blanks && !text.contains(|c: char| c != ' ' && c.is_whitespace()) {
+            return text.to_string();
+        }
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         if text.chars().count() <= 100 { text } else { text.chars().take(97).chain("...".chars()).collect() }
     }
 

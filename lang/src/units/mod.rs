@@ -192,8 +192,8 @@ impl Units {
 
     /// The percent unit of a fraction, in which fractions are shown.
     pub fn percent(&self, dimension: &Dimension) -> Option<Unit> {
-        let (name, def) =
-            self.units.iter().find(|(n, u)| n.starts_with('%') && u.dimension == *dimension && u.factor == 0.01)?;
+        let mut percents = self.units.range("%".to_string()..).take_while(|(n, _)| n.starts_with('%'));
+        let (name, def) = percents.find(|(_, u)| u.dimension == *dimension && u.factor == 0.01)?;
         Some(Unit::scaled(name.clone(), def.factor))
     }
 

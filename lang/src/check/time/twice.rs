@@ -18,14 +18,21 @@ pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -
     let uses = usage::uses(times.plan, &times.timing);
     let mut clashes: Vec<(&Use, &Use, bool)> = Vec::new();
     let mut pairs = 0;
-    for (i, first) in uses.iter().enumerate() {
-        for second in uses[i + 1..].iter().take_while(|u| u.instance == first.instance) {
-            if thread(times, first.step) == thread(times, second.step) {
-                continue;
-            }
-            pairs += 1;
-            if pairs <= MOST {
-                clashes.extend(clash(times, first, second).map(|sure| (first, second, sure)));
+    for of_one in uses.chunk_by(|a, b| a.instance == b.instance) {
+        let threads: Vec<u32> = of_one.iter().map(|u| thread(times, u.step)).collect();
+        // In one line of steps nothing meets: most instances are used in one only.
+        if threads.windows(2).all(|two| two[0] == two[1]) {
+            continue;
+        }
+        for (i, first) in of_one.iter().enumerate() {
+            for (j, second) in of_one.iter().enumerate().skip(i + 1) {
+                if threads[i] == threads[j] {
+                    continue;
+                }
+                pairs += 1;
+                if pairs <= MOST {
+                    clashes.extend(clash(times, first, second).map(|sure| (first, second, sure)));
+                }
             }
         }
     }
