@@ -9,6 +9,7 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 
+use super::flight::Candidate;
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -23,6 +24,8 @@ const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 const RETREAT: f64 = 0.10;
 /// Samples drawn before a way counts as not found.
 const SAMPLES: usize = 60_000;
+/// The same for a way around what others sweep, which is only looked for to save waiting.
+const DETOUR: usize = 2_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
 const RAMP: (f64, f64) = (0.3, 0.1);
 
@@ -31,25 +34,25 @@ const RAMP: (f64, f64) = (0.3, 0.1);
 pub struct Performed {
     /// The robot.
     pub robot: InstanceId,
-    /// Of the joints that move its tip, one after the other.
-    pub parts: Vec<Trajectory>,
+    /// Of the joints that move its tip, each with the time at which it begins, s since the motion did.
+    pub parts: Vec<(f64, Trajectory)>,
 }
 
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.iter().map(Trajectory::duration).sum()
+        self.parts.last().map_or(0.0, |(begin, part)| begin + part.duration())
     }
 
-    /// The joints that move the tip at a time since the beginning, s.
-    pub fn at(&self, mut time: f64) -> Vec<f64> {
-        for part in &self.parts {
-            if time <= part.duration() {
-                return part.at(time).position;
-            }
-            time -= part.duration();
-        }
-        self.parts.last().map(|p| p.at(p.duration()).position).unwrap_or_default()
+    /// The joints that move the tip at a time since the beginning, s; while it waits, where it is.
+    pub fn at(&self, time: f64) -> Vec<f64> {
+        let begun = self.parts.partition_point(|(begin, _)| *begin <= time).max(1) - 1;
+        self.parts.get(begun).map(|(begin, part)| part.at(time - begin).position).unwrap_or_default()
+    }
+
+    /// A part that begins when those before it have ended and it has waited, s.
+    fn push(&mut self, (wait, part): (f64, Trajectory)) {
+        self.parts.push((self.duration() + wait, part));
     }
 }
 
@@ -111,7 +114,7 @@ impl Refused {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
             Refused::NoFrame => format!("`{name}` is sent to a frame that nothing gives a place"),
             Refused::OutOfReach(far, _) => format!("`{name}` stays {:.0} mm short of it", far * 1e3),
-            Refused::Collides(m) => format!("`{}` of `{name}` runs into `{}`", m.mine, m.other),
+            Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
@@ -126,12 +129,30 @@ pub struct Meeting {
     pub mine: String,
     /// What it meets: an instance, or another link.
     pub other: String,
+    /// The link that it meets, if that is another robot's.
+    pub part: Option<String>,
     /// The instance it meets, if it is not the robot itself.
     pub with: Option<InstanceId>,
     /// Where, in the lab, m.
     pub at: [f64; 3],
     /// How deep, m.
     pub depth: f64,
+}
+
+impl Meeting {
+    /// What it meets, in words.
+    pub fn whom(&self) -> String {
+        match &self.part {
+            Some(part) => format!("`{part}` of `{}`", self.other),
+            None => format!("`{}`", self.other),
+        }
+    }
+
+    /// Where, in words.
+    pub fn place(&self) -> String {
+        let [x, y, z] = self.at.map(|v| v * 1e3);
+        format!("({x:.0}, {y:.0}, {z:.0}) mm")
+    }
 }
 
 impl Stage<'_> {
@@ -219,13 +240,14 @@ impl Stage<'_> {
         straight: bool,
         goal: Option<InstanceId>,
     ) -> Result<Performed, Refused> {
-        let mut parts = Vec::new();
+        let mut done = Performed { robot, parts: Vec::new() };
         if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
             let mut back = self.tip(robot);
             back.position = back.point([0.0, 0.0, -RETREAT]);
-            parts.push(self.line(robot, &back, &[item])?);
+            done.push(self.line(robot, &back, &[item], self.now)?);
         }
         self.leave(robot);
+        let since = self.now + done.duration();
         let base = self.pose(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let now = actor.configuration();
@@ -252,13 +274,13 @@ impl Stage<'_> {
         }
         for (_, target, q) in found {
             let tried = match straight {
-                true => self.line(robot, target, goal.as_slice()),
-                false => self.way(robot, &q),
+                true => self.line(robot, target, goal.as_slice(), since),
+                false => self.way(robot, &q, since),
             };
             match tried {
                 Ok(part) => {
-                    parts.push(part);
-                    return Ok(Performed { robot, parts });
+                    done.push(part);
+                    return Ok(done);
                 }
                 // What meets says more than that no way was found.
                 Err(why @ Refused::Collides(_)) => refused = why,
@@ -269,29 +291,66 @@ impl Stage<'_> {
         Err(refused)
     }
 
-    /// A free way to a configuration.
-    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Trajectory, Refused> {
+    /// A free way to a configuration, with how long it waits first, s; it could begin at a time, s since the run began.
+    fn way(&mut self, robot: InstanceId, q: &[f64], since: f64) -> Result<(f64, Trajectory), Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
-        let settings = Settings { iterations: SAMPLES, ..Settings::default() };
-        let route =
-            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-                _ => Refused::NoWay,
-            })?;
-        let part = timed(actor, &route.points, &mut checker)?;
+        let part = self.search(actor, &figure, &around, q, SAMPLES).map_err(|refused| match refused {
+            Refused::NoWay => {
+                let alone = self.search(actor, &figure, &self.without_robots(&around), q, SAMPLES).ok();
+                alone.and_then(|way| self.robot_between(&figure, &around, &way)).unwrap_or(Refused::NoWay)
+            }
+            other => other,
+        })?;
+        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &[] });
+        let mut found = (wait, part);
+        if wait > 0.0
+            && let Some(swept) = self.swept(&around, robot, since)
+            && let Ok(part) = self.search(actor, &figure, &swept, q, DETOUR)
+            && part.duration() < wait + found.1.duration()
+        {
+            let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &[] });
+            if wait + part.duration() < found.0 + found.1.duration() {
+                found = (wait, part);
+            }
+        }
         self.settle(robot, q);
-        Ok(part)
+        Ok(found)
     }
 
-    /// A straight line of the tip to a pose; things it comes up to or leaves may be touched.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Trajectory, Refused> {
+    /// A free way among what stands around, timed.
+    fn search(
+        &self,
+        actor: &Actor,
+        figure: &Figure,
+        around: &Surroundings,
+        q: &[f64],
+        samples: usize,
+    ) -> Result<Trajectory, Refused> {
+        let mut checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
+        let settings = Settings { iterations: samples, ..Settings::default() };
+        let route =
+            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
+                plan::Failure::Collision(_, contacts) => self.meeting(figure, around, &contacts),
+                _ => Refused::NoWay,
+            })?;
+        timed(actor, &route.points, &mut checker)
+    }
+
+    /// A straight line of the tip to a pose, with how long it waits first, s; things it comes up to or leaves may be
+    /// touched, and what they stand on, but no hand that holds them.
+    fn line(
+        &mut self,
+        robot: InstanceId,
+        to: &Pose,
+        near: &[InstanceId],
+        since: f64,
+    ) -> Result<(f64, Trajectory), Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
-            without.extend(self.below(*id));
+            without.extend(self.stand_of(*id));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
         let around = Surroundings::of(self, robot, &without);
@@ -307,12 +366,13 @@ impl Stage<'_> {
             Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
         })?;
         let part = timed(actor, &points, &mut checker)?;
+        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &without });
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
-        Ok(part)
+        Ok((wait, part))
     }
 
-    fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
         Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
@@ -325,24 +385,27 @@ impl Stage<'_> {
     }
 
     /// The deepest contact in words.
-    fn meeting(
+    pub(super) fn meeting(
         &self,
         figure: &Figure,
         around: &Surroundings,
         contacts: &[matterix_motion::spheres::Contact],
     ) -> Refused {
         let Some(contact) = contacts.first() else { return Refused::NoWay };
-        let (other, with) = match contact.other {
+        let (other, part, with) = match contact.other {
             Other::Body(index) => {
                 let with = around.owners.get(index).copied();
-                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), with)
+                let robot = with.is_some_and(|w| self.actors.contains_key(&w));
+                let part = around.world.bodies.get(index).filter(|_| robot).map(|b| b.name.clone());
+                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), part, with)
             }
-            Other::Link(link) => (figure.name(link).to_string(), None),
+            Other::Link(link) => (figure.name(link).to_string(), None, None),
         };
         let at = [contact.point.x, contact.point.y, contact.point.z];
         Refused::Collides(Meeting {
             mine: figure.name(contact.link).to_string(),
             other,
+            part,
             with,
             at,
             depth: contact.depth,

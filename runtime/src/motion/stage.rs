@@ -10,6 +10,7 @@ use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 
 use super::assembly::{Assembly, assemble};
+use super::flight::Flight;
 
 /// What carries a thing and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +51,12 @@ pub struct Stage<'p> {
     pub actors: BTreeMap<InstanceId, Actor>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// s since the run began.
+    pub(super) now: f64,
+    /// Robots that are under way.
+    pub(super) flights: BTreeMap<InstanceId, Flight>,
+    /// How often something was moved so far.
+    pub(super) changes: u64,
 }
 
 impl<'p> Stage<'p> {
@@ -67,7 +74,16 @@ impl<'p> Stage<'p> {
             let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
             actors.insert(id, actor);
         }
-        Ok(Stage { scene, carried, before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+        Ok(Stage {
+            scene,
+            carried,
+            before: BTreeMap::new(),
+            actors,
+            freed: BTreeMap::new(),
+            now: 0.0,
+            flights: BTreeMap::new(),
+            changes: 0,
+        })
     }
 
     /// The robot an instance is or is part of.
@@ -130,6 +146,7 @@ impl<'p> Stage<'p> {
     pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
         if let Some(carried) = self.carried.get_mut(id.0 as usize) {
             *carried = Carried::Stands(Stand::On(on, at));
+            self.changes += 1;
         }
     }
 
@@ -157,6 +174,14 @@ impl<'p> Stage<'p> {
         match self.carried.get(id.0 as usize)? {
             Carried::Stands(stand) => stand.below(),
             Carried::Held(by, _) => Some(*by),
+        }
+    }
+
+    /// What a thing stands on or is part of; nothing where a robot holds it.
+    pub fn stand_of(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.carried.get(id.0 as usize)? {
+            Carried::Stands(stand) => stand.below(),
+            Carried::Held(..) => None,
         }
     }
 
@@ -224,6 +249,7 @@ impl<'p> Stage<'p> {
             self.before.insert(id, old);
         }
         self.carried[index] = new;
+        self.changes += 1;
     }
 }
 

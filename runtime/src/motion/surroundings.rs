@@ -55,7 +55,7 @@ impl Surroundings {
         }
     }
 
-    /// Another robot as it stands now, ball by ball.
+    /// Another robot as it stands now, ball by ball, each named after its link.
     fn add_robot(&mut self, stage: &Stage<'_>, id: InstanceId) {
         let Some(actor) = stage.actors.get(&id) else { return };
         let base = stage.pose(id);
@@ -63,8 +63,14 @@ impl Surroundings {
         for ball in &actor.assembly.robot.balls {
             let Some(link) = links.get(ball.link as usize) else { continue };
             let at = base.then(matterix_motion::placement(link)).then(Pose::at(ball.center));
-            self.push(id, &stage.scene.get(id).name, at, Solid::Sphere(ball.radius));
+            let name = actor.assembly.robot.links.get(ball.link as usize).map_or("", |l| l.name.as_str());
+            self.push_ball(id, name, at, ball.radius);
         }
+    }
+
+    /// A ball of a link of another robot.
+    pub fn push_ball(&mut self, owner: InstanceId, link: &str, at: Pose, radius: f64) {
+        self.push(owner, link, at, Solid::Sphere(radius));
     }
 }
 
