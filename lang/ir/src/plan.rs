@@ -155,10 +155,12 @@ pub enum Motion {
         /// Along a straight line.
         straight: bool,
     },
-    /// Closes its gripper on a thing.
+    /// Closes its gripper on a thing, which may be in the hand of another robot.
     Grip {
         /// The thing.
         item: InstanceId,
+        /// At which of its frames.
+        frame: String,
         /// The robot.
         by: InstanceId,
     },
@@ -166,7 +168,7 @@ pub enum Motion {
     Free {
         /// What it held.
         item: InstanceId,
-        /// What carries it then, if it is known.
+        /// What carries it then, if it is known: a surface, or a robot that grips it as well.
         on: Option<InstanceId>,
         /// The robot.
         by: InstanceId,

@@ -1,7 +1,8 @@
 //! What a robot does with its body in a primitive: `moves`, `grips`, `frees`.
 
 use matterix_ir::plan::Motion;
-use matterix_ir::scene::InstanceId;
+use matterix_ir::scene::{InstanceId, frame};
+use matterix_ir::{Diagnostic, codes};
 
 use super::Planner;
 use crate::ast::{ClauseKind, Expr};
@@ -19,8 +20,13 @@ impl<'a> Planner<'a, '_> {
                 let (goal, frame) = self.goal(to.as_ref()?, scope)?;
                 Some(Motion::To { mover, goal, frame, straight })
             }
-            ClauseKind::Grips { item, by } => {
-                Some(Motion::Grip { item: self.thing(item, scope)?, by: self.thing(by, scope)? })
+            ClauseKind::Grips { item, at, by } => {
+                let thing = self.thing(item, scope)?;
+                let frame = match at {
+                    Some(at) => self.frame_of(thing, at, scope)?,
+                    None => frame::GRASP.to_string(),
+                };
+                Some(Motion::Grip { item: thing, frame, by: self.thing(by, scope)? })
             }
             ClauseKind::Frees { item, on, by } => {
                 let on = match on {
@@ -41,6 +47,21 @@ impl<'a> Planner<'a, '_> {
                 None
             }
         }
+    }
+
+    /// The name of a frame of a thing.
+    fn frame_of(&mut self, thing: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<String> {
+        let (owner, frame) = self.goal(e, scope)?;
+        if owner != thing || frame.is_empty() {
+            self.lab.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                e.span,
+                "a thing is gripped at a frame of its own",
+                "a frame of something else",
+            ));
+            return None;
+        }
+        Some(frame)
     }
 
     fn goal(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, String)> {

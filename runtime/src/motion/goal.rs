@@ -11,7 +11,7 @@ use super::stage::{Carried, Stage};
 /// frame; none where the frame is unknown.
 ///
 /// What is held comes with its origin to the frame. An empty gripper comes with its z axis against the frame's, its
-/// fingers closing along the frame's y axis. What is round may be turned about its own axis.
+/// fingers closing along the frame's y axis or against it. What is round may be turned about its own axis.
 pub fn targets(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &str) -> Vec<Pose> {
     let Some(to) = stage.frame(goal, frame) else { return Vec::new() };
     let own = |held: &InstanceId| *held == goal && !stage.is_stand(goal, frame);
@@ -24,9 +24,26 @@ pub fn targets(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &s
         }
         _ => {
             let over = Pose::turned([0.0; 3], [PI, 0.0, 0.0]);
+            if !stage.is_stand(goal, frame) && !is_upright(stage, goal, &to) {
+                let own = stage.pose(goal);
+                let from = own.inverse().then(to);
+                return turns(stage, goal, 1)
+                    .into_iter()
+                    .flat_map(|about| [0.0, PI].map(|roll| (about, Pose::turned([0.0; 3], [0.0, 0.0, roll]))))
+                    .map(|(about, roll)| own.then(about).then(from).then(roll).then(over))
+                    .collect();
+            }
             turns(stage, goal, 2).into_iter().map(|turn| to.then(turn).then(over)).collect()
         }
     }
+}
+
+/// Whether a frame's z axis is that of its thing, so that turns about either are the same.
+fn is_upright(stage: &Stage<'_>, id: InstanceId, frame: &Pose) -> bool {
+    let axis = stage.pose(id).inverse().then(*frame);
+    let [x, y, _] = axis.position;
+    let tip = Pose { position: [0.0; 3], ..axis }.point([0.0, 0.0, 1.0]);
+    x.hypot(y) < 1e-6 && tip[2].abs() > 1.0 - 1e-9
 }
 
 /// Distance of the places on a surface that are tried, m.

@@ -3,6 +3,7 @@
 pub mod assembly;
 pub mod flight;
 pub mod goal;
+mod hands;
 pub mod perform;
 mod preflight;
 pub mod stage;

@@ -86,15 +86,17 @@ pub enum Refused {
     NoWay,
     /// The thing to be gripped, or to be put down, is this far from where it should be: m and rad.
     Misplaced(f64, f64),
-    /// It holds nothing that could be let go.
+    /// It, or who is to take it over, does not hold what is to be let go.
     NotHeld,
+    /// It holds a thing that another robot holds as well.
+    Bound(InstanceId, InstanceId),
 }
 
 impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) => "unmovable",
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
@@ -117,6 +119,10 @@ impl Refused {
             Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
+            Refused::Bound(item, other) => {
+                let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
+                format!("`{name}` and `{other}` both hold `{item}`")
+            }
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
         }
     }
@@ -173,20 +179,23 @@ impl Stage<'_> {
                 (0..3).for_each(|k| to.position[k] += shift[k]);
                 self.go(robot, &[to], *straight, None).map(Some)
             }
-            Motion::Grip { item, by } => {
+            Motion::Grip { item, frame, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *item, frame::GRASP);
+                let to = targets(self, robot, *item, frame);
                 let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
                 }
-                self.carry(*item, Some(robot));
+                self.grip(*item, robot);
                 Ok(None)
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
                 if self.held(robot) != Some(*item) {
                     return Err(Refused::NotHeld);
+                }
+                if let Some(taker) = on.and_then(|on| self.actor_of(on)) {
+                    return if self.pass(*item, robot, taker) { Ok(None) } else { Err(Refused::NotHeld) };
                 }
                 let to = match on {
                     Some(on) => self.surface(*on).then(spot(self, *item, *on)),
@@ -240,6 +249,9 @@ impl Stage<'_> {
         straight: bool,
         goal: Option<InstanceId>,
     ) -> Result<Performed, Refused> {
+        if let Some((item, other)) = self.bound(robot) {
+            return Err(Refused::Bound(item, other));
+        }
         let mut done = Performed { robot, parts: Vec::new() };
         if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
             let mut back = self.tip(robot);

@@ -179,7 +179,7 @@ impl<'p> Walk<'p> {
     fn finding(&self, motion: &Motion, refused: &Refused, span: Span) -> Option<Diagnostic> {
         let scene = &self.program.scene;
         let (Motion::To { mover: robot, .. } | Motion::By { mover: robot, .. }) = motion else {
-            let (Motion::Grip { item, by } | Motion::Free { item, by, .. }) = motion else { return None };
+            let (Motion::Grip { item, by, .. } | Motion::Free { item, by, .. }) = motion else { return None };
             let Refused::Misplaced(far, _) = refused else { return None };
             let (item, by) = (&scene.get(*item).name, &scene.get(*by).name);
             let headline = format!("`{by}` is not at `{item}`: {:.0} mm are between them", far * 1e3);
@@ -224,6 +224,12 @@ impl<'p> Walk<'p> {
                 format!("no way was found for `{name}` to {to}"),
                 "nothing is in the way at its end, but between",
             ),
+            Refused::Bound(item, other) => {
+                let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
+                let headline = format!("`{name}` moves while `{other}` holds `{item}` as well");
+                Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")
+                    .help("let one of them let go first")
+            }
             Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
         };
         Some(match goal.filter(|g| scene.get(*g).span != span) {

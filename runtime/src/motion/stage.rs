@@ -51,6 +51,8 @@ pub struct Stage<'p> {
     pub actors: BTreeMap<InstanceId, Actor>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// What a second robot grips as well, with that robot.
+    pub(super) shared: BTreeMap<InstanceId, InstanceId>,
     /// s since the run began.
     pub(super) now: f64,
     /// Robots that are under way.
@@ -80,6 +82,7 @@ impl<'p> Stage<'p> {
             before: BTreeMap::new(),
             actors,
             freed: BTreeMap::new(),
+            shared: BTreeMap::new(),
             now: 0.0,
             flights: BTreeMap::new(),
             changes: 0,
@@ -225,6 +228,14 @@ impl<'p> Stage<'p> {
     pub fn is_inside_a_shape(&self, id: InstanceId) -> bool {
         let owner = self.scene.get(id).owner;
         owner.is_some_and(|o| self.scene.get(o).shape.is_some() || self.is_inside_a_shape(o))
+    }
+
+    /// The robot that holds a thing.
+    pub fn holder(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.carried.get(id.0 as usize)? {
+            Carried::Held(by, _) => Some(*by),
+            Carried::Stands(_) => None,
+        }
     }
 
     /// What a robot holds.

@@ -232,7 +232,9 @@ fn clause(clause: &Clause) -> Sexp {
             .with([expr(mover)])
             .with(maybe("to", to.as_ref()))
             .with(maybe("by", by.as_ref())),
-        ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
+        ClauseKind::Grips { item, at, by } => {
+            node("grips").with([expr(item)]).with(maybe("at", at.as_ref())).with([expr(by)])
+        }
         ClauseKind::Frees { item, on, by } => {
             node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])
         }

@@ -152,20 +152,27 @@ impl Lower<'_> {
             }
             Rule::grips => {
                 let item = self.expr_in(kids);
-                ClauseKind::Grips { item, by: self.expr_in(kids) }
+                let (at, by) = self.maybe_before(kids);
+                ClauseKind::Grips { item, at, by }
             }
             Rule::frees => {
                 let item = self.expr_in(kids);
-                let first = self.expr_in(kids);
-                let (on, by) = match kids.eat(Rule::operand) {
-                    Some(by) => (Some(first), self.expr(by)),
-                    None => (None, first),
-                };
+                let (on, by) = self.maybe_before(kids);
                 ClauseKind::Frees { item, on, by }
             }
             Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
             _ => return None,
         })
+    }
+
+    /// An operand that may be left out before one that may not.
+    fn maybe_before(&mut self, kids: &mut Kids) -> (Option<Expr>, Expr) {
+        let first = self.expr_in(kids);
+        kids.has(Rule::kw_to);
+        match kids.eat(Rule::operand) {
+            Some(second) => (Some(first), self.expr(second)),
+            None => (None, first),
+        }
     }
 
     fn effect(&mut self, node: Node) -> Effect {
