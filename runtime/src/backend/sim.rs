@@ -18,6 +18,7 @@ use crate::process::{Advance, Engine, Watch};
 /// Simulates at `process` fidelity, or with robots that move through space.
 pub struct Sim<'m> {
     stage: Option<Stage<'m>>,
+    beside: bool,
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
@@ -67,12 +68,13 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Sim { stage: None, engine, prepared, seed, running, started: 0, sampled, told }
+        Sim { stage: None, beside: false, engine, prepared, seed, running, started: 0, sampled, told }
     }
 
     /// Robots move through space from now on: their motions take the time they need, and fail where there is no way.
-    pub fn with_motion(self, stage: Stage<'m>) -> Self {
-        Sim { stage: Some(stage), ..self }
+    /// `beside` is whether some steps of the plan run beside others, so that what is in the way may go away.
+    pub fn with_motion(self, stage: Stage<'m>, beside: bool) -> Self {
+        Sim { stage: Some(stage), beside, ..self }
     }
 
     /// Carries out the motion of an operation; how long it takes, if it takes time.
@@ -101,7 +103,7 @@ impl<'m> Sim<'m> {
         };
         let (now, stage) = (self.engine.time(), self.stage.as_ref());
         let mut text = stage.map(|s| refused.text(s.scene, operation)).unwrap_or_default();
-        if stage.is_some_and(|s| s.is_by_a_robot(&refused)) {
+        if self.beside && stage.is_some_and(|s| s.is_by_a_robot(&refused)) {
             let bounds = operation.takes.and_then(|t| t.bounds);
             let until = begun + bounds.map_or(0.0, |(_, most)| self.engine.eval(most));
             if now < until {

@@ -30,6 +30,8 @@ pub struct Flight {
     /// When it began, s since the run began.
     begin: f64,
     performed: Performed,
+    /// The joints that move its tip.
+    arm: Vec<usize>,
     /// The robot and what it holds.
     figure: Arc<Figure>,
     load: Option<InstanceId>,
@@ -44,7 +46,7 @@ impl Flight {
     }
 
     fn at(&self, time: f64) -> Vec<f64> {
-        self.performed.at(time - self.begin)
+        self.performed.at(&self.arm, time - self.begin).unwrap_or_default()
     }
 }
 
@@ -84,14 +86,17 @@ impl Stage<'_> {
     /// A motion that was carried out begins now; until it ends, others keep clear of it.
     pub fn depart(&mut self, performed: &Performed) {
         let robot = performed.robot;
+        self.changes += 1;
         let Some(actor) = self.actors.get(&robot) else { return };
         let Ok(figure) = self.figure(robot, actor) else { return };
-        let (begin, load) = (self.now, self.held(robot));
-        let speed =
-            meet::speed(&Mover { figure: &figure, at: &|t| performed.at(t) }, 0.0, performed.duration());
-        let flight = Flight { begin, performed: performed.clone(), figure: Arc::new(figure), load, speed };
-        self.flights.insert(robot, flight);
-        self.changes += 1;
+        let arm = actor.arm.clone();
+        if performed.at(&arm, 0.0).is_none() {
+            return;
+        }
+        let at = |t: f64| performed.at(&arm, t).unwrap_or_default();
+        let speed = meet::speed(&Mover { figure: &figure, at: &at }, 0.0, performed.duration());
+        let (begin, load, performed) = (self.now, self.held(robot), performed.clone());
+        self.flights.insert(robot, Flight { begin, performed, arm, figure: Arc::new(figure), load, speed });
     }
 
     /// The others that are under way after a time.

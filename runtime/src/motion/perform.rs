@@ -2,6 +2,7 @@
 
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
+use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
 use matterix_motion::plan::{self, Blocked, Settings, Stride};
@@ -9,6 +10,7 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 
+use super::fingers::CLEARANCE;
 use super::flight::Candidate;
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
@@ -34,25 +36,47 @@ const RAMP: (f64, f64) = (0.3, 0.1);
 pub struct Performed {
     /// The robot.
     pub robot: InstanceId,
-    /// Of the joints that move its tip, each with the time at which it begins, s since the motion did.
-    pub parts: Vec<(f64, Trajectory)>,
+    /// One after the other.
+    pub parts: Vec<Part>,
+}
+
+/// A motion of some of a robot's joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// When it begins, s since the first one could.
+    pub begin: f64,
+    /// Which of all that move, by index.
+    pub joints: Vec<usize>,
+    /// Their way.
+    pub trajectory: Trajectory,
 }
 
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.last().map_or(0.0, |(begin, part)| begin + part.duration())
-    }
-
-    /// The joints that move the tip at a time since the beginning, s; while it waits, where it is.
-    pub fn at(&self, time: f64) -> Vec<f64> {
-        let begun = self.parts.partition_point(|(begin, _)| *begin <= time).max(1) - 1;
-        self.parts.get(begun).map(|(begin, part)| part.at(time - begin).position).unwrap_or_default()
+        self.parts.last().map_or(0.0, |part| part.begin + part.trajectory.duration())
     }
 
     /// A part that begins when those before it have ended and it has waited, s.
-    fn push(&mut self, (wait, part): (f64, Trajectory)) {
-        self.parts.push((self.duration() + wait, part));
+    fn push(&mut self, (wait, part): (f64, Part)) {
+        self.parts.push(Part { begin: self.duration() + wait, ..part });
+    }
+
+    /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
+    pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
+        let mut parts = self.parts.iter().filter(|part| part.joints == joints);
+        let first = parts.clone().next()?;
+        let part = parts.rfind(|part| part.begin <= time).unwrap_or(first);
+        Some(part.trajectory.at(time - part.begin).position)
+    }
+
+    /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
+    pub fn bring(&self, actor: &mut Actor, time: f64) {
+        for part in &self.parts {
+            if let Some(at) = self.at(&part.joints, time) {
+                actor.set_some(&part.joints, &at);
+            }
+        }
     }
 }
 
@@ -186,8 +210,9 @@ impl Stage<'_> {
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
                 }
+                let width = self.scene.get(*item).body().across(frame);
                 self.grip(*item, robot);
-                Ok(None)
+                Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -208,7 +233,7 @@ impl Stage<'_> {
                 let below = on.or_else(|| self.stood_on(*item));
                 self.carry(*item, below);
                 self.freed(robot, *item);
-                Ok(None)
+                Ok(self.make_room(robot, *item).map(|part| Performed { robot, parts: vec![part] }))
             }
         }
     }
@@ -229,10 +254,26 @@ impl Stage<'_> {
         (0..=steps)
             .filter_map(|step| {
                 let since = performed.duration() * f64::from(step) / f64::from(steps);
-                stage.settle(performed.robot, &performed.at(since));
+                performed.bring(stage.actors.get_mut(&performed.robot)?, since);
                 stage.moment(performed.robot, begin + since)
             })
             .collect()
+    }
+
+    /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
+    fn spread(&mut self, robot: InstanceId, width: f64) -> Option<Part> {
+        let actor = self.actors.get_mut(&robot)?;
+        let fingers = actor.fingers.clone()?;
+        let to = fingers.at(&actor.tree, &actor.joints, width);
+        let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
+        actor.set_some(&fingers.joints, &to);
+        Some(Part { begin: 0.0, joints: fingers.joints, trajectory })
+    }
+
+    /// Opens a gripper further than a thing is wide.
+    fn make_room(&mut self, robot: InstanceId, item: InstanceId) -> Option<Part> {
+        let width = self.scene.get(item).body().across_grasp()?;
+        self.spread(robot, width + 2.0 * CLEARANCE)
     }
 
     /// Distance and angle from the tip to the nearest of some poses.
@@ -242,7 +283,25 @@ impl Stage<'_> {
         all.min_by(|a, b| (a.0 + a.1).total_cmp(&(b.0 + b.1)))
     }
 
+    /// Goes somewhere; where it cannot, it stays as it is.
     fn go(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        straight: bool,
+        goal: Option<InstanceId>,
+    ) -> Result<Performed, Refused> {
+        let joints = self.actors.get(&robot).map(|actor| actor.joints.clone());
+        let freed = self.just_freed(robot);
+        let gone = self.try_to_go(robot, to, straight, goal);
+        if let (Err(_), Some(actor), Some(joints)) = (&gone, self.actors.get_mut(&robot), joints) {
+            actor.joints = joints;
+            freed.into_iter().for_each(|item| self.freed(robot, item));
+        }
+        gone
+    }
+
+    fn try_to_go(
         &mut self,
         robot: InstanceId,
         to: &[Pose],
@@ -259,6 +318,10 @@ impl Stage<'_> {
             done.push(self.line(robot, &back, &[item], self.now)?);
         }
         self.leave(robot);
+        if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
+            let room = self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0);
+            room.into_iter().for_each(|part| done.push((0.0, part)));
+        }
         let since = self.now + done.duration();
         let base = self.pose(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
@@ -304,26 +367,25 @@ impl Stage<'_> {
     }
 
     /// A free way to a configuration, with how long it waits first, s; it could begin at a time, s since the run began.
-    fn way(&mut self, robot: InstanceId, q: &[f64], since: f64) -> Result<(f64, Trajectory), Refused> {
+    fn way(&mut self, robot: InstanceId, q: &[f64], since: f64) -> Result<(f64, Part), Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
         let part = self.search(actor, &figure, &around, q, SAMPLES).map_err(|refused| match refused {
             Refused::NoWay => {
                 let alone = self.search(actor, &figure, &self.without_robots(&around), q, SAMPLES).ok();
-                alone.and_then(|way| self.robot_between(&figure, &around, &way)).unwrap_or(Refused::NoWay)
+                alone.and_then(|way| self.robot_between(&figure, &around, &way.trajectory)).unwrap_or(Refused::NoWay)
             }
             other => other,
         })?;
-        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &[] });
+        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &[] });
         let mut found = (wait, part);
         if wait > 0.0
             && let Some(swept) = self.swept(&around, robot, since)
             && let Ok(part) = self.search(actor, &figure, &swept, q, DETOUR)
-            && part.duration() < wait + found.1.duration()
         {
-            let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &[] });
-            if wait + part.duration() < found.0 + found.1.duration() {
+            let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &[] });
+            if wait + part.trajectory.duration() < found.0 + found.1.trajectory.duration() {
                 found = (wait, part);
             }
         }
@@ -339,7 +401,7 @@ impl Stage<'_> {
         around: &Surroundings,
         q: &[f64],
         samples: usize,
-    ) -> Result<Trajectory, Refused> {
+    ) -> Result<Part, Refused> {
         let mut checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
         let settings = Settings { iterations: samples, ..Settings::default() };
         let route =
@@ -352,17 +414,11 @@ impl Stage<'_> {
 
     /// A straight line of the tip to a pose, with how long it waits first, s; things it comes up to or leaves may be
     /// touched, and what they stand on, but no hand that holds them.
-    fn line(
-        &mut self,
-        robot: InstanceId,
-        to: &Pose,
-        near: &[InstanceId],
-        since: f64,
-    ) -> Result<(f64, Trajectory), Refused> {
+    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId], since: f64) -> Result<(f64, Part), Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
-            without.extend(self.stand_of(*id));
+            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
         let around = Surroundings::of(self, robot, &without);
@@ -378,7 +434,7 @@ impl Stage<'_> {
             Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
         })?;
         let part = timed(actor, &points, &mut checker)?;
-        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part, since, without: &without });
+        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &without });
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
         Ok((wait, part))
@@ -425,15 +481,20 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Trajectory, Refused> {
-    let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
-        actor.chain.variables().iter().map(|v| f(&v.limits)).collect()
-    };
-    let acceleration = |l: &matterix_ir::robot::JointLimits| l.acceleration.unwrap_or(l.velocity / RAMP.0);
-    let limits = Limits {
-        velocity: limits(&|l| l.velocity),
-        acceleration: limits(&acceleration),
-        jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
-    };
-    follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)
+fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
+    let limits =
+        |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
+    let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
+    let trajectory = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
+    Ok(Part { begin: 0.0, joints: actor.arm.clone(), trajectory })
+}
+
+/// The greatest acceleration of a joint, rad/s2 or m/s2.
+pub(super) fn acceleration(limits: &JointLimits) -> f64 {
+    limits.acceleration.unwrap_or(limits.velocity / RAMP.0)
+}
+
+/// The greatest jerk of a joint, rad/s3 or m/s3.
+pub(super) fn jerk(limits: &JointLimits) -> f64 {
+    limits.jerk.unwrap_or(acceleration(limits) / RAMP.1)
 }

@@ -167,8 +167,8 @@ impl Lower<'_> {
 
     /// An operand that may be left out before one that may not.
     fn maybe_before(&mut self, kids: &mut Kids) -> (Option<Expr>, Expr) {
-        let first = self.expr_in(kids);
         kids.has(Rule::kw_to);
+        let first = self.expr_in(kids);
         match kids.eat(Rule::operand) {
             Some(second) => (Some(first), self.expr(second)),
             None => (None, first),
