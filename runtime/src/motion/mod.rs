@@ -9,8 +9,11 @@ pub mod perform;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod together;
+mod values;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
 pub use preflight::{preflight, supported};
 pub use stage::{Actor, Carried, Stage};
+pub use together::together;

@@ -16,6 +16,7 @@ use matterix_motion::pose::pose;
 
 use super::perform::Refused;
 use super::stage::{Carried, Stage};
+use super::together::together;
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
@@ -29,7 +30,9 @@ pub fn preflight(program: &Program) -> Vec<Diagnostic> {
     let mut walk =
         Walk { program, stage, found: Vec::new(), told: BTreeSet::new(), site: Vec::new(), lost: false, left: MOST };
     walk.step(program.plan.root);
-    walk.found
+    let mut found = walk.found;
+    found.extend(together(program));
+    found
 }
 
 struct Walk<'p> {
