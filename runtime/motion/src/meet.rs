@@ -15,6 +15,9 @@ const FASTER: f64 = 0.1;
 /// Distances below this do not matter, m.
 const LEAST: f64 = 1e-4;
 
+/// Distances above this are not told apart, m.
+const FAR: f64 = 0.5;
+
 /// A robot of which it is known where it is at any time.
 pub struct Mover<'a> {
     /// It and what it holds.
@@ -34,28 +37,41 @@ pub struct Gap {
     pub point: Point3<f64>,
 }
 
-/// The nearest that robots come, among the links that `counts` names; none where one of them has no balls.
-pub fn gap(a: &[Placed], b: &[Placed], counts: &dyn Fn(u32, u32) -> bool) -> Option<Gap> {
+/// The nearest that robots come, among the links that `counts` names, if it is nearer than `below`, m.
+pub fn gap(a: &[Placed], b: &[Placed], below: f64, counts: &dyn Fn(u32, u32) -> bool) -> Option<Gap> {
     let mut nearest: Option<Gap> = None;
+    let mut least = below;
     for one in a {
-        for other in b.iter().filter(|other| counts(one.link, other.link)) {
-            let between = (one.cover.0 - other.cover.0).norm() - one.cover.1 - other.cover.1;
-            if nearest.is_some_and(|n| between >= n.distance) {
+        for other in b {
+            let reach = least + one.cover.1 + other.cover.1;
+            if reach <= 0.0 || square(&one.cover.0, &other.cover.0) >= reach * reach {
+                continue;
+            }
+            if !counts(one.link, other.link) {
                 continue;
             }
             for (p, r) in &one.balls {
                 for (q, s) in &other.balls {
-                    let apart = (p - q).norm();
-                    let distance = apart - r - s;
-                    if nearest.is_none_or(|n| distance < n.distance) {
-                        let point = if apart > 0.0 { q + (p - q) * (s / apart) } else { *q };
-                        nearest = Some(Gap { distance, links: [one.link, other.link], point });
+                    let reach = least + r + s;
+                    let apart = square(p, q);
+                    if reach <= 0.0 || apart >= reach * reach {
+                        continue;
                     }
+                    let apart = apart.sqrt();
+                    let point = if apart > 0.0 { q + (p - q) * (s / apart) } else { *q };
+                    least = apart - r - s;
+                    nearest = Some(Gap { distance: least, links: [one.link, other.link], point });
                 }
             }
         }
     }
     nearest
+}
+
+/// The square of a distance, m^2.
+fn square(a: &Point3<f64>, b: &Point3<f64>) -> f64 {
+    let (x, y, z) = (a.x - b.x, a.y - b.y, a.z - b.z);
+    x * x + y * y + z * z
 }
 
 /// The greatest speed of any ball between two times, m/s.
@@ -87,14 +103,15 @@ pub fn meeting(
 ) -> Option<(f64, Gap)> {
     let mut time = from;
     loop {
-        let nearest = gap(&a.figure.placed(&(a.at)(time)), &b.figure.placed(&(b.at)(time)), counts)?;
-        if nearest.distance < least {
+        let nearest = gap(&a.figure.placed(&(a.at)(time)), &b.figure.placed(&(b.at)(time)), FAR, counts);
+        let distance = nearest.map_or(FAR, |gap| gap.distance);
+        if let Some(nearest) = nearest.filter(|gap| gap.distance < least) {
             return Some((time, nearest));
         }
         if time >= until || speed <= 0.0 {
             return None;
         }
-        time = (time + nearest.distance.max(LEAST) / speed).min(until);
+        time = (time + distance.max(LEAST) / speed).min(until);
     }
 }
 

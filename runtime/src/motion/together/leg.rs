@@ -94,5 +94,5 @@ impl Leg {
 
 /// How two robots that stand still reach into each other, if deeper than this, m.
 pub fn overlap(a: &[Placed], b: &[Placed], deep: f64) -> Option<Gap> {
-    meet::gap(a, b, &|_, _| true).filter(|gap| gap.distance < -deep)
+    meet::gap(a, b, -deep, &|_, _| true)
 }
