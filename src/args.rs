@@ -73,9 +73,12 @@ pub struct CheckArgs {
     /// Take warnings for errors, and show advice as warnings.
     #[arg(long)]
     pub strict: bool,
-    /// How closely motions are looked at: with `motion` also what is out of reach of robots and what they run into.
-    #[arg(long, value_enum, default_value_t = Fidelity::Process)]
+    /// How closely motions are looked at: with `process` not what is out of reach of robots and what they run into.
+    #[arg(long, value_enum, default_value_t = Fidelity::Motion)]
     pub fidelity: Fidelity,
+    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    #[arg(long)]
+    pub no_cache: bool,
     /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
     #[arg(long)]
     pub contents: bool,

@@ -9,5 +9,5 @@ pub mod surroundings;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
-pub use preflight::{preflight, supported};
+pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};

@@ -27,10 +27,13 @@ impl Surroundings {
         for index in 0..stage.scene.instances.len() {
             let id = InstanceId(index as u32);
             let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
-            if mine || stage.is_in_any(id, without) {
+            if mine || stage.is_in_any(id, without) || stage.is_unknown(id) {
                 continue;
             }
             if stage.actors.contains_key(&id) {
+                if stage.unknown.postures.contains(&id) {
+                    continue;
+                }
                 out.add_robot(stage, id);
             } else if !stage.is_inside_a_shape(id) {
                 out.add_shapes(stage, id);
