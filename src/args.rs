@@ -136,9 +136,12 @@ pub struct RunArgs {
     /// Where to write recording, table, plots and report; nothing is written without it.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// How closely motions are simulated.
+    /// How closely motions are simulated; with `motion` they are looked at before the run begins.
     #[arg(long, value_enum, default_value_t = Fidelity::Process)]
     pub fidelity: Fidelity,
+    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    #[arg(long)]
+    pub no_cache: bool,
     /// Form of the report.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,

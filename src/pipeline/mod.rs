@@ -86,6 +86,11 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
     (sources, found)
 }
 
+/// What would go wrong with the motions of a program.
+pub fn motions(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
+    preflight(program, store)
+}
+
 /// Findings of a file, and what is known at every statement of its workflows.
 pub fn contents(input: &Input) -> (Sources, Vec<Diagnostic>, Vec<Points>) {
     let (mut sources, file) = input.source();

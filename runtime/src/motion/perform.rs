@@ -136,6 +136,8 @@ pub struct Meeting {
     pub at: [f64; 3],
     /// How deep, m.
     pub depth: f64,
+    /// Whether they are there before anything moves.
+    pub before: bool,
 }
 
 impl Stage<'_> {
@@ -325,7 +327,9 @@ impl Stage<'_> {
         let settings = Settings { iterations: SAMPLES, ..Settings::default() };
         let route =
             plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+                plan::Failure::Collision(end, contacts) => {
+                    self.meeting(&figure, &around, &contacts, end == plan::End::Start)
+                }
                 _ => Refused::NoWay,
             })?;
         let part = timed(actor, &route.points, &mut checker)?;
@@ -341,7 +345,8 @@ impl Stage<'_> {
             without.extend(self.below(*id));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
-        let around = Surroundings::of(self, robot, &without);
+        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
+        let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let to = pose(&self.pose(robot).inverse().then(*to));
         let figure = self.figure(robot, actor)?;
@@ -350,7 +355,7 @@ impl Stage<'_> {
         let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
         let mut points = followed.map_err(|blocked| match blocked {
             Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
             Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
         })?;
         let part = timed(actor, &points, &mut checker)?;
@@ -377,6 +382,7 @@ impl Stage<'_> {
         figure: &Figure,
         around: &Surroundings,
         contacts: &[matterix_motion::spheres::Contact],
+        before: bool,
     ) -> Refused {
         let Some(contact) = contacts.first() else { return Refused::NoWay };
         let (other, with) = match contact.other {
@@ -393,6 +399,7 @@ impl Stage<'_> {
             with,
             at,
             depth: contact.depth,
+            before,
         })
     }
 }

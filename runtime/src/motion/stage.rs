@@ -232,6 +232,21 @@ impl<'p> Stage<'p> {
         }
     }
 
+    /// Whether a thing, and all that carries it, is where it was when the run began.
+    pub fn is_where_it_was(&self, id: InstanceId) -> bool {
+        let first = self.scene.stands();
+        let unmoved = |i: InstanceId| {
+            let (now, first) = (self.carried.get(i.0 as usize), first.get(i.0 as usize));
+            matches!((now, first), (Some(Carried::Stands(now)), Some(first)) if now == first)
+        };
+        unmoved(id) && self.carriers(id).into_iter().all(unmoved)
+    }
+
+    /// What an instance is part of, and what that is part of.
+    pub fn owners(&self, id: InstanceId) -> Vec<InstanceId> {
+        std::iter::successors(self.scene.get(id).owner, |id| self.scene.get(*id).owner).collect()
+    }
+
     /// Whether what it is part of has a shape, of which it is taken to be a part.
     pub fn is_inside_a_shape(&self, id: InstanceId) -> bool {
         let owner = self.scene.get(id).owner;

@@ -83,7 +83,7 @@ impl<'p, 's> Looker<'p, 's> {
                     }
                     _ => !adrift && beside.is_empty(),
                 };
-                let finding = told::finding(&self.program.scene, motion, &why, nearer, site).filter(|_| sure);
+                let finding = told::finding(&course.stage, motion, &why, nearer, site).filter(|_| sure);
                 course.drifts(robot);
                 course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
             }
@@ -151,7 +151,7 @@ impl<'p, 's> Looker<'p, 's> {
     }
 
     fn refuse(&self, course: &mut Course<'p>, motion: &Motion, why: &Refused, site: Span, unsure: bool) {
-        let finding = told::finding(&self.program.scene, motion, why, None, site).filter(|_| !unsure);
+        let finding = told::finding(&course.stage, motion, why, None, site).filter(|_| !unsure);
         course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
     }
 

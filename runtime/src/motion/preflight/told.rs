@@ -13,12 +13,13 @@ use crate::motion::stage::Stage;
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
 pub fn finding(
-    scene: &Scene,
+    stage: &Stage<'_>,
     motion: &Motion,
     refused: &Refused,
     nearer: Option<[f64; 2]>,
     span: Span,
 ) -> Option<Diagnostic> {
+    let scene = stage.scene;
     let name = |id: InstanceId| scene.get(id).name.as_str();
     let (robot, goal) = match motion {
         Motion::To { mover, goal, .. } => (*mover, Some(*goal)),
@@ -37,7 +38,10 @@ pub fn finding(
         }
         Refused::Collides(meeting) => {
             let [x, y, z] = meeting.at.map(|v| v * 1e3);
-            let headline = format!("`{}` runs into `{}` on its way to {to}", name(robot), meeting.other);
+            let headline = match meeting.before {
+                true => format!("`{}` stands in `{}` before it goes to {to}", name(robot), meeting.other),
+                false => format!("`{}` runs into `{}` on its way to {to}", name(robot), meeting.other),
+            };
             let depth = (meeting.depth * 1e3).max(1.0);
             let label = format!("`{}` meets it at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
             Diagnostic::error(codes::COLLISION, span, headline, label)
@@ -59,9 +63,13 @@ pub fn finding(
     let mut shown = Vec::new();
     for id in met.into_iter().chain(goal) {
         let at = scene.get(id).span;
-        if at != span && !shown.contains(&at) {
+        if at == span || shown.contains(&at) {
+            continue;
+        }
+        shown.push(at);
+        // What has been moved is no longer where its line says.
+        if stage.is_where_it_was(id) {
             found = found.because(at, format!("`{}` stands here", name(id)));
-            shown.push(at);
         }
     }
     if let (Some(goal), Some([x, y])) = (goal, nearer) {
