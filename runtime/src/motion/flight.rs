@@ -138,7 +138,7 @@ impl Stage<'_> {
         let steps = (way.duration() / STEP * 10.0).ceil().max(1.0) as u32;
         let at = |step: u32| way.at(way.duration() * f64::from(step) / f64::from(steps)).position;
         let met = (0..=steps).map(|step| figure.contacts(&around.world, &at(step))).find(|found| !found.is_empty())?;
-        Some(self.meeting(figure, around, &met))
+        Some(self.meeting(figure, around, &met, false))
     }
 
     /// What stands around, but for other robots and what they hold.

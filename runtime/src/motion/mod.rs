@@ -10,10 +10,9 @@ mod preflight;
 pub mod stage;
 pub mod surroundings;
 mod together;
-mod values;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
-pub use preflight::{preflight, supported};
+pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

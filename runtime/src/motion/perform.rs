@@ -9,10 +9,11 @@ use matterix_motion::plan::{self, Blocked, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
+use serde::{Deserialize, Serialize};
 
 use super::fingers::CLEARANCE;
 use super::flight::Candidate;
-use super::goal::{spot, targets};
+use super::goal::{carried_to, spots, targets, targets_at};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
@@ -96,7 +97,7 @@ pub struct Moment {
 }
 
 /// Why a motion cannot be carried out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Refused {
     /// The mover has no joints to move with.
     NoRobot,
@@ -114,13 +115,15 @@ pub enum Refused {
     NotHeld,
     /// It holds a thing that another robot holds as well.
     Bound(InstanceId, InstanceId),
+    /// It stands on what it is to grip.
+    StandsOn,
 }
 
 impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn => "unmovable",
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
@@ -148,12 +151,13 @@ impl Refused {
                 format!("`{name}` and `{other}` both hold `{item}`")
             }
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
+            Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
         }
     }
 }
 
 /// Two things in one place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Meeting {
     /// A link of the robot, or what it holds.
     pub mine: String,
@@ -167,6 +171,8 @@ pub struct Meeting {
     pub at: [f64; 3],
     /// How deep, m.
     pub depth: f64,
+    /// Whether they are there before anything moves.
+    pub before: bool,
 }
 
 impl Meeting {
@@ -191,11 +197,7 @@ impl Stage<'_> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *goal, frame);
-                if to.is_empty() {
-                    return Err(Refused::NoFrame);
-                }
-                self.go(robot, &to, *straight, Some(*goal)).map(Some)
+                self.bring(robot, *goal, frame, *straight).map(Some)
             }
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -206,6 +208,9 @@ impl Stage<'_> {
             Motion::Grip { item, frame, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
                 let to = targets(self, robot, *item, frame);
+                if self.stands_on(robot, *item) {
+                    return Err(Refused::StandsOn);
+                }
                 let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
@@ -222,11 +227,12 @@ impl Stage<'_> {
                 if let Some(taker) = on.and_then(|on| self.actor_of(on)) {
                     return if self.pass(*item, robot, taker) { Ok(None) } else { Err(Refused::NotHeld) };
                 }
-                let to = match on {
-                    Some(on) => self.surface(*on).then(spot(self, *item, *on)),
-                    None => self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item)),
+                let to: Vec<Pose> = match on {
+                    Some(on) => spots(self, *item, *on).into_iter().map(|s| self.surface(*on).then(s)).collect(),
+                    None => vec![self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item))],
                 };
-                let (far, _) = distance(&pose(&self.pose(*item)), &pose(&to));
+                let now = pose(&self.pose(*item));
+                let far = to.iter().map(|to| distance(&now, &pose(to)).0).fold(f64::INFINITY, f64::min);
                 if far > TOLERANCE.0 {
                     return Err(Refused::Misplaced(far, 0.0));
                 }
@@ -281,6 +287,49 @@ impl Stage<'_> {
         let tip = pose(&self.tip(robot));
         let all = to.iter().map(|t| distance(&tip, &pose(t)));
         all.min_by(|a, b| (a.0 + a.1).total_cmp(&(b.0 + b.1)))
+    }
+
+    /// Brings a robot to a frame; what it holds to the nearest spot about it that is free and within reach.
+    fn bring(
+        &mut self,
+        robot: InstanceId,
+        goal: InstanceId,
+        frame: &str,
+        straight: bool,
+    ) -> Result<Performed, Refused> {
+        let mut spots = match carried_to(self, robot, goal, frame) {
+            Some(held) => spots(self, held, goal),
+            None => vec![Pose::IDENTITY],
+        };
+        if straight && spots.len() > 1 {
+            // Straight down, not over to another spot.
+            let tip = self.tip(robot).position;
+            let far = |spot: &Pose| {
+                let to = targets_at(self, robot, goal, frame, *spot).first().map_or(tip, |p| p.position);
+                (0..3).map(|k| (to[k] - tip[k]) * (to[k] - tip[k])).sum::<f64>()
+            };
+            let mut near: Vec<(f64, Pose)> = spots.into_iter().map(|spot| (far(&spot), spot)).collect();
+            near.sort_by(|a, b| a.0.total_cmp(&b.0));
+            spots = near.into_iter().map(|n| n.1).take(1).collect();
+        }
+        let before = (spots.len() > 1).then(|| self.clone());
+        let mut refused = Refused::NoFrame;
+        for (k, spot) in spots.into_iter().enumerate() {
+            let to = targets_at(self, robot, goal, frame, spot);
+            if to.is_empty() {
+                return Err(Refused::NoFrame);
+            }
+            match self.go(robot, &to, straight, Some(goal)) {
+                Ok(done) => return Ok(done),
+                // The first spot says best what is wrong.
+                Err(why) if k == 0 => refused = why,
+                Err(_) => {}
+            }
+            if let Some(before) = &before {
+                self.clone_from(before);
+            }
+        }
+        Err(refused)
     }
 
     /// Goes somewhere; where it cannot, it stays as it is.
@@ -406,7 +455,9 @@ impl Stage<'_> {
         let settings = Settings { iterations: samples, ..Settings::default() };
         let route =
             plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(_, contacts) => self.meeting(figure, around, &contacts),
+                plan::Failure::Collision(end, contacts) => {
+                    self.meeting(figure, around, &contacts, end == plan::End::Start)
+                }
                 _ => Refused::NoWay,
             })?;
         timed(actor, &route.points, &mut checker)
@@ -421,7 +472,8 @@ impl Stage<'_> {
             without.extend(self.stand_of(*id).map(|below| self.whole(below)));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
-        let around = Surroundings::of(self, robot, &without);
+        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
+        let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let to = pose(&self.pose(robot).inverse().then(*to));
         let figure = self.figure(robot, actor)?;
@@ -430,7 +482,7 @@ impl Stage<'_> {
         let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
         let mut points = followed.map_err(|blocked| match blocked {
             Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
             Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
         })?;
         let part = timed(actor, &points, &mut checker)?;
@@ -458,6 +510,7 @@ impl Stage<'_> {
         figure: &Figure,
         around: &Surroundings,
         contacts: &[matterix_motion::spheres::Contact],
+        before: bool,
     ) -> Refused {
         let Some(contact) = contacts.first() else { return Refused::NoWay };
         let (other, part, with) = match contact.other {
@@ -477,6 +530,7 @@ impl Stage<'_> {
             with,
             at,
             depth: contact.depth,
+            before,
         })
     }
 }

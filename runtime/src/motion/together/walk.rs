@@ -10,9 +10,9 @@ use matterix_ir::{Diagnostic, Program, Span};
 use super::grid::{Line, deadlock};
 use super::leg::Leg;
 use super::pair::{Times, finding, may_meet};
+use crate::motion::preflight::supported;
+use crate::motion::preflight::values::Values;
 use crate::motion::stage::Stage;
-use crate::motion::supported;
-use crate::motion::values::Values;
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;

@@ -80,4 +80,9 @@ impl Values {
         }
         values.get(&node).copied()
     }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.by_state.iter().map(|(state, value)| (*state, *value))
+    }
 }
