@@ -7,6 +7,7 @@ pub mod perform;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod tilt;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
