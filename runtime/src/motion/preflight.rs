@@ -247,7 +247,15 @@ impl<'p> Walk<'p> {
                 let headline = format!("`{joint}` of `{name}` does not get to this position");
                 Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
             }
-            Refused::NoRobot | Refused::NoFrame | Refused::NotHeld => return None,
+            Refused::NoFrame => {
+                let headline = format!("`{name}` is sent to {to}, and nothing says where that is");
+                let found = Diagnostic::error(codes::OUT_OF_REACH, span, headline, "it has no place to go to");
+                found.help(match motion.goal() {
+                    Some((_, frame)) if !frame.is_empty() => format!("give it a `shape`, or a frame `{frame}`"),
+                    _ => "give it a `shape`, or a frame `grasp`".to_string(),
+                })
+            }
+            Refused::NoRobot | Refused::NotHeld => return None,
         };
         Some(match goal.filter(|g| scene.get(*g).span != span) {
             Some(goal) => found.because(scene.get(goal).span, format!("`{}` stands here", scene.get(goal).name)),

@@ -148,7 +148,11 @@ impl Lower<'_> {
                 let to = match (kids.has(Rule::kw_home), kids.has(Rule::kw_to)) {
                     (true, _) => Goal::Home,
                     (_, true) => match kids.eat(Rule::joints) {
-                        Some(joints) => Goal::Joints(self.expr_in(&mut Kids::of(joints))),
+                        Some(joints) => {
+                            let kids = &mut Kids::of(joints);
+                            kids.has(Rule::kw_joints);
+                            Goal::Joints(self.expr_in(kids))
+                        }
                         None => Goal::Frame(self.expr_in(kids)),
                     },
                     _ => Goal::Shift(self.expr_in(kids)),
