@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::{Motion, Operation};
+use matterix_ir::plan::Operation;
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 
@@ -80,14 +80,10 @@ impl<'m> Sim<'m> {
     /// Carries out the motion of an operation; how long it takes, if it takes time.
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
         let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
-        let shift = match motion {
-            Motion::By { shift, .. } => shift.map(|node| self.engine.eval(node)),
-            _ => [0.0; 3],
-        };
+        let values: Vec<f64> = motion.values().into_iter().map(|node| self.engine.eval(node)).collect();
         stage.come_to(self.engine.time());
-        let performed = stage.perform(motion, shift)?;
+        let performed = stage.set_out(motion, &values)?;
         Ok(performed.map(|performed| {
-            stage.depart(&performed);
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()
         }))

@@ -9,6 +9,7 @@ pub mod perform;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod tilt;
 mod together;
 
 pub use assembly::Assembly;

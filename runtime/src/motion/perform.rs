@@ -5,30 +5,31 @@ use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Blocked, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
 use super::fingers::CLEARANCE;
-use super::flight::Candidate;
 use super::goal::{carried_to, spots, targets, targets_at};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
 /// How near a gripper must be to what it grips, and what it holds to where it is put down: m and rad.
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
+/// How far shapes of fingers and what a gripper is said to open may differ, m.
+const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
 const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
+/// How far what is held tilts while a gripper only turns, rad.
+const TURNING: f64 = 0.1;
 /// Samples drawn before a way counts as not found.
 const SAMPLES: usize = 60_000;
-/// The same for a way around what others sweep, which is only looked for to save waiting.
-const DETOUR: usize = 2_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
 const RAMP: (f64, f64) = (0.3, 0.1);
 
@@ -44,8 +45,8 @@ pub struct Performed {
 /// A motion of some of a robot's joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// When it begins, s since the first one could.
-    pub begin: f64,
+    /// How long it waits first when those before it have ended, s.
+    pub wait: f64,
     /// Which of all that move, by index.
     pub joints: Vec<usize>,
     /// Their way.
@@ -55,20 +56,24 @@ pub struct Part {
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.last().map_or(0.0, |part| part.begin + part.trajectory.duration())
+        self.parts.iter().map(|part| part.wait + part.trajectory.duration()).sum()
     }
 
-    /// A part that begins when those before it have ended and it has waited, s.
-    fn push(&mut self, (wait, part): (f64, Part)) {
-        self.parts.push(Part { begin: self.duration() + wait, ..part });
+    /// Its parts, each with the time at which it begins, s since the motion did.
+    pub fn begins(&self) -> impl Iterator<Item = (f64, &Part)> {
+        self.parts.iter().scan(0.0, |time, part| {
+            let begin = *time + part.wait;
+            *time = begin + part.trajectory.duration();
+            Some((begin, part))
+        })
     }
 
     /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
     pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
-        let mut parts = self.parts.iter().filter(|part| part.joints == joints);
-        let first = parts.clone().next()?;
-        let part = parts.rfind(|part| part.begin <= time).unwrap_or(first);
-        Some(part.trajectory.at(time - part.begin).position)
+        let mut own = self.begins().filter(|(_, part)| part.joints == joints);
+        let mut now = own.next()?;
+        own.take_while(|(begin, _)| *begin <= time).for_each(|next| now = next);
+        Some(now.1.trajectory.at(time - now.0).position)
     }
 
     /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
@@ -79,6 +84,15 @@ impl Performed {
             }
         }
     }
+}
+
+/// How a tip is brought to a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Free,
+    Straight,
+    /// What is held tilts by no more than this, rad.
+    Upright(f64),
 }
 
 /// Where a robot and what it holds are at one moment of a motion.
@@ -117,6 +131,14 @@ pub enum Refused {
     Bound(InstanceId, InstanceId),
     /// It stands on what it is to grip.
     StandsOn,
+    /// A thing is this wide, and the fingers open so far: m.
+    TooWide(f64, f64),
+    /// What is to stay upright tilts by so much where the way begins or ends, rad.
+    Tilted(f64),
+    /// So many positions were given for so many joints.
+    Joints(usize, usize),
+    /// This joint does not get to its position.
+    Beyond(String),
 }
 
 impl Refused {
@@ -128,16 +150,15 @@ impl Refused {
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
             Refused::Misplaced(..) | Refused::NotHeld => "missed",
+            Refused::TooWide(..) => "too_wide",
+            Refused::Tilted(_) => "no_way",
+            Refused::Joints(..) | Refused::Beyond(_) => "unreachable",
         }
     }
 
     /// In words, for the run of an operation.
     pub fn text(&self, scene: &Scene, operation: &Operation) -> String {
-        let mover = match &operation.motion {
-            Some(Motion::To { mover: by, .. } | Motion::By { mover: by, .. }) => *by,
-            Some(Motion::Grip { by, .. } | Motion::Free { by, .. }) => *by,
-            None => return String::new(),
-        };
+        let Some(mover) = operation.motion.as_ref().map(Motion::mover) else { return String::new() };
         let name = &scene.get(mover).name;
         match self {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
@@ -150,8 +171,14 @@ impl Refused {
                 let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
                 format!("`{name}` and `{other}` both hold `{item}`")
             }
-            Refused::NotHeld => format!("`{name}` holds nothing like that"),
             Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
+            Refused::NotHeld => format!("`{name}` holds nothing like that"),
+            Refused::TooWide(width, opening) => {
+                format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
+            }
+            Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Joints(given, there) => format!("{given} positions are given for {there} joints of `{name}`"),
+            Refused::Beyond(joint) => format!("`{joint}` of `{name}` does not get there"),
         }
     }
 }
@@ -192,18 +219,43 @@ impl Meeting {
 }
 
 impl Stage<'_> {
-    /// Carries out a motion. `shift` gives the values of a relative one, m.
-    pub fn perform(&mut self, motion: &Motion, shift: [f64; 3]) -> Result<Option<Performed>, Refused> {
+    /// Carries out a motion. `values` are those of [`Motion::values`], SI.
+    pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                self.bring(robot, *goal, frame, *straight).map(Some)
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.bring(robot, *goal, frame, way).map(Some)
+            }
+            Motion::Upright { mover, goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let within = values.first().copied().unwrap_or_default();
+                self.bring(robot, *goal, frame, Way::Upright(within)).map(Some)
+            }
+            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let parts = self.depart(robot, None)?;
+                let angle = values.first().copied().unwrap_or_default();
+                self.tilt(robot, (*item, point), (*goal, frame), angle, parts).map(Some)
+            }
+            Motion::Joints { mover, .. } => self.turn(*mover, values.to_vec()).map(Some),
+            Motion::Home { mover } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+                let home = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+                self.turn(robot, home).map(Some)
+            }
+            Motion::Fingers { by, open } => {
+                let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
+                let width = if *open { f64::INFINITY } else { 0.0 };
+                Ok(self.spread(robot, width).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let mut to = self.tip(robot);
-                (0..3).for_each(|k| to.position[k] += shift[k]);
-                self.go(robot, &[to], *straight, None).map(Some)
+                to.position.iter_mut().zip(values).for_each(|(x, by)| *x += by);
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.go(robot, &[to], way, None).map(Some)
             }
             Motion::Grip { item, frame, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -216,6 +268,12 @@ impl Stage<'_> {
                     return Err(Refused::Misplaced(far, turned));
                 }
                 let width = self.scene.get(*item).body().across(frame);
+                let fingers = self.actors.get(&robot).and_then(|a| a.fingers.as_ref());
+                if let (Some(width), Some(fingers)) = (width, fingers)
+                    && width > fingers.opening() + NOMINAL
+                {
+                    return Err(Refused::TooWide(width, fingers.opening()));
+                }
                 self.grip(*item, robot);
                 Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
@@ -273,7 +331,7 @@ impl Stage<'_> {
         let to = fingers.at(&actor.tree, &actor.joints, width);
         let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
         actor.set_some(&fingers.joints, &to);
-        Some(Part { begin: 0.0, joints: fingers.joints, trajectory })
+        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
     }
 
     /// Opens a gripper further than a thing is wide.
@@ -289,19 +347,49 @@ impl Stage<'_> {
         all.min_by(|a, b| (a.0 + a.1).total_cmp(&(b.0 + b.1)))
     }
 
+    /// What comes before a motion: a gripper draws back from what it has let go, and opens for what it goes to. Nothing is
+    /// drawn back where `near` is what it let go.
+    pub(super) fn depart(&mut self, robot: InstanceId, near: Option<InstanceId>) -> Result<Vec<Part>, Refused> {
+        if let Some((item, other)) = self.bound(robot) {
+            return Err(Refused::Bound(item, other));
+        }
+        let mut parts = Vec::new();
+        if let Some(item) = self.just_freed(robot).filter(|item| Some(*item) != near) {
+            let mut back = self.tip(robot);
+            back.position = back.point([0.0, 0.0, -RETREAT]);
+            parts.push(self.line(robot, &[back], &[item])?);
+        }
+        self.leave(robot);
+        Ok(parts)
+    }
+
+    /// Brings the joints that move the tip to positions.
+    fn turn(&mut self, mover: InstanceId, to: Vec<f64>) -> Result<Performed, Refused> {
+        let robot = self.actor_of(mover).ok_or(Refused::NoRobot)?;
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let variables = actor.chain.variables();
+        if to.len() != variables.len() {
+            return Err(Refused::Joints(to.len(), variables.len()));
+        }
+        let beyond = |(v, q): &(&matterix_motion::Variable, &f64)| {
+            v.is_bounded() && !(v.limits.lower..=v.limits.upper).contains(*q)
+        };
+        if let Some((variable, _)) = variables.iter().zip(&to).find(beyond) {
+            let joint = actor.assembly.robot.joints.get(variable.joint as usize);
+            return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
+        }
+        let mut parts = self.depart(robot, None)?;
+        parts.push(self.way(robot, &to, None)?);
+        Ok(Performed { robot, parts })
+    }
+
     /// Brings a robot to a frame; what it holds to the nearest spot about it that is free and within reach.
-    fn bring(
-        &mut self,
-        robot: InstanceId,
-        goal: InstanceId,
-        frame: &str,
-        straight: bool,
-    ) -> Result<Performed, Refused> {
+    fn bring(&mut self, robot: InstanceId, goal: InstanceId, frame: &str, way: Way) -> Result<Performed, Refused> {
         let mut spots = match carried_to(self, robot, goal, frame) {
             Some(held) => spots(self, held, goal),
             None => vec![Pose::IDENTITY],
         };
-        if straight && spots.len() > 1 {
+        if way == Way::Straight && spots.len() > 1 {
             // Straight down, not over to another spot.
             let tip = self.tip(robot).position;
             let far = |spot: &Pose| {
@@ -319,7 +407,7 @@ impl Stage<'_> {
             if to.is_empty() {
                 return Err(Refused::NoFrame);
             }
-            match self.go(robot, &to, straight, Some(goal)) {
+            match self.go(robot, &to, way, Some(goal)) {
                 Ok(done) => return Ok(done),
                 // The first spot says best what is wrong.
                 Err(why) if k == 0 => refused = why,
@@ -332,46 +420,11 @@ impl Stage<'_> {
         Err(refused)
     }
 
-    /// Goes somewhere; where it cannot, it stays as it is.
-    fn go(
-        &mut self,
-        robot: InstanceId,
-        to: &[Pose],
-        straight: bool,
-        goal: Option<InstanceId>,
-    ) -> Result<Performed, Refused> {
-        let joints = self.actors.get(&robot).map(|actor| actor.joints.clone());
-        let freed = self.just_freed(robot);
-        let gone = self.try_to_go(robot, to, straight, goal);
-        if let (Err(_), Some(actor), Some(joints)) = (&gone, self.actors.get_mut(&robot), joints) {
-            actor.joints = joints;
-            freed.into_iter().for_each(|item| self.freed(robot, item));
-        }
-        gone
-    }
-
-    fn try_to_go(
-        &mut self,
-        robot: InstanceId,
-        to: &[Pose],
-        straight: bool,
-        goal: Option<InstanceId>,
-    ) -> Result<Performed, Refused> {
-        if let Some((item, other)) = self.bound(robot) {
-            return Err(Refused::Bound(item, other));
-        }
-        let mut done = Performed { robot, parts: Vec::new() };
-        if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
-            let mut back = self.tip(robot);
-            back.position = back.point([0.0, 0.0, -RETREAT]);
-            done.push(self.line(robot, &back, &[item], self.now)?);
-        }
-        self.leave(robot);
+    fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {
+        let mut parts = self.depart(robot, goal.filter(|_| way == Way::Straight))?;
         if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
-            let room = self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0);
-            room.into_iter().for_each(|part| done.push((0.0, part)));
+            parts.extend(self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0));
         }
-        let since = self.now + done.duration();
         let base = self.pose(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let now = actor.configuration();
@@ -396,100 +449,116 @@ impl Stage<'_> {
         if !found.is_empty() {
             refused = Refused::NoWay;
         }
-        for (_, target, q) in found {
-            let tried = match straight {
-                true => self.line(robot, target, goal.as_slice(), since),
-                false => self.way(robot, &q, since),
+        let mut keep = |why: Refused| {
+            // What meets says more than that no way was found.
+            if !matches!(refused, Refused::Collides(_)) || matches!(why, Refused::Collides(_)) {
+                refused = why;
+            }
+        };
+        for (_, target, q) in &found {
+            let tried = match way {
+                Way::Straight => self.line(robot, std::slice::from_ref(*target), goal.as_slice()),
+                Way::Free => self.way(robot, q, None),
+                Way::Upright(within) => self.way(robot, q, Some(within)),
             };
             match tried {
                 Ok(part) => {
-                    done.push(part);
-                    return Ok(done);
+                    parts.push(part);
+                    return Ok(Performed { robot, parts });
                 }
-                // What meets says more than that no way was found.
-                Err(why @ Refused::Collides(_)) => refused = why,
-                Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
-                Err(_) => {}
+                Err(why) => keep(why),
+            }
+        }
+        // What is in the way beside a line may not be if the gripper turns before it sets out.
+        for (_, target, _) in found.iter().filter(|_| way == Way::Straight) {
+            if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
+                parts.extend(turned);
+                return Ok(Performed { robot, parts });
             }
         }
         Err(refused)
     }
 
-    /// A free way to a configuration, with how long it waits first, s; it could begin at a time, s since the run began.
-    fn way(&mut self, robot: InstanceId, q: &[f64], since: f64) -> Result<(f64, Part), Refused> {
+    /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
+    fn turned_line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<[Part; 2], Refused> {
+        let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
+        let base = self.pose(robot).inverse();
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let before = actor.joints.clone();
+        let now = actor.configuration();
+        let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
+        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
+        let first = self.way(robot, &turned.q, Some(TURNING));
+        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
+            actor.joints = before;
+        }
+        both
+    }
+
+    /// A free way to a configuration; what is held tilts by no more than so much on it, rad.
+    pub(super) fn way(&mut self, robot: InstanceId, q: &[f64], within: Option<f64>) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
-        let part = self.search(actor, &figure, &around, q, SAMPLES).map_err(|refused| match refused {
-            Refused::NoWay => {
-                let alone = self.search(actor, &figure, &self.without_robots(&around), q, SAMPLES).ok();
-                alone.and_then(|way| self.robot_between(&figure, &around, &way.trajectory)).unwrap_or(Refused::NoWay)
+        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
+        let start = actor.configuration();
+        let refused = |failure| match failure {
+            plan::Failure::Collision(end, contacts) => {
+                self.meeting(&figure, &around, &contacts, end == plan::End::Start)
             }
-            other => other,
-        })?;
-        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &[] });
-        let mut found = (wait, part);
-        if wait > 0.0
-            && let Some(swept) = self.swept(&around, robot, since)
-            && let Ok(part) = self.search(actor, &figure, &swept, q, DETOUR)
-        {
-            let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &[] });
-            if wait + part.trajectory.duration() < found.0 + found.1.trajectory.duration() {
-                found = (wait, part);
+            plan::Failure::Tilt(_, by) => Refused::Tilted(by),
+            _ => Refused::NoWay,
+        };
+        let part = match within.and_then(|tilt| self.upright(robot, tilt)) {
+            Some(upright) => {
+                let mut solver = Solver::new(actor.chain.clone());
+                let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
+                let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut level)?
             }
-        }
+            None => {
+                let route = plan::plan(&mut checker, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut checker)?
+            }
+        };
         self.settle(robot, q);
-        Ok(found)
+        Ok(part)
     }
 
-    /// A free way among what stands around, timed.
-    fn search(
-        &self,
-        actor: &Actor,
-        figure: &Figure,
-        around: &Surroundings,
-        q: &[f64],
-        samples: usize,
-    ) -> Result<Part, Refused> {
-        let mut checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
-        let settings = Settings { iterations: samples, ..Settings::default() };
-        let route =
-            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(end, contacts) => {
-                    self.meeting(figure, around, &contacts, end == plan::End::Start)
-                }
-                _ => Refused::NoWay,
-            })?;
-        timed(actor, &route.points, &mut checker)
-    }
-
-    /// A straight line of the tip to a pose, with how long it waits first, s; things it comes up to or leaves may be
-    /// touched, and what they stand on, but no hand that holds them.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId], since: f64) -> Result<(f64, Part), Refused> {
+    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
+            // No hand that holds it.
             without.extend(self.stand_of(*id).map(|below| self.whole(below)));
         }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
+        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
         let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
         let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let to = pose(&self.pose(robot).inverse().then(*to));
+        let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let mut solver = Solver::new(actor.chain.clone());
-        let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
-        let mut points = followed.map_err(|blocked| match blocked {
-            Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
-            Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
-        })?;
+        let mut points = vec![actor.configuration()];
+        for to in to {
+            let from = points.last().cloned().unwrap_or_default();
+            let to = pose(&base.then(*to));
+            let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
+            let followed = followed.map_err(|blocked| match blocked {
+                Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
+                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
+                Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
+            })?;
+            points.extend(followed.into_iter().skip(1));
+        }
         let part = timed(actor, &points, &mut checker)?;
-        let wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, without: &without });
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
-        Ok((wait, part))
+        Ok(part)
     }
 
     pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
@@ -535,12 +604,12 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
+fn timed(actor: &Actor, points: &[Vec<f64>], judge: &mut dyn Judge) -> Result<Part, Refused> {
     let limits =
         |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
     let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
-    let trajectory = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
-    Ok(Part { begin: 0.0, joints: actor.arm.clone(), trajectory })
+    let trajectory = follow(points, &limits, Some(judge)).map_err(|_| Refused::NoWay)?;
+    Ok(Part { wait: 0.0, joints: actor.arm.clone(), trajectory })
 }
 
 /// The greatest acceleration of a joint, rad/s2 or m/s2.

@@ -62,6 +62,8 @@ pub struct Stage<'p> {
     pub(super) now: f64,
     /// Robots that are under way.
     pub(super) flights: BTreeMap<InstanceId, Flight>,
+    /// Whether ways are planned around all that robots under way sweep.
+    pub(super) around_sweeps: bool,
     /// How often something was moved so far.
     pub(super) changes: u64,
     /// What cannot be told: empty in a run.
@@ -101,6 +103,7 @@ impl<'p> Stage<'p> {
             shared: BTreeMap::new(),
             now: 0.0,
             flights: BTreeMap::new(),
+            around_sweeps: false,
             changes: 0,
             unknown: Unknown::default(),
         })
@@ -372,7 +375,7 @@ impl Stage<'_> {
     /// Feeds all that tells this moment from others of the same lab to a hash; with `coarse`, figures that differ by
     /// less than that (m, rad) mostly count as the same.
     pub fn digest(&self, coarse: Option<f64>, hash: &mut impl Hasher) {
-        let Stage { scene: _, carried, before, actors, freed, shared, unknown, now: _, flights: _, changes: _ } = self;
+        let Stage { carried, before, actors, freed, shared, unknown, .. } = self;
         for one in carried {
             match one {
                 Carried::Stands(s) => write_stand(hash, s, coarse),

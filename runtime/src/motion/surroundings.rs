@@ -44,6 +44,11 @@ impl Surroundings {
                 out.add_shapes(stage, id, !bodiless.contains(&id));
             }
         }
+        if stage.around_sweeps {
+            for (id, link, at, radius) in stage.sweeps(robot) {
+                out.push(id, &link, at, Solid::Sphere(radius));
+            }
+        }
         out
     }
 
@@ -72,13 +77,8 @@ impl Surroundings {
             let Some(link) = links.get(ball.link as usize) else { continue };
             let at = base.then(matterix_motion::placement(link)).then(Pose::at(ball.center));
             let name = actor.assembly.robot.links.get(ball.link as usize).map_or("", |l| l.name.as_str());
-            self.push_ball(id, name, at, ball.radius);
+            self.push(id, name, at, Solid::Sphere(ball.radius));
         }
-    }
-
-    /// A ball of a link of another robot.
-    pub fn push_ball(&mut self, owner: InstanceId, link: &str, at: Pose, radius: f64) {
-        self.push(owner, link, at, Solid::Sphere(radius));
     }
 }
 

@@ -29,7 +29,6 @@ impl Moved {
             open.extend(step.children());
             let Step::Operation(operation) = step else { continue };
             match &operation.motion {
-                Some(Motion::To { mover, .. } | Motion::By { mover, .. }) => out.robots.extend(stage.actor_of(*mover)),
                 Some(Motion::Grip { item, .. }) => {
                     out.items.insert(*item);
                 }
@@ -37,7 +36,8 @@ impl Moved {
                     out.items.insert(*item);
                     out.surfaces.extend(on);
                 }
-                None => {}
+                Some(Motion::Fingers { .. }) | None => {}
+                Some(travel) => out.robots.extend(stage.actor_of(travel.mover())),
             }
         }
         out

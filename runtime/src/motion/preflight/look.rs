@@ -47,15 +47,11 @@ impl<'p, 's> Looker<'p, 's> {
     /// Carries out a motion in a course; what cannot be done makes it lost, what cannot be told makes things unknown.
     /// `site` is the statement to blame, `beside` what moves at the same time.
     pub fn motion(&mut self, course: &mut Course<'p>, motion: &Motion, site: Span, beside: &Moved) {
-        let mover = match motion {
-            Motion::To { mover, .. } | Motion::By { mover, .. } => *mover,
-            Motion::Grip { by, .. } | Motion::Free { by, .. } => *by,
-        };
-        let Some(robot) = course.stage.actor_of(mover) else { return };
+        let Some(robot) = course.stage.actor_of(motion.mover()) else { return };
         match motion {
             Motion::Grip { item, .. } => self.grip(course, motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, motion, robot, (*item, *on), site, beside),
-            Motion::To { .. } | Motion::By { .. } => self.go(course, motion, robot, site, beside),
+            _ => self.go(course, motion, robot, site, beside),
         }
     }
 
@@ -63,18 +59,20 @@ impl<'p, 's> Looker<'p, 's> {
         let stage = &course.stage;
         let adrift = stage.unknown.postures.contains(&robot);
         let held = stage.held(robot).is_some_and(|h| stage.unknown.places.contains(&h));
-        let blind = held
-            || !self.equipped.contains(&robot)
-            || stage.is_unknown(robot)
-            || match motion {
-                Motion::To { goal, frame, straight, .. } => adrift && *straight || stage.is_frame_unknown(*goal, frame),
-                _ => adrift,
-            };
-        let shift = self.shift(motion);
-        let (Some(shift), false) = (shift, blind) else { return course.drifts(robot) };
+        let somewhere = motion.goal().is_some_and(|(goal, frame)| stage.is_frame_unknown(goal, frame));
+        let goes_on = match motion {
+            Motion::To { straight, .. } => *straight,
+            Motion::By { .. } | Motion::Tilted { .. } | Motion::Fingers { .. } => true,
+            _ => false,
+        };
+        let unsure = held || somewhere || adrift && goes_on;
+        let blind = unsure || !self.equipped.contains(&robot) || stage.is_unknown(robot);
+        let known = motion.values().into_iter().map(|node| course.values.value(&self.program.model, node));
+        // What only a run can tell is left to the run.
+        let (Some(values), false) = (known.collect::<Option<Vec<f64>>>(), blind) else { return course.drifts(robot) };
         // From nowhere in particular, only where it ends can be judged.
         course.stage.unknown.postures.remove(&robot);
-        match self.outcome(course, motion, shift) {
+        match self.outcome(course, motion, &values) {
             Outcome::Done(_) => {}
             Outcome::Refused { why, nearer } => {
                 let sure = match &why {
@@ -110,7 +108,7 @@ impl<'p, 's> Looker<'p, 's> {
             stage.unknown.places.insert(item);
             return;
         }
-        if let Err(why) = stage.perform(motion, [0.0; 3]) {
+        if let Err(why) = stage.perform(motion, &[]) {
             stage.carry(item, Some(robot));
             stage.unknown.places.insert(item);
             self.refuse(course, motion, &why, site, beside.items.contains(&item));
@@ -142,7 +140,7 @@ impl<'p, 's> Looker<'p, 's> {
             }
             return;
         }
-        if let Err(why) = stage.perform(motion, [0.0; 3]) {
+        if let Err(why) = stage.perform(motion, &[]) {
             match below.filter(|on| stage.actor_of(*on).is_none()) {
                 Some(on) => course.stands(item, on),
                 None => stage.carry(item, below),
@@ -159,17 +157,9 @@ impl<'p, 's> Looker<'p, 's> {
         course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
     }
 
-    /// Values of a relative motion, m; what only a run can tell is left to the run.
-    fn shift(&self, motion: &Motion) -> Option<[f64; 3]> {
-        let Motion::By { shift, .. } = motion else { return Some([0.0; 3]) };
-        let graph = &self.program.model.graph;
-        let known: Option<Vec<f64>> = shift.iter().map(|node| graph.constant(*node)).collect();
-        known.and_then(|k| <[f64; 3]>::try_from(k).ok())
-    }
-
     /// What becomes of a motion; the course is where it ends.
-    fn outcome(&mut self, course: &mut Course<'p>, motion: &Motion, shift: [f64; 3]) -> Outcome {
-        let key = self.memory.key(&course.stage, motion, shift);
+    fn outcome(&mut self, course: &mut Course<'p>, motion: &Motion, values: &[f64]) -> Outcome {
+        let key = self.memory.key(&course.stage, motion, values);
         if let Some(known) = self.memory.recall(&key) {
             match &known {
                 Outcome::Done(change) if course.stage.change(change).is_none() => {}
@@ -178,7 +168,7 @@ impl<'p, 's> Looker<'p, 's> {
         }
         self.left = self.left.saturating_sub(1);
         let before = course.stage.clone();
-        let outcome = match course.stage.perform(motion, shift) {
+        let outcome = match course.stage.perform(motion, values) {
             Ok(_) => Outcome::Done(course.stage.since(&before)),
             Err(why) => {
                 course.stage = before;

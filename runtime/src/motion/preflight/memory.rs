@@ -9,7 +9,7 @@ use std::hash::Hasher;
 use std::io;
 
 use matterix_ir::plan::Motion;
-use matterix_ir::scene::Scene;
+use matterix_ir::scene::{InstanceId, Scene};
 use serde::{Deserialize, Serialize};
 use siphasher::sip128::{Hasher128, SipHasher13};
 
@@ -80,34 +80,30 @@ impl<'s> Memory<'s> {
     }
 
     /// What a motion is known by.
-    pub fn key(&self, stage: &Stage<'_>, motion: &Motion, shift: [f64; 3]) -> String {
+    pub fn key(&self, stage: &Stage<'_>, motion: &Motion, values: &[f64]) -> String {
         let mut hash = SipHasher13::new();
         stage.digest(None, &mut hash);
+        let mut write = |kind: u8, ids: &[InstanceId], name: &str| {
+            hash.write_u8(kind);
+            ids.iter().for_each(|id| hash.write_u32(id.0));
+            hash.write(name.as_bytes());
+            hash.write_u8(u8::MAX);
+        };
         match motion {
-            Motion::To { mover, goal, frame, straight } => {
-                hash.write_u32(mover.0);
-                hash.write_u32(goal.0);
-                hash.write_u8(u8::from(*straight));
-                hash.write(frame.as_bytes());
+            Motion::To { mover, goal, frame, straight } => write(u8::from(*straight), &[*mover, *goal], frame),
+            Motion::By { mover, straight, .. } => write(2 + u8::from(*straight), &[*mover], ""),
+            Motion::Grip { item, frame, by } => write(4, &[*by, *item], frame),
+            Motion::Free { item, on, by } => write(5, &[*by, *item, on.unwrap_or(InstanceId(u32::MAX))], ""),
+            Motion::Upright { mover, goal, frame, .. } => write(6, &[*mover, *goal], frame),
+            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
+                write(7, &[*mover, *item], point);
+                write(7, &[*goal], frame);
             }
-            Motion::By { mover, straight, .. } => {
-                hash.write_u32(mover.0);
-                hash.write_u8(2 + u8::from(*straight));
-                shift.iter().for_each(|v| hash.write_u64(v.to_bits()));
-            }
-            Motion::Grip { item, frame, by } => {
-                hash.write_u32(by.0);
-                hash.write_u32(item.0);
-                hash.write_u8(4);
-                hash.write(frame.as_bytes());
-            }
-            Motion::Free { item, on, by } => {
-                hash.write_u32(by.0);
-                hash.write_u32(item.0);
-                hash.write_u32(on.map_or(u32::MAX, |on| on.0));
-                hash.write_u8(5);
-            }
+            Motion::Joints { mover, .. } => write(8, &[*mover], ""),
+            Motion::Home { mover } => write(9, &[*mover], ""),
+            Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
+        values.iter().for_each(|v| hash.write_u64(v.to_bits()));
         hex(&hash)
     }
 

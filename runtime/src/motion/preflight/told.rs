@@ -21,13 +21,10 @@ pub fn finding(
 ) -> Option<Diagnostic> {
     let scene = stage.scene;
     let name = |id: InstanceId| scene.get(id).name.as_str();
-    let (robot, goal) = match motion {
-        Motion::To { mover, goal, .. } => (*mover, Some(*goal)),
-        Motion::By { mover, .. } => (*mover, None),
-        Motion::Grip { item, by, .. } | Motion::Free { item, by, .. } => {
-            return gripping(scene, *item, *by, refused, span);
-        }
-    };
+    if let Motion::Grip { item, by, .. } | Motion::Free { item, by, .. } = motion {
+        return gripping(scene, *item, *by, refused, span);
+    }
+    let (robot, goal) = (motion.mover(), motion.goal().map(|(goal, _)| goal));
     let to = goal.map_or("there".to_string(), |g| format!("`{}`", name(g)));
     let mut found = match refused {
         Refused::OutOfReach(far, _) => {
@@ -59,9 +56,21 @@ pub fn finding(
             Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")
                 .help("let one of them let go first")
         }
-        Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld | Refused::StandsOn => {
-            return None;
+        Refused::Tilted(by) => {
+            let headline = format!("what `{}` holds tilts on its way to {to}", name(robot));
+            let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
+        Refused::Joints(given, there) => {
+            let headline = format!("{given} positions for the {there} joints of `{}`", name(robot));
+            Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "not one for each")
+        }
+        Refused::Beyond(joint) => {
+            let headline = format!("`{joint}` of `{}` does not get to this position", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
+        }
+        Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
+        Refused::StandsOn | Refused::TooWide(..) => return None,
     };
     let met = match refused {
         Refused::Collides(meeting) => meeting.with,
@@ -94,6 +103,11 @@ fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, 
             let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go");
             Some(found.help(format!("move `{by}` there first; `pick` and `place` do that")))
         }
+        Refused::TooWide(width, opening) => {
+            let headline = format!("`{by}` does not open wide enough for `{}`", item.name);
+            let label = format!("it is {:.0} mm wide, and the fingers open {:.0} mm", width * 1e3, opening * 1e3);
+            Some(Diagnostic::error(codes::TOO_WIDE, span, headline, label))
+        }
         Refused::StandsOn => {
             let headline = format!("`{by}` cannot grip `{}`, on which it stands", item.name);
             let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "it would have to carry itself");
@@ -106,13 +120,13 @@ fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, 
 /// How far a goal out of reach would have to be shifted to be reached, x and y in metres: the nearest place on the line to
 /// the robot.
 pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
-    let Motion::To { mover, goal, frame, .. } = motion else { return None };
-    let robot = stage.actor_of(*mover)?;
+    let (goal, frame) = motion.goal()?;
+    let robot = stage.actor_of(motion.mover())?;
     let base = stage.pose(robot);
     let actor = stage.actors.get(&robot)?;
     let mut solver = Solver::new(actor.chain.clone());
     let now = actor.configuration();
-    let targets = targets(stage, robot, *goal, frame);
+    let targets = targets(stage, robot, goal, frame);
     for share in (1..20).map(|k| f64::from(k) * 0.05) {
         for target in &targets {
             let mut at: Pose = *target;

@@ -139,17 +139,12 @@ impl<'p> Walk<'p, '_> {
     }
 
     fn motion(&mut self, id: StepId, motion: &Motion) {
-        let known = |nodes: &[_; 3]| -> Option<[f64; 3]> {
-            let values = nodes.map(|node| self.values.value(&self.program.model, node));
-            Some([values[0]?, values[1]?, values[2]?])
-        };
-        let (shift, straight) = match motion {
-            Motion::By { shift, straight, .. } => (known(shift), *straight),
-            Motion::To { straight, .. } => (Some([0.0; 3]), *straight),
-            _ => (Some([0.0; 3]), true),
-        };
-        let Some(shift) = shift else { return };
-        match self.stage.perform(motion, shift) {
+        let known = motion.values().into_iter().map(|node| self.values.value(&self.program.model, node));
+        // What only a run can tell is left to the run.
+        let Some(values) = known.collect::<Option<Vec<f64>>>() else { return self.perhaps(true) };
+        let straight = matches!(motion, Motion::By { straight: true, .. } | Motion::To { straight: true, .. });
+        let before = self.stage.clone();
+        match self.stage.perform(motion, &values) {
             Ok(Some(performed)) => {
                 let site = self.sites.last().copied().unwrap_or_default();
                 let claims = self.claims.clone();
@@ -160,6 +155,7 @@ impl<'p> Walk<'p, '_> {
             Ok(None) => {}
             Err(refused) => {
                 self.blocked |= self.stage.is_by_a_robot(&refused);
+                self.stage = before;
                 // What cannot be done is another finding; what would come after it is not known.
                 self.perhaps(true);
             }
@@ -229,9 +225,7 @@ impl<'p> Walk<'p, '_> {
     fn alone(&self, which: usize, lines: &[Vec<StepId>], robots: &[BTreeSet<InstanceId>]) -> Line {
         let mut walk = self.clone();
         let others = robots.iter().enumerate().filter(|(i, _)| *i != which).flat_map(|(_, all)| all);
-        for robot in others.filter(|r| !robots[which].contains(r)) {
-            walk.stage.actors.remove(robot);
-        }
+        walk.stage.unknown.postures.extend(others.filter(|r| !robots[which].contains(r)));
         walk.line = Some(Line { legs: Vec::new(), strict: true });
         walk.sequence(&lines[which]);
         walk.line.unwrap_or_default()
@@ -254,9 +248,9 @@ impl<'p> Walk<'p, '_> {
             let step = &self.program.plan.get(id).step;
             open.extend(step.children());
             let Step::Operation(operation) = step else { continue };
-            if let Some(Motion::To { mover, .. } | Motion::By { mover, .. }) = &operation.motion {
-                out.extend(self.stage.actor_of(*mover));
-            }
+            let travels =
+                |m: &&Motion| !matches!(m, Motion::Grip { .. } | Motion::Free { .. } | Motion::Fingers { .. });
+            out.extend(operation.motion.iter().find(travels).and_then(|m| self.stage.actor_of(m.mover())));
         }
         out
     }
