@@ -11,6 +11,7 @@ mod files;
 mod findings;
 mod formatting;
 mod grids;
+mod gripping;
 mod harness;
 mod motion;
 mod new;

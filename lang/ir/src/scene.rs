@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Span;
+use crate::extent::Body;
 pub use crate::pose::Pose;
 use crate::robot::Robot;
 
@@ -66,6 +67,16 @@ impl Shape {
         }
     }
 
+    /// How far the edge of its top is from its axis in the direction of x, m.
+    pub fn rim(&self) -> f64 {
+        match self {
+            Shape::Box([x, ..]) => x / 2.0,
+            Shape::Cylinder([d, _]) => d / 2.0,
+            Shape::Sphere(_) => 0.0,
+            Shape::Turned { outside, .. } => outside.last().map_or(0.0, |p| p[0]),
+        }
+    }
+
     /// Whether turning it about its own axis changes nothing.
     pub fn is_round(&self) -> bool {
         !matches!(self, Shape::Box(_))
@@ -107,6 +118,9 @@ pub struct Instance {
     pub support: Option<InstanceId>,
     /// Where it stood when the run began, relative to its support or the lab.
     pub pose: Pose,
+    /// Whether that is known, seen from there: the text says it, or leaves no other choice.
+    #[serde(default)]
+    pub placed: bool,
     /// Its named points.
     pub frames: Vec<Frame>,
     /// Its body.
@@ -119,8 +133,15 @@ pub struct Instance {
     pub span: Span,
 }
 
+impl Instance {
+    /// What it is made of, for its measures.
+    pub fn body(&self) -> Body<'_> {
+        Body { frames: &self.frames, shape: self.shape.as_ref(), solids: &self.solids }
+    }
+}
+
 /// What a thing stands on and where on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Stand {
     /// In the lab.
     Lab(Pose),

@@ -1,13 +1,19 @@
 //! Robots that move: what they are made of, where everything is meanwhile, where they are to go and how they get there.
 
 pub mod assembly;
+pub mod fingers;
+pub mod flight;
 pub mod goal;
+mod hands;
 pub mod perform;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod tilt;
+mod together;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
-pub use preflight::{preflight, supported};
+pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
+pub use together::together;

@@ -2,25 +2,32 @@
 
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
+use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Blocked, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
+use serde::{Deserialize, Serialize};
 
-use super::goal::{spot, targets};
+use super::fingers::CLEARANCE;
+use super::goal::{carried_to, spots, targets, targets_at};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
 /// How near a gripper must be to what it grips, and what it holds to where it is put down: m and rad.
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
+/// How far shapes of fingers and what a gripper is said to open may differ, m.
+const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
 const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
+/// How far what is held tilts while a gripper only turns, rad.
+const TURNING: f64 = 0.1;
 /// Samples drawn before a way counts as not found.
 const SAMPLES: usize = 60_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
@@ -31,26 +38,61 @@ const RAMP: (f64, f64) = (0.3, 0.1);
 pub struct Performed {
     /// The robot.
     pub robot: InstanceId,
-    /// Of the joints that move its tip, one after the other.
-    pub parts: Vec<Trajectory>,
+    /// One after the other.
+    pub parts: Vec<Part>,
+}
+
+/// A motion of some of a robot's joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// How long it waits first when those before it have ended, s.
+    pub wait: f64,
+    /// Which of all that move, by index.
+    pub joints: Vec<usize>,
+    /// Their way.
+    pub trajectory: Trajectory,
 }
 
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.iter().map(Trajectory::duration).sum()
+        self.parts.iter().map(|part| part.wait + part.trajectory.duration()).sum()
     }
 
-    /// The joints that move the tip at a time since the beginning, s.
-    pub fn at(&self, mut time: f64) -> Vec<f64> {
-        for part in &self.parts {
-            if time <= part.duration() {
-                return part.at(time).position;
-            }
-            time -= part.duration();
-        }
-        self.parts.last().map(|p| p.at(p.duration()).position).unwrap_or_default()
+    /// Its parts, each with the time at which it begins, s since the motion did.
+    pub fn begins(&self) -> impl Iterator<Item = (f64, &Part)> {
+        self.parts.iter().scan(0.0, |time, part| {
+            let begin = *time + part.wait;
+            *time = begin + part.trajectory.duration();
+            Some((begin, part))
+        })
     }
+
+    /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
+    pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
+        let mut own = self.begins().filter(|(_, part)| part.joints == joints);
+        let mut now = own.next()?;
+        own.take_while(|(begin, _)| *begin <= time).for_each(|next| now = next);
+        Some(now.1.trajectory.at(time - now.0).position)
+    }
+
+    /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
+    pub fn bring(&self, actor: &mut Actor, time: f64) {
+        for part in &self.parts {
+            if let Some(at) = self.at(&part.joints, time) {
+                actor.set_some(&part.joints, &at);
+            }
+        }
+    }
+}
+
+/// How a tip is brought to a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Free,
+    Straight,
+    /// What is held tilts by no more than this, rad.
+    Upright(f64),
 }
 
 /// Where a robot and what it holds are at one moment of a motion.
@@ -69,7 +111,7 @@ pub struct Moment {
 }
 
 /// Why a motion cannot be carried out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Refused {
     /// The mover has no joints to move with.
     NoRobot,
@@ -83,102 +125,179 @@ pub enum Refused {
     NoWay,
     /// The thing to be gripped, or to be put down, is this far from where it should be: m and rad.
     Misplaced(f64, f64),
-    /// It holds nothing that could be let go.
+    /// It, or who is to take it over, does not hold what is to be let go.
     NotHeld,
+    /// It holds a thing that another robot holds as well.
+    Bound(InstanceId, InstanceId),
+    /// It stands on what it is to grip.
+    StandsOn,
+    /// A thing is this wide, and the fingers open so far: m.
+    TooWide(f64, f64),
+    /// What is to stay upright tilts by so much where the way begins or ends, rad.
+    Tilted(f64),
+    /// So many positions were given for so many joints.
+    Joints(usize, usize),
+    /// This joint does not get to its position.
+    Beyond(String),
 }
 
 impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn => "unmovable",
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
             Refused::Misplaced(..) | Refused::NotHeld => "missed",
+            Refused::TooWide(..) => "too_wide",
+            Refused::Tilted(_) => "no_way",
+            Refused::Joints(..) | Refused::Beyond(_) => "unreachable",
         }
     }
 
     /// In words, for the run of an operation.
     pub fn text(&self, scene: &Scene, operation: &Operation) -> String {
-        let mover = match &operation.motion {
-            Some(Motion::To { mover: by, .. } | Motion::By { mover: by, .. }) => *by,
-            Some(Motion::Grip { by, .. } | Motion::Free { by, .. }) => *by,
-            None => return String::new(),
-        };
+        let Some(mover) = operation.motion.as_ref().map(Motion::mover) else { return String::new() };
         let name = &scene.get(mover).name;
         match self {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
             Refused::NoFrame => format!("`{name}` is sent to a frame that nothing gives a place"),
             Refused::OutOfReach(far, _) => format!("`{name}` stays {:.0} mm short of it", far * 1e3),
-            Refused::Collides(m) => format!("`{}` of `{name}` runs into `{}`", m.mine, m.other),
+            Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
+            Refused::Bound(item, other) => {
+                let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
+                format!("`{name}` and `{other}` both hold `{item}`")
+            }
+            Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
+            Refused::TooWide(width, opening) => {
+                format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
+            }
+            Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Joints(given, there) => format!("{given} positions are given for {there} joints of `{name}`"),
+            Refused::Beyond(joint) => format!("`{joint}` of `{name}` does not get there"),
         }
     }
 }
 
 /// Two things in one place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Meeting {
     /// A link of the robot, or what it holds.
     pub mine: String,
     /// What it meets: an instance, or another link.
     pub other: String,
+    /// The link that it meets, if that is another robot's.
+    pub part: Option<String>,
     /// The instance it meets, if it is not the robot itself.
     pub with: Option<InstanceId>,
     /// Where, in the lab, m.
     pub at: [f64; 3],
     /// How deep, m.
     pub depth: f64,
+    /// Whether they are there before anything moves.
+    pub before: bool,
+}
+
+impl Meeting {
+    /// What it meets, in words.
+    pub fn whom(&self) -> String {
+        match &self.part {
+            Some(part) => format!("`{part}` of `{}`", self.other),
+            None => format!("`{}`", self.other),
+        }
+    }
+
+    /// Where, in words.
+    pub fn place(&self) -> String {
+        let [x, y, z] = self.at.map(|v| v * 1e3);
+        format!("({x:.0}, {y:.0}, {z:.0}) mm")
+    }
 }
 
 impl Stage<'_> {
-    /// Carries out a motion. `shift` gives the values of a relative one, m.
-    pub fn perform(&mut self, motion: &Motion, shift: [f64; 3]) -> Result<Option<Performed>, Refused> {
+    /// Carries out a motion. `values` are those of [`Motion::values`], SI.
+    pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *goal, frame);
-                if to.is_empty() {
-                    return Err(Refused::NoFrame);
-                }
-                self.go(robot, &to, *straight, Some(*goal)).map(Some)
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.bring(robot, *goal, frame, way).map(Some)
+            }
+            Motion::Upright { mover, goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let within = values.first().copied().unwrap_or_default();
+                self.bring(robot, *goal, frame, Way::Upright(within)).map(Some)
+            }
+            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let parts = self.depart(robot, None)?;
+                let angle = values.first().copied().unwrap_or_default();
+                self.tilt(robot, (*item, point), (*goal, frame), angle, parts).map(Some)
+            }
+            Motion::Joints { mover, .. } => self.turn(*mover, values.to_vec()).map(Some),
+            Motion::Home { mover } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+                let home = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+                self.turn(robot, home).map(Some)
+            }
+            Motion::Fingers { by, open } => {
+                let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
+                let width = if *open { f64::INFINITY } else { 0.0 };
+                Ok(self.spread(robot, width).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let mut to = self.tip(robot);
-                (0..3).for_each(|k| to.position[k] += shift[k]);
-                self.go(robot, &[to], *straight, None).map(Some)
+                to.position.iter_mut().zip(values).for_each(|(x, by)| *x += by);
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.go(robot, &[to], way, None).map(Some)
             }
-            Motion::Grip { item, by } => {
+            Motion::Grip { item, frame, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *item, frame::GRASP);
+                let to = targets(self, robot, *item, frame);
+                if self.stands_on(robot, *item) {
+                    return Err(Refused::StandsOn);
+                }
                 let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
                 }
-                self.carry(*item, Some(robot));
-                Ok(None)
+                let width = self.scene.get(*item).body().across(frame);
+                let fingers = self.actors.get(&robot).and_then(|a| a.fingers.as_ref());
+                if let (Some(width), Some(fingers)) = (width, fingers)
+                    && width > fingers.opening() + NOMINAL
+                {
+                    return Err(Refused::TooWide(width, fingers.opening()));
+                }
+                self.grip(*item, robot);
+                Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
                 if self.held(robot) != Some(*item) {
                     return Err(Refused::NotHeld);
                 }
-                let to = match on {
-                    Some(on) => self.surface(*on).then(spot(self, *item, *on)),
-                    None => self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item)),
+                if let Some(taker) = on.and_then(|on| self.actor_of(on)) {
+                    return if self.pass(*item, robot, taker) { Ok(None) } else { Err(Refused::NotHeld) };
+                }
+                let to: Vec<Pose> = match on {
+                    Some(on) => spots(self, *item, *on).into_iter().map(|s| self.surface(*on).then(s)).collect(),
+                    None => vec![self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item))],
                 };
-                let (far, _) = distance(&pose(&self.pose(*item)), &pose(&to));
+                let now = pose(&self.pose(*item));
+                let far = to.iter().map(|to| distance(&now, &pose(to)).0).fold(f64::INFINITY, f64::min);
                 if far > TOLERANCE.0 {
                     return Err(Refused::Misplaced(far, 0.0));
                 }
                 let below = on.or_else(|| self.stood_on(*item));
                 self.carry(*item, below);
                 self.freed(robot, *item);
-                Ok(None)
+                Ok(self.make_room(robot, *item).map(|part| Performed { robot, parts: vec![part] }))
             }
         }
     }
@@ -199,10 +318,26 @@ impl Stage<'_> {
         (0..=steps)
             .filter_map(|step| {
                 let since = performed.duration() * f64::from(step) / f64::from(steps);
-                stage.settle(performed.robot, &performed.at(since));
+                performed.bring(stage.actors.get_mut(&performed.robot)?, since);
                 stage.moment(performed.robot, begin + since)
             })
             .collect()
+    }
+
+    /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
+    fn spread(&mut self, robot: InstanceId, width: f64) -> Option<Part> {
+        let actor = self.actors.get_mut(&robot)?;
+        let fingers = actor.fingers.clone()?;
+        let to = fingers.at(&actor.tree, &actor.joints, width);
+        let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
+        actor.set_some(&fingers.joints, &to);
+        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
+    }
+
+    /// Opens a gripper further than a thing is wide.
+    fn make_room(&mut self, robot: InstanceId, item: InstanceId) -> Option<Part> {
+        let width = self.scene.get(item).body().across_grasp()?;
+        self.spread(robot, width + 2.0 * CLEARANCE)
     }
 
     /// Distance and angle from the tip to the nearest of some poses.
@@ -212,20 +347,84 @@ impl Stage<'_> {
         all.min_by(|a, b| (a.0 + a.1).total_cmp(&(b.0 + b.1)))
     }
 
-    fn go(
-        &mut self,
-        robot: InstanceId,
-        to: &[Pose],
-        straight: bool,
-        goal: Option<InstanceId>,
-    ) -> Result<Performed, Refused> {
+    /// What comes before a motion: a gripper draws back from what it has let go, and opens for what it goes to. Nothing is
+    /// drawn back where `near` is what it let go.
+    pub(super) fn depart(&mut self, robot: InstanceId, near: Option<InstanceId>) -> Result<Vec<Part>, Refused> {
+        if let Some((item, other)) = self.bound(robot) {
+            return Err(Refused::Bound(item, other));
+        }
         let mut parts = Vec::new();
-        if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
+        if let Some(item) = self.just_freed(robot).filter(|item| Some(*item) != near) {
             let mut back = self.tip(robot);
             back.position = back.point([0.0, 0.0, -RETREAT]);
-            parts.push(self.line(robot, &back, &[item])?);
+            parts.push(self.line(robot, &[back], &[item])?);
         }
         self.leave(robot);
+        Ok(parts)
+    }
+
+    /// Brings the joints that move the tip to positions.
+    fn turn(&mut self, mover: InstanceId, to: Vec<f64>) -> Result<Performed, Refused> {
+        let robot = self.actor_of(mover).ok_or(Refused::NoRobot)?;
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let variables = actor.chain.variables();
+        if to.len() != variables.len() {
+            return Err(Refused::Joints(to.len(), variables.len()));
+        }
+        let beyond = |(v, q): &(&matterix_motion::Variable, &f64)| {
+            v.is_bounded() && !(v.limits.lower..=v.limits.upper).contains(*q)
+        };
+        if let Some((variable, _)) = variables.iter().zip(&to).find(beyond) {
+            let joint = actor.assembly.robot.joints.get(variable.joint as usize);
+            return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
+        }
+        let mut parts = self.depart(robot, None)?;
+        parts.push(self.way(robot, &to, None)?);
+        Ok(Performed { robot, parts })
+    }
+
+    /// Brings a robot to a frame; what it holds to the nearest spot about it that is free and within reach.
+    fn bring(&mut self, robot: InstanceId, goal: InstanceId, frame: &str, way: Way) -> Result<Performed, Refused> {
+        let mut spots = match carried_to(self, robot, goal, frame) {
+            Some(held) => spots(self, held, goal),
+            None => vec![Pose::IDENTITY],
+        };
+        if way == Way::Straight && spots.len() > 1 {
+            // Straight down, not over to another spot.
+            let tip = self.tip(robot).position;
+            let far = |spot: &Pose| {
+                let to = targets_at(self, robot, goal, frame, *spot).first().map_or(tip, |p| p.position);
+                (0..3).map(|k| (to[k] - tip[k]) * (to[k] - tip[k])).sum::<f64>()
+            };
+            let mut near: Vec<(f64, Pose)> = spots.into_iter().map(|spot| (far(&spot), spot)).collect();
+            near.sort_by(|a, b| a.0.total_cmp(&b.0));
+            spots = near.into_iter().map(|n| n.1).take(1).collect();
+        }
+        let before = (spots.len() > 1).then(|| self.clone());
+        let mut refused = Refused::NoFrame;
+        for (k, spot) in spots.into_iter().enumerate() {
+            let to = targets_at(self, robot, goal, frame, spot);
+            if to.is_empty() {
+                return Err(Refused::NoFrame);
+            }
+            match self.go(robot, &to, way, Some(goal)) {
+                Ok(done) => return Ok(done),
+                // The first spot says best what is wrong.
+                Err(why) if k == 0 => refused = why,
+                Err(_) => {}
+            }
+            if let Some(before) = &before {
+                self.clone_from(before);
+            }
+        }
+        Err(refused)
+    }
+
+    fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {
+        let mut parts = self.depart(robot, goal.filter(|_| way == Way::Straight))?;
+        if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
+            parts.extend(self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0));
+        }
         let base = self.pose(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let now = actor.configuration();
@@ -250,69 +449,119 @@ impl Stage<'_> {
         if !found.is_empty() {
             refused = Refused::NoWay;
         }
-        for (_, target, q) in found {
-            let tried = match straight {
-                true => self.line(robot, target, goal.as_slice()),
-                false => self.way(robot, &q),
+        let mut keep = |why: Refused| {
+            // What meets says more than that no way was found.
+            if !matches!(refused, Refused::Collides(_)) || matches!(why, Refused::Collides(_)) {
+                refused = why;
+            }
+        };
+        for (_, target, q) in &found {
+            let tried = match way {
+                Way::Straight => self.line(robot, std::slice::from_ref(*target), goal.as_slice()),
+                Way::Free => self.way(robot, q, None),
+                Way::Upright(within) => self.way(robot, q, Some(within)),
             };
             match tried {
                 Ok(part) => {
                     parts.push(part);
                     return Ok(Performed { robot, parts });
                 }
-                // What meets says more than that no way was found.
-                Err(why @ Refused::Collides(_)) => refused = why,
-                Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
-                Err(_) => {}
+                Err(why) => keep(why),
+            }
+        }
+        // What is in the way beside a line may not be if the gripper turns before it sets out.
+        for (_, target, _) in found.iter().filter(|_| way == Way::Straight) {
+            if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
+                parts.extend(turned);
+                return Ok(Performed { robot, parts });
             }
         }
         Err(refused)
     }
 
-    /// A free way to a configuration.
-    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Trajectory, Refused> {
+    /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
+    fn turned_line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<[Part; 2], Refused> {
+        let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
+        let base = self.pose(robot).inverse();
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let before = actor.joints.clone();
+        let now = actor.configuration();
+        let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
+        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
+        let first = self.way(robot, &turned.q, Some(TURNING));
+        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
+            actor.joints = before;
+        }
+        both
+    }
+
+    /// A free way to a configuration; what is held tilts by no more than so much on it, rad.
+    pub(super) fn way(&mut self, robot: InstanceId, q: &[f64], within: Option<f64>) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
-        let settings = Settings { iterations: SAMPLES, ..Settings::default() };
-        let route =
-            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-                _ => Refused::NoWay,
-            })?;
-        let part = timed(actor, &route.points, &mut checker)?;
+        let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
+        let start = actor.configuration();
+        let refused = |failure| match failure {
+            plan::Failure::Collision(end, contacts) => {
+                self.meeting(&figure, &around, &contacts, end == plan::End::Start)
+            }
+            plan::Failure::Tilt(_, by) => Refused::Tilted(by),
+            _ => Refused::NoWay,
+        };
+        let part = match within.and_then(|tilt| self.upright(robot, tilt)) {
+            Some(upright) => {
+                let mut solver = Solver::new(actor.chain.clone());
+                let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
+                let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut level)?
+            }
+            None => {
+                let route = plan::plan(&mut checker, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut checker)?
+            }
+        };
         self.settle(robot, q);
         Ok(part)
     }
 
-    /// A straight line of the tip to a pose; things it comes up to or leaves may be touched.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Trajectory, Refused> {
+    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
-            without.extend(self.below(*id));
+            // No hand that holds it.
+            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
         }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
-        let around = Surroundings::of(self, robot, &without);
+        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
+        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
+        let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let to = pose(&self.pose(robot).inverse().then(*to));
+        let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let mut solver = Solver::new(actor.chain.clone());
-        let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
-        let mut points = followed.map_err(|blocked| match blocked {
-            Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-            Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
-        })?;
+        let mut points = vec![actor.configuration()];
+        for to in to {
+            let from = points.last().cloned().unwrap_or_default();
+            let to = pose(&base.then(*to));
+            let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
+            let followed = followed.map_err(|blocked| match blocked {
+                Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
+                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
+                Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
+            })?;
+            points.extend(followed.into_iter().skip(1));
+        }
         let part = timed(actor, &points, &mut checker)?;
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
         Ok(part)
     }
 
-    fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
         Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
@@ -325,40 +574,50 @@ impl Stage<'_> {
     }
 
     /// The deepest contact in words.
-    fn meeting(
+    pub(super) fn meeting(
         &self,
         figure: &Figure,
         around: &Surroundings,
         contacts: &[matterix_motion::spheres::Contact],
+        before: bool,
     ) -> Refused {
         let Some(contact) = contacts.first() else { return Refused::NoWay };
-        let (other, with) = match contact.other {
+        let (other, part, with) = match contact.other {
             Other::Body(index) => {
                 let with = around.owners.get(index).copied();
-                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), with)
+                let robot = with.is_some_and(|w| self.actors.contains_key(&w));
+                let part = around.world.bodies.get(index).filter(|_| robot).map(|b| b.name.clone());
+                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), part, with)
             }
-            Other::Link(link) => (figure.name(link).to_string(), None),
+            Other::Link(link) => (figure.name(link).to_string(), None, None),
         };
         let at = [contact.point.x, contact.point.y, contact.point.z];
         Refused::Collides(Meeting {
             mine: figure.name(contact.link).to_string(),
             other,
+            part,
             with,
             at,
             depth: contact.depth,
+            before,
         })
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Trajectory, Refused> {
-    let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
-        actor.chain.variables().iter().map(|v| f(&v.limits)).collect()
-    };
-    let acceleration = |l: &matterix_ir::robot::JointLimits| l.acceleration.unwrap_or(l.velocity / RAMP.0);
-    let limits = Limits {
-        velocity: limits(&|l| l.velocity),
-        acceleration: limits(&acceleration),
-        jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
-    };
-    follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)
+fn timed(actor: &Actor, points: &[Vec<f64>], judge: &mut dyn Judge) -> Result<Part, Refused> {
+    let limits =
+        |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
+    let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
+    let trajectory = follow(points, &limits, Some(judge)).map_err(|_| Refused::NoWay)?;
+    Ok(Part { wait: 0.0, joints: actor.arm.clone(), trajectory })
+}
+
+/// The greatest acceleration of a joint, rad/s2 or m/s2.
+pub(super) fn acceleration(limits: &JointLimits) -> f64 {
+    limits.acceleration.unwrap_or(limits.velocity / RAMP.0)
+}
+
+/// The greatest jerk of a joint, rad/s3 or m/s3.
+pub(super) fn jerk(limits: &JointLimits) -> f64 {
+    limits.jerk.unwrap_or(acceleration(limits) / RAMP.1)
 }
