@@ -309,8 +309,7 @@ impl Stage<'_> {
                     parts.push(part);
                     return Ok(Performed { robot, parts });
                 }
-                // What meets says more than that no way was found.
-                Err(why @ Refused::Collides(_)) => refused = why,
+                // What meets says more than that no way was found, and the nearest says most.
                 Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
                 Err(_) => {}
             }
