@@ -1,6 +1,6 @@
 //! Protocols with one fault each, their twins without it, and further clean ones: what a check finds of them.
 //!
-//! They were written from the reference, not from the checker. `found.tsv` holds the first finding of each; it is written
+//! They were written from the reference, not from the checker; those of `tests/motions` have their faults in space. `found.tsv` holds the first finding of each; it is written
 //! anew with `MATTERIX_UPDATE=1`, and read before it is kept.
 
 use std::collections::BTreeMap;
@@ -41,16 +41,25 @@ fn findings(folder: &str) -> BTreeMap<String, Vec<(String, String, u64)>> {
 
 #[test]
 fn every_fault_is_found() {
-    let found = findings("tests/faults");
+    every_one_is_found("tests/faults");
+}
+
+#[test]
+fn every_fault_in_space_is_found() {
+    every_one_is_found("tests/motions");
+}
+
+fn every_one_is_found(folder: &str) {
+    let found = findings(folder);
     let mut table = String::new();
-    for file in files("tests/faults") {
+    for file in files(folder) {
         let name = Path::new(&file).file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let Some((severity, code, line)) = found.get(&name).and_then(|all| all.first()) else {
             panic!("`{name}`: nothing is found");
         };
         table.push_str(&format!("{name}\t{severity}\t{code}\t{line}\n"));
     }
-    let golden = root().join("tests/faults/found.tsv");
+    let golden = root().join(folder).join("found.tsv");
     if std::env::var_os("MATTERIX_UPDATE").is_some() {
         std::fs::write(&golden, &table).expect("the table can be written");
     }
@@ -59,7 +68,7 @@ fn every_fault_is_found() {
 
 #[test]
 fn what_has_no_fault_has_no_error() {
-    for folder in ["tests/faults/twins", "tests/faults/clean"] {
+    for folder in ["tests/faults/twins", "tests/faults/clean", "tests/motions/twins"] {
         for (name, all) in findings(folder) {
             assert!(all.iter().all(|(severity, ..)| severity != "error"), "{folder}/{name}: {all:?}");
         }

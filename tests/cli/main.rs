@@ -1,5 +1,6 @@
 //! The command from outside: what is typed, what comes back, what is left on disk.
 
+mod beforehand;
 mod bill;
 mod contents;
 mod determinism;

@@ -82,9 +82,6 @@ fn found(code: &Code, text: &str, name: &str, strict: bool) -> (Vec<String>, End
     } else {
         let mut args = vec!["check", "example.mtx", "--format", "json"];
         args.extend(strict.then_some("--strict"));
-        if code.family.starts_with('G') {
-            args.extend(["--fidelity", "motion"]);
-        }
         let ended = matterixc_in(&dir, &args);
         let lines = ended.out_lines();
         (ended, lines)

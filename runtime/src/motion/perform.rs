@@ -450,8 +450,8 @@ impl Stage<'_> {
             refused = Refused::NoWay;
         }
         let mut keep = |why: Refused| {
-            // What meets says more than that no way was found.
-            if !matches!(refused, Refused::Collides(_)) || matches!(why, Refused::Collides(_)) {
+            // What meets says more than that no way was found, and the nearest says most.
+            if !matches!(refused, Refused::Collides(_)) {
                 refused = why;
             }
         };

@@ -103,7 +103,8 @@ impl<'p, 's> Looker<'p, 's> {
             || stage.unknown.postures.contains(&robot)
             || stage.is_unknown(robot)
             || stage.is_unknown(item);
-        if blind && !stage.stands_on(robot, item) {
+        let stuck = stage.stands_on(robot, item);
+        if blind && !stuck {
             stage.carry(item, Some(robot));
             stage.unknown.places.insert(item);
             return;

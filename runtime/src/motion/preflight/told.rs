@@ -2,14 +2,14 @@
 
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::scene::{InstanceId, Scene, Stand};
 use matterix_ir::{Diagnostic, Span, codes};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
 use crate::motion::goal::targets;
 use crate::motion::perform::Refused;
-use crate::motion::stage::Stage;
+use crate::motion::stage::{Carried, Stage};
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
 pub fn finding(
@@ -89,10 +89,23 @@ pub fn finding(
         }
     }
     if let (Some(goal), Some([x, y])) = (goal, nearer) {
-        let moved = format!("{:.0}, {:.0}", x * 1e3, y * 1e3);
-        found = found.help(format!("`{}` is within reach if it stands ({moved}) mm from there", name(goal)));
+        found = found.help(within_reach(stage, goal, [x, y]));
     }
     Some(found)
+}
+
+/// Where a goal could be reached, if it is shifted by x and y, m: as its line says it, or from where it is.
+fn within_reach(stage: &Stage<'_>, goal: InstanceId, [x, y]: [f64; 2]) -> String {
+    let name = &stage.scene.get(goal).name;
+    match stage.carried.get(goal.0 as usize) {
+        Some(Carried::Stands(Stand::On(on, at))) if stage.is_where_it_was(goal) => {
+            let turned = Pose { position: [0.0; 3], ..stage.surface(*on) }.inverse();
+            let [dx, dy, _] = turned.point([x, y, 0.0]);
+            let [x, y] = [at.position[0] + dx, at.position[1] + dy].map(|v| v * 1e3);
+            format!("`{name}` is within reach at ({x:.0}, {y:.0}) mm on `{}`", stage.scene.get(*on).name)
+        }
+        _ => format!("`{name}` is within reach if it stands ({:.0}, {:.0}) mm from there", x * 1e3, y * 1e3),
+    }
 }
 
 fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, span: Span) -> Option<Diagnostic> {
@@ -117,6 +130,9 @@ fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, 
     }
 }
 
+/// How much of the way to the robot a goal is shifted at a time.
+const STEP: f64 = 0.05;
+
 /// How far a goal out of reach would have to be shifted to be reached, x and y in metres: the nearest place on the line to
 /// the robot.
 pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
@@ -127,15 +143,15 @@ pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
     let mut solver = Solver::new(actor.chain.clone());
     let now = actor.configuration();
     let targets = targets(stage, robot, goal, frame);
-    for share in (1..20).map(|k| f64::from(k) * 0.05) {
-        for target in &targets {
+    let mut shifted = |share: f64| {
+        targets.iter().find_map(|target| {
             let mut at: Pose = *target;
             (0..2).for_each(|k| at.position[k] += share * (base.position[k] - at.position[k]));
             let request = Request { attempts: 20, ..Request::new(pose(&base.inverse().then(at)), &now) };
-            if solver.solve(&request).is_ok() {
-                return Some([0, 1].map(|k| at.position[k] - target.position[k]));
-            }
-        }
-    }
-    None
+            solver.solve(&request).ok().map(|_| [0, 1].map(|k| at.position[k] - target.position[k]))
+        })
+    };
+    let first = (1..20).find(|k| shifted(f64::from(*k) * STEP).is_some())?;
+    // A step further in leaves room for what comes after.
+    shifted(f64::from(first + 1) * STEP).or_else(|| shifted(f64::from(first) * STEP))
 }

@@ -416,6 +416,7 @@ impl<'p> Walk<'p, '_> {
 /// After a statement that cannot be done, robots count as where they were, and things stand where their states say.
 fn recover<'p>(course: &mut Course<'p>, before: &Stage<'p>) {
     let after = std::mem::replace(&mut course.stage, before.clone());
+    course.stage.unknown.places.extend(&after.unknown.places);
     for (index, carried) in after.carried.iter().enumerate() {
         let (Carried::Stands(Stand::On(below, _)) | Carried::Held(below, _)) = carried else { continue };
         course.follow(InstanceId(index as u32), Some(*below));

@@ -1,0 +1,114 @@
+//! What is looked at of motions before a run, what is not, and what is remembered of it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::harness::{command, folder, write};
+
+/// A Panda, two hotplates and a beaker at this place, with these steps.
+fn bench(beaker: &str, steps: &str) -> String {
+    format!(
+        "mtx 1\n\nuse std::furniture::OpticalTable\nuse std::glassware::Beaker250mL\nuse std::heating::IkaRetControl\n\
+         use std::robots::{{FrankaHand, FrankaPanda}}\n\nlab bench {{\n    ambient: 25 degC\n    table = OpticalTable\n    \
+         panda = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
+         plate = IkaRetControl on table at (450, 200) mm\n    far = IkaRetControl on table at (800, -300) mm\n    \
+         beaker = Beaker250mL on table{beaker}\n}}\n\nworkflow carry in bench {{\n{steps}\n}}\n"
+    )
+}
+
+const NEAR: &str = " at (450, -250) mm";
+
+/// What a check prints, with its cache in this folder.
+fn check(dir: &Path, text: &str, more: &[&str]) -> String {
+    write(dir, "bench.mtx", text);
+    let mut command = command();
+    command.args(["check", "bench.mtx", "--format", "concise"]).args(more);
+    let ended = command.current_dir(dir).env("XDG_CACHE_HOME", dir.join("cache")).output().expect("the command starts");
+    String::from_utf8(ended.stdout).expect("text")
+}
+
+/// The files of the cache.
+fn kept(dir: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(dir.join("cache/matterixc")).into_iter().flatten().flatten();
+    let mut kept: Vec<PathBuf> = entries.map(|e| e.path()).collect();
+    kept.sort();
+    kept
+}
+
+#[test]
+fn a_failure_that_is_handled_is_a_warning() {
+    let dir = folder("beforehand_handled");
+    let other = "    try { place beaker on far by panda } else { place beaker on plate by panda }";
+    let found = check(&dir, &bench(NEAR, other), &[]);
+    assert!(found.contains("bench.mtx:18:11: warning[out-of-reach]"), "{found}");
+    assert!(!found.contains("error["), "{found}");
+    let handler = "    sequence { place beaker on far by panda } on unreachable { note \"too far\" }";
+    let found = check(&dir, &bench(NEAR, handler), &[]);
+    assert!(found.contains("warning[out-of-reach]") && !found.contains("error["), "{found}");
+}
+
+#[test]
+fn what_fails_on_one_way_only_is_a_warning() {
+    let dir = folder("beforehand_may");
+    let steps = "    let warm = beaker.contents.temperature\n    if warm > 30 degC { move panda to plate.pre_place }\n    \
+                 slide panda to beaker.grasp";
+    let found = check(&dir, &bench(NEAR, steps), &[]);
+    assert!(found.contains("bench.mtx:20:5: "), "{found}");
+}
+
+#[test]
+fn what_has_no_known_place_is_passed_over() {
+    let dir = folder("beforehand_unknown");
+    let text = bench(NEAR, "    place beaker on plate by panda").replace(" at (450, 200) mm", "").replace(NEAR, "");
+    assert_eq!(check(&dir, &text, &["--strict"]).trim(), "", "{text}");
+}
+
+#[test]
+fn process_fidelity_leaves_motions_out() {
+    let dir = folder("beforehand_process");
+    let text = bench(NEAR, "    place beaker on far by panda");
+    assert!(check(&dir, &text, &[]).contains("error[out-of-reach]"));
+    assert!(!check(&dir, &text, &["--fidelity", "process"]).contains("out-of-reach"));
+}
+
+#[test]
+fn what_was_planned_is_remembered_and_said_in_the_same_bytes() {
+    let dir = folder("beforehand_cache");
+    let text = bench(NEAR, "    place beaker on plate by panda\n    place beaker on far by panda");
+    let without = check(&dir, &text, &["--no-cache"]);
+    assert!(without.contains("error[out-of-reach]"), "{without}");
+    assert!(kept(&dir).is_empty(), "nothing is kept with `--no-cache`");
+    let cold = check(&dir, &text, &[]);
+    let files = kept(&dir);
+    assert_eq!(files.len(), 1, "one lab");
+    let bytes = fs::read(&files[0]).expect("the cache");
+    let warm = check(&dir, &text, &[]);
+    assert_eq!((&without, &cold), (&cold, &warm));
+    assert_eq!(fs::read(&files[0]).expect("the cache"), bytes, "nothing new, nothing written");
+
+    // The same motions on other lines are not planned again.
+    let moved = bench(NEAR, "    note \"first\"\n    place beaker on plate by panda\n    place beaker on far by panda");
+    assert!(check(&dir, &moved, &[]).contains("bench.mtx:20:5: error[out-of-reach]"));
+    assert_eq!(fs::read(&files[0]).expect("the cache"), bytes);
+    // Another lab is another matter.
+    check(&dir, &bench(" at (440, -250) mm", "    place beaker on plate by panda"), &[]);
+    assert_eq!(kept(&dir).len(), 2);
+}
+
+#[test]
+fn a_damaged_cache_is_ignored_and_written_anew() {
+    let dir = folder("beforehand_damaged");
+    let text = bench(NEAR, "    place beaker on far by panda");
+    let first = check(&dir, &text, &[]);
+    let file = kept(&dir).remove(0);
+    let good = fs::read(&file).expect("the cache");
+    let foreign = [&b"0123456789abcdef0123456789abcdef\n{}"[..], b"", b"\xff\xfe", &good[..good.len() / 2]];
+    let mut bent = good.clone();
+    let middle = bent.len() / 2;
+    bent[middle] ^= 1;
+    for damaged in foreign.into_iter().chain([bent.as_slice()]) {
+        fs::write(&file, damaged).expect("the cache can be written");
+        assert_eq!(check(&dir, &text, &[]), first);
+        assert_eq!(fs::read(&file).expect("the cache"), good);
+    }
+}
