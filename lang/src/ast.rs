@@ -369,6 +369,28 @@ pub struct At {
     pub turned: Option<Expr>,
 }
 
+/// A joint of an asset and what it follows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Jointed {
+    /// Its name, and that of the part it carries.
+    pub name: Name,
+    /// How that moves; a joint of the asset's description without it.
+    pub way: Option<Way>,
+    /// How far it has moved: a length or an angle.
+    pub by: Expr,
+}
+
+/// How a part of an asset moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Way {
+    /// Along its axis instead of about it.
+    pub slides: bool,
+    /// Three numbers.
+    pub axis: Expr,
+    /// Where the part is before it has moved; at the origin without it.
+    pub at: Option<At>,
+}
+
 /// A line of an asset.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AssetLine {
@@ -390,6 +412,8 @@ pub enum AssetLine {
         /// Its pose; at the origin without one.
         at: Option<At>,
     },
+    /// `joint lid turns (1, 0, 0) at (0, 0, 90) mm by choose(lid == open, 100 deg, 0 deg)`: a part of it that moves.
+    Joint(Box<Jointed>),
     /// Links and joints, from the file at this place.
     Robot(Box<matterix_ir::robot::Robot>, Span),
     /// `lid = Lid { ... }`: a child asset.
@@ -741,6 +765,13 @@ pub enum ClauseKind {
         /// The robot.
         by: Expr,
     },
+    /// `leads door.handle by arm`: to where the step's effects put it.
+    Leads {
+        /// A frame on a part that moves.
+        handle: Expr,
+        /// The robot.
+        by: Expr,
+    },
     /// `frees item on target by arm`.
     Frees {
         /// What.
@@ -750,6 +781,16 @@ pub enum ClauseKind {
         /// The robot.
         by: Expr,
     },
+}
+
+impl ClauseKind {
+    /// Whether it says what a robot does with its body.
+    pub fn is_motion(&self) -> bool {
+        matches!(
+            self,
+            ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. } | ClauseKind::Leads { .. }
+        )
+    }
 }
 
 /// One effect.

@@ -40,4 +40,4 @@ pub fn file(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
 }
 
-modules! { "bodies" "centrifuges" "chemistry" "closures" "devices" "furniture" "glassware" "hazards" "heating" "labware" "materials" "math" "opentrons" "pipetting" "prelude" "reactivity" "robots" "shakers" "skills" "species" "thermal" "units" "vials" }
+modules! { "bodies" "centrifuges" "chemistry" "closures" "devices" "doors" "fixtures" "furniture" "glassware" "hazards" "heating" "labware" "materials" "math" "opentrons" "pipetting" "prelude" "reactivity" "robots" "shakers" "skills" "species" "thermal" "units" "vials" }

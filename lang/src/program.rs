@@ -563,7 +563,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
         let support = inst.placed.first().map(|p| p.1);
-        let Geometry { frames, shape, solids } = lab.geometry(id);
+        let Geometry { frames, shape, solids, moving } = lab.geometry(id);
         instances.push(matterix_ir::scene::Instance {
             name,
             kind: lab.kind_names(id),
@@ -574,7 +574,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             frames,
             shape,
             solids,
-            articulation: lab.articulation(id).map(Box::new),
+            articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });
     }

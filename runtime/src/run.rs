@@ -92,12 +92,12 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
         Err(fault) => return refused(program, fault),
     };
     let mut sim = Sim::new(engine, &prepared, options.seed);
-    if options.fidelity == Fidelity::Motion {
-        sim = match Stage::new(&program.scene) {
-            Ok(stage) => sim.with_motion(stage),
-            Err(message) => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
-        };
-    }
+    let moves = options.fidelity == Fidelity::Motion;
+    sim = match Stage::new(program) {
+        Ok(stage) if moves || !stage.fixtures.is_empty() => sim.with_stage(stage, moves, out),
+        Err(message) if moves => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
+        _ => sim,
+    };
     let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
     let engine = sim.engine();
     let finished = engine.finish(out);

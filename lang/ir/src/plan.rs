@@ -162,6 +162,15 @@ pub enum Motion {
         /// The robot.
         by: InstanceId,
     },
+    /// Takes a part of a thing that moves, by a frame on it, to where the effects at the operation's end put it.
+    Lead {
+        /// The thing.
+        item: InstanceId,
+        /// The frame.
+        frame: String,
+        /// The robot.
+        by: InstanceId,
+    },
     /// Opens its gripper.
     Free {
         /// What it held.

@@ -1,7 +1,8 @@
-//! What a robot does with its body in a primitive: `moves`, `grips`, `frees`.
+//! What a robot does with its body in a primitive: `moves`, `grips`, `frees`, `leads`.
 
 use matterix_ir::plan::Motion;
 use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, codes};
 
 use super::Planner;
 use crate::ast::{ClauseKind, Expr};
@@ -28,6 +29,19 @@ impl<'a> Planner<'a, '_> {
                     None => None,
                 };
                 Some(Motion::Free { item: self.thing(item, scope)?, on, by: self.thing(by, scope)? })
+            }
+            ClauseKind::Leads { handle, by } => {
+                let (item, frame) = self.goal(handle, scope)?;
+                if !self.lab.prototype && self.lab.rides_on(item, &frame).is_none() {
+                    self.lab.report(Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        handle.span,
+                        format!("`{}` has nothing that moves at `{frame}`", self.lab.instances[item.0 as usize].name),
+                        "a frame given `from` a joint is led",
+                    ));
+                    return None;
+                }
+                Some(Motion::Lead { item, frame, by: self.thing(by, scope)? })
             }
             _ => None,
         }

@@ -6,7 +6,7 @@
 pub mod dry;
 pub mod noise;
 pub mod sim;
-mod unknown;
+pub(crate) mod unknown;
 mod watch;
 
 use matterix_ir::NodeId;

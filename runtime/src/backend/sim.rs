@@ -18,6 +18,8 @@ use crate::process::{Advance, Engine, Watch};
 /// Simulates at `process` fidelity, or with robots that move through space.
 pub struct Sim<'m> {
     stage: Option<Stage<'m>>,
+    /// Robots move through space.
+    moves: bool,
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
@@ -56,22 +58,53 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Sim { stage: None, engine, prepared, seed, running, started: 0, sampled, told }
+        Sim { stage: None, moves: false, engine, prepared, seed, running, started: 0, sampled, told }
     }
 
-    /// Robots move through space from now on: their motions take the time they need, and fail where there is no way.
-    pub fn with_motion(self, stage: Stage<'m>) -> Self {
-        Sim { stage: Some(stage), ..self }
+    /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
+    /// no way.
+    pub fn with_stage(self, stage: Stage<'m>, moves: bool, out: &mut dyn Listener) -> Self {
+        let mut sim = Sim { stage: Some(stage), moves, ..self };
+        sim.follow_joints(0.0, out);
+        sim
+    }
+
+    /// Joints stand where the model says; how they get there in so many seconds is told.
+    fn follow_joints(&mut self, lasts: f64, out: &mut dyn Listener) {
+        let Some(stage) = self.stage.as_mut().filter(|stage| !stage.fixtures.is_empty()) else { return };
+        let engine = &self.engine;
+        let moved = stage.follow_joints(|node| Some(engine.eval(node)));
+        if !moved.is_empty() {
+            out.travels(&stage.swings(&moved, engine.time(), lasts, FRAME));
+        }
+    }
+
+    /// The value of a node when an operation has ended.
+    fn after(&self, operation: &Operation, node: NodeId) -> f64 {
+        let mut states = self.engine.states().to_vec();
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let value = self.engine.eval_with(*value, &states);
+            if let Some(slot) = states.get_mut(*state as usize) {
+                *slot = value;
+            }
+        }
+        self.engine.eval_with(node, &states)
     }
 
     /// Carries out the motion of an operation; how long it takes, if it takes time.
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
-        let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
-        let shift = match motion {
+        let Some(motion) = operation.motion.as_ref().filter(|_| self.moves) else { return Ok(None) };
+        let given = match motion {
             Motion::By { shift, .. } => shift.map(|node| self.engine.eval(node)),
+            Motion::Lead { .. } => {
+                let led = self.stage.as_ref().and_then(|stage| stage.led_by(motion));
+                [led.map_or(f64::NAN, |node| self.after(operation, node)), 0.0, 0.0]
+            }
             _ => [0.0; 3],
         };
-        let performed = stage.perform(motion, shift)?;
+        let Some(stage) = self.stage.as_mut() else { return Ok(None) };
+        let performed = stage.perform(motion, given)?;
         Ok(performed.map(|performed| {
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()
@@ -203,6 +236,11 @@ impl Backend for Sim<'_> {
         };
         self.engine.apply(&operation.at_start, out)?;
         self.follow_supports(&operation.at_start);
+        let lasts = match &ends {
+            Ends::At(end) => end - self.engine.time(),
+            _ => 0.0,
+        };
+        self.follow_joints(lasts, out);
         let ticket = Ticket(self.started);
         self.started += 1;
         self.running.insert(ticket, Running { ends, at_end: operation.at_end.clone() });
@@ -219,6 +257,7 @@ impl Backend for Sim<'_> {
             }
             self.engine.apply(&running.at_end, out)?;
             self.follow_supports(&running.at_end);
+            self.follow_joints(0.0, out);
         }
         Ok(Status::Done)
     }
@@ -229,6 +268,7 @@ impl Backend for Sim<'_> {
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         let advance = self.engine.advance(until, watches, out)?;
+        self.follow_joints(0.0, out);
         if let Advance::Watch(indices) = &advance {
             let fired = indices.iter().filter_map(|&i| watches.get(i)).filter(|w| w.value);
             fired.for_each(|w| self.end_when(w.node));

@@ -9,6 +9,7 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 
+use super::fixture::Led;
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -26,30 +27,47 @@ const SAMPLES: usize = 60_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
 const RAMP: (f64, f64) = (0.3, 0.1);
 
+/// Some joints of a robot moving together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Which of those that move by themselves.
+    pub variables: Vec<usize>,
+    /// How.
+    pub way: Trajectory,
+}
+
 /// What a robot did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Performed {
     /// The robot.
     pub robot: InstanceId,
-    /// Of the joints that move its tip, one after the other.
-    pub parts: Vec<Trajectory>,
+    /// All its joints when it began, rad or m.
+    pub begun: Vec<f64>,
+    /// One after the other.
+    pub parts: Vec<Part>,
+    /// What its hand took along.
+    pub led: Option<Led>,
 }
 
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.iter().map(Trajectory::duration).sum()
+        self.parts.iter().map(|part| part.way.duration()).sum()
     }
 
-    /// The joints that move the tip at a time since the beginning, s.
+    /// All joints at a time since the beginning, s.
     pub fn at(&self, mut time: f64) -> Vec<f64> {
+        let mut joints = self.begun.clone();
         for part in &self.parts {
-            if time <= part.duration() {
-                return part.at(time).position;
+            let lasts = part.way.duration();
+            let positions = part.way.at(time.min(lasts)).position;
+            part.variables.iter().zip(positions).for_each(|(variable, q)| joints[*variable] = q);
+            time -= lasts;
+            if time <= 0.0 {
+                break;
             }
-            time -= part.duration();
         }
-        self.parts.last().map(|p| p.at(p.duration()).position).unwrap_or_default()
+        joints
     }
 }
 
@@ -103,7 +121,7 @@ impl Refused {
     pub fn text(&self, scene: &Scene, operation: &Operation) -> String {
         let mover = match &operation.motion {
             Some(Motion::To { mover: by, .. } | Motion::By { mover: by, .. }) => *by,
-            Some(Motion::Grip { by, .. } | Motion::Free { by, .. }) => *by,
+            Some(Motion::Grip { by, .. } | Motion::Free { by, .. } | Motion::Lead { by, .. }) => *by,
             None => return String::new(),
         };
         let name = &scene.get(mover).name;
@@ -135,8 +153,9 @@ pub struct Meeting {
 }
 
 impl Stage<'_> {
-    /// Carries out a motion. `shift` gives the values of a relative one, m.
-    pub fn perform(&mut self, motion: &Motion, shift: [f64; 3]) -> Result<Option<Performed>, Refused> {
+    /// Carries out a motion. `given` is how far a relative one goes, m; of one that takes a part along, its first number
+    /// is where the joint of that part then stands, rad or m.
+    pub fn perform(&mut self, motion: &Motion, given: [f64; 3]) -> Result<Option<Performed>, Refused> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -149,7 +168,7 @@ impl Stage<'_> {
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let mut to = self.tip(robot);
-                (0..3).for_each(|k| to.position[k] += shift[k]);
+                (0..3).for_each(|k| to.position[k] += given[k]);
                 self.go(robot, &[to], *straight, None).map(Some)
             }
             Motion::Grip { item, by } => {
@@ -161,6 +180,15 @@ impl Stage<'_> {
                 }
                 self.carry(*item, Some(robot));
                 Ok(None)
+            }
+            Motion::Lead { item, frame, by } => {
+                let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
+                let to = targets(self, robot, *item, frame);
+                let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
+                if far > TOLERANCE.0 || turned > TOLERANCE.1 {
+                    return Err(Refused::Misplaced(far, turned));
+                }
+                self.lead(robot, *item, frame, given[0]).map(Some)
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -185,8 +213,12 @@ impl Stage<'_> {
 
     /// A robot and what it holds as they are now, for a recording.
     pub fn moment(&self, robot: InstanceId, time: f64) -> Option<Moment> {
-        let actor = self.actors.get(&robot)?;
         let base = self.pose(robot);
+        if let Some(fixture) = self.fixtures.get(&robot) {
+            let links = fixture.links().into_iter().map(|l| base.then(l)).collect();
+            return Some(Moment { time, robot, joints: fixture.joints.clone(), links, held: None });
+        }
+        let actor = self.actors.get(&robot)?;
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
         Some(Moment { time, robot, joints: actor.joints.clone(), links, held })
@@ -195,14 +227,22 @@ impl Stage<'_> {
     /// Moments of a motion that has been carried out and began at a time, s, at most so far apart.
     pub fn moments(&self, performed: &Performed, begin: f64, apart: f64) -> Vec<Moment> {
         let mut stage = self.clone();
+        let robot = performed.robot;
+        performed.led.iter().for_each(|led| stage.undrag(led));
         let steps = (performed.duration() / apart).ceil().max(1.0) as u32;
-        (0..=steps)
-            .filter_map(|step| {
-                let since = performed.duration() * f64::from(step) / f64::from(steps);
-                stage.settle(performed.robot, &performed.at(since));
-                stage.moment(performed.robot, begin + since)
-            })
-            .collect()
+        let mut out = Vec::new();
+        for step in 0..=steps {
+            let since = performed.duration() * f64::from(step) / f64::from(steps);
+            if let Some(actor) = stage.actors.get_mut(&robot) {
+                actor.joints = performed.at(since);
+            }
+            if let Some(led) = &performed.led {
+                let item = stage.dragged(led, robot);
+                out.extend(stage.moment(item, begin + since));
+            }
+            out.extend(stage.moment(robot, begin + since));
+        }
+        out
     }
 
     /// Distance and angle from the tip to the nearest of some poses.
@@ -219,16 +259,28 @@ impl Stage<'_> {
         straight: bool,
         goal: Option<InstanceId>,
     ) -> Result<Performed, Refused> {
-        let mut parts = Vec::new();
+        let (mut parts, begun) = (Vec::new(), self.joints(robot));
         if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
             let mut back = self.tip(robot);
             back.position = back.point([0.0, 0.0, -RETREAT]);
-            parts.push(self.line(robot, &back, &[item])?);
+            parts.push(self.along(robot, &[back], &[item])?);
         }
         self.leave(robot);
-        let base = self.pose(robot).inverse();
+        parts.extend(self.reach(robot, to, straight, goal)?);
+        Ok(Performed { robot, begun, parts, led: None })
+    }
+
+    /// Brings the tip to one of some poses from where the robot stands.
+    pub(super) fn stretch(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        straight: bool,
+        goal: Option<InstanceId>,
+    ) -> Result<Part, Refused> {
+        let base = self.foot(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let now = actor.configuration();
+        let (now, actor_arm) = (actor.configuration(), actor.arm.clone());
         let mut solver = Solver::new(actor.chain.clone());
         let mut found: Vec<(f64, &Pose, Vec<f64>)> = Vec::new();
         let mut missed: Option<Unreached> = None;
@@ -252,14 +304,11 @@ impl Stage<'_> {
         }
         for (_, target, q) in found {
             let tried = match straight {
-                true => self.line(robot, target, goal.as_slice()),
-                false => self.way(robot, &q),
+                true => self.along(robot, std::slice::from_ref(target), goal.as_slice()),
+                false => self.way(robot, &actor_arm, &q),
             };
             match tried {
-                Ok(part) => {
-                    parts.push(part);
-                    return Ok(Performed { robot, parts });
-                }
+                Ok(part) => return Ok(part),
                 // What meets says more than that no way was found.
                 Err(why @ Refused::Collides(_)) => refused = why,
                 Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
@@ -269,25 +318,25 @@ impl Stage<'_> {
         Err(refused)
     }
 
-    /// A free way to a configuration.
-    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Trajectory, Refused> {
+    /// A free way of some joints to where they are to stand; the others do not move.
+    pub(super) fn way(&mut self, robot: InstanceId, variables: &[usize], q: &[f64]) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let figure = self.figure(robot, actor)?;
+        let figure = self.figure(robot, actor, variables)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let settings = Settings { iterations: SAMPLES, ..Settings::default() };
         let route =
-            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
+            plan::plan(&mut checker, &actor.positions(variables), q, &settings).map_err(|failure| match failure {
                 plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
                 _ => Refused::NoWay,
             })?;
-        let part = timed(actor, &route.points, &mut checker)?;
-        self.settle(robot, q);
+        let part = timed(actor, variables, &route.points, &mut checker)?;
+        self.settle(robot, variables, q);
         Ok(part)
     }
 
-    /// A straight line of the tip to a pose; things it comes up to or leaves may be touched.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Trajectory, Refused> {
+    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    pub(super) fn along(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
@@ -296,32 +345,43 @@ impl Stage<'_> {
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
         let around = Surroundings::of(self, robot, &without);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let to = pose(&self.pose(robot).inverse().then(*to));
-        let figure = self.figure(robot, actor)?;
+        let foot = self.foot(robot).inverse();
+        let figure = self.figure(robot, actor, &actor.arm)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let mut solver = Solver::new(actor.chain.clone());
-        let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
-        let mut points = followed.map_err(|blocked| match blocked {
-            Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-            Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
-        })?;
-        let part = timed(actor, &points, &mut checker)?;
+        let mut points = vec![actor.configuration()];
+        for to in to {
+            let now = points.pop().unwrap_or_default();
+            let followed = plan::straight(&mut solver, &mut checker, &now, &pose(&foot.then(*to)), &STRIDE);
+            points.extend(followed.map_err(|blocked| match blocked {
+                Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
+                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+                Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
+            })?);
+        }
+        let variables = actor.arm.clone();
+        let part = timed(actor, &variables, &points, &mut checker)?;
         let end = points.pop().unwrap_or_default();
-        self.settle(robot, &end);
+        self.settle(robot, &variables, &end);
         Ok(part)
     }
 
-    fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor, moved: &[usize]) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
-        Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
+        Figure::new(actor.to_plan(), &base, moved, &actor.joints, &held).map_err(|_| Refused::NoRobot)
     }
 
-    fn settle(&mut self, robot: InstanceId, q: &[f64]) {
+    /// Joints of a robot stand like this from now on.
+    pub(super) fn settle(&mut self, robot: InstanceId, variables: &[usize], q: &[f64]) {
         if let Some(actor) = self.actors.get_mut(&robot) {
-            actor.set(q);
+            variables.iter().zip(q).for_each(|(variable, q)| actor.joints[*variable] = *q);
         }
+    }
+
+    /// All joints of a robot as they stand, rad or m.
+    pub(super) fn joints(&self, robot: InstanceId) -> Vec<f64> {
+        self.actors.get(&robot).map(|actor| actor.joints.clone()).unwrap_or_default()
     }
 
     /// The deepest contact in words.
@@ -350,9 +410,9 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Trajectory, Refused> {
+fn timed(actor: &Actor, variables: &[usize], points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
     let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
-        actor.chain.variables().iter().map(|v| f(&v.limits)).collect()
+        variables.iter().filter_map(|i| actor.tree.variables().get(*i)).map(|v| f(&v.limits)).collect()
     };
     let acceleration = |l: &matterix_ir::robot::JointLimits| l.acceleration.unwrap_or(l.velocity / RAMP.0);
     let limits = Limits {
@@ -360,5 +420,6 @@ fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Resul
         acceleration: limits(&acceleration),
         jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
     };
-    follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)
+    let way = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
+    Ok(Part { variables: variables.to_vec(), way })
 }

@@ -6,28 +6,38 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::model::{Action, Domain};
+use matterix_ir::model::{Action, Domain, Model};
 use matterix_ir::plan::{Motion, Operation, Step, StepId};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
-use matterix_ir::{Diagnostic, Program, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
+use super::fixture::initial;
 use super::perform::Refused;
 use super::stage::{Carried, Stage};
+use crate::backend::unknown::{Known, eval};
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
 
 /// What would go wrong with the motions of a program. Empty for labs without robots that have joints.
 pub fn preflight(program: &Program) -> Vec<Diagnostic> {
-    let Ok(stage) = Stage::new(&program.scene) else { return Vec::new() };
+    let Ok(stage) = Stage::new(program) else { return Vec::new() };
     if stage.actors.is_empty() {
         return Vec::new();
     }
-    let mut walk =
-        Walk { program, stage, found: Vec::new(), told: BTreeSet::new(), site: Vec::new(), lost: false, left: MOST };
+    let mut walk = Walk {
+        program,
+        stage,
+        states: still(program),
+        found: Vec::new(),
+        told: BTreeSet::new(),
+        site: Vec::new(),
+        lost: false,
+        left: MOST,
+    };
     walk.step(program.plan.root);
     walk.found
 }
@@ -35,6 +45,8 @@ pub fn preflight(program: &Program) -> Vec<Diagnostic> {
 struct Walk<'p> {
     program: &'p Program,
     stage: Stage<'p>,
+    /// Values of states as far as they are known: what moves by itself is not, nor what was set to something unknown.
+    states: Vec<Option<f64>>,
     found: Vec<Diagnostic>,
     /// Statements of the user that have been reported.
     told: BTreeSet<Span>,
@@ -141,7 +153,7 @@ impl<'p> Walk<'p> {
         if let Some(motion) = &operation.motion {
             self.left -= 1;
             if !self.lost
-                && let Err(refused) = self.motion(motion)
+                && let Err(refused) = self.motion(motion, operation)
             {
                 self.lost = true;
                 let site = self.site.last().copied().unwrap_or(span);
@@ -154,15 +166,42 @@ impl<'p> Walk<'p> {
         }
         for action in operation.at_start.iter().chain(&operation.at_end) {
             let Action::Assign { state, value, .. } = action else { continue };
+            let value = self.value(*value);
+            if let Some(slot) = self.states.get_mut(*state as usize) {
+                *slot = value;
+            }
             let Some(state) = self.program.model.states.get(*state as usize) else { continue };
-            let Some(value) = self.program.model.graph.constant(*value) else { continue };
+            let Some(value) = value else { continue };
             if let Some(id) = supported(&self.program.scene, &state.name, &state.domain) {
                 self.stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
             }
         }
+        if !self.stage.fixtures.is_empty() {
+            let mut stage = self.stage.clone();
+            stage.follow_joints(|node| self.value(node));
+            self.stage = stage;
+        }
     }
 
-    fn motion(&mut self, motion: &Motion) -> Result<(), Refused> {
+    /// What a node is worth as far as the states are known that steps before gave a value.
+    fn value(&self, node: NodeId) -> Option<f64> {
+        known(&self.program.model, node, &self.states)
+    }
+
+    /// The same when an operation has ended.
+    fn after(&self, operation: &Operation, node: NodeId) -> Option<f64> {
+        let mut states = self.states.clone();
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let value = known(&self.program.model, *value, &states);
+            if let Some(slot) = states.get_mut(*state as usize) {
+                *slot = value;
+            }
+        }
+        known(&self.program.model, node, &states)
+    }
+
+    fn motion(&mut self, motion: &Motion, operation: &Operation) -> Result<(), Refused> {
         let shift = match motion {
             Motion::By { shift, .. } => {
                 let known: Option<Vec<f64>> =
@@ -171,6 +210,11 @@ impl<'p> Walk<'p> {
                 let Some(known) = known.and_then(|k| <[f64; 3]>::try_from(k).ok()) else { return Ok(()) };
                 known
             }
+            Motion::Lead { .. } => {
+                let to = self.stage.led_by(motion).and_then(|node| self.after(operation, node));
+                let Some(to) = to else { return Ok(()) };
+                [to, 0.0, 0.0]
+            }
             _ => [0.0; 3],
         };
         self.stage.perform(motion, shift).map(|_| ())
@@ -178,7 +222,9 @@ impl<'p> Walk<'p> {
 
     fn finding(&self, motion: &Motion, refused: &Refused, span: Span) -> Option<Diagnostic> {
         let scene = &self.program.scene;
-        let (Motion::To { mover: robot, .. } | Motion::By { mover: robot, .. }) = motion else {
+        let (Motion::To { mover: robot, .. } | Motion::By { mover: robot, .. } | Motion::Lead { by: robot, .. }) =
+            motion
+        else {
             let (Motion::Grip { item, by } | Motion::Free { item, by, .. }) = motion else { return None };
             let Refused::Misplaced(far, _) = refused else { return None };
             let (item, by) = (&scene.get(*item).name, &scene.get(*by).name);
@@ -187,7 +233,7 @@ impl<'p> Walk<'p> {
         };
         let name = &scene.get(*robot).name;
         let goal = match motion {
-            Motion::To { goal, .. } => Some(*goal),
+            Motion::To { goal, .. } | Motion::Lead { item: goal, .. } => Some(*goal),
             _ => None,
         };
         let to = goal.map_or("there".to_string(), |g| format!("`{}`", scene.get(g).name));
@@ -224,7 +270,11 @@ impl<'p> Walk<'p> {
                 format!("no way was found for `{name}` to {to}"),
                 "nothing is in the way at its end, but between",
             ),
-            Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
+            Refused::Misplaced(far, _) => {
+                let headline = format!("`{name}` is not at {to}: {:.0} mm are between them", far * 1e3);
+                Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip")
+            }
+            Refused::NoRobot | Refused::NoFrame | Refused::NotHeld => return None,
         };
         Some(match goal.filter(|g| scene.get(*g).span != span) {
             Some(goal) => found.because(scene.get(goal).span, format!("`{}` stands here", scene.get(goal).name)),
@@ -237,7 +287,7 @@ impl<'p> Walk<'p> {
         let Motion::To { frame, .. } = motion else { return None };
         let robot = self.stage.actor_of(robot)?;
         let targets = super::goal::targets(&self.stage, robot, goal, frame);
-        let base = self.stage.pose(robot);
+        let base = self.stage.foot(robot);
         let actor = self.stage.actors.get(&robot)?;
         let mut solver = Solver::new(actor.chain.clone());
         let now = actor.configuration();
@@ -260,6 +310,30 @@ impl<'p> Walk<'p> {
     }
 }
 
+/// States when a run begins, but for those that move by themselves or by events.
+fn still(program: &Program) -> Vec<Option<f64>> {
+    let model = &program.model;
+    let mut states: Vec<Option<f64>> =
+        model.states.iter().map(|s| Some(initial(program, s.initial)).filter(|v| v.is_finite())).collect();
+    let acted = model.events.iter().flat_map(|e| &e.actions).filter_map(|action| match action {
+        Action::Assign { state, .. } => Some(*state),
+        Action::Move { .. } => None,
+    });
+    let amounts = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|e| e.1));
+    for state in model.derivatives.iter().map(|d| d.state).chain(acted).chain(amounts) {
+        if let Some(slot) = states.get_mut(state as usize) {
+            *slot = None;
+        }
+    }
+    states
+}
+
+fn known(model: &Model, node: NodeId, states: &[Option<f64>]) -> Option<f64> {
+    let params: Vec<f64> = model.params.iter().map(|p| p.value).collect();
+    eval(&model.graph, node, Known { time: f64::NAN, states, params: &params, locals: &[], readings: &[] })
+        .filter(|v| v.is_finite())
+}
+
 /// The instance of which a state says what it stands on.
 pub fn supported(scene: &matterix_ir::scene::Scene, state: &str, domain: &Domain) -> Option<InstanceId> {
     let owner = state.strip_suffix(".support").filter(|_| *domain == Domain::Instance)?;
@@ -270,11 +344,11 @@ impl Stage<'_> {
     /// Something else carries a thing from now on, as a state of the model says. Where that is not so already, the thing
     /// comes to its new place at once.
     pub fn follow(&mut self, id: InstanceId, by: Option<InstanceId>) {
-        let carrier = by.map(|by| self.actor_of(by).unwrap_or(by));
+        let carrier = by.map(|by| self.holder(by).unwrap_or(by));
         if self.below(id) == carrier || self.below(id) == by {
             return;
         }
-        match by.filter(|by| self.actor_of(*by).is_none()) {
+        match by.filter(|by| self.holder(*by).is_none()) {
             Some(on) => self.put(id, on, Pose::IDENTITY),
             None => self.carry(id, by),
         }

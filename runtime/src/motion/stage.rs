@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
+use matterix_ir::Program;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Robot;
-use matterix_ir::scene::{InstanceId, Scene, Stand};
+use matterix_ir::scene::{InstanceId, Scene, Stand, frame};
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 
 use super::assembly::{Assembly, assemble};
+use super::fixture::{Fixture, following, initial};
 
 /// What carries a thing and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,12 +29,14 @@ pub struct Actor {
     pub assembly: Assembly,
     /// Every link.
     pub tree: Tree,
-    /// From its foot to what is brought to a goal.
+    /// From the link it reaches from to what is brought to a goal.
     pub chain: Chain,
     /// Positions of all that moves, rad or m.
     pub joints: Vec<f64>,
     /// Indices into `joints` of those that move the tip.
     pub arm: Vec<usize>,
+    /// Of those that drive it about.
+    pub drive: Vec<usize>,
     /// Shared by all copies of a stage.
     to_plan: Arc<OnceLock<Robot>>,
 }
@@ -48,26 +52,37 @@ pub struct Stage<'p> {
     before: BTreeMap<InstanceId, Stand>,
     /// By instance.
     pub actors: BTreeMap<InstanceId, Actor>,
+    /// Things with parts that move as the model says.
+    pub fixtures: BTreeMap<InstanceId, Fixture>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
 }
 
 impl<'p> Stage<'p> {
     /// The lab when the run begins. Robots whose description cannot be moved are named.
-    pub fn new(scene: &'p Scene) -> Result<Self, String> {
+    pub fn new(program: &'p Program) -> Result<Self, String> {
+        let scene = &program.scene;
         let carried = scene.stands().into_iter().map(Carried::Stands).collect();
-        let mut actors = BTreeMap::new();
+        let (mut actors, mut fixtures) = (BTreeMap::new(), BTreeMap::new());
         for (index, instance) in scene.instances.iter().enumerate() {
             let id = InstanceId(index as u32);
-            let mounted = instance.owner.is_some_and(|o| scene.get(o).articulation.is_some());
+            let wrong = |why: String| format!("`{}` cannot be moved: {why}", instance.name);
+            if let Some(articulation) = following(scene, id) {
+                fixtures.insert(id, Fixture::new(articulation).map_err(wrong)?);
+                continue;
+            }
+            let carries = |o: InstanceId| scene.get(o).articulation.is_some() && following(scene, o).is_none();
+            let mounted = instance.owner.is_some_and(carries);
             if instance.articulation.is_none() || mounted {
                 continue;
             }
             let Some(assembly) = assemble(scene, id) else { continue };
-            let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
-            actors.insert(id, actor);
+            actors.insert(id, Actor::new(assembly).map_err(wrong)?);
         }
-        Ok(Stage { scene, carried, before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+        let (before, freed) = (BTreeMap::new(), BTreeMap::new());
+        let mut stage = Stage { scene, carried, before, actors, fixtures, freed };
+        stage.follow_joints(|node| Some(initial(program, node)));
+        Ok(stage)
     }
 
     /// The robot an instance is or is part of.
@@ -80,9 +95,37 @@ impl<'p> Stage<'p> {
         }
     }
 
+    /// The robot that holds what an instance carries: the instance is that robot, or a tool mounted on it.
+    pub fn holder(&self, id: InstanceId) -> Option<InstanceId> {
+        self.actor_of(id).filter(|robot| *robot == id || self.scene.get(id).articulation.is_some())
+    }
+
+    /// Things whose links move, with their descriptions.
+    pub fn movers(&self) -> impl Iterator<Item = (InstanceId, &Robot, &Tree)> {
+        let robots = self.actors.iter().map(|(id, actor)| (*id, &actor.assembly.robot, &actor.tree));
+        let fixtures = self.fixtures.iter().filter_map(|(id, fixture)| {
+            following(self.scene, *id).map(|articulation| (*id, &articulation.robot, &fixture.tree))
+        });
+        robots.chain(fixtures)
+    }
+
     /// Where an instance is in the lab.
     pub fn pose(&self, id: InstanceId) -> Pose {
-        self.scene.in_lab(id, |id| self.stand(id))
+        self.scene.in_lab_on(id, |id| self.stand(id), |id| self.top(id))
+    }
+
+    /// Where something is put down on an instance, relative to it.
+    fn top(&self, id: InstanceId) -> Pose {
+        let place = self.scene.get(id).frames.iter().find(|f| f.name == frame::PLACE);
+        let link = place.and_then(|f| f.link).map_or(Pose::IDENTITY, |link| self.link(id, link));
+        link.then(self.scene.surface(id))
+    }
+
+    /// Where the link is in the lab from which a robot's arm reaches.
+    pub fn foot(&self, robot: InstanceId) -> Pose {
+        let base = self.actors.get(&robot).map_or(0, |actor| actor.assembly.base);
+        let own = self.pose(robot);
+        if base == 0 { own } else { own.then(self.link(robot, base)) }
     }
 
     /// Where a thing stands; what is in hand, in the lab.
@@ -95,14 +138,14 @@ impl<'p> Stage<'p> {
 
     /// Where something is put down on an instance, in the lab.
     pub fn surface(&self, id: InstanceId) -> Pose {
-        self.pose(id).then(self.scene.surface(id))
+        self.pose(id).then(self.top(id))
     }
 
     /// Where the tip of a robot is in the lab.
     pub fn tip(&self, robot: InstanceId) -> Pose {
         let Some(actor) = self.actors.get(&robot) else { return self.pose(robot) };
         let tip = matterix_motion::placement(&actor.chain.tip(&actor.configuration()));
-        self.pose(robot).then(tip)
+        self.foot(robot).then(tip)
     }
 
     /// A named point of an instance in the lab; the instance itself for an empty name.
@@ -112,6 +155,7 @@ impl<'p> Stage<'p> {
         }
         let found = self.scene.get(id).frames.iter().find(|f| f.name == name)?;
         let base = if found.stand { self.stood(id) } else { self.pose(id) };
+        let base = found.link.map_or(base, |link| base.then(self.link(id, link)));
         Some(base.then(found.pose))
     }
 
@@ -123,7 +167,8 @@ impl<'p> Stage<'p> {
     /// Where a thing stood before it was picked up; where it is, if it never was.
     fn stood(&self, id: InstanceId) -> Pose {
         let before = self.before.get(&id);
-        self.scene.in_lab(id, |i| before.filter(|_| i == id).copied().or_else(|| self.stand(i)))
+        let stand = |i: InstanceId| before.filter(|_| i == id).copied().or_else(|| self.stand(i));
+        self.scene.in_lab_on(id, stand, |id| self.top(id))
     }
 
     /// A thing stands somewhere on a surface from now on.
@@ -215,7 +260,7 @@ impl<'p> Stage<'p> {
         let Some(old) = self.carried.get(index).copied() else { return };
         let new = match by {
             None => Carried::Stands(Stand::Lab(now)),
-            Some(by) => match self.actor_of(by) {
+            Some(by) => match self.holder(by) {
                 Some(robot) => Carried::Held(robot, self.tip(robot).inverse().then(now)),
                 None => Carried::Stands(Stand::On(by, self.surface(by).inverse().then(now))),
             },
@@ -230,12 +275,16 @@ impl<'p> Stage<'p> {
 impl Actor {
     fn new(assembly: Assembly) -> Result<Self, String> {
         let tree = Tree::new(&assembly.robot).map_err(|why| why.to_string())?;
-        let chain = Chain::new(&assembly.robot, 0, assembly.tip).map_err(|why| why.to_string())?;
+        let chain = Chain::new(&assembly.robot, assembly.base, assembly.tip).map_err(|why| why.to_string())?;
+        let drive = Chain::new(&assembly.robot, 0, assembly.base).map_err(|why| why.to_string())?;
         let joint = |v: &matterix_motion::Variable| v.joint;
         let all: Vec<u32> = tree.variables().iter().map(joint).collect();
-        let arm = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
+        let which = |chain: &Chain| -> Vec<usize> {
+            chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect()
+        };
+        let (arm, drive) = (which(&chain), which(&drive));
         let joints = assembly.home.clone();
-        Ok(Actor { assembly, tree, chain, joints, arm, to_plan: Arc::default() })
+        Ok(Actor { assembly, tree, chain, joints, arm, drive, to_plan: Arc::default() })
     }
 
     /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
@@ -250,13 +299,11 @@ impl Actor {
 
     /// The positions of the joints that move the tip.
     pub fn configuration(&self) -> Vec<f64> {
-        self.arm.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
+        self.positions(&self.arm)
     }
 
-    /// Moves the joints that move the tip.
-    pub fn set(&mut self, configuration: &[f64]) {
-        for (index, value) in self.arm.iter().zip(configuration) {
-            self.joints[*index] = *value;
-        }
+    /// The positions of some joints.
+    pub fn positions(&self, variables: &[usize]) -> Vec<f64> {
+        variables.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
     }
 }

@@ -148,6 +148,14 @@ fn asset_line(line: &AssetLine) -> Sexp {
         AssetLine::Error(_) => leaf("error"),
         AssetLine::Field(of) => field(of),
         AssetLine::Frame { name: word, at } => node("frame").with([name(word)]).with(place(at)),
+        AssetLine::Joint(joint) => {
+            let way = joint.way.iter().map(|way| {
+                node(if way.slides { "slides" } else { "turns" })
+                    .with([expr(&way.axis)])
+                    .with(way.at.iter().flat_map(place))
+            });
+            node("joint").with([name(&joint.name)]).with(way).with(maybe("by", Some(&joint.by)))
+        }
         AssetLine::Robot(robot, _) => node("robot").with([quoted(&robot.name)]),
         AssetLine::Solid { shape, at } => node("solid").with([expr(shape)]).with(at.iter().flat_map(place)),
         AssetLine::Grid(of) => node("grid")
@@ -233,6 +241,7 @@ fn clause(clause: &Clause) -> Sexp {
             .with(maybe("to", to.as_ref()))
             .with(maybe("by", by.as_ref())),
         ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
+        ClauseKind::Leads { handle, by } => node("leads").with([expr(handle), expr(by)]),
         ClauseKind::Frees { item, on, by } => {
             node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])
         }

@@ -8,8 +8,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Member,
-    MemberKind, Name, Path, Role, Term,
+    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Jointed, Member,
+    MemberKind, Name, Path, Role, Term, Way,
 };
 
 impl Lower<'_> {
@@ -154,6 +154,10 @@ impl Lower<'_> {
                 let item = self.expr_in(kids);
                 ClauseKind::Grips { item, by: self.expr_in(kids) }
             }
+            Rule::leads => {
+                let handle = self.expr_in(kids);
+                ClauseKind::Leads { handle, by: self.expr_in(kids) }
+            }
             Rule::frees => {
                 let item = self.expr_in(kids);
                 let first = self.expr_in(kids);
@@ -218,6 +222,7 @@ impl Lower<'_> {
                     let shape = self.expr_in(kids);
                     lines.push(AssetLine::Solid { shape, at: kids.eat(Rule::place_at).map(|n| self.at(n)) });
                 }
+                Rule::joint => lines.push(AssetLine::Joint(Box::new(self.joint(part)))),
                 Rule::frame => {
                     let kids = &mut Kids::of(part);
                     let name = self.name_in(kids);
@@ -233,6 +238,16 @@ impl Lower<'_> {
             before = Some(start);
         }
         lines
+    }
+
+    fn joint(&mut self, node: Node) -> Jointed {
+        let kids = &mut Kids::of(node);
+        let name = self.name_in(kids);
+        let way = kids.eat(Rule::joint_way).map(|way| {
+            let (slides, axis) = (way.as_str() == "slides", self.expr_in(kids));
+            Way { slides, axis, at: kids.eat(Rule::place_at).map(|n| self.at(n)) }
+        });
+        Jointed { name, way, by: self.expr_in(kids) }
     }
 
     fn at(&mut self, node: Node) -> At {
