@@ -4,6 +4,7 @@ pub mod assembly;
 mod drive;
 pub mod fixture;
 pub mod goal;
+mod known;
 pub mod perform;
 mod preflight;
 pub mod stage;

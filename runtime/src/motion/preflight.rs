@@ -6,18 +6,17 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::model::{Action, Domain, Model};
+use matterix_ir::model::{Action, Domain};
 use matterix_ir::plan::{Motion, Operation, Step, StepId};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
-use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
+use matterix_ir::{Diagnostic, Program, Span, codes};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
-use super::fixture::initial;
+use super::known::States;
 use super::perform::Refused;
 use super::stage::{Carried, Stage};
-use crate::backend::unknown::{Known, eval};
 
 /// How many motions are followed before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
@@ -31,7 +30,7 @@ pub fn preflight(program: &Program) -> Vec<Diagnostic> {
     let mut walk = Walk {
         program,
         stage,
-        states: still(program),
+        states: States::new(program),
         found: Vec::new(),
         told: BTreeSet::new(),
         site: Vec::new(),
@@ -45,8 +44,8 @@ pub fn preflight(program: &Program) -> Vec<Diagnostic> {
 struct Walk<'p> {
     program: &'p Program,
     stage: Stage<'p>,
-    /// Values of states as far as they are known: what moves by itself is not, nor what was set to something unknown.
-    states: Vec<Option<f64>>,
+    /// What is known of the model's states.
+    states: States<'p>,
     found: Vec<Diagnostic>,
     /// Statements of the user that have been reported.
     told: BTreeSet<Span>,
@@ -109,44 +108,64 @@ impl<'p> Walk<'p> {
         let at = self.program.plan.get(id);
         match &at.step {
             Step::Operation(operation) => self.operation(operation, at.span),
-            Step::If { then, otherwise, .. } => {
-                let before = self.stage.clone();
-                self.step(*then);
-                if let Some(otherwise) = otherwise {
-                    let after = std::mem::replace(&mut self.stage, before);
-                    self.step(*otherwise);
-                    self.stage = after;
-                }
-            }
-            Step::Try(all) => {
-                let mut after = None;
-                for one in all {
-                    let before = self.stage.clone();
-                    self.step(*one);
-                    after.get_or_insert_with(|| self.stage.clone());
-                    self.stage = before;
-                }
-                self.stage = after.unwrap_or_else(|| self.stage.clone());
-            }
+            Step::If { condition, then, otherwise } => match self.states.value(condition.node) {
+                Some(0.0) => otherwise.iter().for_each(|step| self.step(*step)),
+                Some(_) => self.step(*then),
+                None => self.ways(std::iter::once(*then).chain(*otherwise), otherwise.is_none()),
+            },
+            Step::Try(all) => self.ways(all.iter().copied(), false),
             Step::Guarded { body, handlers, finally } => {
-                let before = self.stage.clone();
+                let (before, states) = (self.stage.clone(), self.states.clone());
                 self.step(*body);
                 // Handlers begin somewhere in the body; what they do is followed from its beginning.
                 let after = std::mem::replace(&mut self.stage, before);
+                let mut joined = std::mem::replace(&mut self.states, states);
+                if !handlers.is_empty() {
+                    self.states.forget_written(*body);
+                }
                 for (_, handler) in handlers {
-                    let before = self.stage.clone();
+                    let (before, states) = (self.stage.clone(), self.states.clone());
                     self.step(*handler);
                     self.stage = before;
+                    joined.join(&std::mem::replace(&mut self.states, states));
                 }
                 self.stage = after;
+                self.states = joined;
                 finally.iter().for_each(|f| self.step(*f));
             }
             Step::Repeat { body, .. } | Step::RepeatWhile { body, .. } => {
+                self.states.forget_written(*body);
                 self.step(*body);
                 self.step(*body);
+                self.states.forget_written(*body);
+            }
+            Step::Parallel(branches) => {
+                branches.iter().for_each(|branch| self.states.forget_written(*branch));
+                branches.iter().for_each(|branch| self.step(*branch));
+                branches.iter().for_each(|branch| self.states.forget_written(*branch));
             }
             other => other.children().into_iter().for_each(|child| self.step(child)),
         }
+    }
+
+    /// Follows one way after the other from the same state; where things stand after the first is kept. `or_none`: none of
+    /// them may be gone, too.
+    fn ways(&mut self, ways: impl Iterator<Item = StepId>, or_none: bool) {
+        let (stage, states) = (self.stage.clone(), self.states.clone());
+        let mut after = None;
+        let mut joined: Option<States<'p>> = or_none.then(|| states.clone());
+        for way in ways {
+            self.stage = stage.clone();
+            self.states = states.clone();
+            self.step(way);
+            after.get_or_insert_with(|| self.stage.clone());
+            match &mut joined {
+                Some(joined) => joined.join(&self.states),
+                None => joined = Some(self.states.clone()),
+            }
+        }
+        self.stage = after.unwrap_or(stage);
+        self.states = joined.unwrap_or(states);
     }
 
     fn operation(&mut self, operation: &Operation, span: Span) {
@@ -164,12 +183,11 @@ impl<'p> Walk<'p> {
                 }
             }
         }
+        let before = self.states.clone();
+        self.states.apply(operation);
         for action in operation.at_start.iter().chain(&operation.at_end) {
             let Action::Assign { state, value, .. } = action else { continue };
-            let value = self.value(*value);
-            if let Some(slot) = self.states.get_mut(*state as usize) {
-                *slot = value;
-            }
+            let value = before.value(*value);
             let Some(state) = self.program.model.states.get(*state as usize) else { continue };
             let Some(value) = value else { continue };
             if let Some(id) = supported(&self.program.scene, &state.name, &state.domain) {
@@ -178,27 +196,9 @@ impl<'p> Walk<'p> {
         }
         if !self.stage.fixtures.is_empty() {
             let mut stage = self.stage.clone();
-            stage.follow_joints(|node| self.value(node));
+            stage.follow_joints(|node| self.states.value(node));
             self.stage = stage;
         }
-    }
-
-    /// What a node is worth as far as the states are known that steps before gave a value.
-    fn value(&self, node: NodeId) -> Option<f64> {
-        known(&self.program.model, node, &self.states)
-    }
-
-    /// The same when an operation has ended.
-    fn after(&self, operation: &Operation, node: NodeId) -> Option<f64> {
-        let mut states = self.states.clone();
-        for action in operation.at_start.iter().chain(&operation.at_end) {
-            let Action::Assign { state, value, .. } = action else { continue };
-            let value = known(&self.program.model, *value, &states);
-            if let Some(slot) = states.get_mut(*state as usize) {
-                *slot = value;
-            }
-        }
-        known(&self.program.model, node, &states)
     }
 
     fn motion(&mut self, motion: &Motion, operation: &Operation) -> Result<(), Refused> {
@@ -211,7 +211,11 @@ impl<'p> Walk<'p> {
                 known
             }
             Motion::Lead { .. } => {
-                let to = self.stage.led_by(motion).and_then(|node| self.after(operation, node));
+                let to = self.stage.led_by(motion).and_then(|node| {
+                    let mut after = self.states.clone();
+                    after.apply(operation);
+                    after.value(node)
+                });
                 let Some(to) = to else { return Ok(()) };
                 [to, 0.0, 0.0]
             }
@@ -308,30 +312,6 @@ impl<'p> Walk<'p> {
         }
         None
     }
-}
-
-/// States when a run begins, but for those that move by themselves or by events.
-fn still(program: &Program) -> Vec<Option<f64>> {
-    let model = &program.model;
-    let mut states: Vec<Option<f64>> =
-        model.states.iter().map(|s| Some(initial(program, s.initial)).filter(|v| v.is_finite())).collect();
-    let acted = model.events.iter().flat_map(|e| &e.actions).filter_map(|action| match action {
-        Action::Assign { state, .. } => Some(*state),
-        Action::Move { .. } => None,
-    });
-    let amounts = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|e| e.1));
-    for state in model.derivatives.iter().map(|d| d.state).chain(acted).chain(amounts) {
-        if let Some(slot) = states.get_mut(state as usize) {
-            *slot = None;
-        }
-    }
-    states
-}
-
-fn known(model: &Model, node: NodeId, states: &[Option<f64>]) -> Option<f64> {
-    let params: Vec<f64> = model.params.iter().map(|p| p.value).collect();
-    eval(&model.graph, node, Known { time: f64::NAN, states, params: &params, locals: &[], readings: &[] })
-        .filter(|v| v.is_finite())
 }
 
 /// The instance of which a state says what it stands on.
