@@ -33,12 +33,17 @@ impl<'a> Planner<'a, '_> {
             ClauseKind::Leads { handle, by } => {
                 let (item, frame) = self.goal(handle, scope)?;
                 if !self.lab.prototype && self.lab.rides_on(item, &frame).is_none() {
-                    self.lab.report(Diagnostic::error(
+                    let name = &self.lab.instances[item.0 as usize].name;
+                    let at = self.lab.calls.first().copied().unwrap_or(handle.span);
+                    let found = Diagnostic::error(
                         codes::TYPE_MISMATCH,
-                        handle.span,
-                        format!("`{}` has nothing that moves at `{frame}`", self.lab.instances[item.0 as usize].name),
-                        "a frame given `from` a joint is led",
-                    ));
+                        at,
+                        format!("`{name}` has no part that moves at its frame `{frame}`"),
+                        "a hand would take nothing along",
+                    );
+                    self.lab.report(found.help(format!(
+                        "give the frame `from` a joint of the asset: `frame {frame} at (0, 0, 0) mm from lid`"
+                    )));
                     return None;
                 }
                 Some(Motion::Lead { item, frame, by: self.thing(by, scope)? })

@@ -38,6 +38,7 @@ const FRAME: f64 = 0.04;
 struct Running {
     ends: Ends,
     at_end: Vec<Action>,
+    motion: Option<Motion>,
 }
 
 /// When an operation ends.
@@ -243,7 +244,8 @@ impl Backend for Sim<'_> {
         self.follow_joints(lasts, out);
         let ticket = Ticket(self.started);
         self.started += 1;
-        self.running.insert(ticket, Running { ends, at_end: operation.at_end.clone() });
+        self.running
+            .insert(ticket, Running { ends, at_end: operation.at_end.clone(), motion: operation.motion.clone() });
         Ok(ticket)
     }
 
@@ -252,6 +254,9 @@ impl Backend for Sim<'_> {
             return Ok(status);
         }
         if let Some(running) = self.running.remove(&ticket) {
+            if let Some(stage) = self.stage.as_mut() {
+                stage.let_go(running.motion.as_ref());
+            }
             if let Ends::Failed(name, text) = running.ends {
                 return Ok(Status::Failed { name, text });
             }
@@ -263,7 +268,10 @@ impl Backend for Sim<'_> {
     }
 
     fn halt(&mut self, ticket: Ticket) {
-        self.running.remove(&ticket);
+        let halted = self.running.remove(&ticket);
+        if let (Some(stage), Some(halted)) = (self.stage.as_mut(), halted) {
+            stage.let_go(halted.motion.as_ref());
+        }
     }
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {

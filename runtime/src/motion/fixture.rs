@@ -89,7 +89,7 @@ impl Stage<'_> {
     pub fn follow_joints(&mut self, value: impl Fn(NodeId) -> Option<f64>) -> Vec<(InstanceId, Vec<f64>)> {
         let mut moved = Vec::new();
         let scene = self.scene;
-        for (id, fixture) in &mut self.fixtures {
+        for (id, fixture) in self.fixtures.iter_mut().filter(|(id, _)| !self.led.contains(id)) {
             let before = fixture.joints.clone();
             for Follow { variable, position } in following(scene, *id).iter().flat_map(|a| &a.follows) {
                 let (Some(slot), Some(value)) = (fixture.joints.get_mut(*variable as usize), value(*position)) else {
@@ -172,7 +172,15 @@ impl Stage<'_> {
         let begun = self.joints(robot);
         let part = self.along(robot, &way, &[item])?;
         self.set_joint(item, variable, to);
+        self.led.insert(item);
         Ok(Performed { robot, begun, parts: vec![part], led: Some(led) })
+    }
+
+    /// A motion has ended: what it took along follows the model again.
+    pub fn let_go(&mut self, motion: Option<&Motion>) {
+        if let Some(Motion::Lead { item, .. }) = motion {
+            self.led.remove(item);
+        }
     }
 
     fn set_joint(&mut self, item: InstanceId, variable: usize, to: f64) {

@@ -196,6 +196,7 @@ impl<'p> Walk<'p> {
         }
         if !self.stage.fixtures.is_empty() {
             let mut stage = self.stage.clone();
+            stage.let_go(operation.motion.as_ref());
             stage.follow_joints(|node| self.states.value(node));
             self.stage = stage;
         }

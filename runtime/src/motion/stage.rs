@@ -1,6 +1,6 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 use matterix_ir::Program;
@@ -56,6 +56,8 @@ pub struct Stage<'p> {
     pub fixtures: BTreeMap<InstanceId, Fixture>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// Things whose parts hands are moving.
+    pub(super) led: BTreeSet<InstanceId>,
 }
 
 impl<'p> Stage<'p> {
@@ -79,8 +81,8 @@ impl<'p> Stage<'p> {
             let Some(assembly) = assemble(scene, id) else { continue };
             actors.insert(id, Actor::new(assembly).map_err(wrong)?);
         }
-        let (before, freed) = (BTreeMap::new(), BTreeMap::new());
-        let mut stage = Stage { scene, carried, before, actors, fixtures, freed };
+        let (before, freed, led) = (BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+        let mut stage = Stage { scene, carried, before, actors, fixtures, freed, led };
         stage.follow_joints(|node| Some(initial(program, node)));
         Ok(stage)
     }
