@@ -747,7 +747,7 @@ pub enum ClauseKind {
         /// When it is said; always without it.
         when: Option<Expr>,
     },
-    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`.
+    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`, `moves self to well by (0, 0, 50) mm in travel`.
     Moves {
         /// The robot.
         mover: Expr,
@@ -755,8 +755,10 @@ pub enum ClauseKind {
         straight: bool,
         /// Where to.
         to: Option<Expr>,
-        /// How far, instead.
+        /// How far, from there or from where it is.
         by: Option<Expr>,
+        /// The share of the step's time that is the motion's; all of it without.
+        within: Option<Expr>,
     },
     /// `grips item by arm`.
     Grips {

@@ -143,8 +143,14 @@ pub enum Motion {
         goal: InstanceId,
         /// Its name; empty for the thing itself.
         frame: String,
+        /// An instance known only in a run, by its index, which goes before `goal`.
+        choice: Option<NodeId>,
+        /// How far from there, in the axes of the lab, m.
+        shift: Option<[NodeId; 3]>,
         /// Along a straight line.
         straight: bool,
+        /// The share of the operation's time that the motion takes the place of, s; all of it without.
+        within: Option<NodeId>,
     },
     /// Shifts its tool, in the axes of the lab.
     By {

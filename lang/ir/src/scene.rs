@@ -121,6 +121,9 @@ pub struct Instance {
     pub capabilities: Vec<String>,
     /// The instance it is a part of.
     pub owner: Option<InstanceId>,
+    /// The link of its owner that it is on, by index.
+    #[serde(default)]
+    pub link: Option<u32>,
     /// What it stood on when the run began.
     pub support: Option<InstanceId>,
     /// Where it stood when the run began, relative to its support or the lab.

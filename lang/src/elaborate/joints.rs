@@ -1,12 +1,12 @@
 //! Parts of an asset that move as its states say: lids, doors, sashes, knobs.
 
 use matterix_ir::robot::{Joint, JointKind, JointLimits, Link, Piece, Robot, Solid as Body};
-use matterix_ir::scene::{Follow, InstanceId, Pose, Shape, Solid};
+use matterix_ir::scene::{Follow, Frame, InstanceId, Pose, Shape, Solid};
 use matterix_ir::{Diagnostic, NodeId, codes};
 
 use super::Elaborator;
 use super::geometry::Geometry;
-use crate::ast::{AssetLine, At, Expr, Jointed, Name};
+use crate::ast::{AssetLine, At, Expr, ExprKind, FieldValue, Jointed, Name};
 use crate::eval::{Scope, Type, Value};
 use crate::names::near::{nearest, question};
 
@@ -60,6 +60,28 @@ impl<'a> Elaborator<'a> {
             name = &from.text;
         }
         None
+    }
+
+    /// The frame of its owner that an instance is mounted on, if it says so.
+    pub fn mounted(&mut self, id: InstanceId, frames: &[Frame]) -> Option<Frame> {
+        let setting = self.instances[id.0 as usize].setting("mounted")?;
+        let FieldValue::Expr(e) = setting.value() else { return None };
+        let ExprKind::Text(text) = &*e.kind else {
+            let headline = "`mounted` names a frame of what it is a part of: `mounted: \"left\"`";
+            self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "not a text"));
+            return None;
+        };
+        let found = frames.iter().find(|f| f.name == *text).cloned();
+        if found.is_none() {
+            let close = nearest(text, frames.iter().map(|f| f.name.as_str()));
+            let headline = format!("what it is a part of has no frame `{text}`");
+            let d = Diagnostic::error(codes::UNKNOWN_NAME, e.span, headline, "no such frame");
+            self.report(match question(&close) {
+                Some(asked) => d.help(asked),
+                None => d,
+            });
+        }
+        found
     }
 
     fn place_of(&self, id: InstanceId, frame: &str) -> Option<&'a At> {

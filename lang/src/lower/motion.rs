@@ -12,13 +12,28 @@ impl<'a> Planner<'a, '_> {
     /// The motion of a clause; none where it has a mistake, which is reported.
     pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
         match clause {
-            ClauseKind::Moves { mover, straight, to, by } => {
+            ClauseKind::Moves { mover, straight, to, by, within } => {
                 let (mover, straight) = (self.thing(mover, scope)?, *straight);
-                if let Some(shift) = by {
-                    return Some(Motion::By { mover, shift: self.shift(shift, scope)?, straight });
-                }
-                let (goal, frame) = self.goal(to.as_ref()?, scope)?;
-                Some(Motion::To { mover, goal, frame, straight })
+                let shift = match by {
+                    Some(shift) => Some(self.shift(shift, scope)?),
+                    None => None,
+                };
+                let Some(to) = to else { return Some(Motion::By { mover, shift: shift?, straight }) };
+                let within = match within {
+                    Some(within) => Some(self.duration_node(within, scope, "in")?),
+                    None => None,
+                };
+                let (goal, frame, choice) = match self.lab.expr(to, scope) {
+                    Value::InstanceNode(node) => {
+                        let first = self.lab.picks.get(&node).and_then(|all| all.first()).copied();
+                        (first.unwrap_or(mover), String::new(), Some(node))
+                    }
+                    value => {
+                        let (goal, frame) = self.place(value, to)?;
+                        (goal, frame, None)
+                    }
+                };
+                Some(Motion::To { mover, goal, frame, choice, shift, straight, within })
             }
             ClauseKind::Grips { item, by } => {
                 Some(Motion::Grip { item: self.thing(item, scope)?, by: self.thing(by, scope)? })
@@ -63,7 +78,12 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn goal(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, String)> {
-        match self.lab.expr(e, scope) {
+        let value = self.lab.expr(e, scope);
+        self.place(value, e)
+    }
+
+    fn place(&mut self, value: Value, e: &'a Expr) -> Option<(InstanceId, String)> {
+        match value {
             Value::Frame(id, frame) => Some((id, frame)),
             Value::Instance(id) | Value::Qualified(id, _) => Some((id, String::new())),
             other => {

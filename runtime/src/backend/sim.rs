@@ -97,19 +97,36 @@ impl<'m> Sim<'m> {
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
         let Some(motion) = operation.motion.as_ref().filter(|_| self.moves) else { return Ok(None) };
         let given = match motion {
-            Motion::By { shift, .. } => shift.map(|node| self.engine.eval(node)),
+            Motion::By { shift, .. } | Motion::To { shift: Some(shift), .. } => {
+                shift.map(|node| self.engine.eval(node))
+            }
             Motion::Lead { .. } => {
                 let led = self.stage.as_ref().and_then(|stage| stage.led_by(motion));
                 [led.map_or(f64::NAN, |node| self.after(operation, node)), 0.0, 0.0]
             }
             _ => [0.0; 3],
         };
+        let mut motion = motion.clone();
+        if let Motion::To { goal, choice: Some(choice), .. } = &mut motion {
+            let id = self.engine.eval(*choice);
+            if id >= 0.0 {
+                *goal = InstanceId(id as u32);
+            }
+        }
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
-        let performed = stage.perform(motion, given)?;
+        let performed = stage.perform(&motion, given)?;
         Ok(performed.map(|performed| {
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()
         }))
+    }
+
+    /// What an operation takes beside its motion, s.
+    fn beside(&self, operation: &Operation) -> f64 {
+        let (Some(Motion::To { within: Some(within), .. }), Some(takes)) = (&operation.motion, &operation.takes) else {
+            return 0.0;
+        };
+        (self.engine.eval(takes.nominal) - self.engine.eval(*within)).max(0.0)
     }
 
     /// Things stand where the states of the model say.
@@ -227,7 +244,7 @@ impl Backend for Sim<'_> {
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         let ends = match self.perform(operation, out) {
-            Ok(Some(duration)) => Ends::At(self.engine.time() + duration),
+            Ok(Some(duration)) => Ends::At(self.engine.time() + self.beside(operation) + duration),
             Ok(None) => self.end_of(operation, out)?,
             Err(refused) => {
                 let scene = self.stage.as_ref().map(|s| s.scene);

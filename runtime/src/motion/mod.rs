@@ -3,6 +3,7 @@
 pub mod assembly;
 mod drive;
 pub mod fixture;
+mod gantry;
 pub mod goal;
 mod known;
 pub mod perform;

@@ -4,7 +4,7 @@ use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Blocked, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Judge, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
@@ -17,7 +17,7 @@ use super::surroundings::{Surroundings, held};
 /// How near a gripper must be to what it grips, and what it holds to where it is put down: m and rad.
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 /// Distance of checked configurations along a way, rad or m.
-const FINENESS: f64 = 0.02;
+pub(super) const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
@@ -153,15 +153,23 @@ pub struct Meeting {
 }
 
 impl Stage<'_> {
-    /// Carries out a motion. `given` is how far a relative one goes, m; of one that takes a part along, its first number
+    /// Carries out a motion. `given` is how far one goes, or from its goal, m; of one that takes a part along, its first number
     /// is where the joint of that part then stands, rad or m.
     pub fn perform(&mut self, motion: &Motion, given: [f64; 3]) -> Result<Option<Performed>, Refused> {
         match motion {
-            Motion::To { mover, goal, frame, straight } => {
-                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *goal, frame);
+            Motion::To { mover, goal, frame, straight, within, .. } => {
+                // What has a time of its own and nothing to move with, or nowhere to go, takes that time.
+                let Some(robot) = self.actor_of(*mover) else {
+                    return if within.is_some() { Ok(None) } else { Err(Refused::NoRobot) };
+                };
+                self.take(robot, *mover)?;
+                let mut to = targets(self, robot, *goal, frame);
+                to.iter_mut().for_each(|to| (0..3).for_each(|k| to.position[k] += given[k]));
                 if to.is_empty() {
-                    return Err(Refused::NoFrame);
+                    return if within.is_some() { Ok(None) } else { Err(Refused::NoFrame) };
+                }
+                if self.actors.get(&robot).is_some_and(Actor::is_gantry) {
+                    return self.cross(robot, &to, given[2].max(0.0)).map(Some);
                 }
                 self.go(robot, &to, *straight, Some(*goal)).map(Some)
             }
@@ -330,7 +338,7 @@ impl Stage<'_> {
                 plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
                 _ => Refused::NoWay,
             })?;
-        let part = timed(actor, variables, &route.points, &mut checker)?;
+        let part = timed(actor, variables, &route.points, Some(&mut checker))?;
         self.settle(robot, variables, q);
         Ok(part)
     }
@@ -360,7 +368,7 @@ impl Stage<'_> {
             })?);
         }
         let variables = actor.arm.clone();
-        let part = timed(actor, &variables, &points, &mut checker)?;
+        let part = timed(actor, &variables, &points, Some(&mut checker))?;
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &variables, &end);
         Ok(part)
@@ -385,7 +393,7 @@ impl Stage<'_> {
     }
 
     /// The deepest contact in words.
-    fn meeting(
+    pub(super) fn meeting(
         &self,
         figure: &Figure,
         around: &Surroundings,
@@ -410,7 +418,12 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, variables: &[usize], points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
+pub(super) fn timed(
+    actor: &Actor,
+    variables: &[usize],
+    points: &[Vec<f64>],
+    checker: Option<&mut Checker<'_>>,
+) -> Result<Part, Refused> {
     let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
         variables.iter().filter_map(|i| actor.tree.variables().get(*i)).map(|v| f(&v.limits)).collect()
     };
@@ -420,6 +433,6 @@ fn timed(actor: &Actor, variables: &[usize], points: &[Vec<f64>], checker: &mut 
         acceleration: limits(&acceleration),
         jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
     };
-    let way = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
+    let way = follow(points, &limits, checker.map(|c| c as &mut dyn Judge)).map_err(|_| Refused::NoWay)?;
     Ok(Part { variables: variables.to_vec(), way })
 }

@@ -204,9 +204,8 @@ impl<'p> Walk<'p> {
 
     fn motion(&mut self, motion: &Motion, operation: &Operation) -> Result<(), Refused> {
         let shift = match motion {
-            Motion::By { shift, .. } => {
-                let known: Option<Vec<f64>> =
-                    shift.iter().map(|node| self.program.model.graph.constant(*node)).collect();
+            Motion::By { shift, .. } | Motion::To { shift: Some(shift), .. } => {
+                let known: Option<Vec<f64>> = shift.iter().map(|node| self.states.value(*node)).collect();
                 // What only a run can tell is left to the run.
                 let Some(known) = known.and_then(|k| <[f64; 3]>::try_from(k).ok()) else { return Ok(()) };
                 known
@@ -222,7 +221,14 @@ impl<'p> Walk<'p> {
             }
             _ => [0.0; 3],
         };
-        self.stage.perform(motion, shift).map(|_| ())
+        let mut chosen = motion.clone();
+        if let Motion::To { goal, choice: Some(choice), .. } = &mut chosen {
+            match self.states.value(*choice) {
+                Some(id) if id >= 0.0 => *goal = InstanceId(id as u32),
+                _ => return Ok(()),
+            }
+        }
+        self.stage.perform(&chosen, shift).map(|_| ())
     }
 
     fn finding(&self, motion: &Motion, refused: &Refused, span: Span) -> Option<Diagnostic> {

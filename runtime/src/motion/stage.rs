@@ -133,6 +133,10 @@ impl<'p> Stage<'p> {
     /// Where a thing stands; what is in hand, in the lab.
     fn stand(&self, id: InstanceId) -> Option<Stand> {
         Some(match self.carried.get(id.0 as usize)? {
+            Carried::Stands(Stand::PartOf(owner, inner)) => {
+                let link = self.scene.get(id).link.map_or(Pose::IDENTITY, |link| self.link(*owner, link));
+                Stand::PartOf(*owner, link.then(*inner))
+            }
             Carried::Stands(stand) => *stand,
             Carried::Held(by, inner) => Stand::Lab(self.tip(*by).then(*inner)),
         })

@@ -236,10 +236,13 @@ fn clause(clause: &Clause) -> Sexp {
         ClauseKind::Says { text, when } => {
             node("says").with([super::steps::filled(text)]).with(maybe("when", when.as_ref()))
         }
-        ClauseKind::Moves { mover, straight, to, by } => node(if *straight { "moves straight" } else { "moves" })
-            .with([expr(mover)])
-            .with(maybe("to", to.as_ref()))
-            .with(maybe("by", by.as_ref())),
+        ClauseKind::Moves { mover, straight, to, by, within } => {
+            node(if *straight { "moves straight" } else { "moves" })
+                .with([expr(mover)])
+                .with(maybe("to", to.as_ref()))
+                .with(maybe("by", by.as_ref()))
+                .with(maybe("in", within.as_ref()))
+        }
         ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
         ClauseKind::Leads { handle, by } => node("leads").with([expr(handle), expr(by)]),
         ClauseKind::Frees { item, on, by } => {

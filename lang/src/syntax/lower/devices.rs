@@ -145,10 +145,10 @@ impl Lower<'_> {
             Rule::moves => {
                 let mover = self.expr_in(kids);
                 let straight = kids.has(Rule::kw_straight);
-                let by = !kids.has(Rule::kw_to);
-                let goal = self.expr_in(kids);
-                let (to, by) = if by { (None, Some(goal)) } else { (Some(goal), None) };
-                ClauseKind::Moves { mover, straight, to, by }
+                let to = kids.has(Rule::kw_to).then(|| self.expr_in(kids));
+                let by = kids.eat(Rule::moves_by).map(|n| self.expr_in(&mut Kids::of(n)));
+                let within = kids.eat(Rule::moves_in).map(|n| self.expr_in(&mut Kids::of(n)));
+                ClauseKind::Moves { mover, straight, to, by, within }
             }
             Rule::grips => {
                 let item = self.expr_in(kids);
