@@ -46,6 +46,7 @@ files! {
     "robots/iiwa14/" => "iiwa14.urdf"
     "robots/iiwa7/" => "iiwa7.urdf"
     "robots/kmr_iiwa/" => "kmr_iiwa.urdf"
+    "robots/ot2/" => "ot2.urdf"
     "robots/panda/" => "panda.urdf"
     "robots/robotiq_2f85/" => "robotiq_2f85.urdf"
     "robots/ur3e/" => "ur3e.urdf"

@@ -3,7 +3,7 @@
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
-use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
@@ -564,19 +564,30 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
         let support = inst.placed.first().map(|p| p.1);
-        let Geometry { frames, shape, solids } = lab.geometry(id);
-        instances.push(matterix_ir::scene::Instance {
+        let on: Vec<Frame> = match owner {
+            Some(owner) => {
+                instances.get(owner.0 as usize).map(|o: &SceneInstance| o.frames.clone()).unwrap_or_default()
+            }
+            None => Vec::new(),
+        };
+        let (pose, link) = match lab.mounted(id, &on) {
+            Some(frame) => (frame.pose.then(pose), frame.link),
+            None => (pose, None),
+        };
+        let Geometry { frames, shape, solids, moving } = lab.geometry(id);
+        instances.push(SceneInstance {
             name,
             kind: lab.kind_names(id),
             capabilities,
             owner,
+            link,
             support,
             pose,
             placed: placed[i],
             frames,
             shape,
             solids,
-            articulation: lab.articulation(id).map(Box::new),
+            articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });
     }

@@ -4,7 +4,7 @@ use matterix_ir::plan::{Plan, Step};
 use matterix_ir::{Program, codes};
 use serde::Serialize;
 
-use crate::backend::{Dry, Prepared, Sim};
+use crate::backend::{Dry, Moves, Prepared, Sim};
 use crate::exec::{
     self, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
 };
@@ -93,12 +93,14 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
         Err(fault) => return refused(program, fault),
     };
     let mut sim = Sim::new(engine, &prepared, options.seed);
-    if options.fidelity == Fidelity::Motion {
-        sim = match Stage::new(&program.scene) {
-            Ok(stage) => sim.with_motion(stage, runs_beside(&program.plan)),
-            Err(message) => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
-        };
-    }
+    let moves = options.fidelity == Fidelity::Motion;
+    sim = match Stage::new(program) {
+        Ok(stage) if moves || !stage.fixtures.is_empty() => {
+            sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out)
+        }
+        Err(message) if moves => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
+        _ => sim,
+    };
     let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
     let engine = sim.engine();
     let finished = engine.finish(out);

@@ -7,11 +7,11 @@ use matterix_view::{Document, from_program, robot};
 /// The lab of a program before anything happens, robots as their joints stand.
 pub fn still(program: &Program, sources: &Sources) -> Document {
     let mut document = from_program::from_program(program, sources);
-    let Ok(stage) = Stage::new(&program.scene) else { return document };
-    for (id, actor) in &stage.actors {
-        let name = &program.scene.get(*id).name;
-        let placements = stage.moment(*id, 0.0).map(|moment| moment.links).unwrap_or_default();
-        robot::add(&mut document, &actor.assembly.robot, name, &placements, |_| None);
+    let Ok(stage) = Stage::new(program) else { return document };
+    for (id, description, _) in stage.movers() {
+        let name = &program.scene.get(id).name;
+        let placements = stage.moment(id, 0.0).map(|moment| moment.links).unwrap_or_default();
+        robot::add(&mut document, description, name, &placements, |_| None);
     }
     document
 }

@@ -52,7 +52,7 @@ fn gap(stage: &Stage<'_>, robot: InstanceId) -> f64 {
 
 /// Carries out the motions of a workflow; how far the fingers are apart after each.
 fn gaps(program: &Program) -> Vec<f64> {
-    let mut stage = Stage::new(&program.scene).expect("a stage");
+    let mut stage = Stage::new(&program).expect("a stage");
     let panda = program.scene.find("panda").expect("it is there");
     let perform = |(motion, values): (Motion, Vec<f64>)| {
         let done = stage.perform(&motion, &values).unwrap_or_else(|why| panic!("{motion:?}: {why:?}"));
@@ -88,7 +88,7 @@ fn a_gripper_closes_and_opens_as_far_as_it_goes() {
 fn joints_go_to_positions_and_home() {
     let lines = "turn joints panda to [10 deg, -30 deg, 0 deg, -120 deg, 0 deg, 90 deg, 45 deg]; home panda";
     let program = program("FrankaHand", "", lines);
-    let mut stage = Stage::new(&program.scene).expect("a stage");
+    let mut stage = Stage::new(&program).expect("a stage");
     let panda = program.scene.find("panda").expect("it is there");
     let home = stage.actors[&panda].configuration();
     let moves = motions(&program);
@@ -112,7 +112,7 @@ fn what_is_carried_stays_upright_and_is_tilted_over_its_target() {
     let things = "scale = IkaRetControl on table at (550, 0) mm\n    full = Beaker250mL on table at (450, -250) mm holding 100 g of water\n    \
                   cup = Beaker250mL on scale holding 20 g of water";
     let program = program("FrankaHand", things, "pour 30 g from full into cup by panda using scale { tolerance: 5 g }");
-    let mut stage = Stage::new(&program.scene).expect("a stage");
+    let mut stage = Stage::new(&program).expect("a stage");
     let find = |name| program.scene.find(name).expect("it is there");
     let (full, cup) = (find("full"), find("cup"));
     let mut most: f64 = 0.0;

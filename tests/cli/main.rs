@@ -14,6 +14,7 @@ mod formatting;
 mod grids;
 mod gripping;
 mod harness;
+mod joints;
 mod motion;
 mod new;
 mod pages;

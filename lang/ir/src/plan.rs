@@ -143,8 +143,14 @@ pub enum Motion {
         goal: InstanceId,
         /// Its name; empty for the thing itself.
         frame: String,
+        /// An instance known only in a run, by its index, which goes before `goal`.
+        choice: Option<NodeId>,
+        /// How far from there, in the axes of the lab, m.
+        shift: Option<[NodeId; 3]>,
         /// Along a straight line.
         straight: bool,
+        /// The share of the operation's time that the motion takes the place of, s; all of it without.
+        within: Option<NodeId>,
     },
     /// Shifts its tool, in the axes of the lab.
     By {
@@ -208,6 +214,15 @@ pub enum Motion {
         /// The robot.
         by: InstanceId,
     },
+    /// Takes a part of a thing that moves, by a frame on it, to where the effects at the operation's end put it.
+    Lead {
+        /// The thing.
+        item: InstanceId,
+        /// The frame.
+        frame: String,
+        /// The robot.
+        by: InstanceId,
+    },
     /// Opens its gripper.
     Free {
         /// What it held.
@@ -225,7 +240,8 @@ impl Motion {
         match self {
             Motion::To { mover, .. } | Motion::By { mover, .. } | Motion::Upright { mover, .. } => *mover,
             Motion::Tilted { mover, .. } | Motion::Joints { mover, .. } | Motion::Home { mover } => *mover,
-            Motion::Fingers { by, .. } | Motion::Grip { by, .. } | Motion::Free { by, .. } => *by,
+            Motion::Fingers { by, .. } | Motion::Grip { by, .. } => *by,
+            Motion::Free { by, .. } | Motion::Lead { by, .. } => *by,
         }
     }
 
@@ -233,15 +249,26 @@ impl Motion {
     pub fn goal(&self) -> Option<(InstanceId, &str)> {
         match self {
             Motion::To { goal, frame, .. } | Motion::Upright { goal, frame, .. } => Some((*goal, frame)),
-            Motion::Tilted { goal, frame, .. } => Some((*goal, frame)),
+            Motion::Tilted { goal, frame, .. } | Motion::Lead { item: goal, frame, .. } => Some((*goal, frame)),
             _ => None,
         }
+    }
+
+    /// The same motion to what `value` says was chosen; nothing where that is not known.
+    pub fn chosen(&self, value: impl Fn(NodeId) -> Option<f64>) -> Option<Motion> {
+        let mut motion = self.clone();
+        if let Motion::To { goal, choice, .. } = &mut motion
+            && let Some(node) = choice.take()
+        {
+            *goal = value(node).filter(|id| *id >= 0.0).map(|id| InstanceId(id as u32))?;
+        }
+        Some(motion)
     }
 
     /// The quantities it depends on, in their order.
     pub fn values(&self) -> Vec<NodeId> {
         match self {
-            Motion::By { shift, .. } => shift.to_vec(),
+            Motion::By { shift, .. } | Motion::To { shift: Some(shift), .. } => shift.to_vec(),
             Motion::Upright { within, .. } => vec![*within],
             Motion::Tilted { angle, .. } => vec![*angle],
             Motion::Joints { positions, .. } => positions.clone(),

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Span;
 use crate::extent::Body;
 pub use crate::pose::Pose;
 use crate::robot::Robot;
+use crate::{NodeId, Span};
 
 /// An instance, by its index in the [`Scene`]. The graph stores instances as this number, "nothing" as -1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -20,6 +20,9 @@ pub struct Frame {
     pub pose: Pose,
     /// Relative to where the asset last stood before it was picked up, instead of to the asset.
     pub stand: bool,
+    /// Relative to this link of the asset instead, by index.
+    #[serde(default)]
+    pub link: Option<u32>,
 }
 
 /// Names of frames that have a meaning of their own.
@@ -101,6 +104,21 @@ pub struct Articulation {
     pub tip: u32,
     /// Positions of the moving joints in the order of the description when the run begins, rad or m.
     pub home: Vec<f64>,
+    /// The link from which its arm reaches; what is before it, from the root, drives that about.
+    #[serde(default)]
+    pub base: u32,
+    /// Positions that the model gives: of a lid, a sash, a knob. None of a robot that moves by itself.
+    #[serde(default)]
+    pub follows: Vec<Follow>,
+}
+
+/// A moving joint that is where the model says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Follow {
+    /// Which of those that move by themselves, as in `home`.
+    pub variable: u32,
+    /// rad or m.
+    pub position: NodeId,
 }
 
 /// One asset in the lab, or a part of one.
@@ -114,6 +132,9 @@ pub struct Instance {
     pub capabilities: Vec<String>,
     /// The instance it is a part of.
     pub owner: Option<InstanceId>,
+    /// The link of its owner that it is on, by index.
+    #[serde(default)]
+    pub link: Option<u32>,
     /// What it stood on when the run began.
     pub support: Option<InstanceId>,
     /// Where it stood when the run began, relative to its support or the lab.
@@ -200,12 +221,22 @@ impl Scene {
 
     /// An instance in the frame of the lab, where things stand as `stand` says. Where supports form a ring, the ring is cut.
     pub fn in_lab(&self, id: InstanceId, stand: impl Fn(InstanceId) -> Option<Stand>) -> Pose {
+        self.in_lab_on(id, stand, |below| self.surface(below))
+    }
+
+    /// The same where `surface` says where on an instance things stand, in its frame.
+    pub fn in_lab_on(
+        &self,
+        id: InstanceId,
+        stand: impl Fn(InstanceId) -> Option<Stand>,
+        surface: impl Fn(InstanceId) -> Pose,
+    ) -> Pose {
         let mut at = Pose::IDENTITY;
         let mut next = id;
         for _ in 0..=self.instances.len() {
             let (below, inner) = match stand(next) {
                 Some(Stand::Lab(inner)) => return inner.then(at),
-                Some(Stand::On(below, inner)) => (below, self.surface(below).then(inner)),
+                Some(Stand::On(below, inner)) => (below, surface(below).then(inner)),
                 Some(Stand::PartOf(owner, inner)) => (owner, inner),
                 None => return at,
             };

@@ -209,8 +209,8 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     }
     let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
     lab.use_lines(this);
-    lab.geometry(this);
-    lab.articulation(this);
+    let moving = lab.geometry(this).moving;
+    lab.articulation(this, moving);
     for m in lab.all_members(this) {
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
             lab.member_value(this, m, name.span);

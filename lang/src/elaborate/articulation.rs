@@ -1,11 +1,12 @@
 //! Links and joints of an asset that comes from a description of a robot, and how it is set up.
 
 use matterix_ir::robot::{Joint, JointKind, Robot};
-use matterix_ir::scene::{Articulation, InstanceId};
+use matterix_ir::scene::{Articulation, InstanceId, Solid};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Elaborator;
 use super::instances::Setting;
+use super::joints::clothe;
 use crate::ast::{AssetLine, ExprKind, FieldValue};
 use crate::eval::{Type, Value};
 use crate::names::near::{nearest, question};
@@ -18,8 +19,22 @@ impl<'a> Elaborator<'a> {
         kinds.any(|kind| lines(kind).any(|(_, line)| matches!(line, AssetLine::Robot(..))))
     }
 
-    /// What moves the links of an instance, if it has any.
-    pub fn articulation(&mut self, id: InstanceId) -> Option<Articulation> {
+    /// What moves the links of an instance, if it has any; `solids` are those of its body that are on links.
+    pub fn articulation(&mut self, id: InstanceId, solids: Vec<(u32, Solid)>) -> Option<Articulation> {
+        let mut found = match self.declared_tree(id) {
+            Some(robot) => {
+                let home = vec![0.0; robot.joints.len()];
+                Articulation { robot, tip: 0, home, base: 0, follows: Vec::new() }
+            }
+            None => self.imported(id)?,
+        };
+        clothe(&mut found.robot, solids);
+        found.follows = self.follows(id, &found.robot);
+        Some(found)
+    }
+
+    /// What moves the links that a description gives.
+    fn imported(&mut self, id: InstanceId) -> Option<Articulation> {
         let kinds = self.instances[id.0 as usize].kinds.clone();
         let (robot, at) =
             kinds.iter().filter_map(|k| self.tables.kinds.get(k)).flat_map(|k| &k.lines).find_map(|(_, line)| {
@@ -34,7 +49,8 @@ impl<'a> Elaborator<'a> {
         let name = robot.links[tip as usize].name.clone();
         let robot = robot.cut_after(tip);
         let tip = robot.link(&name)?;
-        Some(Articulation { tip, home: self.home(id, &robot, at)?, robot })
+        let base = self.link(id, "base", &robot, 0)?;
+        Some(Articulation { tip, home: self.home(id, &robot, at)?, base, follows: Vec::new(), robot })
     }
 
     /// The link that a field names.

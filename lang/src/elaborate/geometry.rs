@@ -32,6 +32,8 @@ pub struct Geometry {
     pub shape: Option<Shape>,
     /// More of it.
     pub solids: Vec<Solid>,
+    /// More of it on links that move, by index.
+    pub moving: Vec<(u32, Solid)>,
 }
 
 impl<'a> Elaborator<'a> {
@@ -48,13 +50,21 @@ impl<'a> Elaborator<'a> {
             let AssetLine::Solid { shape, at } = line else { continue };
             let mut scope = Scope::of(id, module);
             let Some(shape) = self.shape(shape, &mut scope) else { continue };
-            let pose = at.as_ref().map_or(Some(Pose::default()), |at| self.pose(at, &out, &mut scope).map(|f| f.0));
-            out.solids.extend(pose.map(|pose| Solid { shape, pose }));
+            let place = match at {
+                Some(at) => self.pose(id, at, &out, &mut scope),
+                None => Some((Pose::IDENTITY, false, None)),
+            };
+            match place {
+                Some((pose, _, Some(link))) => out.moving.push((link, Solid { shape, pose })),
+                Some((pose, ..)) => out.solids.push(Solid { shape, pose }),
+                None => {}
+            }
         }
         out
     }
 
-    fn lines(&self, id: InstanceId) -> Vec<(usize, &'a AssetLine)> {
+    /// The lines of an asset and of those it builds on.
+    pub(super) fn lines(&self, id: InstanceId) -> Vec<(usize, &'a AssetLine)> {
         let kinds = &self.instances[id.0 as usize].kinds;
         kinds.iter().filter_map(|k| self.tables.kinds.get(k)).flat_map(|k| k.lines.iter().copied()).collect()
     }
@@ -85,11 +95,11 @@ impl<'a> Elaborator<'a> {
             let before = waiting.len();
             let (ready, rest): (Vec<_>, Vec<_>) = waiting.into_iter().partition(|(_, _, at)| {
                 let given = |from: &Name| from.text == frame::STAND || done.frames.iter().any(|f| f.name == from.text);
-                at.from.as_ref().is_none_or(given)
+                at.from.as_ref().is_none_or(|from| given(from) || self.link_of(id, from).is_some())
             });
             for (module, name, at) in ready {
-                if let Some((pose, stand)) = self.pose(at, &done, &mut Scope::of(id, module)) {
-                    done.frames.push(Frame { name: name.text.clone(), pose, stand });
+                if let Some((pose, stand, link)) = self.pose(id, at, &done, &mut Scope::of(id, module)) {
+                    done.frames.push(Frame { name: name.text.clone(), pose, stand, link });
                 }
             }
             waiting = rest;
@@ -139,8 +149,27 @@ impl<'a> Elaborator<'a> {
                 .any(|m| matches!(&m.member.kind, MemberKind::Frame { name: n, .. } if n.text == name.text))
     }
 
-    /// A pose in the frame it names, and whether that is where the thing last stood.
-    fn pose(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<(Pose, bool)> {
+    /// A pose in the frame it names, whether that is where the thing last stood, and the link that it is on.
+    fn pose(
+        &mut self,
+        id: InstanceId,
+        at: &'a At,
+        of: &Geometry,
+        scope: &mut Scope,
+    ) -> Option<(Pose, bool, Option<u32>)> {
+        let local = self.local(at, of, scope)?;
+        match &at.from {
+            None => Some((local, false, None)),
+            Some(from) if from.text == frame::STAND => Some((local, true, None)),
+            Some(from) => match of.frames.iter().find(|f| f.name == from.text) {
+                Some(base) => Some((base.pose.then(local), base.stand, base.link)),
+                None => self.link_of(id, from).map(|link| (local, false, Some(link))),
+            },
+        }
+    }
+
+    /// A pose in whatever frame it is given in.
+    pub(super) fn local(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<Pose> {
         let position = match (&*at.position.kind, &of.shape) {
             (ExprKind::Name(name), shape) if POINTS.contains(&name.text.as_str()) => {
                 let shape = shape.as_ref()?;
@@ -163,15 +192,7 @@ impl<'a> Elaborator<'a> {
             Some(turned) => self.turned(turned, scope)?,
             None => [0.0; 3],
         };
-        let local = Pose::turned(position, rpy);
-        match &at.from {
-            None => Some((local, false)),
-            Some(from) if from.text == frame::STAND => Some((local, true)),
-            Some(from) => {
-                let base = of.frames.iter().find(|f| f.name == from.text)?;
-                Some((base.pose.then(local), base.stand))
-            }
-        }
+        Some(Pose::turned(position, rpy))
     }
 
     /// `rpy(0 deg, 0 deg, 90 deg)`: roll, pitch and yaw in rad.

@@ -9,6 +9,7 @@ pub mod grids;
 pub mod hazards;
 pub mod include;
 pub mod instances;
+mod joints;
 pub mod lab;
 pub mod laws;
 mod lineage;

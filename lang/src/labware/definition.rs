@@ -27,6 +27,8 @@ struct Metadata {
 #[serde(rename_all = "camelCase")]
 struct Parameters {
     is_tiprack: bool,
+    tip_length: Option<f64>,
+    tip_overlap: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -150,6 +152,11 @@ impl Definition {
     /// Whether its places are tips.
     pub(super) fn is_tip_rack(&self) -> bool {
         self.parameters.is_tiprack
+    }
+
+    /// How far the end of one of its tips is below the nozzle that has it, mm.
+    pub(super) fn tip_reach(&self) -> Option<f64> {
+        Some(self.parameters.tip_length? - self.parameters.tip_overlap.unwrap_or(0.0))
     }
 
     /// The capability called like its category.

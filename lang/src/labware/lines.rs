@@ -87,7 +87,10 @@ impl<'d> Writer<'d> {
         let shape = sizes.iter().all(|s| *s > 0.0).then(|| self.shape(kind_of_shape, &sizes));
         let volume = self.quantity(well.total_liquid_volume, "uL");
         let mut fields: Vec<Field> = std::iter::once(self.field("max_volume", volume)).chain(shape).collect();
-        if !self.definition.is_tip_rack() {
+        if self.definition.is_tip_rack() {
+            let reach = self.definition.tip_reach().filter(|reach| *reach > 0.0);
+            fields.extend(reach.map(|reach| self.field("reach", self.quantity(reach, "mm"))));
+        } else {
             let (Opening::Circular { diameter: across } | Opening::Rectangular { y_dimension: across, .. }) =
                 well.opening;
             fields.push(self.field("mouth", self.quantity(across, "mm")));

@@ -1,4 +1,4 @@
-//! What a robot does with its body in a primitive: `moves`, `grips`, `frees`.
+//! What a robot does with its body in a primitive: `moves`, `grips`, `frees`, `leads`.
 
 use matterix_ir::plan::Motion;
 use matterix_ir::scene::{InstanceId, frame};
@@ -12,7 +12,7 @@ impl<'a> Planner<'a, '_> {
     /// The motion of a clause; none where it has a mistake, which is reported.
     pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
         match clause {
-            ClauseKind::Moves { mover, manner, to } => self.moves(mover, manner, to, scope),
+            ClauseKind::Moves { mover, manner, to, within } => self.moves(mover, manner, to, within.as_ref(), scope),
             ClauseKind::Grips { item, at, by } => {
                 let by = self.thing(by, scope)?;
                 Some(match self.load(item, scope)? {
@@ -36,18 +36,66 @@ impl<'a> Planner<'a, '_> {
                 };
                 Some(Motion::Free { item: self.thing(item, scope)?, on, by: self.thing(by, scope)? })
             }
+            ClauseKind::Leads { handle, by } => {
+                let (item, frame) = self.goal(handle, scope)?;
+                if !self.lab.prototype && self.lab.rides_on(item, &frame).is_none() {
+                    let name = &self.lab.instances[item.0 as usize].name;
+                    let at = self.lab.calls.first().copied().unwrap_or(handle.span);
+                    let found = Diagnostic::error(
+                        codes::TYPE_MISMATCH,
+                        at,
+                        format!("`{name}` has no part that moves at its frame `{frame}`"),
+                        "a hand would take nothing along",
+                    );
+                    self.lab.report(found.help(format!(
+                        "give the frame `from` a joint of the asset: `frame {frame} at (0, 0, 0) mm from lid`"
+                    )));
+                    return None;
+                }
+                Some(Motion::Lead { item, frame, by: self.thing(by, scope)? })
+            }
             _ => None,
         }
     }
 
-    fn moves(&mut self, mover: &'a Expr, manner: &'a Manner, to: &'a Goal, scope: &mut Scope) -> Option<Motion> {
+    fn moves(
+        &mut self,
+        mover: &'a Expr,
+        manner: &'a Manner,
+        to: &'a Goal,
+        within: Option<&'a Expr>,
+        scope: &mut Scope,
+    ) -> Option<Motion> {
         let mover = self.thing(mover, scope)?;
         let straight = *manner == Manner::Straight;
         match (to, manner) {
-            (Goal::Frame(to), manner) => {
-                let (goal, frame) = self.goal(to, scope)?;
+            (Goal::Frame { at, by }, Manner::Free | Manner::Straight) => {
+                let shift = match by {
+                    Some(by) => Some(self.shift(by, scope)?),
+                    None => None,
+                };
+                let within = match within {
+                    Some(within) => Some(self.duration_node(within, scope, "in")?),
+                    None => None,
+                };
+                let (goal, frame, choice) = match self.lab.expr(at, scope) {
+                    Value::InstanceNode(node) => {
+                        let first = self.lab.picks.get(&node).and_then(|all| all.first()).copied();
+                        (first.unwrap_or(mover), String::new(), Some(node))
+                    }
+                    value => {
+                        let (goal, frame) = self.place(value, at)?;
+                        (goal, frame, None)
+                    }
+                };
+                Some(Motion::To { mover, goal, frame, choice, shift, straight, within })
+            }
+            _ if within.is_some() => self.mismatched(within.map_or_else(Span::default, |e| e.span)),
+            (Goal::Frame { by: Some(by), .. }, _) => self.mismatched(by.span),
+            (Goal::Frame { at, by: None }, manner) => {
+                let (goal, frame) = self.goal(at, scope)?;
                 Some(match manner {
-                    Manner::Free | Manner::Straight => Motion::To { mover, goal, frame, straight },
+                    Manner::Free | Manner::Straight => return None,
                     Manner::Upright(within) => {
                         Motion::Upright { mover, goal, frame, within: self.quantity(within, "Angle", scope)? }
                     }
@@ -153,7 +201,12 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn goal(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, String)> {
-        match self.lab.expr(e, scope) {
+        let value = self.lab.expr(e, scope);
+        self.place(value, e)
+    }
+
+    fn place(&mut self, value: Value, e: &'a Expr) -> Option<(InstanceId, String)> {
+        match value {
             Value::Frame(id, frame) => Some((id, frame)),
             Value::Instance(id) | Value::Qualified(id, _) => Some((id, String::new())),
             other => {

@@ -105,7 +105,7 @@ impl<'a> Planner<'a, '_> {
                 operation.fails.extend(names.iter().map(|n| n.text.clone()));
                 continue;
             }
-            if matches!(clause.kind, ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. }) {
+            if clause.kind.is_motion() {
                 if operation.motion.is_some() {
                     self.lab.report(Diagnostic::error(
                         codes::MISPLACED,
@@ -161,7 +161,8 @@ impl<'a> Planner<'a, '_> {
             | ClauseKind::Says { .. }
             | ClauseKind::Moves { .. }
             | ClauseKind::Grips { .. }
-            | ClauseKind::Frees { .. } => return None,
+            | ClauseKind::Frees { .. }
+            | ClauseKind::Leads { .. } => return None,
         })
     }
 
@@ -271,7 +272,10 @@ impl<'a> Planner<'a, '_> {
                     "a skill with a body lasts as long as its steps",
                     "`until` belongs to a command",
                 )),
-                ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. } => {
+                ClauseKind::Moves { .. }
+                | ClauseKind::Grips { .. }
+                | ClauseKind::Frees { .. }
+                | ClauseKind::Leads { .. } => {
                     self.lab.report(Diagnostic::error(
                         codes::MISPLACED,
                         clause.span,

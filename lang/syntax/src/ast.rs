@@ -370,6 +370,28 @@ pub struct At {
     pub turned: Option<Expr>,
 }
 
+/// A joint of an asset and what it follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Jointed {
+    /// Its name, and that of the part it carries.
+    pub name: Name,
+    /// How that moves; a joint of the asset's description without it.
+    pub way: Option<Way>,
+    /// How far it has moved: a length or an angle.
+    pub by: Expr,
+}
+
+/// How a part of an asset moves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Way {
+    /// Along its axis instead of about it.
+    pub slides: bool,
+    /// Three numbers.
+    pub axis: Expr,
+    /// Where the part is before it has moved; at the origin without it.
+    pub at: Option<At>,
+}
+
 /// A line of an asset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum AssetLine {
@@ -391,6 +413,8 @@ pub enum AssetLine {
         /// Its pose; at the origin without one.
         at: Option<At>,
     },
+    /// `joint lid turns (1, 0, 0) at (0, 0, 90) mm by choose(lid == open, 100 deg, 0 deg)`: a part of it that moves.
+    Joint(Box<Jointed>),
     /// Links and joints, from the file at this place.
     Robot(Box<matterix_ir::robot::Robot>, Span),
     /// `lid = Lid { ... }`: a child asset.
@@ -724,7 +748,7 @@ pub enum ClauseKind {
         /// When it is said; always without it.
         when: Option<Expr>,
     },
-    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`, `moves arm home`.
+    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`, `moves arm home`, `moves self to well by (0, 0, 50) mm in travel`.
     Moves {
         /// The robot.
         mover: Expr,
@@ -732,6 +756,8 @@ pub enum ClauseKind {
         manner: Manner,
         /// Where to.
         to: Goal,
+        /// The share of the step's time that is the motion's; all of it without.
+        within: Option<Expr>,
     },
     /// `grips item by arm`, `grips item at frame by arm`.
     Grips {
@@ -739,6 +765,13 @@ pub enum ClauseKind {
         item: Expr,
         /// Where, if not at its frame `grasp`.
         at: Option<Expr>,
+        /// The robot.
+        by: Expr,
+    },
+    /// `leads door.handle by arm`: to where the step's effects put it.
+    Leads {
+        /// A frame on a part that moves.
+        handle: Expr,
         /// The robot.
         by: Expr,
     },
@@ -753,8 +786,18 @@ pub enum ClauseKind {
     },
 }
 
+impl ClauseKind {
+    /// Whether it says what a robot does with its body.
+    pub fn is_motion(&self) -> bool {
+        matches!(
+            self,
+            ClauseKind::Moves { .. } | ClauseKind::Grips { .. } | ClauseKind::Frees { .. } | ClauseKind::Leads { .. }
+        )
+    }
+}
+
 /// How a robot moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Manner {
     /// Any way that is free.
     Free,
@@ -767,10 +810,15 @@ pub enum Manner {
 }
 
 /// Where a robot moves to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Goal {
-    /// `to goal`.
-    Frame(Expr),
+    /// `to goal`, `to goal by (0, 0, 50) mm`.
+    Frame {
+        /// Where.
+        at: Expr,
+        /// How far from there.
+        by: Option<Expr>,
+    },
     /// `by (0, 0, 100) mm`.
     Shift(Expr),
     /// `to joints [0 deg, 90 deg]`.

@@ -390,8 +390,10 @@ const BLOCK_WORDS: &[&str] = &[
 ];
 
 /// The words that start a clause.
-const CLAUSE_WORDS: &[&str] =
-    &["needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees"];
+const CLAUSE_WORDS: &[&str] = &[
+    "needs", "presumes", "while", "fails", "effect", "takes", "until", "option", "says", "moves", "grips", "frees",
+    "leads",
+];
 
 /// The head of a line: what stands before its bracket.
 fn title(code: &str) -> &str {

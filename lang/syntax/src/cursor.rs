@@ -163,6 +163,8 @@ fn is_noise(rule: Rule) -> bool {
             | kw_moves
             | kw_grips
             | kw_frees
+            | kw_leads
+            | kw_joint
             | kw_solid
             | kw_per
             | kw_also

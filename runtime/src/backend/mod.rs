@@ -13,7 +13,7 @@ use matterix_ir::NodeId;
 use matterix_ir::plan::Operation;
 
 pub use dry::Dry;
-pub use sim::Sim;
+pub use sim::{Moves, Sim};
 pub use watch::Prepared;
 
 use crate::exec::Listener;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 
@@ -15,10 +15,19 @@ use crate::fault::Fault;
 use crate::motion::{Refused, Stage, supported};
 use crate::process::{Advance, Engine, Watch};
 
+/// What moves through space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moves {
+    /// Robots, by planned motions.
+    pub robots: bool,
+    /// Some steps of the plan run beside others, so that what is in a robot's way may go away.
+    pub beside: bool,
+}
+
 /// Simulates at `process` fidelity, or with robots that move through space.
 pub struct Sim<'m> {
     stage: Option<Stage<'m>>,
-    beside: bool,
+    moves: Moves,
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
@@ -40,6 +49,7 @@ const PATIENCE: f64 = 0.25;
 struct Running {
     ends: Ends,
     at_end: Vec<Action>,
+    motion: Option<Motion>,
 }
 
 /// When an operation ends.
@@ -68,21 +78,53 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Sim { stage: None, beside: false, engine, prepared, seed, running, started: 0, sampled, told }
+        let moves = Moves::default();
+        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, sampled, told }
     }
 
-    /// Robots move through space from now on: their motions take the time they need, and fail where there is no way.
-    /// `beside` is whether some steps of the plan run beside others, so that what is in the way may go away.
-    pub fn with_motion(self, stage: Stage<'m>, beside: bool) -> Self {
-        Sim { stage: Some(stage), beside, ..self }
+    /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
+    /// no way.
+    pub fn with_stage(self, stage: Stage<'m>, moves: Moves, out: &mut dyn Listener) -> Self {
+        let mut sim = Sim { stage: Some(stage), moves, ..self };
+        sim.follow_joints(0.0, out);
+        sim
+    }
+
+    /// Joints stand where the model says; how they get there in so many seconds is told.
+    fn follow_joints(&mut self, lasts: f64, out: &mut dyn Listener) {
+        let Some(stage) = self.stage.as_mut().filter(|stage| !stage.fixtures.is_empty()) else { return };
+        let engine = &self.engine;
+        let moved = stage.follow_joints(|node| Some(engine.eval(node)));
+        if !moved.is_empty() {
+            out.travels(&stage.swings(&moved, engine.time(), lasts, FRAME));
+        }
+    }
+
+    /// The value of a node when an operation has ended.
+    fn after(&self, operation: &Operation, node: NodeId) -> f64 {
+        let mut states = self.engine.states().to_vec();
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let value = self.engine.eval_with(*value, &states);
+            if let Some(slot) = states.get_mut(*state as usize) {
+                *slot = value;
+            }
+        }
+        self.engine.eval_with(node, &states)
     }
 
     /// Carries out the motion of an operation; how long it takes, if it takes time.
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
-        let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
-        let values: Vec<f64> = motion.values().into_iter().map(|node| self.engine.eval(node)).collect();
+        let Some(motion) = operation.motion.as_ref().filter(|_| self.moves.robots) else { return Ok(None) };
+        let motion = motion.chosen(|node| Some(self.engine.eval(node))).unwrap_or_else(|| motion.clone());
+        let led = self.stage.as_ref().and_then(|stage| stage.led_by(&motion));
+        let values: Vec<f64> = match led {
+            Some(led) => vec![self.after(operation, led)],
+            None => motion.values().into_iter().map(|node| self.engine.eval(node)).collect(),
+        };
+        let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
-        let performed = stage.set_out(motion, &values)?;
+        let performed = stage.set_out(&motion, &values)?;
         Ok(performed.map(|performed| {
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()
@@ -93,13 +135,13 @@ impl<'m> Sim<'m> {
     /// longer than the bounds of its duration allow; `begun` is when it first tried, s.
     fn attempt(&mut self, operation: &Operation, begun: f64, out: &mut dyn Listener) -> Result<Ends, Fault> {
         let refused = match self.perform(operation, out) {
-            Ok(Some(duration)) => return Ok(Ends::At(self.engine.time() + duration)),
+            Ok(Some(duration)) => return Ok(Ends::At(self.engine.time() + self.rest(operation) + duration)),
             Ok(None) => return self.end_of(operation, out),
             Err(refused) => refused,
         };
         let (now, stage) = (self.engine.time(), self.stage.as_ref());
         let mut text = stage.map(|s| refused.text(s.scene, operation)).unwrap_or_default();
-        if self.beside && stage.is_some_and(|s| s.is_by_a_robot(&refused)) {
+        if self.moves.beside && stage.is_some_and(|s| s.is_by_a_robot(&refused)) {
             let bounds = operation.takes.and_then(|t| t.bounds);
             let until = begun + bounds.map_or(0.0, |(_, most)| self.engine.eval(most));
             if now < until {
@@ -109,6 +151,14 @@ impl<'m> Sim<'m> {
             text.push_str(&format!(", and it did not go away within {} s", show_number(now - begun)));
         }
         Ok(Ends::Failed(refused.failure().to_string(), text))
+    }
+
+    /// What an operation takes beside its motion, s.
+    fn rest(&self, operation: &Operation) -> f64 {
+        let (Some(Motion::To { within: Some(within), .. }), Some(takes)) = (&operation.motion, &operation.takes) else {
+            return 0.0;
+        };
+        (self.engine.eval(takes.nominal) - self.engine.eval(*within)).max(0.0)
     }
 
     /// Things stand where the states of the model say.
@@ -248,9 +298,15 @@ impl Backend for Sim<'_> {
         let ends = self.attempt(operation, self.engine.time(), out)?;
         self.engine.apply(&operation.at_start, out)?;
         self.follow_supports(&operation.at_start);
+        let lasts = match &ends {
+            Ends::At(end) => end - self.engine.time(),
+            _ => 0.0,
+        };
+        self.follow_joints(lasts, out);
         let ticket = Ticket(self.started);
         self.started += 1;
-        self.running.insert(ticket, Running { ends, at_end: operation.at_end.clone() });
+        self.running
+            .insert(ticket, Running { ends, at_end: operation.at_end.clone(), motion: operation.motion.clone() });
         Ok(ticket)
     }
 
@@ -260,21 +316,29 @@ impl Backend for Sim<'_> {
             return Ok(status);
         }
         if let Some(running) = self.running.remove(&ticket) {
+            if let Some(stage) = self.stage.as_mut() {
+                stage.let_go(running.motion.as_ref());
+            }
             if let Ends::Failed(name, text) = running.ends {
                 return Ok(Status::Failed { name, text });
             }
             self.engine.apply(&running.at_end, out)?;
             self.follow_supports(&running.at_end);
+            self.follow_joints(0.0, out);
         }
         Ok(Status::Done)
     }
 
     fn halt(&mut self, ticket: Ticket) {
-        self.running.remove(&ticket);
+        let halted = self.running.remove(&ticket);
+        if let (Some(stage), Some(halted)) = (self.stage.as_mut(), halted) {
+            stage.let_go(halted.motion.as_ref());
+        }
     }
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         let advance = self.engine.advance(until, watches, out)?;
+        self.follow_joints(0.0, out);
         if let Advance::Watch(indices) = &advance {
             let fired = indices.iter().filter_map(|&i| watches.get(i)).filter(|w| w.value);
             fired.for_each(|w| self.end_when(w.node));

@@ -7,7 +7,7 @@ use matterix_ir::{BinaryOp, Graph, NodeId, Op};
 
 /// The leaves' values at one instant; `None` is not known.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known<'a> {
+pub(crate) struct Known<'a> {
     pub time: f64,
     pub states: &'a [Option<f64>],
     pub params: &'a [f64],
@@ -17,7 +17,7 @@ pub(super) struct Known<'a> {
 }
 
 /// The value of `node`, if it follows from what is known.
-pub(super) fn eval(graph: &Graph, node: NodeId, known: Known<'_>) -> Option<f64> {
+pub(crate) fn eval(graph: &Graph, node: NodeId, known: Known<'_>) -> Option<f64> {
     let mut values: BTreeMap<NodeId, Option<f64>> = BTreeMap::new();
     for n in graph.schedule(roots(graph, node, known)) {
         let value = one(graph.op(n), known, &values);

@@ -12,6 +12,8 @@ pub struct Assembly {
     pub tip: u32,
     /// The link that carries the tools: the robot's own tip.
     pub flange: u32,
+    /// The link from which its arm reaches; what is before it drives that about.
+    pub base: u32,
     /// Positions of the moving joints when the run begins, rad or m.
     pub home: Vec<f64>,
     /// Which instance each link belongs to.
@@ -25,11 +27,13 @@ pub fn assemble(scene: &Scene, id: InstanceId) -> Option<Assembly> {
         robot: own.robot.clone(),
         tip: own.tip,
         flange: own.tip,
+        base: own.base,
         home: own.home.clone(),
         owners: vec![id; own.robot.links.len()],
     };
     for part in parts(scene, id) {
-        if let Some(articulation) = scene.get(part).articulation.as_deref() {
+        let tool = scene.get(part).articulation.as_deref().filter(|a| a.follows.is_empty());
+        if let Some(articulation) = tool {
             whole.mount(scene, part, articulation);
         }
     }

@@ -12,7 +12,6 @@ use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Mover};
 use matterix_motion::spheres::{Figure, Other};
-use matterix_motion::time::Trajectory;
 
 use super::perform::{Performed, Refused};
 use super::stage::Stage;
@@ -33,8 +32,8 @@ pub struct Flight {
     /// When it began, s since the run began.
     begin: f64,
     performed: Performed,
-    /// The joints that move its tip.
-    arm: Vec<usize>,
+    /// The joints that move.
+    joints: Vec<usize>,
     /// The robot and what it holds.
     figure: Arc<Figure>,
     load: Option<InstanceId>,
@@ -49,7 +48,7 @@ impl Flight {
     }
 
     fn at(&self, time: f64) -> Vec<f64> {
-        self.performed.at(&self.arm, time - self.begin).unwrap_or_default()
+        self.performed.at(&self.joints, time - self.begin).unwrap_or_default()
     }
 }
 
@@ -57,7 +56,10 @@ impl Flight {
 struct Candidate<'a> {
     robot: InstanceId,
     figure: &'a Figure,
-    part: &'a Trajectory,
+    /// Where its joints are so long after it began, s.
+    at: &'a dyn Fn(f64) -> Vec<f64>,
+    /// s.
+    lasts: f64,
     /// When it could begin, s since the run began.
     since: f64,
     /// What it may touch.
@@ -125,15 +127,15 @@ impl Stage<'_> {
         let robot = performed.robot;
         self.changes += 1;
         let Some(actor) = self.actors.get(&robot) else { return };
-        let Ok(figure) = self.figure(robot, actor) else { return };
-        let arm = actor.arm.clone();
-        if performed.at(&arm, 0.0).is_none() {
+        let joints = performed.moved(actor);
+        let Ok(figure) = self.figure(robot, actor, &joints) else { return };
+        if joints.is_empty() {
             return;
         }
-        let at = |t: f64| performed.at(&arm, t).unwrap_or_default();
+        let at = |t: f64| performed.at(&joints, t).unwrap_or_default();
         let speed = meet::speed(&Mover { figure: &figure, at: &at }, 0.0, performed.duration());
         let (begin, load, performed) = (self.now, self.held(robot), performed.clone());
-        self.flights.insert(robot, Flight { begin, performed, arm, figure: Arc::new(figure), load, speed });
+        self.flights.insert(robot, Flight { begin, performed, joints, figure: Arc::new(figure), load, speed });
     }
 
     /// The others that are under way after a time.
@@ -145,36 +147,41 @@ impl Stage<'_> {
     fn hold_back(&self, performed: &mut Performed, near: Option<InstanceId>) -> f64 {
         let robot = performed.robot;
         let Some(actor) = self.actors.get(&robot) else { return 0.0 };
-        let Ok(figure) = self.figure(robot, actor) else { return 0.0 };
-        let (mut since, mut waited) = (self.now, 0.0);
-        for part in &mut performed.parts {
-            if part.joints == actor.arm {
-                part.wait = self.wait(&Candidate { robot, figure: &figure, part: &part.trajectory, since, near });
+        let joints = performed.moved(actor);
+        let Ok(figure) = self.figure(robot, actor, &joints) else { return 0.0 };
+        let (mut begun, mut waited) = (0.0, 0.0);
+        for index in 0..performed.parts.len() {
+            let part = &performed.parts[index];
+            let (lasts, goes) = (part.trajectory.duration(), part.joints.iter().any(|j| joints.contains(j)));
+            if goes {
+                let at = |t: f64| performed.at(&joints, begun + t).unwrap_or_default();
+                let since = self.now + begun;
+                let wait = self.wait(&Candidate { robot, figure: &figure, at: &at, lasts, since, near });
+                performed.parts[index].wait = wait;
+                waited += wait;
             }
-            since += part.wait + part.trajectory.duration();
-            waited += part.wait;
+            begun += performed.parts[index].wait + lasts;
         }
         waited
     }
 
     /// The least time, s, that a motion has to wait to keep clear of robots that are under way.
     fn wait(&self, candidate: &Candidate<'_>) -> f64 {
-        let &Candidate { robot, figure, part, since, .. } = candidate;
+        let &Candidate { robot, figure, at, lasts, since, .. } = candidate;
         let last = self.under_way(robot, since).map(|(_, f)| f.end() - since).fold(0.0, f64::max);
         if last == 0.0 {
             return 0.0;
         }
-        let own = |t: f64| part.at(t).position;
-        let speed = meet::speed(&Mover { figure, at: &own }, 0.0, part.duration());
+        let speed = meet::speed(&Mover { figure, at }, 0.0, lasts);
         let steps = (last / STEP).ceil() as u32;
         let waits = (0..steps).map(|k| f64::from(k) * STEP);
         waits.into_iter().find(|wait| self.keeps_clear(candidate, *wait, speed)).unwrap_or(last)
     }
 
     fn keeps_clear(&self, candidate: &Candidate<'_>, wait: f64, speed: f64) -> bool {
-        let Candidate { robot, figure, part, since, near } = candidate;
+        let Candidate { robot, figure, at, since, near, .. } = candidate;
         let begin = since + wait;
-        let own = |t: f64| part.at(t - begin).position;
+        let own = |t: f64| at((t - begin).max(0.0));
         let a = Mover { figure, at: &own };
         self.under_way(*robot, begin).all(|(_, flight)| {
             let other = |t: f64| flight.at(t);
@@ -199,12 +206,13 @@ impl Stage<'_> {
     fn robot_between(&self, performed: &Performed) -> Option<Refused> {
         let robot = performed.robot;
         let actor = self.actors.get(&robot)?;
-        let figure = self.figure(robot, actor).ok()?;
+        let joints = performed.moved(actor);
+        let figure = self.figure(robot, actor, &joints).ok()?;
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let others: Vec<bool> = around.owners.iter().map(|owner| self.robot_with(*owner).is_some()).collect();
         let steps = (performed.duration() / STEP * 10.0).ceil().max(1.0) as u32;
         (0..=steps).find_map(|step| {
-            let at = performed.at(&actor.arm, performed.duration() * f64::from(step) / f64::from(steps))?;
+            let at = performed.at(&joints, performed.duration() * f64::from(step) / f64::from(steps))?;
             let mut met = figure.contacts(&around.world, &at);
             met.retain(|c| matches!(c.other, Other::Body(index) if others.get(index) == Some(&true)));
             (!met.is_empty()).then(|| self.meeting(&figure, &around, &met, step == 0))

@@ -1,8 +1,11 @@
 //! Robots that move: what they are made of, where everything is meanwhile, where they are to go and how they get there.
 
 pub mod assembly;
+mod drive;
 pub mod fingers;
+pub mod fixture;
 pub mod flight;
+mod gantry;
 pub mod goal;
 mod hands;
 pub mod perform;
@@ -13,7 +16,8 @@ mod tilt;
 mod together;
 
 pub use assembly::Assembly;
-pub use perform::{Meeting, Moment, Performed, Refused};
+pub use fixture::Fixture;
+pub use perform::{Meeting, Moment, Part, Performed, Refused};
 pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

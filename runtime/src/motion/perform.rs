@@ -12,6 +12,7 @@ use matterix_motion::time::{Limits, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
 use super::fingers::CLEARANCE;
+use super::fixture::Led;
 use super::goal::{carried_to, spots, targets, targets_at};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -21,7 +22,7 @@ pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 /// How far shapes of fingers and what a gripper is said to open may differ, m.
 const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
-const FINENESS: f64 = 0.02;
+pub(super) const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
@@ -40,6 +41,8 @@ pub struct Performed {
     pub robot: InstanceId,
     /// One after the other.
     pub parts: Vec<Part>,
+    /// What its hand took along.
+    pub led: Option<Led>,
 }
 
 /// A motion of some of a robot's joints.
@@ -54,6 +57,11 @@ pub struct Part {
 }
 
 impl Performed {
+    /// Some parts after each other, with nothing taken along.
+    pub fn new(robot: InstanceId, parts: Vec<Part>) -> Self {
+        Performed { robot, parts, led: None }
+    }
+
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
         self.parts.iter().map(|part| part.wait + part.trajectory.duration()).sum()
@@ -68,12 +76,22 @@ impl Performed {
         })
     }
 
-    /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
+    /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where one of them does not
+    /// move.
     pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
-        let mut own = self.begins().filter(|(_, part)| part.joints == joints);
-        let mut now = own.next()?;
-        own.take_while(|(begin, _)| *begin <= time).for_each(|next| now = next);
-        Some(now.1.trajectory.at(time - now.0).position)
+        let of_one = |joint: &usize| {
+            let mut own = self.begins().filter_map(|(t, p)| Some((t, p, p.joints.iter().position(|j| j == joint)?)));
+            let mut now = own.next()?;
+            own.take_while(|(begin, ..)| *begin <= time).for_each(|next| now = next);
+            now.1.trajectory.at(time - now.0).position.get(now.2).copied()
+        };
+        joints.iter().map(of_one).collect()
+    }
+
+    /// Which joints it moves of those that move the tip and that drive the robot about.
+    pub fn moved(&self, actor: &Actor) -> Vec<usize> {
+        let moves = |joints: &&Vec<usize>| self.parts.iter().any(|part| part.joints == **joints);
+        [&actor.arm, &actor.drive].into_iter().filter(moves).flatten().copied().collect()
     }
 
     /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
@@ -88,7 +106,7 @@ impl Performed {
 
 /// How a tip is brought to a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Way {
+pub(super) enum Way {
     Free,
     Straight,
     /// What is held tilts by no more than this, rad.
@@ -222,15 +240,31 @@ impl Stage<'_> {
     /// Carries out a motion. `values` are those of [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         match motion {
-            Motion::To { mover, goal, frame, straight } => {
-                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+            Motion::To { mover, goal, frame, straight, within, .. } => {
+                // What has a time of its own and nothing to move with, or nowhere to go, takes that time.
+                let Some(robot) = self.actor_of(*mover) else {
+                    return if within.is_some() { Ok(None) } else { Err(Refused::NoRobot) };
+                };
+                self.take(robot, *mover)?;
+                let shift = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or_default());
+                let gantry = self.actors.get(&robot).is_some_and(Actor::is_gantry);
+                if gantry || within.is_some() {
+                    let mut to = targets(self, robot, *goal, frame);
+                    to.iter_mut().for_each(|to| (0..3).for_each(|k| to.position[k] += shift[k]));
+                    match to.is_empty() {
+                        true if within.is_some() => return Ok(None),
+                        true => return Err(Refused::NoFrame),
+                        false if gantry => return self.cross(robot, &to, shift[2].max(0.0)).map(Some),
+                        false => {}
+                    }
+                }
                 let way = if *straight { Way::Straight } else { Way::Free };
-                self.bring(robot, *goal, frame, way).map(Some)
+                self.bring(robot, (*goal, frame), shift, way).map(Some)
             }
             Motion::Upright { mover, goal, frame, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let within = values.first().copied().unwrap_or_default();
-                self.bring(robot, *goal, frame, Way::Upright(within)).map(Some)
+                self.bring(robot, (*goal, frame), [0.0; 3], Way::Upright(within)).map(Some)
             }
             Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -248,7 +282,7 @@ impl Stage<'_> {
             Motion::Fingers { by, open } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
                 let width = if *open { f64::INFINITY } else { 0.0 };
-                Ok(self.spread(robot, width).map(|part| Performed { robot, parts: vec![part] }))
+                Ok(self.spread(robot, width).map(|part| Performed::new(robot, vec![part])))
             }
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -275,7 +309,16 @@ impl Stage<'_> {
                     return Err(Refused::TooWide(width, fingers.opening()));
                 }
                 self.grip(*item, robot);
-                Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
+                Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed::new(robot, vec![part])))
+            }
+            Motion::Lead { item, frame, by } => {
+                let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
+                let to = targets(self, robot, *item, frame);
+                let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
+                if far > TOLERANCE.0 || turned > TOLERANCE.1 {
+                    return Err(Refused::Misplaced(far, turned));
+                }
+                self.lead(robot, *item, frame, values.first().copied().unwrap_or(f64::NAN)).map(Some)
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -297,15 +340,19 @@ impl Stage<'_> {
                 let below = on.or_else(|| self.stood_on(*item));
                 self.carry(*item, below);
                 self.freed(robot, *item);
-                Ok(self.make_room(robot, *item).map(|part| Performed { robot, parts: vec![part] }))
+                Ok(self.make_room(robot, *item).map(|part| Performed::new(robot, vec![part])))
             }
         }
     }
 
     /// A robot and what it holds as they are now, for a recording.
     pub fn moment(&self, robot: InstanceId, time: f64) -> Option<Moment> {
-        let actor = self.actors.get(&robot)?;
         let base = self.pose(robot);
+        if let Some(fixture) = self.fixtures.get(&robot) {
+            let links = fixture.links().into_iter().map(|l| base.then(l)).collect();
+            return Some(Moment { time, robot, joints: fixture.joints.clone(), links, held: None });
+        }
+        let actor = self.actors.get(&robot)?;
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
         Some(Moment { time, robot, joints: actor.joints.clone(), links, held })
@@ -314,14 +361,22 @@ impl Stage<'_> {
     /// Moments of a motion that has been carried out and began at a time, s, at most so far apart.
     pub fn moments(&self, performed: &Performed, begin: f64, apart: f64) -> Vec<Moment> {
         let mut stage = self.clone();
+        let robot = performed.robot;
+        performed.led.iter().for_each(|led| stage.undrag(led));
         let steps = (performed.duration() / apart).ceil().max(1.0) as u32;
-        (0..=steps)
-            .filter_map(|step| {
-                let since = performed.duration() * f64::from(step) / f64::from(steps);
-                performed.bring(stage.actors.get_mut(&performed.robot)?, since);
-                stage.moment(performed.robot, begin + since)
-            })
-            .collect()
+        let mut out = Vec::new();
+        for step in 0..=steps {
+            let since = performed.duration() * f64::from(step) / f64::from(steps);
+            if let Some(actor) = stage.actors.get_mut(&robot) {
+                performed.bring(actor, since);
+            }
+            if let Some(led) = &performed.led {
+                let item = stage.dragged(led, robot);
+                out.extend(stage.moment(item, begin + since));
+            }
+            out.extend(stage.moment(robot, begin + since));
+        }
+        out
     }
 
     /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
@@ -379,12 +434,20 @@ impl Stage<'_> {
             return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
         }
         let mut parts = self.depart(robot, None)?;
-        parts.push(self.way(robot, &to, None)?);
-        Ok(Performed { robot, parts })
+        let arm = self.arm(robot);
+        parts.push(self.way(robot, &arm, &to, None)?);
+        Ok(Performed::new(robot, parts))
     }
 
-    /// Brings a robot to a frame; what it holds to the nearest spot about it that is free and within reach.
-    fn bring(&mut self, robot: InstanceId, goal: InstanceId, frame: &str, way: Way) -> Result<Performed, Refused> {
+    /// Brings a robot to a frame, or so far from it, m; what it holds to the nearest spot about it that is free and within
+    /// reach.
+    fn bring(
+        &mut self,
+        robot: InstanceId,
+        (goal, frame): (InstanceId, &str),
+        shift: [f64; 3],
+        way: Way,
+    ) -> Result<Performed, Refused> {
         let mut spots = match carried_to(self, robot, goal, frame) {
             Some(held) => spots(self, held, goal),
             None => vec![Pose::IDENTITY],
@@ -403,7 +466,8 @@ impl Stage<'_> {
         let before = (spots.len() > 1).then(|| self.clone());
         let mut refused = Refused::NoFrame;
         for (k, spot) in spots.into_iter().enumerate() {
-            let to = targets_at(self, robot, goal, frame, spot);
+            let mut to = targets_at(self, robot, goal, frame, spot);
+            to.iter_mut().for_each(|to| (0..3).for_each(|k| to.position[k] += shift[k]));
             if to.is_empty() {
                 return Err(Refused::NoFrame);
             }
@@ -425,9 +489,21 @@ impl Stage<'_> {
         if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
             parts.extend(self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0));
         }
-        let base = self.pose(robot).inverse();
+        parts.extend(self.reach(robot, to, way, goal)?);
+        Ok(Performed::new(robot, parts))
+    }
+
+    /// Brings the tip to one of some poses from where the robot stands.
+    pub(super) fn stretch(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        way: Way,
+        goal: Option<InstanceId>,
+    ) -> Result<Vec<Part>, Refused> {
+        let base = self.foot(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let now = actor.configuration();
+        let (now, arm) = (actor.configuration(), actor.arm.clone());
         let mut solver = Solver::new(actor.chain.clone());
         let mut found: Vec<(f64, &Pose, Vec<f64>)> = Vec::new();
         let mut missed: Option<Unreached> = None;
@@ -458,22 +534,18 @@ impl Stage<'_> {
         for (_, target, q) in &found {
             let tried = match way {
                 Way::Straight => self.line(robot, std::slice::from_ref(*target), goal.as_slice()),
-                Way::Free => self.way(robot, q, None),
-                Way::Upright(within) => self.way(robot, q, Some(within)),
+                Way::Free => self.way(robot, &arm, q, None),
+                Way::Upright(within) => self.way(robot, &arm, q, Some(within)),
             };
             match tried {
-                Ok(part) => {
-                    parts.push(part);
-                    return Ok(Performed { robot, parts });
-                }
+                Ok(part) => return Ok(vec![part]),
                 Err(why) => keep(why),
             }
         }
         // What is in the way beside a line may not be if the gripper turns before it sets out.
         for (_, target, _) in found.iter().filter(|_| way == Way::Straight) {
             if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
-                parts.extend(turned);
-                return Ok(Performed { robot, parts });
+                return Ok(turned.into());
             }
         }
         Err(refused)
@@ -482,13 +554,14 @@ impl Stage<'_> {
     /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
     fn turned_line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<[Part; 2], Refused> {
         let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
-        let base = self.pose(robot).inverse();
+        let base = self.foot(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let arm = actor.arm.clone();
         let before = actor.joints.clone();
         let now = actor.configuration();
         let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
         let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
-        let first = self.way(robot, &turned.q, Some(TURNING));
+        let first = self.way(robot, &arm, &turned.q, Some(TURNING));
         let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
         if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
             actor.joints = before;
@@ -496,14 +569,21 @@ impl Stage<'_> {
         both
     }
 
-    /// A free way to a configuration; what is held tilts by no more than so much on it, rad.
-    pub(super) fn way(&mut self, robot: InstanceId, q: &[f64], within: Option<f64>) -> Result<Part, Refused> {
+    /// A free way of some joints to where they are to stand; the others do not move. What is held tilts by no more than so
+    /// much on it, rad.
+    pub(super) fn way(
+        &mut self,
+        robot: InstanceId,
+        variables: &[usize],
+        q: &[f64],
+        within: Option<f64>,
+    ) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let figure = self.figure(robot, actor)?;
+        let figure = self.figure(robot, actor, variables)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
-        let start = actor.configuration();
+        let start = actor.positions(variables);
         let refused = |failure| match failure {
             plan::Failure::Collision(end, contacts) => {
                 self.meeting(&figure, &around, &contacts, end == plan::End::Start)
@@ -516,14 +596,14 @@ impl Stage<'_> {
                 let mut solver = Solver::new(actor.chain.clone());
                 let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
                 let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
-                timed(actor, &route.points, &mut level)?
+                timed(actor, variables, &route.points, Some(&mut level))?
             }
             None => {
                 let route = plan::plan(&mut checker, &start, q, &settings).map_err(refused)?;
-                timed(actor, &route.points, &mut checker)?
+                timed(actor, variables, &route.points, Some(&mut checker))?
             }
         };
-        self.settle(robot, q);
+        self.settle(robot, variables, q);
         Ok(part)
     }
 
@@ -539,8 +619,8 @@ impl Stage<'_> {
         let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
         let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let base = self.pose(robot).inverse();
-        let figure = self.figure(robot, actor)?;
+        let (base, arm) = (self.foot(robot).inverse(), actor.arm.clone());
+        let figure = self.figure(robot, actor, &arm)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let mut solver = Solver::new(actor.chain.clone());
         let mut points = vec![actor.configuration()];
@@ -555,22 +635,28 @@ impl Stage<'_> {
             })?;
             points.extend(followed.into_iter().skip(1));
         }
-        let part = timed(actor, &points, &mut checker)?;
+        let part = timed(actor, &arm, &points, Some(&mut checker))?;
         let end = points.pop().unwrap_or_default();
-        self.settle(robot, &end);
+        self.settle(robot, &arm, &end);
         Ok(part)
     }
 
-    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor, moved: &[usize]) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
-        Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
+        Figure::new(actor.to_plan(), &base, moved, &actor.joints, &held).map_err(|_| Refused::NoRobot)
     }
 
-    fn settle(&mut self, robot: InstanceId, q: &[f64]) {
+    /// Joints of a robot stand like this from now on.
+    pub(super) fn settle(&mut self, robot: InstanceId, variables: &[usize], q: &[f64]) {
         if let Some(actor) = self.actors.get_mut(&robot) {
-            actor.set(q);
+            actor.set_some(variables, q);
         }
+    }
+
+    /// Which joints of a robot move its tip.
+    fn arm(&self, robot: InstanceId) -> Vec<usize> {
+        self.actors.get(&robot).map(|actor| actor.arm.clone()).unwrap_or_default()
     }
 
     /// The deepest contact in words.
@@ -604,12 +690,19 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], judge: &mut dyn Judge) -> Result<Part, Refused> {
-    let limits =
-        |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
+/// The motion of some joints of a robot from point to point, as fast as they may.
+pub(super) fn timed(
+    actor: &Actor,
+    variables: &[usize],
+    points: &[Vec<f64>],
+    judge: Option<&mut dyn Judge>,
+) -> Result<Part, Refused> {
+    let limits = |f: fn(&JointLimits) -> f64| -> Vec<f64> {
+        variables.iter().filter_map(|i| actor.tree.variables().get(*i)).map(|v| f(&v.limits)).collect()
+    };
     let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
-    let trajectory = follow(points, &limits, Some(judge)).map_err(|_| Refused::NoWay)?;
-    Ok(Part { wait: 0.0, joints: actor.arm.clone(), trajectory })
+    let trajectory = follow(points, &limits, judge).map_err(|_| Refused::NoWay)?;
+    Ok(Part { wait: 0.0, joints: variables.to_vec(), trajectory })
 }
 
 /// The greatest acceleration of a joint, rad/s2 or m/s2.

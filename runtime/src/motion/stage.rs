@@ -4,15 +4,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
 
+use matterix_ir::Program;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Robot;
-use matterix_ir::scene::{InstanceId, Scene, Stand};
+use matterix_ir::scene::{InstanceId, Scene, Stand, frame};
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, assemble};
 use super::fingers::Fingers;
+use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
 
 /// What carries a thing and where.
@@ -31,7 +33,7 @@ pub struct Actor {
     pub assembly: Assembly,
     /// Every link.
     pub tree: Tree,
-    /// From its foot to what is brought to a goal.
+    /// From the link it reaches from to what is brought to a goal.
     pub chain: Chain,
     /// Positions of all that moves, rad or m.
     pub joints: Vec<f64>,
@@ -39,6 +41,8 @@ pub struct Actor {
     pub arm: Vec<usize>,
     /// What opens and closes its gripper.
     pub fingers: Option<Fingers>,
+    /// Of those that drive it about.
+    pub drive: Vec<usize>,
     /// Shared by all copies of a stage.
     to_plan: Arc<OnceLock<Robot>>,
 }
@@ -54,8 +58,12 @@ pub struct Stage<'p> {
     before: BTreeMap<InstanceId, Stand>,
     /// By instance.
     pub actors: BTreeMap<InstanceId, Actor>,
+    /// Things with parts that move as the model says.
+    pub fixtures: BTreeMap<InstanceId, Fixture>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// Things whose parts hands are moving.
+    pub(super) led: BTreeSet<InstanceId>,
     /// What a second robot grips as well, with that robot.
     pub(super) shared: BTreeMap<InstanceId, InstanceId>,
     /// s since the run began.
@@ -81,32 +89,42 @@ pub struct Unknown {
 
 impl<'p> Stage<'p> {
     /// The lab when the run begins. Robots whose description cannot be moved are named.
-    pub fn new(scene: &'p Scene) -> Result<Self, String> {
+    pub fn new(program: &'p Program) -> Result<Self, String> {
+        let scene = &program.scene;
         let carried = scene.stands().into_iter().map(Carried::Stands).collect();
-        let mut actors = BTreeMap::new();
+        let (mut actors, mut fixtures) = (BTreeMap::new(), BTreeMap::new());
         for (index, instance) in scene.instances.iter().enumerate() {
             let id = InstanceId(index as u32);
-            let mounted = instance.owner.is_some_and(|o| scene.get(o).articulation.is_some());
+            let wrong = |why: String| format!("`{}` cannot be moved: {why}", instance.name);
+            if let Some(articulation) = following(scene, id) {
+                fixtures.insert(id, Fixture::new(articulation).map_err(wrong)?);
+                continue;
+            }
+            let carries = |o: InstanceId| scene.get(o).articulation.is_some() && following(scene, o).is_none();
+            let mounted = instance.owner.is_some_and(carries);
             if instance.articulation.is_none() || mounted {
                 continue;
             }
             let Some(assembly) = assemble(scene, id) else { continue };
-            let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
-            actors.insert(id, actor);
+            actors.insert(id, Actor::new(assembly).map_err(wrong)?);
         }
-        Ok(Stage {
+        let mut stage = Stage {
             scene,
             carried,
             before: BTreeMap::new(),
             actors,
+            fixtures,
             freed: BTreeMap::new(),
+            led: BTreeSet::new(),
             shared: BTreeMap::new(),
             now: 0.0,
             flights: BTreeMap::new(),
             around_sweeps: false,
             changes: 0,
             unknown: Unknown::default(),
-        })
+        };
+        stage.follow_joints(|node| Some(initial(program, node)));
+        Ok(stage)
     }
 
     /// The robot an instance is or is part of.
@@ -119,14 +137,46 @@ impl<'p> Stage<'p> {
         }
     }
 
+    /// The robot that holds what an instance carries: the instance is that robot, or a tool mounted on it.
+    pub fn hand_of(&self, id: InstanceId) -> Option<InstanceId> {
+        self.actor_of(id).filter(|robot| *robot == id || self.scene.get(id).articulation.is_some())
+    }
+
+    /// Things whose links move, with their descriptions.
+    pub fn movers(&self) -> impl Iterator<Item = (InstanceId, &Robot, &Tree)> {
+        let robots = self.actors.iter().map(|(id, actor)| (*id, &actor.assembly.robot, &actor.tree));
+        let fixtures = self.fixtures.iter().filter_map(|(id, fixture)| {
+            following(self.scene, *id).map(|articulation| (*id, &articulation.robot, &fixture.tree))
+        });
+        robots.chain(fixtures)
+    }
+
     /// Where an instance is in the lab.
     pub fn pose(&self, id: InstanceId) -> Pose {
-        self.scene.in_lab(id, |id| self.stand(id))
+        self.scene.in_lab_on(id, |id| self.stand(id), |id| self.top(id))
+    }
+
+    /// Where something is put down on an instance, relative to it.
+    fn top(&self, id: InstanceId) -> Pose {
+        let place = self.scene.get(id).frames.iter().find(|f| f.name == frame::PLACE);
+        let link = place.and_then(|f| f.link).map_or(Pose::IDENTITY, |link| self.link(id, link));
+        link.then(self.scene.surface(id))
+    }
+
+    /// Where the link is in the lab from which a robot's arm reaches.
+    pub fn foot(&self, robot: InstanceId) -> Pose {
+        let base = self.actors.get(&robot).map_or(0, |actor| actor.assembly.base);
+        let own = self.pose(robot);
+        if base == 0 { own } else { own.then(self.link(robot, base)) }
     }
 
     /// Where a thing stands; what is in hand, in the lab.
     fn stand(&self, id: InstanceId) -> Option<Stand> {
         Some(match self.carried.get(id.0 as usize)? {
+            Carried::Stands(Stand::PartOf(owner, inner)) => {
+                let link = self.scene.get(id).link.map_or(Pose::IDENTITY, |link| self.link(*owner, link));
+                Stand::PartOf(*owner, link.then(*inner))
+            }
             Carried::Stands(stand) => *stand,
             Carried::Held(by, inner) => Stand::Lab(self.tip(*by).then(*inner)),
         })
@@ -134,14 +184,14 @@ impl<'p> Stage<'p> {
 
     /// Where something is put down on an instance, in the lab.
     pub fn surface(&self, id: InstanceId) -> Pose {
-        self.pose(id).then(self.scene.surface(id))
+        self.pose(id).then(self.top(id))
     }
 
     /// Where the tip of a robot is in the lab.
     pub fn tip(&self, robot: InstanceId) -> Pose {
         let Some(actor) = self.actors.get(&robot) else { return self.pose(robot) };
         let tip = matterix_motion::placement(&actor.chain.tip(&actor.configuration()));
-        self.pose(robot).then(tip)
+        self.foot(robot).then(tip)
     }
 
     /// A named point of an instance in the lab; the instance itself for an empty name.
@@ -151,6 +201,7 @@ impl<'p> Stage<'p> {
         }
         let found = self.scene.get(id).frames.iter().find(|f| f.name == name)?;
         let base = if found.stand { self.stood(id) } else { self.pose(id) };
+        let base = found.link.map_or(base, |link| base.then(self.link(id, link)));
         Some(base.then(found.pose))
     }
 
@@ -162,7 +213,8 @@ impl<'p> Stage<'p> {
     /// Where a thing stood before it was picked up; where it is, if it never was.
     fn stood(&self, id: InstanceId) -> Pose {
         let before = self.before.get(&id);
-        self.scene.in_lab(id, |i| before.filter(|_| i == id).copied().or_else(|| self.stand(i)))
+        let stand = |i: InstanceId| before.filter(|_| i == id).copied().or_else(|| self.stand(i));
+        self.scene.in_lab_on(id, stand, |id| self.top(id))
     }
 
     /// A thing stands somewhere on a surface from now on.
@@ -320,7 +372,7 @@ impl<'p> Stage<'p> {
         let Some(old) = self.carried.get(index).copied() else { return };
         let new = match by {
             None => Carried::Stands(Stand::Lab(now)),
-            Some(by) => match self.actor_of(by) {
+            Some(by) => match self.hand_of(by) {
                 Some(robot) => Carried::Held(robot, self.tip(robot).inverse().then(now)),
                 None => Carried::Stands(Stand::On(by, self.surface(by).inverse().then(now))),
             },
@@ -338,6 +390,9 @@ impl<'p> Stage<'p> {
 pub struct Change {
     carried: Vec<(InstanceId, Carried)>,
     joints: Vec<(InstanceId, Vec<f64>)>,
+    parts: Vec<(InstanceId, Vec<f64>)>,
+    led: Vec<(InstanceId, bool)>,
+    tools: Vec<(InstanceId, u32)>,
     freed: Vec<(InstanceId, Option<InstanceId>)>,
 }
 
@@ -347,7 +402,13 @@ impl Stage<'_> {
         let things = self.carried.iter().zip(&before.carried).enumerate();
         let moved = self.actors.iter().filter(|(id, a)| before.actors.get(id).is_none_or(|b| a.joints != b.joints));
         let freed = |id: &&InstanceId| self.freed.get(id) != before.freed.get(id);
+        let swung = self.fixtures.iter().filter(|(id, a)| before.fixtures.get(id).is_none_or(|b| a.joints != b.joints));
+        let tool =
+            |(id, a): &(&InstanceId, &Actor)| before.actors.get(id).is_none_or(|b| a.assembly.tip != b.assembly.tip);
         Change {
+            parts: swung.map(|(id, f)| (*id, f.joints.clone())).collect(),
+            led: self.led.symmetric_difference(&before.led).map(|id| (*id, self.led.contains(id))).collect(),
+            tools: self.actors.iter().filter(tool).map(|(id, a)| (*id, a.assembly.tip)).collect(),
             carried: things.filter(|(_, (a, b))| a != b).map(|(i, (a, _))| (InstanceId(i as u32), *a)).collect(),
             joints: moved.map(|(id, a)| (*id, a.joints.clone())).collect(),
             freed: self.actors.keys().filter(freed).map(|id| (*id, self.freed.get(id).copied())).collect(),
@@ -358,6 +419,19 @@ impl Stage<'_> {
     pub fn change(&mut self, change: &Change) -> Option<()> {
         for (id, carried) in &change.carried {
             *self.carried.get_mut(id.0 as usize)? = *carried;
+        }
+        for (robot, link) in &change.tools {
+            self.take_link(*robot, *link).ok()?;
+        }
+        for (id, joints) in &change.parts {
+            let fixture = self.fixtures.get_mut(id).filter(|f| f.joints.len() == joints.len())?;
+            fixture.joints.clone_from(joints);
+        }
+        for (id, led) in &change.led {
+            match led {
+                true => self.led.insert(*id),
+                false => self.led.remove(id),
+            };
         }
         for (id, joints) in &change.joints {
             let actor = self.actors.get_mut(id).filter(|a| a.joints.len() == joints.len())?;
@@ -375,7 +449,7 @@ impl Stage<'_> {
     /// Feeds all that tells this moment from others of the same lab to a hash; with `coarse`, figures that differ by
     /// less than that (m, rad) mostly count as the same.
     pub fn digest(&self, coarse: Option<f64>, hash: &mut impl Hasher) {
-        let Stage { carried, before, actors, freed, shared, unknown, .. } = self;
+        let Stage { carried, before, actors, fixtures, freed, led, shared, unknown, .. } = self;
         for one in carried {
             match one {
                 Carried::Stands(s) => write_stand(hash, s, coarse),
@@ -391,7 +465,12 @@ impl Stage<'_> {
         }
         for (id, actor) in actors {
             hash.write_u64(u64::from(id.0) | 3 << 32);
+            hash.write_u32(actor.assembly.tip);
             actor.joints.iter().for_each(|v| write_number(hash, *v, coarse));
+        }
+        for (id, fixture) in fixtures {
+            hash.write_u64(u64::from(id.0) | 4 << 32 | u64::from(led.contains(id)) << 40);
+            fixture.joints.iter().for_each(|v| write_number(hash, *v, coarse));
         }
         for (a, b) in freed.iter().chain([(&InstanceId(u32::MAX), &InstanceId(u32::MAX))]).chain(shared) {
             hash.write_u64(u64::from(a.0) << 32 | u64::from(b.0));
@@ -421,13 +500,17 @@ fn write_stand(hash: &mut impl Hasher, stand: &Stand, coarse: Option<f64>) {
 impl Actor {
     fn new(assembly: Assembly) -> Result<Self, String> {
         let tree = Tree::new(&assembly.robot).map_err(|why| why.to_string())?;
-        let chain = Chain::new(&assembly.robot, 0, assembly.tip).map_err(|why| why.to_string())?;
+        let chain = Chain::new(&assembly.robot, assembly.base, assembly.tip).map_err(|why| why.to_string())?;
+        let drive = Chain::new(&assembly.robot, 0, assembly.base).map_err(|why| why.to_string())?;
         let joint = |v: &matterix_motion::Variable| v.joint;
         let all: Vec<u32> = tree.variables().iter().map(joint).collect();
-        let arm: Vec<usize> = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
+        let which = |chain: &Chain| -> Vec<usize> {
+            chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect()
+        };
+        let (arm, drive) = (which(&chain), which(&drive));
         let joints = assembly.home.clone();
         let fingers = Fingers::of(&assembly, &tree, &arm);
-        Ok(Actor { assembly, tree, chain, joints, arm, fingers, to_plan: Arc::default() })
+        Ok(Actor { assembly, tree, chain, joints, arm, fingers, drive, to_plan: Arc::default() })
     }
 
     /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
@@ -442,7 +525,12 @@ impl Actor {
 
     /// The positions of the joints that move the tip.
     pub fn configuration(&self) -> Vec<f64> {
-        self.arm.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
+        self.positions(&self.arm)
+    }
+
+    /// The positions of some joints.
+    pub fn positions(&self, variables: &[usize]) -> Vec<f64> {
+        variables.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
     }
 
     /// Moves some of its joints.
@@ -451,13 +539,6 @@ impl Actor {
             if let Some(joint) = self.joints.get_mut(*index) {
                 *joint = *value;
             }
-        }
-    }
-
-    /// Moves the joints that move the tip.
-    pub fn set(&mut self, configuration: &[f64]) {
-        for (index, value) in self.arm.iter().zip(configuration) {
-            self.joints[*index] = *value;
         }
     }
 }

@@ -1,11 +1,13 @@
 //! What a robot must not run into, as solids, and what it holds, as balls.
 
 use matterix_ir::pose::Pose;
+use matterix_ir::robot;
 use matterix_ir::scene::{InstanceId, Shape};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Held;
 use matterix_motion::world::{Body, Shape as Solid, World};
 
+use super::fixture::following;
 use super::stage::{Actor, Stage};
 
 /// How far balls may reach into what things stand on or in before it counts, m: shapes are nominal.
@@ -66,6 +68,15 @@ impl Surroundings {
             let (solid, middle) = solid(shape);
             self.push(id, &instance.name, at.then(Pose::up(middle)), solid);
         }
+        let Some(fixture) = stage.fixtures.get(&id) else { return };
+        let links = following(stage.scene, id).into_iter().flat_map(|a| &a.robot.links).zip(fixture.links());
+        for (link, inner) in links {
+            for piece in &link.collision {
+                if let Some(solid) = piece_of(&piece.solid) {
+                    self.push(id, &instance.name, at.then(inner).then(piece.placement), solid);
+                }
+            }
+        }
     }
 
     /// Another robot as it stands now, ball by ball, each named after its link.
@@ -79,6 +90,16 @@ impl Surroundings {
             let name = actor.assembly.robot.links.get(ball.link as usize).map_or("", |l| l.name.as_str());
             self.push(id, name, at, Solid::Sphere(ball.radius));
         }
+    }
+}
+
+/// A piece of a link as a solid; meshes are not looked at.
+fn piece_of(solid: &robot::Solid) -> Option<Solid> {
+    match solid {
+        robot::Solid::Cuboid(size) => Some(Solid::Cuboid(size.map(|s| s / 2.0))),
+        robot::Solid::Cylinder([r, length]) => Some(Solid::Cylinder(*r, length / 2.0)),
+        robot::Solid::Sphere(r) => Some(Solid::Sphere(*r)),
+        robot::Solid::Mesh(..) => None,
     }
 }
 

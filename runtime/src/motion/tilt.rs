@@ -58,7 +58,7 @@ impl Stage<'_> {
     /// What must not tilt while a robot moves, if it holds anything.
     pub(super) fn upright(&self, robot: InstanceId, tilt: f64) -> Option<Upright> {
         let (_, inner) = self.inner(robot)?;
-        Some(Upright::of(&pose(&inner), &pose(&self.pose(robot).inverse()), tilt))
+        Some(Upright::of(&pose(&inner), &pose(&self.foot(robot).inverse()), tilt))
     }
 
     /// What a robot holds and where, relative to its tip.
@@ -86,7 +86,7 @@ impl Stage<'_> {
         let now = tilt_of(self.pose(item));
         let ways = self.ways(robot, item, to, point, inner);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let before = actor.joints.clone();
+        let (before, arm) = (actor.joints.clone(), actor.arm.clone());
         let mut refused = Refused::NoWay;
         let mut keep = |why: Refused| {
             if !matches!(refused, Refused::Collides(_)) {
@@ -96,14 +96,14 @@ impl Stage<'_> {
         for (way, q) in self.nearest_first(robot, ways, now, &mut keep) {
             let mut done = parts.clone();
             let brought = match now < LEVEL {
-                true => self.way(robot, &q, Some(LEVEL)).map(|part| done.push(part)),
+                true => self.way(robot, &arm, &q, Some(LEVEL)).map(|part| done.push(part)),
                 false => Ok(()),
             };
             let poses = way.poses((now >= LEVEL).then_some(now), angle);
             match brought.and_then(|()| self.line(robot, &poses, &[])) {
                 Ok(part) => {
                     done.push(part);
-                    return Ok(Performed { robot, parts: done });
+                    return Ok(Performed::new(robot, done));
                 }
                 Err(why) => keep(why),
             }
@@ -145,7 +145,7 @@ impl Stage<'_> {
         missed: &mut dyn FnMut(Refused),
     ) -> Vec<(Tilting, Vec<f64>)> {
         let Some(actor) = self.actors.get(&robot) else { return Vec::new() };
-        let (base, here) = (self.pose(robot).inverse(), actor.configuration());
+        let (base, here) = (self.foot(robot).inverse(), actor.configuration());
         let mut solver = Solver::new(actor.chain.clone());
         let mut found: Vec<(f64, Tilting, Vec<f64>)> = Vec::new();
         for way in ways {

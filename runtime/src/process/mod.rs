@@ -203,6 +203,11 @@ impl<'m> Engine<'m> {
         self.memo.borrow_mut().eval(&self.model.graph, node, self.env())
     }
 
+    /// The value of `node` now if the states were these.
+    pub fn eval_with(&self, node: NodeId, states: &[f64]) -> f64 {
+        self.model.graph.eval(node, Env { states, ..self.env() })
+    }
+
     /// Whether `node` is not 0 now.
     pub fn truth(&self, node: NodeId) -> bool {
         self.eval(node) != 0.0

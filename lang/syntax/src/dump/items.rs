@@ -148,6 +148,14 @@ fn asset_line(line: &AssetLine) -> Sexp {
         AssetLine::Error(_) => leaf("error"),
         AssetLine::Field(of) => field(of),
         AssetLine::Frame { name: word, at } => node("frame").with([name(word)]).with(place(at)),
+        AssetLine::Joint(joint) => {
+            let way = joint.way.iter().map(|way| {
+                node(if way.slides { "slides" } else { "turns" })
+                    .with([expr(&way.axis)])
+                    .with(way.at.iter().flat_map(place))
+            });
+            node("joint").with([name(&joint.name)]).with(way).with(maybe("by", Some(&joint.by)))
+        }
         AssetLine::Robot(robot, _) => node("robot").with([quoted(&robot.name)]),
         AssetLine::Solid { shape, at } => node("solid").with([expr(shape)]).with(at.iter().flat_map(place)),
         AssetLine::Grid(of) => node("grid")
@@ -228,23 +236,25 @@ fn clause(clause: &Clause) -> Sexp {
         ClauseKind::Says { text, when } => {
             node("says").with([super::steps::filled(text)]).with(maybe("when", when.as_ref()))
         }
-        ClauseKind::Moves { mover, manner, to } => {
+        ClauseKind::Moves { mover, manner, to, within } => {
             let moves = match manner {
                 Manner::Free => node("moves").with([expr(mover)]),
                 Manner::Straight => node("moves straight").with([expr(mover)]),
                 Manner::Upright(within) => node("moves upright").with([expr(mover), expr(within)]),
                 Manner::Tilted(angle, about) => node("moves tilted").with([expr(mover), expr(angle), expr(about)]),
             };
-            match to {
-                Goal::Frame(to) => moves.with(maybe("to", Some(to))),
+            let moves = match to {
+                Goal::Frame { at, by } => moves.with(maybe("to", Some(at))).with(maybe("by", by.as_ref())),
                 Goal::Shift(by) => moves.with(maybe("by", Some(by))),
                 Goal::Joints(to) => moves.with(maybe("to joints", Some(to))),
                 Goal::Home => moves.with([node("home")]),
-            }
+            };
+            moves.with(maybe("in", within.as_ref()))
         }
         ClauseKind::Grips { item, at, by } => {
             node("grips").with([expr(item)]).with(maybe("at", at.as_ref())).with([expr(by)])
         }
+        ClauseKind::Leads { handle, by } => node("leads").with([expr(handle), expr(by)]),
         ClauseKind::Frees { item, on, by } => {
             node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])
         }

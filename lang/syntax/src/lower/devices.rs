@@ -8,8 +8,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Goal, Grid, ItemKind, Manner,
-    Member, MemberKind, Name, Path, Role, Term,
+    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Goal, Grid, ItemKind, Jointed,
+    Manner, Member, MemberKind, Name, Path, Role, Term, Way,
 };
 
 impl Lower<'_> {
@@ -153,16 +153,27 @@ impl Lower<'_> {
                             kids.has(Rule::kw_joints);
                             Goal::Joints(self.expr_in(kids))
                         }
-                        None => Goal::Frame(self.expr_in(kids)),
+                        None => {
+                            let at = self.expr_in(kids);
+                            Goal::Frame { at, by: kids.eat(Rule::moves_by).map(|n| self.expr_in(&mut Kids::of(n))) }
+                        }
                     },
-                    _ => Goal::Shift(self.expr_in(kids)),
+                    _ => Goal::Shift(match kids.eat(Rule::moves_by) {
+                        Some(by) => self.expr_in(&mut Kids::of(by)),
+                        None => self.expr_in(kids),
+                    }),
                 };
-                ClauseKind::Moves { mover, manner, to }
+                let within = kids.eat(Rule::moves_in).map(|n| self.expr_in(&mut Kids::of(n)));
+                ClauseKind::Moves { mover, manner, to, within }
             }
             Rule::grips => {
                 let item = self.expr_in(kids);
                 let (at, by) = self.maybe_before(kids);
                 ClauseKind::Grips { item, at, by }
+            }
+            Rule::leads => {
+                let handle = self.expr_in(kids);
+                ClauseKind::Leads { handle, by: self.expr_in(kids) }
             }
             Rule::frees => {
                 let item = self.expr_in(kids);
@@ -247,6 +258,7 @@ impl Lower<'_> {
                     let shape = self.expr_in(kids);
                     lines.push(AssetLine::Solid { shape, at: kids.eat(Rule::place_at).map(|n| self.at(n)) });
                 }
+                Rule::joint => lines.push(AssetLine::Joint(Box::new(self.joint(part)))),
                 Rule::frame => {
                     let kids = &mut Kids::of(part);
                     let name = self.name_in(kids);
@@ -262,6 +274,16 @@ impl Lower<'_> {
             before = Some(start);
         }
         lines
+    }
+
+    fn joint(&mut self, node: Node) -> Jointed {
+        let kids = &mut Kids::of(node);
+        let name = self.name_in(kids);
+        let way = kids.eat(Rule::joint_way).map(|way| {
+            let (slides, axis) = (way.as_str() == "slides", self.expr_in(kids));
+            Way { slides, axis, at: kids.eat(Rule::place_at).map(|n| self.at(n)) }
+        });
+        Jointed { name, way, by: self.expr_in(kids) }
     }
 
     fn at(&mut self, node: Node) -> At {

@@ -2,7 +2,7 @@
 
 use std::hash::Hasher;
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Model};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, Program, Span};
@@ -51,6 +51,14 @@ impl Course<'_> {
                     self.stage.unknown.places.insert(id);
                 }
             }
+        }
+    }
+
+    /// Parts that move stand where the states say, as far as those are known.
+    pub fn follow_joints(&mut self, model: &Model) {
+        if !self.stage.fixtures.is_empty() {
+            let values = &self.values;
+            self.stage.follow_joints(|node| values.value(model, node));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::plan::Motion;
+use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Program, Span};
 
@@ -46,30 +46,52 @@ impl<'p, 's> Looker<'p, 's> {
 
     /// Carries out a motion in a course; what cannot be done makes it lost, what cannot be told makes things unknown.
     /// `site` is the statement to blame, `beside` what moves at the same time.
-    pub fn motion(&mut self, course: &mut Course<'p>, motion: &Motion, site: Span, beside: &Moved) {
+    pub fn motion(&mut self, course: &mut Course<'p>, operation: &Operation, site: Span, beside: &Moved) {
+        let Some(motion) = &operation.motion else { return };
         let Some(robot) = course.stage.actor_of(motion.mover()) else { return };
-        match motion {
-            Motion::Grip { item, .. } => self.grip(course, motion, robot, *item, site, beside),
-            Motion::Free { item, on, .. } => self.free(course, motion, robot, (*item, *on), site, beside),
-            _ => self.go(course, motion, robot, site, beside),
+        let model = &self.program.model;
+        // What only a run can tell is left to the run.
+        let Some(motion) = motion.chosen(|node| course.values.value(model, node)) else { return course.drifts(robot) };
+        match &motion {
+            Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
+            Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),
+            _ => {
+                let values = self.values(course, &motion, operation);
+                self.go(course, (&motion, values), robot, site, beside);
+            }
         }
     }
 
-    fn go(&mut self, course: &mut Course<'p>, motion: &Motion, robot: InstanceId, site: Span, beside: &Moved) {
+    /// The values of a motion; nothing where only a run can tell them.
+    fn values(&self, course: &Course<'p>, motion: &Motion, operation: &Operation) -> Option<Vec<f64>> {
+        let model = &self.program.model;
+        if let Some(led) = course.stage.led_by(motion) {
+            let after = course.values.after(model, operation.at_start.iter().chain(&operation.at_end));
+            return after.value(model, led).map(|to| vec![to]);
+        }
+        motion.values().into_iter().map(|node| course.values.value(model, node)).collect()
+    }
+
+    fn go(
+        &mut self,
+        course: &mut Course<'p>,
+        (motion, values): (&Motion, Option<Vec<f64>>),
+        robot: InstanceId,
+        site: Span,
+        beside: &Moved,
+    ) {
         let stage = &course.stage;
         let adrift = stage.unknown.postures.contains(&robot);
         let held = stage.held(robot).is_some_and(|h| stage.unknown.places.contains(&h));
         let somewhere = motion.goal().is_some_and(|(goal, frame)| stage.is_frame_unknown(goal, frame));
         let goes_on = match motion {
             Motion::To { straight, .. } => *straight,
-            Motion::By { .. } | Motion::Tilted { .. } | Motion::Fingers { .. } => true,
+            Motion::By { .. } | Motion::Tilted { .. } | Motion::Fingers { .. } | Motion::Lead { .. } => true,
             _ => false,
         };
         let unsure = held || somewhere || adrift && goes_on;
         let blind = unsure || !self.equipped.contains(&robot) || stage.is_unknown(robot);
-        let known = motion.values().into_iter().map(|node| course.values.value(&self.program.model, node));
-        // What only a run can tell is left to the run.
-        let (Some(values), false) = (known.collect::<Option<Vec<f64>>>(), blind) else { return course.drifts(robot) };
+        let (Some(values), false) = (values, blind) else { return course.drifts(robot) };
         // From nowhere in particular, only where it ends can be judged.
         course.stage.unknown.postures.remove(&robot);
         match self.outcome(course, motion, &values) {

@@ -90,8 +90,10 @@ impl<'s> Memory<'s> {
             hash.write_u8(u8::MAX);
         };
         match motion {
-            Motion::To { mover, goal, frame, straight } => write(u8::from(*straight), &[*mover, *goal], frame),
-            Motion::By { mover, straight, .. } => write(2 + u8::from(*straight), &[*mover], ""),
+            Motion::To { mover, goal, frame, straight, within, .. } => {
+                write(u8::from(*straight) + 2 * u8::from(within.is_some()), &[*mover, *goal], frame);
+            }
+            Motion::By { mover, straight, .. } => write(12 + u8::from(*straight), &[*mover], ""),
             Motion::Grip { item, frame, by } => write(4, &[*by, *item], frame),
             Motion::Free { item, on, by } => write(5, &[*by, *item, on.unwrap_or(InstanceId(u32::MAX))], ""),
             Motion::Upright { mover, goal, frame, .. } => write(6, &[*mover, *goal], frame),
@@ -101,6 +103,7 @@ impl<'s> Memory<'s> {
             }
             Motion::Joints { mover, .. } => write(8, &[*mover], ""),
             Motion::Home { mover } => write(9, &[*mover], ""),
+            Motion::Lead { item, frame, by } => write(14, &[*by, *item], frame),
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
         values.iter().for_each(|v| hash.write_u64(v.to_bits()));

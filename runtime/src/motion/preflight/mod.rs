@@ -20,7 +20,7 @@ pub use memory::{Nowhere, Store};
 /// What would go wrong with the motions of a program. Empty for labs without robots that have joints. What was planned
 /// before is taken from `store`, what is new goes there.
 pub fn preflight(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
-    let Ok(stage) = Stage::new(&program.scene) else { return Vec::new() };
+    let Ok(stage) = Stage::new(program) else { return Vec::new() };
     if stage.actors.is_empty() {
         return Vec::new();
     }
@@ -39,11 +39,11 @@ impl Stage<'_> {
     /// Something else carries a thing from now on, as a state of the model says. Where that is not so already, the thing
     /// comes to its new place at once.
     pub fn follow(&mut self, id: InstanceId, by: Option<InstanceId>) {
-        let carrier = by.map(|by| self.actor_of(by).unwrap_or(by));
+        let carrier = by.map(|by| self.hand_of(by).unwrap_or(by));
         if self.below(id) == carrier || self.below(id) == by {
             return;
         }
-        match by.filter(|by| self.actor_of(*by).is_none()) {
+        match by.filter(|by| self.hand_of(*by).is_none()) {
             Some(on) => self.put(id, on, Pose::IDENTITY),
             None => self.carry(id, by),
         }

@@ -138,7 +138,7 @@ const STEP: f64 = 0.05;
 pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
     let (goal, frame) = motion.goal()?;
     let robot = stage.actor_of(motion.mover())?;
-    let base = stage.pose(robot);
+    let base = stage.foot(robot);
     let actor = stage.actors.get(&robot)?;
     let mut solver = Solver::new(actor.chain.clone());
     let now = actor.configuration();

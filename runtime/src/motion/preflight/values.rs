@@ -45,6 +45,19 @@ impl Values {
         value
     }
 
+    /// What is known when actions have been carried out, the quantities that they set included.
+    pub fn after<'a>(&self, model: &Model, actions: impl Iterator<Item = &'a Action>) -> Values {
+        let mut out = self.clone();
+        for action in actions {
+            let Action::Assign { state, value, .. } = action else { continue };
+            match out.value(model, *value) {
+                Some(value) => out.by_state.insert(*state, value),
+                None => out.by_state.remove(state),
+            };
+        }
+        out
+    }
+
     /// The value of an expression, if what is known settles it.
     pub fn value(&self, model: &Model, node: NodeId) -> Option<f64> {
         let graph = &model.graph;

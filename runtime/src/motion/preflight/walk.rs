@@ -203,16 +203,18 @@ impl<'p> Walk<'p, '_> {
             }
         }
         course.act(self.program, &operation.at_start);
-        if let Some(motion) = operation.motion.as_ref().filter(|_| course.lost.is_none()) {
+        if operation.motion.is_some() && course.lost.is_none() {
             let site = self.sites.last().copied().unwrap_or(span);
             let beside = std::mem::take(&mut self.beside);
-            self.looker.motion(&mut course, motion, site, &beside);
+            self.looker.motion(&mut course, operation, site, &beside);
             self.beside = beside;
             if let Some(lost) = &mut course.lost {
                 lost.finding = on_step(lost.finding.clone(), span);
             }
         }
         course.act(self.program, &operation.at_end);
+        course.stage.let_go(operation.motion.as_ref());
+        course.follow_joints(&self.program.model);
         course
     }
 

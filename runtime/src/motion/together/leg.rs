@@ -43,9 +43,12 @@ impl Leg {
     ) -> Option<Self> {
         let robot = performed.robot;
         let actor = stage.actors.get(&robot)?;
-        let figure: Figure = stage.figure(robot, actor).ok()?;
-        performed.at(&actor.arm, 0.0)?;
-        let at = |t: f64| performed.at(&actor.arm, t).unwrap_or_default();
+        let joints = performed.moved(actor);
+        if joints.is_empty() {
+            return None;
+        }
+        let figure: Figure = stage.figure(robot, actor, &joints).ok()?;
+        let at = |t: f64| performed.at(&joints, t).unwrap_or_default();
         let duration = performed.duration();
         let way = meet::speed(&Mover { figure: &figure, at: &at }, 0.0, duration) * duration;
         let steps = (way / PACE).ceil().clamp(1.0, 1e3) as u32;

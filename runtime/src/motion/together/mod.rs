@@ -17,7 +17,7 @@ use super::stage::Stage;
 
 /// Robots of a program that may meet, or must.
 pub fn together(program: &Program) -> Vec<Diagnostic> {
-    match Stage::new(&program.scene) {
+    match Stage::new(program) {
         Ok(stage) if stage.actors.len() > 1 => walk::follow(program, stage),
         _ => Vec::new(),
     }

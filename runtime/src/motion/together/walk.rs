@@ -133,15 +133,26 @@ impl<'p> Walk<'p, '_> {
         self.act(&operation.at_start);
         if let Some(motion) = operation.motion.as_ref().filter(|_| self.left > 0) {
             self.left -= 1;
-            self.motion(id, motion);
+            self.motion(id, motion, operation);
         }
         self.act(&operation.at_end);
+        self.stage.let_go(operation.motion.as_ref());
+        let (values, model) = (&self.values, &self.program.model);
+        self.stage.follow_joints(|node| values.value(model, node));
     }
 
-    fn motion(&mut self, id: StepId, motion: &Motion) {
-        let known = motion.values().into_iter().map(|node| self.values.value(&self.program.model, node));
+    fn motion(&mut self, id: StepId, motion: &Motion, operation: &Operation) {
+        let model = &self.program.model;
         // What only a run can tell is left to the run.
-        let Some(values) = known.collect::<Option<Vec<f64>>>() else { return self.perhaps(true) };
+        let Some(motion) = &motion.chosen(|node| self.values.value(model, node)) else { return self.perhaps(true) };
+        let values = match self.stage.led_by(motion) {
+            Some(led) => {
+                let after = self.values.after(model, operation.at_start.iter().chain(&operation.at_end));
+                after.value(model, led).map(|to| vec![to])
+            }
+            None => motion.values().into_iter().map(|node| self.values.value(model, node)).collect(),
+        };
+        let Some(values) = values else { return self.perhaps(true) };
         let straight = matches!(motion, Motion::By { straight: true, .. } | Motion::To { straight: true, .. });
         let before = self.stage.clone();
         match self.stage.perform(motion, &values) {

@@ -27,6 +27,8 @@ pub(super) struct Robots {
     joints: u16,
     /// The first moment that has not been written.
     next: usize,
+    /// What each robot holds.
+    hands: BTreeMap<InstanceId, usize>,
     /// What is in hand, by instance, in the lab.
     pub(super) held: BTreeMap<usize, Pose>,
     /// Where things were when they were last in hand.
@@ -42,25 +44,24 @@ impl Robots {
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
-        let mut out =
-            Robots { names: BTreeMap::new(), joints: 0, next: 0, held: BTreeMap::new(), left: BTreeMap::new() };
-        let Ok(stage) = Stage::new(&run.program.scene) else { return Ok(out) };
-        if stage.actors.is_empty() {
+        let (hands, held, left) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let mut out = Robots { names: BTreeMap::new(), joints: 0, next: 0, hands, held, left };
+        let Ok(stage) = Stage::new(run.program) else { return Ok(out) };
+        if stage.movers().next().is_none() {
             return Ok(out);
         }
         out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
-        for (id, actor) in &stage.actors {
-            let name = &run.program.scene.get(*id).name;
-            let robot = &actor.assembly.robot;
+        for (id, robot, tree) in stage.movers() {
+            let name = &run.program.scene.get(id).name;
             let links: Vec<String> = robot.links.iter().map(|l| format!("{name}.{}", l.name)).collect();
-            let moving = actor.tree.variables().iter().filter_map(|v| robot.joints.get(v.joint as usize));
+            let moving = tree.variables().iter().filter_map(|v| robot.joints.get(v.joint as usize));
             let joints = moving.map(|j| format!("{name}.{}", j.name)).collect();
-            let kind = &run.program.scene.get(*id).kind;
+            let kind = &run.program.scene.get(id).kind;
             let drawn: Vec<Entity<'_>> =
                 robot.links.iter().zip(&links).filter_map(|(link, id)| entity(&link.visual, id, kind)).collect();
             sink.push(entities, 0.0, &SceneUpdate { deletions: [], entities: drawn })?;
-            out.names.insert(*id, (links, joints));
-            if let Some(moment) = stage.moment(*id, 0.0) {
+            out.names.insert(id, (links, joints));
+            if let Some(moment) = stage.moment(id, 0.0) {
                 out.write(&moment, sink, frames)?;
             }
         }
@@ -79,9 +80,12 @@ impl Robots {
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
             self.write(moment, sink, frames)?;
-            self.held.clear();
+            if let Some(item) = self.hands.remove(&moment.robot) {
+                self.held.remove(&item);
+            }
             if let Some((id, at)) = moment.held {
                 let index = id.0 as usize;
+                self.hands.insert(moment.robot, index);
                 self.held.insert(index, at);
                 self.left.insert(index, at);
                 carried = true;

@@ -1,0 +1,189 @@
+//! Robots that drive: where to stand so that the arm reaches, and the way there.
+
+use std::f64::consts::{PI, TAU};
+
+use matterix_ir::math;
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::pose::pose;
+use matterix_motion::spheres::Checker;
+
+use super::perform::{Part, Refused, Way};
+use super::stage::Stage;
+use super::surroundings::Surroundings;
+
+/// Distances from the target at which the foot of the arm is tried, m.
+const DISTANCES: [f64; 5] = [0.65, 0.55, 0.75, 0.45, 0.85];
+/// Directions around the target, and headings, that are tried at each distance.
+const AROUND: u32 = 16;
+/// Places that are driven to before a target counts as out of reach.
+const PLACES: usize = 6;
+/// How far the tip must get on from a place, back and forth along its own axis, m: approaches and retreats are driven
+/// by the arm alone.
+const ROOM: f64 = 0.12;
+
+/// A place to stand.
+struct Place {
+    /// What drives the robot about, rad or m.
+    drive: Vec<f64>,
+    /// How far it is from where it stands.
+    far: f64,
+}
+
+impl Stage<'_> {
+    /// Brings the tip to one of some poses; a robot that drives goes where its arm reaches them.
+    pub(super) fn reach(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        way: Way,
+        goal: Option<InstanceId>,
+    ) -> Result<Vec<Part>, Refused> {
+        let straight = way == Way::Straight;
+        let refused = match self.stretch(robot, to, way, goal) {
+            Ok(parts) if straight || self.has_room(robot, to) => return Ok(parts),
+            Ok(parts) => {
+                // It reaches, but not beyond: another place is better where there is one.
+                let there = self.clone();
+                match self.visit(robot, to, way, goal) {
+                    Some(parts) => return Ok(parts),
+                    None => *self = there,
+                }
+                return Ok(parts);
+            }
+            Err(refused) => refused,
+        };
+        match straight {
+            true => Err(refused),
+            false => self.visit(robot, to, way, goal).ok_or(refused),
+        }
+    }
+
+    /// Whether a robot stands for good, or so that its tip gets on from one of these poses.
+    fn has_room(&self, robot: InstanceId, to: &[Pose]) -> bool {
+        let Some(actor) = self.actors.get(&robot).filter(|a| !a.drive.is_empty()) else { return true };
+        let mut solver = Solver::new(actor.chain.clone());
+        let tip = self.tip(robot);
+        let near = |at: &&Pose| (0..3).all(|k| (at.position[k] - tip.position[k]).abs() < 1e-3);
+        to.iter().filter(near).any(|at| gets_on(&mut solver, &self.foot(robot), at, &actor.configuration()))
+    }
+
+    /// Drives to where the arm reaches one of some poses, and reaches it.
+    fn visit(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Option<Vec<Part>> {
+        let (drive, arm, home) = {
+            let actor = self.actors.get(&robot).filter(|actor| !actor.drive.is_empty())?;
+            let home: Vec<f64> = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+            (actor.drive.clone(), actor.arm.clone(), home)
+        };
+        let within = match way {
+            Way::Upright(within) => Some(within),
+            _ => None,
+        };
+        for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
+            let before = self.clone();
+            let mut parts = Vec::new();
+            // On the way the arm is where it is at home, if it gets there.
+            parts.extend(self.way(robot, &arm, &home, within).ok());
+            let driven = self.way(robot, &drive, &place.drive, None).and_then(|part| {
+                parts.push(part);
+                self.stretch(robot, to, way, goal)
+            });
+            if let Ok(reached) = driven {
+                parts.extend(reached);
+                return Some(parts);
+            }
+            *self = before;
+        }
+        None
+    }
+
+    /// Places where the robot is free to stand and from which its arm gets to one of some poses and on; the nearest first.
+    fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
+        let (Some(actor), [x, y, turn]) = (self.actors.get(&robot), drive) else { return Vec::new() };
+        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let Ok(figure) = self.figure(robot, actor, drive) else { return Vec::new() };
+        let mut checker = Checker::new(&figure, &around.world, 1.0);
+        let mut solver = Solver::new(actor.chain.clone());
+        let home: Vec<f64> = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+        let now = actor.positions(drive);
+        let own = self.pose(robot).inverse();
+        let mut found = Vec::new();
+        for target in to {
+            let at = own.point(target.position);
+            for (distance, k) in DISTANCES.iter().flat_map(|d| (0..AROUND * AROUND).map(move |k| (*d, k))) {
+                let (side, heading) = (k / AROUND, k % AROUND);
+                let [side, heading] = [side, heading].map(|n| TAU * f64::from(n) / f64::from(AROUND));
+                let mut joints = actor.joints.clone();
+                let nearest = now[2] + wrapped(heading - now[2]);
+                (joints[*x], joints[*y], joints[*turn]) = (0.0, 0.0, nearest);
+                // Where the arm's foot is when the base is in the middle tells where the base is for a foot elsewhere.
+                let links = actor.tree.poses(&joints);
+                let Some(foot) = links.get(actor.assembly.base as usize).map(matterix_motion::placement) else {
+                    continue;
+                };
+                let reach = self.reaching_from(actor, &foot);
+                let wanted = [at[0] + distance * math::cos(side), at[1] + distance * math::sin(side)];
+                let place = vec![wanted[0] - reach[0], wanted[1] - reach[1], nearest];
+                let far = place.iter().zip(&now).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+                found.push((far, place, *target));
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut out: Vec<Place> = Vec::new();
+        for (far, place, target) in found {
+            if out.len() == PLACES {
+                break;
+            }
+            let point: Vec<f32> = place.iter().map(|v| *v as f32).collect();
+            if !checker.is_clear(&point, &[0.0; 3], 0.0) {
+                continue;
+            }
+            let mut joints = actor.joints.clone();
+            drive.iter().zip(&place).for_each(|(variable, q)| joints[*variable] = *q);
+            let links = actor.tree.poses(&joints);
+            let Some(foot) = links.get(actor.assembly.base as usize).map(matterix_motion::placement) else { continue };
+            let foot = self.pose(robot).then(foot);
+            if gets_on(&mut solver, &foot, &target, &home) {
+                out.push(Place { drive: place, far });
+            }
+        }
+        out.sort_by(|a, b| a.far.total_cmp(&b.far));
+        out
+    }
+
+    /// Where the first joint of an arm is, in the frame of its robot, for a base there: x and y, m.
+    fn reaching_from(&self, actor: &super::stage::Actor, base: &Pose) -> [f64; 2] {
+        let first = actor.chain.variables().first().and_then(|v| actor.assembly.robot.joints.get(v.joint as usize));
+        let mut at = *base;
+        // What is fixed between the base and the arm's first joint.
+        let fixed =
+            matterix_motion::Chain::new(&actor.assembly.robot, actor.assembly.base, first.map_or(0, |j| j.parent));
+        if let Ok(chain) = fixed.map(|chain| chain.tip(&vec![0.0; chain.variables().len()])) {
+            at = base.then(matterix_motion::placement(&chain));
+        }
+        [at.position[0], at.position[1]]
+    }
+}
+
+/// Whether an arm with its base there brings its tip to a pose, and some way back and forth from it.
+fn gets_on(solver: &mut Solver, foot: &Pose, at: &Pose, start: &[f64]) -> bool {
+    let back = foot.inverse();
+    let mut start = start.to_vec();
+    [0.0, ROOM, -ROOM].iter().all(|along| {
+        let target = pose(&back.then(at.then(Pose::up(*along))));
+        let request = Request { attempts: 12, ..Request::new(target, &start) };
+        match solver.solve(&request) {
+            Ok(solution) => {
+                start = solution.q;
+                true
+            }
+            Err(_) => false,
+        }
+    })
+}
+
+/// An angle by whole turns within half a turn of 0, rad.
+fn wrapped(angle: f64) -> f64 {
+    angle - TAU * ((angle + PI) / TAU).floor()
+}

@@ -1,0 +1,63 @@
+//! Parts of things that move with their states, arms that move them, and robots that drive.
+
+use crate::harness::{folder, matterixc, matterixc_in, write};
+
+#[test]
+fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
+    for name in ["faucet", "fume_hood", "kuka_transport"] {
+        let file = format!("examples/{name}.mtx");
+        for fidelity in ["process", "motion"] {
+            let dir = folder(&format!("joints_{name}_{fidelity}"));
+            let out = dir.to_str().expect("text");
+            let ended = matterixc(&["run", &file, "--fidelity", fidelity, "--out", out]);
+            assert_eq!(ended.code, 0, "{name}: {}{}", ended.out, ended.err);
+        }
+    }
+}
+
+#[test]
+fn what_is_moved_by_hand_and_where_a_base_drives_is_looked_at_beforehand() {
+    for name in ["faucet", "fume_hood", "kuka_transport"] {
+        let ended = matterixc(&["check", &format!("examples/{name}.mtx"), "--fidelity", "motion"]);
+        assert!(ended.code == 0 && ended.out.contains("no findings"), "{name}: {}", ended.out);
+    }
+}
+
+#[test]
+fn a_sash_too_far_away_is_out_of_reach_before_the_run() {
+    let dir = folder("joints_far");
+    let text = std::fs::read_to_string("examples/fume_hood.mtx").expect("the example");
+    write(&dir, "far.mtx", text.replace("(0, 460) mm", "(0, 700) mm"));
+    let found = matterixc_in(&dir, &["check", "far.mtx", "--fidelity", "motion", "--format", "concise"]);
+    assert_eq!(found.code, 1);
+    assert!(found.out.contains("far.mtx:17:5: error[out-of-reach]"), "{}", found.out);
+}
+
+#[test]
+fn mistakes_in_joints_are_reported_where_they_are() {
+    let dir = folder("joints_mistakes");
+    let text = "mtx 1\nasset Box: HandledLid {\n    mass: 1 kg\n    \
+                joint lid turns (0, 0, 0) by choose(lid == open, 90 deg, 0 deg)\n    \
+                frame handle at (0, 0, 10) mm\n}\n\
+                asset Other: HandledLid {\n    mass: 1 kg\n    \
+                joint lid turns (1, 0, 0) by 3 mm\n    joint lid slides (1, 0, 0) by 3 mm\n    \
+                joint cover turns (0, 1, 0) at (0, 0, 1) mm from top_lid by 0 deg\n    frame handle at (0, 0, 10) mm from lid\n}\n\
+                asset Arm6: Body from urdf \"ur3e.urdf\" { mass: 1 kg, joint elbow by 10 deg }\n\
+                lab l {\n    ambient: 22 degC\n    box = Plain at (0, 0, 0) m\n    arm = UR3e at (1, 0, 0) m\n}\n\
+                asset Plain: HandledLid { mass: 1 kg, frame handle at (0, 0, 10) mm }\nuse std::robots::UR3e\n\
+                workflow w in l { open box by arm }\n";
+    write(&dir, "box.mtx", text);
+    let ended = matterixc_in(&dir, &["check", "box.mtx", "--format", "concise"]);
+    let found: Vec<&str> = ended.out.lines().filter_map(|l| l.split_once("box.mtx:")).map(|(_, l)| l).collect();
+    let expected = [
+        "4:21: error[out-of-range]",
+        "10:11: error[duplicate-name]",
+        "11:54: error[unknown-name]",
+        "14:60: error[unknown-name]",
+        "22:19: error[type-mismatch]",
+    ];
+    assert_eq!(found.len(), expected.len(), "{}", ended.out);
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(found.starts_with(expected), "{found} is not {expected}");
+    }
+}
