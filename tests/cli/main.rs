@@ -24,5 +24,6 @@ mod screening;
 mod slips;
 mod strict;
 mod time;
+mod together;
 mod types;
 mod usage;
