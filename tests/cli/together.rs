@@ -114,6 +114,10 @@ impl Loader for Nobody {
     fn load(&self, _: FileId, _: &str) -> Option<(String, String)> {
         None
     }
+
+    fn file(&self, _: FileId, path: &str) -> Result<String, String> {
+        Err(path.to_string())
+    }
 }
 
 fn program(text: &str) -> Program {
