@@ -77,9 +77,9 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
     let found = match file {
         Ok(file) => match fidelity {
             Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
-            Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| {
-                preflight(program, store)
-            }),
+            Fidelity::Motion => {
+                matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| preflight(program, store))
+            }
         },
         Err(found) => vec![found],
     };

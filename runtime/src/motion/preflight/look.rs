@@ -65,12 +65,13 @@ impl<'p, 's> Looker<'p, 's> {
         let stage = &course.stage;
         let adrift = stage.unknown.postures.contains(&robot);
         let held = stage.held(robot).is_some_and(|h| stage.unknown.places.contains(&h));
-        let blind = held || !self.equipped.contains(&robot) || stage.is_unknown(robot) || match motion {
-            Motion::To { goal, frame, straight, .. } => {
-                adrift && *straight || stage.is_frame_unknown(*goal, frame)
-            }
-            _ => adrift,
-        };
+        let blind = held
+            || !self.equipped.contains(&robot)
+            || stage.is_unknown(robot)
+            || match motion {
+                Motion::To { goal, frame, straight, .. } => adrift && *straight || stage.is_frame_unknown(*goal, frame),
+                _ => adrift,
+            };
         let shift = self.shift(motion);
         let (Some(shift), false) = (shift, blind) else { return course.drifts(robot) };
         // From nowhere in particular, only where it ends can be judged.
