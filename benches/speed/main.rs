@@ -32,6 +32,7 @@ fn main() {
     fs::create_dir_all(&dir).unwrap();
     println!("median of the times of several runs; the fastest in brackets\n");
     check(&dir);
+    robots();
     run(&dir);
     robertson();
     match lsoda() {
@@ -68,6 +69,7 @@ fn show(what: &str, times: &Times) {
 /// The command, which must succeed.
 fn command(args: &[&str]) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
+    command.env("XDG_CACHE_HOME", Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed/cache"));
     let status = command.args(args).stdout(Stdio::null()).stderr(Stdio::null()).status().unwrap();
     assert!(status.success(), "matterixc {args:?}: {status}");
 }
@@ -85,6 +87,17 @@ fn check(dir: &Path) {
     fs::write(&file, &text).unwrap();
     let what = format!("matterixc check, {} lines on a plate of 96 wells", text.lines().count());
     show(&what, &time(31, || command(&["check", file.to_str().unwrap()])));
+}
+
+/// Three arms on three benches: all motions planned, and all remembered.
+fn robots() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/speed/robots.mtx");
+    let file = file.to_str().unwrap();
+    show(
+        "matterixc check, 12 transfers by three arms, all planned",
+        &time(7, || command(&["check", file, "--no-cache"])),
+    );
+    show("matterixc check, the same remembered", &time(31, || command(&["check", file])));
 }
 
 fn example(name: &str) -> PathBuf {

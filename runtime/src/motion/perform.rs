@@ -463,6 +463,10 @@ impl Stage<'_> {
             near.sort_by(|a, b| a.0.total_cmp(&b.0));
             spots = near.into_iter().map(|n| n.1).take(1).collect();
         }
+        if spots.len() > 1 {
+            let near: Vec<Pose> = spots.iter().copied().filter(|s| self.may_reach(robot, goal, frame, *s)).collect();
+            spots = if near.is_empty() { spots.into_iter().take(1).collect() } else { near };
+        }
         let before = (spots.len() > 1).then(|| self.clone());
         let mut refused = Refused::NoFrame;
         for (k, spot) in spots.into_iter().enumerate() {
@@ -482,6 +486,18 @@ impl Stage<'_> {
             }
         }
         Err(refused)
+    }
+
+    /// Whether a short search finds a posture for one spot beside a frame.
+    fn may_reach(&self, robot: InstanceId, goal: InstanceId, frame: &str, spot: Pose) -> bool {
+        let Some(actor) = self.actors.get(&robot) else { return false };
+        if !actor.drive.is_empty() {
+            return true;
+        }
+        let Some(to) = targets_at(self, robot, goal, frame, spot).into_iter().next() else { return false };
+        let now = actor.configuration();
+        let request = Request { attempts: 6, ..Request::new(pose(&self.foot(robot).inverse().then(to)), &now) };
+        Solver::new(actor.chain.clone()).solve(&request).is_ok()
     }
 
     fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {

@@ -56,6 +56,16 @@ impl Moved {
         self
     }
 
+    /// What both parts move.
+    pub fn common(self, other: Moved) -> Self {
+        let both = |a: BTreeSet<InstanceId>, b: BTreeSet<InstanceId>| a.intersection(&b).copied().collect();
+        Moved {
+            robots: both(self.robots, other.robots),
+            items: both(self.items, other.items),
+            surfaces: both(self.surfaces, other.surfaces),
+        }
+    }
+
     /// While this moves, nobody can tell where it is. Gives what could be told before.
     pub fn blur(&self, course: &mut Course<'_>) -> Moved {
         let unknown = &mut course.stage.unknown;

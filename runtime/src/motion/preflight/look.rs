@@ -19,12 +19,14 @@ pub struct Looker<'p, 's> {
     memory: Memory<'s>,
     /// Robots whose tool is described: only of them it is known what gets where.
     equipped: BTreeSet<InstanceId>,
-    /// How many motions may still be planned.
+    /// How much may still be looked at, in motions that can be carried out.
     left: usize,
 }
 
-/// How many motions are planned before a plan counts as too long to be looked at whole.
+/// How many motions are looked at before a plan counts as too long to be looked at whole.
 const MOST: usize = 2000;
+/// As how many of them one counts that cannot be carried out: it takes longer to find that out.
+const REFUSED: usize = 40;
 
 impl<'p, 's> Looker<'p, 's> {
     pub fn new(program: &'p Program, stage: &Stage<'p>, memory: Memory<'s>) -> Self {
@@ -182,6 +184,14 @@ impl<'p, 's> Looker<'p, 's> {
 
     /// What becomes of a motion; the course is where it ends.
     fn outcome(&mut self, course: &mut Course<'p>, motion: &Motion, values: &[f64]) -> Outcome {
+        let outcome = self.planned(course, motion, values);
+        // What is remembered counts as well, so that the findings do not depend on it.
+        let cost = if matches!(outcome, Outcome::Done(_)) { 1 } else { REFUSED };
+        self.left = self.left.saturating_sub(cost);
+        outcome
+    }
+
+    fn planned(&mut self, course: &mut Course<'p>, motion: &Motion, values: &[f64]) -> Outcome {
         let key = self.memory.key(&course.stage, motion, values);
         if let Some(known) = self.memory.recall(&key) {
             match &known {
@@ -189,7 +199,6 @@ impl<'p, 's> Looker<'p, 's> {
                 _ => return known,
             }
         }
-        self.left = self.left.saturating_sub(1);
         let before = course.stage.clone();
         let outcome = match course.stage.perform(motion, values) {
             Ok(_) => Outcome::Done(course.stage.since(&before)),

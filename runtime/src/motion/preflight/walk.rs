@@ -263,10 +263,7 @@ impl<'p> Walk<'p, '_> {
         if own.is_empty() || others.is_empty() {
             return follow(self, courses);
         }
-        let mut blurred = Moved::default();
-        for course in &mut courses {
-            blurred = blurred.and(&others.blur(course));
-        }
+        let blurred = courses.iter_mut().map(|course| others.blur(course)).reduce(Moved::common).unwrap_or_default();
         let before = self.beside.clone();
         self.beside = std::mem::take(&mut self.beside).and(others);
         let mut after = follow(self, courses);
