@@ -8,6 +8,7 @@ mod preflight;
 pub mod stage;
 pub mod surroundings;
 mod tilt;
+mod turn;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
