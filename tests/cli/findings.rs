@@ -48,8 +48,8 @@ fn names_of_an_import_that_failed_are_not_missed_again() {
     let wrong = BENCH.replace("glassware::Beaker250mL", "glassware::{Beaker250mL, Beaker25mL}");
     let wrong = wrong.replace("beaker = Beaker250mL", "beaker = Beaker25mL");
     assert_eq!(only("item", &wrong).1, "`std::glassware` declares no `Beaker25mL`");
-    let wrong = BENCH.replace("use std::heating", "use std::skils::weigh\nuse std::heating");
-    assert_eq!(only("verb", &wrong.replace("stop heating plate", "weigh beaker")).0, "unknown-module");
+    let wrong = BENCH.replace("use std::heating", "use std::skils::grind\nuse std::heating");
+    assert_eq!(only("verb", &wrong.replace("stop heating plate", "grind beaker")).0, "unknown-module");
 }
 
 #[test]

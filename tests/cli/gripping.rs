@@ -6,6 +6,8 @@ use matterix_ir::{Op, Program, Sources};
 use matterix_lang::{LibraryOnly, Options, compile};
 use matterix_runtime::motion::{Refused, Stage};
 
+use crate::harness::{folder, matterixc_in, write};
+
 /// A lab with a gripper of this kind and a workflow of these lines.
 fn program(gripper: &str, things: &str, lines: &str) -> Program {
     let text = format!(
@@ -134,4 +136,39 @@ fn what_is_carried_stays_upright_and_is_tilted_over_its_target() {
         }
     }
     assert!(most < 20f64.to_radians(), "{most} rad");
+}
+
+#[test]
+fn a_vial_is_weighed_and_inserted_and_a_button_pressed() {
+    let dir = folder("gripping_skills");
+    let text = "mtx 1\nuse std::heating::IkaRetControl\nuse std::robots::{FrankaHand, FrankaPanda}\n\
+                use std::vials::{Vial20mL, VialRack8}\nasset Switch: Buttoned {\n    mass: 300 g\n    \
+                shape: box(60 mm, 60 mm, 40 mm)\n    frame button at (0, 0, 45) mm\n}\nlab bench {\n    ambient: 25 degC\n    \
+                table = OpticalTable\n    panda = FrankaPanda { gripper: FrankaHand {} } on table at (0, 0) mm\n    \
+                scale = IkaRetControl on table at (500, 200) mm\n    rack = VialRack8 on table at (450, -250) mm\n    \
+                vial = Vial20mL in rack[A2] holding 10 g of water\n    switch = Switch on table at (350, 350) mm\n}\n\
+                workflow fill in bench {\n    let m <- weigh vial on scale by panda\n    expect m in 26 g .. 28 g\n    \
+                insert vial into rack[B3] by panda\n    expect vial.support == rack[B3]\n    press switch by panda\n    \
+                expect switch.presses == 1\n    lift panda by 50 mm\n    shift panda by (20 mm, 0 mm, 30 mm)\n    home panda\n}\n";
+    write(&dir, "fill.mtx", text);
+    for args in [["check", "fill.mtx", "--fidelity", "motion"], ["run", "fill.mtx", "--fidelity", "motion"]] {
+        let ended = matterixc_in(&dir, &args);
+        assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    }
+}
+
+#[test]
+fn what_a_gripper_cannot_do_is_said_once_with_its_motion_too() {
+    let dir = folder("gripping_wide");
+    let text = "mtx 1\nuse std::glassware::Beaker500mL\nuse std::robots::{FrankaHand, FrankaPanda}\nlab bench {\n    \
+                ambient: 25 degC\n    table = OpticalTable\n    \
+                panda = FrankaPanda { gripper: FrankaHand { OPENING } } on table at (0, 0) mm\n    \
+                cup = Beaker500mL on table at (450, 0) mm\n}\nworkflow take in bench {\n    pick cup by panda\n    put back cup by panda\n}\n";
+    // Said to open wider than its fingers do: only its shape tells.
+    for (opening, line) in [("", 11), ("opening: 90 mm", 11)] {
+        write(&dir, "wide.mtx", text.replace("OPENING", opening));
+        let ended = matterixc_in(&dir, &["check", "wide.mtx", "--fidelity", "motion", "--format", "concise"]);
+        assert!(ended.out.starts_with(&format!("wide.mtx:{line}:5: error[too-wide]")), "{}", ended.out);
+        assert_eq!(ended.out.matches("error[").count(), 1, "{}", ended.out);
+    }
 }

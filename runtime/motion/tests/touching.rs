@@ -61,7 +61,9 @@ fn a_gripper_on_a_wrist_on_an_arm_is_one_robot() {
     assert_eq!(chain.variables().len(), 7);
     let q = [0.1, -1.2, 1.3, -0.4, 0.5, 0.6, 0.7, 0.3];
     let tool = pose::pose(&at(0.01 + 0.044 + 0.008 + 0.02 + 0.13));
-    let turned = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), 0.7);
+    // The fingers close along the y axis of the gripper's tip, which is a quarter turn from its base.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let turned = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), 0.7 + quarter);
     let expected = robots::chain("ur5e", "tool0").tip(&q[..6]) * tool * turned;
     let (linear, angular) = pose::distance(&chain.tip(&q[..7]), &expected);
     assert!(linear < 1e-12 && angular < 1e-9, "{linear} {angular}");

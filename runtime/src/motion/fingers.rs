@@ -5,20 +5,22 @@
 
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{JointLimits, Solid};
+use matterix_ir::scene::InstanceId;
 use matterix_motion::pose::pose;
 use matterix_motion::time::{Limits, Trajectory, follow};
 use matterix_motion::world::{Body, Shape, World};
 use matterix_motion::{Tree, placement};
 
 use super::assembly::Assembly;
-use super::perform::{acceleration, jerk};
+use super::perform::{Part, acceleration, jerk};
+use super::stage::Stage;
 
 /// How exactly widths are met, m.
 const EXACT: f64 = 1e-6;
 /// Fingers further from the tip than this are none, m.
 const FAR: f64 = 0.5;
 /// Free room left on each side of a thing that fingers are opened for or let go, m.
-pub const CLEARANCE: f64 = 0.010;
+const CLEARANCE: f64 = 0.010;
 
 /// What opens and closes a gripper.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,6 +130,24 @@ impl Fingers {
         let limits =
             Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
         follow(&[from, to.to_vec()], &limits, None).ok()
+    }
+}
+
+impl Stage<'_> {
+    /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
+    pub(super) fn spread(&mut self, robot: InstanceId, width: f64) -> Option<Part> {
+        let actor = self.actors.get_mut(&robot)?;
+        let fingers = actor.fingers.clone()?;
+        let to = fingers.at(&actor.tree, &actor.joints, width);
+        let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
+        actor.set_some(&fingers.joints, &to);
+        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
+    }
+
+    /// Opens a gripper further than a thing is wide.
+    pub(super) fn make_room(&mut self, robot: InstanceId, item: InstanceId) -> Option<Part> {
+        let width = self.scene.get(item).body().across_grasp()?;
+        self.spread(robot, width + 2.0 * CLEARANCE)
     }
 }
 

@@ -14,6 +14,7 @@ pub mod stage;
 pub mod surroundings;
 mod tilt;
 mod together;
+mod turn;
 
 pub use assembly::Assembly;
 pub use fixture::Fixture;

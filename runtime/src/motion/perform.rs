@@ -11,7 +11,6 @@ use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
-use super::fingers::CLEARANCE;
 use super::fixture::Led;
 use super::goal::{carried_to, spots, targets, targets_at};
 use super::stage::{Actor, Stage};
@@ -27,8 +26,6 @@ pub(super) const FINENESS: f64 = 0.02;
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
-/// How far what is held tilts while a gripper only turns, rad.
-const TURNING: f64 = 0.1;
 /// Samples drawn before a way counts as not found.
 const SAMPLES: usize = 60_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
@@ -379,22 +376,6 @@ impl Stage<'_> {
         out
     }
 
-    /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
-    fn spread(&mut self, robot: InstanceId, width: f64) -> Option<Part> {
-        let actor = self.actors.get_mut(&robot)?;
-        let fingers = actor.fingers.clone()?;
-        let to = fingers.at(&actor.tree, &actor.joints, width);
-        let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
-        actor.set_some(&fingers.joints, &to);
-        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
-    }
-
-    /// Opens a gripper further than a thing is wide.
-    fn make_room(&mut self, robot: InstanceId, item: InstanceId) -> Option<Part> {
-        let width = self.scene.get(item).body().across_grasp()?;
-        self.spread(robot, width + 2.0 * CLEARANCE)
-    }
-
     /// Distance and angle from the tip to the nearest of some poses.
     fn nearest(&self, robot: InstanceId, to: &[Pose]) -> Option<(f64, f64)> {
         let tip = pose(&self.tip(robot));
@@ -416,27 +397,6 @@ impl Stage<'_> {
         }
         self.leave(robot);
         Ok(parts)
-    }
-
-    /// Brings the joints that move the tip to positions.
-    fn turn(&mut self, mover: InstanceId, to: Vec<f64>) -> Result<Performed, Refused> {
-        let robot = self.actor_of(mover).ok_or(Refused::NoRobot)?;
-        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let variables = actor.chain.variables();
-        if to.len() != variables.len() {
-            return Err(Refused::Joints(to.len(), variables.len()));
-        }
-        let beyond = |(v, q): &(&matterix_motion::Variable, &f64)| {
-            v.is_bounded() && !(v.limits.lower..=v.limits.upper).contains(*q)
-        };
-        if let Some((variable, _)) = variables.iter().zip(&to).find(beyond) {
-            let joint = actor.assembly.robot.joints.get(variable.joint as usize);
-            return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
-        }
-        let mut parts = self.depart(robot, None)?;
-        let arm = self.arm(robot);
-        parts.push(self.way(robot, &arm, &to, None)?);
-        Ok(Performed::new(robot, parts))
     }
 
     /// Brings a robot to a frame, or so far from it, m; what it holds to the nearest spot about it that is free and within
@@ -589,24 +549,6 @@ impl Stage<'_> {
         Surroundings::of_but(self, robot, &without, &bodiless)
     }
 
-    /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
-    fn turned_line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<[Part; 2], Refused> {
-        let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
-        let base = self.foot(robot).inverse();
-        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let arm = actor.arm.clone();
-        let before = actor.joints.clone();
-        let now = actor.configuration();
-        let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
-        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
-        let first = self.way(robot, &arm, &turned.q, Some(TURNING));
-        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
-        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
-            actor.joints = before;
-        }
-        both
-    }
-
     /// A free way of some joints to where they are to stand; the others do not move. What is held tilts by no more than so
     /// much on it, rad.
     pub(super) fn way(
@@ -685,7 +627,7 @@ impl Stage<'_> {
     }
 
     /// Which joints of a robot move its tip.
-    fn arm(&self, robot: InstanceId) -> Vec<usize> {
+    pub(super) fn arm(&self, robot: InstanceId) -> Vec<usize> {
         self.actors.get(&robot).map(|actor| actor.arm.clone()).unwrap_or_default()
     }
 

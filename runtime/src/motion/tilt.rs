@@ -1,6 +1,6 @@
 //! Keeping what is held upright, and tilting it about a point of it, as for pouring.
 
-use std::f64::consts::FRAC_PI_4;
+use std::f64::consts::{FRAC_PI_4, PI};
 
 use matterix_ir::math::{acos, cos};
 use matterix_ir::pose::Pose;
@@ -80,6 +80,9 @@ impl Stage<'_> {
         parts: Vec<Part>,
     ) -> Result<Performed, Refused> {
         let (_, inner) = self.inner(robot).filter(|(held, _)| *held == item).ok_or(Refused::NotHeld)?;
+        if !(0.0..=PI).contains(&angle) {
+            return Err(Refused::Tilted(angle));
+        }
         let to = self.frame(goal, frame).ok_or(Refused::NoFrame)?;
         let point = self.scene.get(item).frames.iter().find(|f| f.name == point && !f.stand);
         let point = point.map(|f| f.pose).ok_or(Refused::NoFrame)?;

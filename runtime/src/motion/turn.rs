@@ -1,0 +1,58 @@
+//! Turning: joints to positions, and a gripper on the spot.
+
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+use matterix_motion::Variable;
+use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::pose::pose;
+
+use super::perform::{Part, Performed, Refused};
+use super::stage::Stage;
+
+/// How far what is held tilts while a gripper only turns, rad.
+const TURNING: f64 = 0.1;
+
+impl Stage<'_> {
+    /// Brings the joints that move the tip to positions.
+    pub(super) fn turn(&mut self, mover: InstanceId, to: Vec<f64>) -> Result<Performed, Refused> {
+        let robot = self.actor_of(mover).ok_or(Refused::NoRobot)?;
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let variables = actor.chain.variables();
+        if to.len() != variables.len() {
+            return Err(Refused::Joints(to.len(), variables.len()));
+        }
+        let beyond = |(v, q): &(&Variable, &f64)| {
+            !q.is_finite() || v.is_bounded() && !(v.limits.lower..=v.limits.upper).contains(*q)
+        };
+        if let Some((variable, _)) = variables.iter().zip(&to).find(beyond) {
+            let joint = actor.assembly.robot.joints.get(variable.joint as usize);
+            return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
+        }
+        let mut parts = self.depart(robot, None)?;
+        let arm = self.arm(robot);
+        parts.push(self.way(robot, &arm, &to, None)?);
+        Ok(Performed::new(robot, parts))
+    }
+
+    /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
+    pub(super) fn turned_line(
+        &mut self,
+        robot: InstanceId,
+        to: &Pose,
+        near: &[InstanceId],
+    ) -> Result<[Part; 2], Refused> {
+        let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
+        let (base, arm) = (self.foot(robot).inverse(), self.arm(robot));
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let before = actor.joints.clone();
+        let now = actor.configuration();
+        let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
+        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
+        let first = self.way(robot, &arm, &turned.q, Some(TURNING));
+        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
+            actor.joints = before;
+        }
+        both
+    }
+}
