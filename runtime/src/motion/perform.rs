@@ -17,7 +17,7 @@ use super::surroundings::{Surroundings, held};
 /// How near a gripper must be to what it grips, and what it holds to where it is put down: m and rad.
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 /// Distance of checked configurations along a way, rad or m.
-pub(super) const FINENESS: f64 = 0.02;
+const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.

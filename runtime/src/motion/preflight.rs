@@ -1,7 +1,7 @@
 //! Follows the motions of a plan before anything moves: what is out of reach, what collides, what cannot be gripped.
 //!
 //! Steps are followed in the order they are written, branches one after the other from the state before them, loops
-//! twice; where a condition decides, both ways are followed and the state after the first is kept. A motion that cannot
+//! twice; where a condition is not known beforehand, both ways are followed and where things stand after the first is kept. A motion that cannot
 //! be carried out is reported once, and the robot counts as where it was.
 
 use std::collections::BTreeSet;
