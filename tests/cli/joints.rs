@@ -61,3 +61,26 @@ fn mistakes_in_joints_are_reported_where_they_are() {
         assert!(found.starts_with(expected), "{found} is not {expected}");
     }
 }
+
+#[test]
+fn a_pipette_takes_the_time_its_gantry_needs() {
+    let dir = folder("joints_gantry");
+    let text = "mtx 1\nuse std::opentrons::{Corning96, OT2, P300Single, TipRack300}\n\
+                lab deck {\n    ambient: 22 degC\n    ot2 = OT2 { left: P300Single } at (0, 0, 0) m\n    \
+                tips = TipRack300 on ot2.slot[1]\n    plate = Corning96 on ot2.slot[SLOT] holding { A1: 200 uL of water }\n}\n\
+                workflow take in deck {\n    pick up tip from tips by ot2.left\n    \
+                aspirate 92.86 uL from plate[A1] by ot2.left\n    dispense 92.86 uL into plate[A2] by ot2.left\n    \
+                return tip to tips[A1] by ot2.left\n}\n";
+    let lasts = |slot: &str, fidelity: &str| -> f64 {
+        let name = format!("slot{slot}.mtx");
+        write(&dir, &name, text.replace("SLOT", slot));
+        let ended = matterixc_in(&dir, &["run", &name, "--fidelity", fidelity]);
+        assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+        let (_, after) = ended.out.split_once("passed after ").expect("a passed run");
+        after.split(' ').next().and_then(|s| s.parse().ok()).expect("a time")
+    };
+    assert_eq!(lasts("2", "process"), lasts("11", "process"));
+    let (near, far) = (lasts("2", "motion"), lasts("11", "motion"));
+    // Three slots further along y, twice there and back: at 400 mm/s some 0.65 s each way.
+    assert!(far - near > 0.5 && far - near < 4.0, "{near} s, {far} s");
+}

@@ -14,6 +14,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         kind: "Thing".into(),
         capabilities: Vec::new(),
         owner: None,
+        link: None,
         support: None,
         pose: Pose::at(at),
         placed: true,
@@ -27,7 +28,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
 
 /// A plate with a place on a table, a beaker with 50 mL on the plate, an oven around a vial.
 fn program() -> (Program, Sources) {
-    let place = Frame { name: "place".into(), pose: Pose::at([0.0, 0.02, 0.08]), stand: false };
+    let place = Frame { name: "place".into(), pose: Pose::at([0.0, 0.02, 0.08]), stand: false, link: None };
     let on = |support: u32, i: Instance| Instance { support: Some(InstanceId(support)), ..i };
     let instances = vec![
         instance("table", Some(Shape::Box([1.0, 0.8, 0.05])), [0.0; 3]),

@@ -7,13 +7,13 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Held};
 use matterix_motion::{Chain, Variable};
 
-use super::perform::{FINENESS, Performed, Refused, TOLERANCE, timed};
+use super::perform::{Performed, Refused, TOLERANCE, timed};
 use super::stage::{Actor, Stage};
 use super::surroundings::{SLACK, Surroundings};
 
 /// Heights at which a crossing is tried are so far apart, m.
 const STEP: f64 = 0.01;
-/// Radius of what hangs below the tool, and distance of the balls that stand for it, m.
+/// Radius of what hangs below the tool, distance of the balls that stand for it, and fineness of the way across, m.
 const HANGING: f64 = 0.004;
 
 impl Actor {
@@ -126,7 +126,7 @@ impl Stage<'_> {
         let base = pose(&self.pose(robot));
         let figure =
             Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &[tool]).map_err(|_| Refused::NoRobot)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let mut checker = Checker::new(&figure, &around.world, 1.0 / HANGING);
         let last = now.len().saturating_sub(1);
         let (up, top) = self.upwards(actor, now);
         let lift = |q: f64| if up > 0.0 { q.min(top) } else { q.max(top) };
@@ -139,7 +139,9 @@ impl Stage<'_> {
             });
             let vector: Vec<f32> = a.iter().zip(&b).map(|(a, b)| b - a).collect();
             let length = vector.iter().map(|v| v * v).sum::<f32>().sqrt();
-            if checker.is_clear(&a, &vector, length) {
+            let still = vec![0.0; a.len()];
+            // A way is taken to begin at a free place.
+            if checker.is_clear(&a, &still, 0.0) && checker.is_clear(&a, &vector, length) {
                 return Ok(height);
             }
             if height == top {

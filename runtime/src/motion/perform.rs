@@ -21,7 +21,7 @@ pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
 /// How far shapes of fingers and what a gripper is said to open may differ, m.
 const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
-pub(super) const FINENESS: f64 = 0.02;
+const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.

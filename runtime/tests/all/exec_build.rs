@@ -48,6 +48,7 @@ impl Lab {
             kind: "Thing".into(),
             capabilities: Vec::new(),
             owner: None,
+            link: None,
             support: None,
             pose: Pose::default(),
             placed: true,

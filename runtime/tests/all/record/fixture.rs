@@ -42,6 +42,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         kind: kind.into(),
         capabilities: vec![],
         owner: None,
+        link: None,
         support: support.map(InstanceId),
         pose: Pose::at(at),
         placed: true,
@@ -54,7 +55,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
 }
 
 fn scene() -> Scene {
-    let place = Frame { name: "place".into(), pose: Pose::up(0.13), stand: false };
+    let place = Frame { name: "place".into(), pose: Pose::up(0.13), stand: false, link: None };
     let mut hotplate = instance("hotplate", "IkaRet", Some(0), [0.55, 0.2, 0.0], Some(Shape::Box([0.16, 0.27, 0.1])));
     hotplate.frames.push(place);
     let mut contents = instance("beaker.contents", "Mixture", None, [0.0; 3], None);
