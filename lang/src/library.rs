@@ -29,6 +29,7 @@ files! {
     "robots/iiwa7/" => "iiwa7.urdf"
     "robots/kmr_iiwa/" => "kmr_iiwa.urdf"
     "robots/panda/" => "panda.urdf"
+    "robots/plate_gripper/" => "plate_gripper.urdf"
     "robots/robotiq_2f85/" => "robotiq_2f85.urdf"
     "robots/ur3e/" => "ur3e.urdf"
     "robots/ur5e/" => "ur5e.urdf"
@@ -40,4 +41,4 @@ pub fn file(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
 }
 
-modules! { "bodies" "centrifuges" "chemistry" "closures" "devices" "furniture" "glassware" "hazards" "heating" "labware" "materials" "math" "opentrons" "pipetting" "prelude" "reactivity" "robots" "shakers" "skills" "species" "thermal" "units" "vials" }
+modules! { "balances" "bodies" "centrifuges" "chemistry" "closures" "devices" "furniture" "glassware" "hazards" "heating" "labware" "materials" "math" "opentrons" "pipetting" "prelude" "pumps" "reactivity" "robots" "shakers" "skills" "species" "thermal" "tools" "units" "vials" }

@@ -2,12 +2,15 @@
 
 pub mod assembly;
 pub mod goal;
+mod outline;
 pub mod perform;
+mod perturb;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
+pub use perturb::{Moved, Perturbation, perturb};
 pub use preflight::{preflight, supported};
 pub use stage::{Actor, Carried, Stage};
