@@ -72,7 +72,8 @@ fn drawn(scene: &Scene, thing: InstanceId, by: Perturbation, seed: u64) -> Resul
     let (c, s) = (x[0] - origin[0], x[1] - origin[1]);
     for attempt in 0..ATTEMPTS {
         let number = |k: u64| 2.0 * uniform(mix(key(seed ^ STREAM, thing.0 as usize, 3 * attempt + k))) - 1.0;
-        let shift = [by.shift * number(0), by.shift * number(1)];
+        // Adding 0 makes a negative zero a positive one.
+        let shift = [by.shift * number(0) + 0.0, by.shift * number(1) + 0.0];
         let turn = by.turn * number(2);
         let in_lab = [c * shift[0] - s * shift[1], s * shift[0] + c * shift[1]];
         let moved = |pieces: &[Outline]| -> Vec<Outline> {
