@@ -122,7 +122,12 @@ codes! {
     USED_AFTER_DISPOSAL "used-after-disposal" "T2" "something is used that was thrown away";
     DISPOSED_TWICE "disposed-twice" "T2" "something is thrown away that is gone already";
     NO_EFFECT "no-effect" "T3" "a step does what is done already";
-    TOO_HEAVY "too-heavy" "D1" "an arm takes more than it can carry";
+    TOO_HEAVY "too-heavy" "G3" "an arm takes more than it can carry";
+    TOO_WIDE "too-wide" "G4" "a gripper does not open wide enough for what it is to grip";
+    TOO_THIN "too-thin" "G4" "a gripper does not close far enough to hold what it is to grip";
+    TOO_TALL "too-tall" "G5" "something is put where there is not enough room above";
+    UNSTABLE "unstable" "G5" "something is put on what is narrower than its foot";
+    WRONG_HOLE "wrong-hole" "G5" "something is put into a hole that is too narrow, or far too wide, for it";
     UNBALANCED_ROTOR "unbalanced-rotor" "D1" "a rotor is loaded on one side";
     WINDOW_UNMEETABLE "window-unmeetable" "S1" "a step can never begin or end in the time it is given";
     UNSCHEDULABLE "unschedulable" "S1" "no schedule of a workflow can be made or found";

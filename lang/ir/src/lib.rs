@@ -11,6 +11,7 @@
 
 pub mod codes;
 pub mod diagnostic;
+pub mod extent;
 pub mod graph;
 pub mod math;
 pub mod model;

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Span;
+use crate::extent::Body;
 pub use crate::pose::Pose;
 use crate::robot::Robot;
 
@@ -117,6 +118,13 @@ pub struct Instance {
     pub articulation: Option<Box<Articulation>>,
     /// Its declaration.
     pub span: Span,
+}
+
+impl Instance {
+    /// What it is made of, for its measures.
+    pub fn body(&self) -> Body<'_> {
+        Body { frames: &self.frames, shape: self.shape.as_ref(), solids: &self.solids }
+    }
 }
 
 /// What a thing stands on and where on it.

@@ -43,6 +43,8 @@ enum Bound {
     Grouped,
     /// Where a part of a thing is, seen from another part of it.
     Displacement,
+    /// How large an instance is in one way, if its shape is known.
+    Measures,
     /// What the lab placed the instance on, by one of these prepositions.
     Placed,
     /// Whether one mixture has touched something that another has not.
@@ -65,6 +67,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("displacement", Bound::Displacement),
     ("grouped", Bound::Grouped),
     ("having", Bound::Having),
+    ("measures", Bound::Measures),
     ("nth", Bound::Nth),
     ("owner", Bound::Owner),
     ("paired", Bound::Paired),
@@ -152,6 +155,7 @@ impl Elaborator<'_> {
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
             (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
+            (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
             (_, values) if values.contains(&Value::Error) => Value::Error,

@@ -10,6 +10,7 @@ pub mod compare;
 pub mod expr;
 pub mod external;
 pub mod lists;
+mod measures;
 pub mod member;
 pub mod reaction;
 pub mod types;

@@ -2,6 +2,7 @@
 
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
+use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
 use matterix_motion::plan::{self, Blocked, Settings, Stride};
@@ -9,6 +10,7 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
 
+use super::fingers::CLEARANCE;
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -31,25 +33,41 @@ const RAMP: (f64, f64) = (0.3, 0.1);
 pub struct Performed {
     /// The robot.
     pub robot: InstanceId,
-    /// Of the joints that move its tip, one after the other.
-    pub parts: Vec<Trajectory>,
+    /// One after the other.
+    pub parts: Vec<Part>,
+}
+
+/// A motion of some of a robot's joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Which of all that move, by index.
+    pub joints: Vec<usize>,
+    /// Their way.
+    pub trajectory: Trajectory,
 }
 
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.iter().map(Trajectory::duration).sum()
+        self.parts.iter().map(|part| part.trajectory.duration()).sum()
     }
 
-    /// The joints that move the tip at a time since the beginning, s.
-    pub fn at(&self, mut time: f64) -> Vec<f64> {
-        for part in &self.parts {
-            if time <= part.duration() {
-                return part.at(time).position;
+    /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
+    pub fn bring(&self, actor: &mut Actor, time: f64) {
+        let mut ends = self.duration();
+        let mut begun: Vec<&[usize]> = Vec::new();
+        for part in self.parts.iter().rev() {
+            let begins = ends - part.trajectory.duration();
+            // Of the same joints, the last part that has begun says where they are, or else the first one.
+            if !begun.contains(&part.joints.as_slice()) {
+                let at = part.trajectory.at((time - begins).clamp(0.0, part.trajectory.duration()));
+                actor.set_some(&part.joints, &at.position);
             }
-            time -= part.duration();
+            if time >= begins {
+                begun.push(&part.joints);
+            }
+            ends = begins;
         }
-        self.parts.last().map(|p| p.at(p.duration()).position).unwrap_or_default()
     }
 }
 
@@ -159,8 +177,9 @@ impl Stage<'_> {
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
                 }
+                let width = self.scene.get(*item).body().across_grasp();
                 self.carry(*item, Some(robot));
-                Ok(None)
+                Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::Free { item, on, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -178,7 +197,7 @@ impl Stage<'_> {
                 let below = on.or_else(|| self.stood_on(*item));
                 self.carry(*item, below);
                 self.freed(robot, *item);
-                Ok(None)
+                Ok(self.make_room(robot, *item).map(|part| Performed { robot, parts: vec![part] }))
             }
         }
     }
@@ -199,10 +218,26 @@ impl Stage<'_> {
         (0..=steps)
             .filter_map(|step| {
                 let since = performed.duration() * f64::from(step) / f64::from(steps);
-                stage.settle(performed.robot, &performed.at(since));
+                performed.bring(stage.actors.get_mut(&performed.robot)?, since);
                 stage.moment(performed.robot, begin + since)
             })
             .collect()
+    }
+
+    /// Opens a gripper, or closes it, to a width, m; nothing where it has no fingers that move.
+    fn spread(&mut self, robot: InstanceId, width: f64) -> Option<Part> {
+        let actor = self.actors.get_mut(&robot)?;
+        let fingers = actor.fingers.clone()?;
+        let to = fingers.at(&actor.tree, &actor.joints, width);
+        let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
+        actor.set_some(&fingers.joints, &to);
+        Some(Part { joints: fingers.joints, trajectory })
+    }
+
+    /// Opens a gripper further than a thing is wide.
+    fn make_room(&mut self, robot: InstanceId, item: InstanceId) -> Option<Part> {
+        let width = self.scene.get(item).body().across_grasp()?;
+        self.spread(robot, width + 2.0 * CLEARANCE)
     }
 
     /// Distance and angle from the tip to the nearest of some poses.
@@ -226,6 +261,9 @@ impl Stage<'_> {
             parts.push(self.line(robot, &back, &[item])?);
         }
         self.leave(robot);
+        if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
+            parts.extend(self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0));
+        }
         let base = self.pose(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let now = actor.configuration();
@@ -270,7 +308,7 @@ impl Stage<'_> {
     }
 
     /// A free way to a configuration.
-    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Trajectory, Refused> {
+    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
@@ -287,11 +325,11 @@ impl Stage<'_> {
     }
 
     /// A straight line of the tip to a pose; things it comes up to or leaves may be touched.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Trajectory, Refused> {
+    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Part, Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
-            without.extend(self.below(*id));
+            without.extend(self.below(*id).map(|below| self.whole(below)));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
         let around = Surroundings::of(self, robot, &without);
@@ -350,15 +388,20 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Trajectory, Refused> {
-    let limits = |f: &dyn Fn(&matterix_ir::robot::JointLimits) -> f64| -> Vec<f64> {
-        actor.chain.variables().iter().map(|v| f(&v.limits)).collect()
-    };
-    let acceleration = |l: &matterix_ir::robot::JointLimits| l.acceleration.unwrap_or(l.velocity / RAMP.0);
-    let limits = Limits {
-        velocity: limits(&|l| l.velocity),
-        acceleration: limits(&acceleration),
-        jerk: limits(&|l| l.jerk.unwrap_or(acceleration(l) / RAMP.1)),
-    };
-    follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)
+fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
+    let limits =
+        |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
+    let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
+    let trajectory = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
+    Ok(Part { joints: actor.arm.clone(), trajectory })
+}
+
+/// The greatest acceleration of a joint, rad/s2 or m/s2.
+pub(super) fn acceleration(limits: &JointLimits) -> f64 {
+    limits.acceleration.unwrap_or(limits.velocity / RAMP.0)
+}
+
+/// The greatest jerk of a joint, rad/s3 or m/s3.
+pub(super) fn jerk(limits: &JointLimits) -> f64 {
+    limits.jerk.unwrap_or(acceleration(limits) / RAMP.1)
 }

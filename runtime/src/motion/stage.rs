@@ -10,6 +10,7 @@ use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 
 use super::assembly::{Assembly, assemble};
+use super::fingers::Fingers;
 
 /// What carries a thing and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub struct Actor {
     pub joints: Vec<f64>,
     /// Indices into `joints` of those that move the tip.
     pub arm: Vec<usize>,
+    /// What opens and closes its gripper.
+    pub fingers: Option<Fingers>,
     /// Shared by all copies of a stage.
     to_plan: Arc<OnceLock<Robot>>,
 }
@@ -183,6 +186,14 @@ impl<'p> Stage<'p> {
         })
     }
 
+    /// What an instance is a part of, parts of parts included; itself where it is of nothing.
+    pub fn whole(&self, mut id: InstanceId) -> InstanceId {
+        while let Some(owner) = self.scene.get(id).owner {
+            id = owner;
+        }
+        id
+    }
+
     /// Whether an instance is one of these or part of one.
     pub fn is_in_any(&self, mut id: InstanceId, these: &[InstanceId]) -> bool {
         loop {
@@ -233,9 +244,10 @@ impl Actor {
         let chain = Chain::new(&assembly.robot, 0, assembly.tip).map_err(|why| why.to_string())?;
         let joint = |v: &matterix_motion::Variable| v.joint;
         let all: Vec<u32> = tree.variables().iter().map(joint).collect();
-        let arm = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
+        let arm: Vec<usize> = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
         let joints = assembly.home.clone();
-        Ok(Actor { assembly, tree, chain, joints, arm, to_plan: Arc::default() })
+        let fingers = Fingers::of(&assembly, &tree, &arm);
+        Ok(Actor { assembly, tree, chain, joints, arm, fingers, to_plan: Arc::default() })
     }
 
     /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
@@ -251,6 +263,15 @@ impl Actor {
     /// The positions of the joints that move the tip.
     pub fn configuration(&self) -> Vec<f64> {
         self.arm.iter().filter_map(|i| self.joints.get(*i)).copied().collect()
+    }
+
+    /// Moves some of its joints.
+    pub fn set_some(&mut self, joints: &[usize], to: &[f64]) {
+        for (index, value) in joints.iter().zip(to) {
+            if let Some(joint) = self.joints.get_mut(*index) {
+                *joint = *value;
+            }
+        }
     }
 
     /// Moves the joints that move the tip.
