@@ -6,6 +6,7 @@ pub mod goal;
 mod outline;
 pub mod perform;
 mod perturb;
+mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;

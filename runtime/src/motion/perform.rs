@@ -12,6 +12,7 @@ use matterix_motion::time::{Limits, Trajectory, follow};
 
 use super::fingers::CLEARANCE;
 use super::goal::{spot, targets};
+use super::postures::postures;
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
@@ -301,6 +302,18 @@ impl Stage<'_> {
                 // What meets says more than that no way was found.
                 Err(why @ Refused::Collides(_)) => refused = why,
                 Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
+                Err(_) => {}
+            }
+        }
+        // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
+        let others = if straight || matches!(refused, Refused::NoWay) { Vec::new() } else { postures(self, robot, to) };
+        for q in others {
+            match self.way(robot, &q) {
+                Ok(part) => {
+                    parts.push(part);
+                    return Ok(Performed { robot, parts });
+                }
+                Err(Refused::NoWay) => break,
                 Err(_) => {}
             }
         }
