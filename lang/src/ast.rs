@@ -723,16 +723,14 @@ pub enum ClauseKind {
         /// When it is said; always without it.
         when: Option<Expr>,
     },
-    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`.
+    /// `moves arm to goal`, `moves arm straight by (0, 0, 100) mm`, `moves arm home`.
     Moves {
         /// The robot.
         mover: Expr,
-        /// Along a straight line.
-        straight: bool,
+        /// How.
+        manner: Manner,
         /// Where to.
-        to: Option<Expr>,
-        /// How far, instead.
-        by: Option<Expr>,
+        to: Goal,
     },
     /// `grips item by arm`.
     Grips {
@@ -750,6 +748,32 @@ pub enum ClauseKind {
         /// The robot.
         by: Expr,
     },
+}
+
+/// How a robot moves.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Manner {
+    /// Any way that is free.
+    Free,
+    /// `straight`.
+    Straight,
+    /// `upright within 20 deg`: what it holds.
+    Upright(Expr),
+    /// `tilted 75 deg about source.lip`: what it holds, about a point of it.
+    Tilted(Expr, Expr),
+}
+
+/// Where a robot moves to.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Goal {
+    /// `to goal`.
+    Frame(Expr),
+    /// `by (0, 0, 100) mm`.
+    Shift(Expr),
+    /// `to joints [0 deg, 90 deg]`.
+    Joints(Expr),
+    /// `home`.
+    Home,
 }
 
 /// One effect.

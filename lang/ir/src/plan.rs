@@ -155,6 +155,50 @@ pub enum Motion {
         /// Along a straight line.
         straight: bool,
     },
+    /// Brings what it holds to a frame without tilting it much on the way; without a load any way will do.
+    Upright {
+        /// The robot.
+        mover: InstanceId,
+        /// Whose frame.
+        goal: InstanceId,
+        /// Its name; empty for the thing itself.
+        frame: String,
+        /// By how much it may tilt, rad.
+        within: NodeId,
+    },
+    /// Brings a point of what it holds to a frame, upright, and there tilts it so that the point's x axis sinks; what is
+    /// tilted already is tilted further or back.
+    Tilted {
+        /// The robot.
+        mover: InstanceId,
+        /// What it holds and the point of it.
+        about: (InstanceId, String),
+        /// Whose frame.
+        goal: InstanceId,
+        /// Its name; empty for the thing itself.
+        frame: String,
+        /// From upright, rad.
+        angle: NodeId,
+    },
+    /// Brings the joints that move its tip to positions, rad or m.
+    Joints {
+        /// The robot.
+        mover: InstanceId,
+        /// In the order of its description.
+        positions: Vec<NodeId>,
+    },
+    /// Brings the joints that move its tip to where they stood when the run began.
+    Home {
+        /// The robot.
+        mover: InstanceId,
+    },
+    /// Opens its empty gripper, or closes it, as far as it goes.
+    Fingers {
+        /// The robot.
+        by: InstanceId,
+        /// Opens.
+        open: bool,
+    },
     /// Closes its gripper on a thing.
     Grip {
         /// The thing.
@@ -171,6 +215,37 @@ pub enum Motion {
         /// The robot.
         by: InstanceId,
     },
+}
+
+impl Motion {
+    /// The robot that moves.
+    pub fn mover(&self) -> InstanceId {
+        match self {
+            Motion::To { mover, .. } | Motion::By { mover, .. } | Motion::Upright { mover, .. } => *mover,
+            Motion::Tilted { mover, .. } | Motion::Joints { mover, .. } | Motion::Home { mover } => *mover,
+            Motion::Fingers { by, .. } | Motion::Grip { by, .. } | Motion::Free { by, .. } => *by,
+        }
+    }
+
+    /// Whose frame it goes to.
+    pub fn goal(&self) -> Option<(InstanceId, &str)> {
+        match self {
+            Motion::To { goal, frame, .. } | Motion::Upright { goal, frame, .. } => Some((*goal, frame)),
+            Motion::Tilted { goal, frame, .. } => Some((*goal, frame)),
+            _ => None,
+        }
+    }
+
+    /// The quantities it depends on, in their order.
+    pub fn values(&self) -> Vec<NodeId> {
+        match self {
+            Motion::By { shift, .. } => shift.to_vec(),
+            Motion::Upright { within, .. } => vec![*within],
+            Motion::Tilted { angle, .. } => vec![*angle],
+            Motion::Joints { positions, .. } => positions.clone(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 /// A leaf: a command of a device or a primitive skill.

@@ -67,6 +67,16 @@ impl Shape {
         }
     }
 
+    /// How far the edge of its top is from its axis in the direction of x, m.
+    pub fn rim(&self) -> f64 {
+        match self {
+            Shape::Box([x, ..]) => x / 2.0,
+            Shape::Cylinder([d, _]) => d / 2.0,
+            Shape::Sphere(_) => 0.0,
+            Shape::Turned { outside, .. } => outside.last().map_or(0.0, |p| p[0]),
+        }
+    }
+
     /// Whether turning it about its own axis changes nothing.
     pub fn is_round(&self) -> bool {
         !matches!(self, Shape::Box(_))

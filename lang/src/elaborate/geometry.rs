@@ -20,8 +20,8 @@ const SHAPES: &[(&str, &str)] = &[
     ),
 ];
 
-/// Points that every shape has: the middle of its top, and of its body.
-const POINTS: &[&str] = &["top", "middle"];
+/// Points that every shape has: the middle of its top, of its body, and of the edge of its top in the direction of x.
+const POINTS: &[&str] = &["top", "middle", "rim"];
 
 /// What an asset's body is made of.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -143,13 +143,18 @@ impl<'a> Elaborator<'a> {
     fn pose(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<(Pose, bool)> {
         let position = match (&*at.position.kind, &of.shape) {
             (ExprKind::Name(name), shape) if POINTS.contains(&name.text.as_str()) => {
-                let height = shape.as_ref()?.size()[2];
-                [0.0, 0.0, if name.text == "top" { height } else { height / 2.0 }]
+                let shape = shape.as_ref()?;
+                let height = shape.size()[2];
+                match name.text.as_str() {
+                    "top" => [0.0, 0.0, height],
+                    "rim" => [shape.rim(), 0.0, height],
+                    _ => [0.0, 0.0, height / 2.0],
+                }
             }
             _ => match self.expr(&at.position, scope) {
                 Value::Tuple(items) => self.position(&items, &at.position)?,
                 other => {
-                    self.expected("a position `(x, y, z) mm`, `top` or `middle`", &other, at.position.span);
+                    self.expected("a position `(x, y, z) mm`, `top`, `middle` or `rim`", &other, at.position.span);
                     return None;
                 }
             },

@@ -2,25 +2,26 @@
 
 use matterix_ir::plan::Motion;
 use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Planner;
-use crate::ast::{ClauseKind, Expr};
+use crate::ast::{ClauseKind, Expr, Goal, Manner};
 use crate::eval::{Scope, Type, Value};
 
 impl<'a> Planner<'a, '_> {
     /// The motion of a clause; none where it has a mistake, which is reported.
     pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
         match clause {
-            ClauseKind::Moves { mover, straight, to, by } => {
-                let (mover, straight) = (self.thing(mover, scope)?, *straight);
-                if let Some(shift) = by {
-                    return Some(Motion::By { mover, shift: self.shift(shift, scope)?, straight });
-                }
-                let (goal, frame) = self.goal(to.as_ref()?, scope)?;
-                Some(Motion::To { mover, goal, frame, straight })
-            }
+            ClauseKind::Moves { mover, manner, to } => self.moves(mover, manner, to, scope),
             ClauseKind::Grips { item, by } => {
-                Some(Motion::Grip { item: self.thing(item, scope)?, by: self.thing(by, scope)? })
+                let by = self.thing(by, scope)?;
+                Some(match self.load(item, scope)? {
+                    Some(item) => Motion::Grip { item, by },
+                    None => Motion::Fingers { by, open: false },
+                })
+            }
+            ClauseKind::Frees { item, on: None, by } if self.load(item, scope)?.is_none() => {
+                Some(Motion::Fingers { by: self.thing(by, scope)?, open: true })
             }
             ClauseKind::Frees { item, on, by } => {
                 let on = match on {
@@ -31,6 +32,93 @@ impl<'a> Planner<'a, '_> {
             }
             _ => None,
         }
+    }
+
+    fn moves(&mut self, mover: &'a Expr, manner: &'a Manner, to: &'a Goal, scope: &mut Scope) -> Option<Motion> {
+        let mover = self.thing(mover, scope)?;
+        let straight = *manner == Manner::Straight;
+        match (to, manner) {
+            (Goal::Frame(to), manner) => {
+                let (goal, frame) = self.goal(to, scope)?;
+                Some(match manner {
+                    Manner::Free | Manner::Straight => Motion::To { mover, goal, frame, straight },
+                    Manner::Upright(within) => {
+                        Motion::Upright { mover, goal, frame, within: self.quantity(within, "Angle", scope)? }
+                    }
+                    Manner::Tilted(angle, about) => {
+                        let angle = self.quantity(angle, "Angle", scope)?;
+                        Motion::Tilted { mover, about: self.goal(about, scope)?, goal, frame, angle }
+                    }
+                })
+            }
+            (Goal::Shift(shift), Manner::Free | Manner::Straight) => {
+                Some(Motion::By { mover, shift: self.shift(shift, scope)?, straight })
+            }
+            (Goal::Joints(positions), Manner::Free) => {
+                Some(Motion::Joints { mover, positions: self.positions(positions, scope)? })
+            }
+            (Goal::Home, Manner::Free) => Some(Motion::Home { mover }),
+            (Goal::Shift(at) | Goal::Joints(at), Manner::Upright(by) | Manner::Tilted(by, _)) => {
+                self.mismatched(by.span.to(at.span))
+            }
+            (Goal::Joints(at), Manner::Straight) => self.mismatched(at.span),
+            (Goal::Home, Manner::Upright(by) | Manner::Tilted(by, _)) => self.mismatched(by.span),
+            (Goal::Home, Manner::Straight) => {
+                let at = self.lab.instances[mover.0 as usize].span;
+                self.mismatched(at)
+            }
+        }
+    }
+
+    /// A manner that only a way to a frame can have.
+    fn mismatched(&mut self, at: Span) -> Option<Motion> {
+        self.lab.report(Diagnostic::error(
+            codes::MISPLACED,
+            at,
+            "joints go to positions as they can",
+            "only a way to a frame is straight, upright or tilted, or one by a shift straight",
+        ));
+        None
+    }
+
+    /// What is gripped or let go; nothing for `nothing`.
+    fn load(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Option<InstanceId>> {
+        match self.lab.expr(e, scope) {
+            Value::Nothing => Some(None),
+            Value::Instance(id) | Value::Qualified(id, _) => Some(Some(id)),
+            other => {
+                self.lab.expected("a thing of the lab, or `nothing`", &other, e.span);
+                None
+            }
+        }
+    }
+
+    fn quantity(&mut self, e: &'a Expr, dimension: &str, scope: &mut Scope) -> Option<NodeId> {
+        let ty = Type::Quantity { dimension: self.lab.tables.units.named(dimension), point: false, optional: false };
+        let value = self.lab.expr(e, scope);
+        match self.lab.coerce(value, &ty, e.span, dimension) {
+            Value::Num(n) => Some(n.node),
+            _ => None,
+        }
+    }
+
+    /// Positions of joints: angles, or lengths of those that slide.
+    fn positions(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<NodeId>> {
+        let value = self.lab.expr(e, scope);
+        let (Value::List(items) | Value::Tuple(items)) = value else {
+            self.lab.expected("positions of joints `[0 deg, 90 deg]`", &value, e.span);
+            return None;
+        };
+        let [angle, length] = ["Angle", "Length"].map(|name| self.lab.tables.units.named(name));
+        let mut out = Vec::new();
+        for item in items {
+            let slides = matches!(&item, Value::Num(n) if n.dimension.agrees(&length));
+            let dimension = if slides { length.clone() } else { angle.clone() };
+            let ty = Type::Quantity { dimension, point: false, optional: false };
+            let Value::Num(n) = self.lab.coerce(item, &ty, e.span, "joints") else { return None };
+            out.push(n.node);
+        }
+        Some(out)
     }
 
     fn thing(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<InstanceId> {
@@ -54,7 +142,7 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
-    fn shift(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<[matterix_ir::NodeId; 3]> {
+    fn shift(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<[NodeId; 3]> {
         let ty = Type::Quantity { dimension: self.lab.tables.units.named("Length"), point: false, optional: false };
         let value = self.lab.expr(e, scope);
         let Value::Tuple(items) = value else {
@@ -66,7 +154,7 @@ impl<'a> Planner<'a, '_> {
             let Value::Num(n) = self.lab.coerce(item, &ty, e.span, "by") else { return None };
             nodes.push(n.node);
         }
-        let found = <[matterix_ir::NodeId; 3]>::try_from(nodes);
+        let found = <[NodeId; 3]>::try_from(nodes);
         if found.is_err() {
             self.lab.expected("a shift `(x, y, z) mm`", &Value::Tuple(Vec::new()), e.span);
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::{Motion, Operation};
+use matterix_ir::plan::Operation;
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 
@@ -67,11 +67,8 @@ impl<'m> Sim<'m> {
     /// Carries out the motion of an operation; how long it takes, if it takes time.
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
         let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
-        let shift = match motion {
-            Motion::By { shift, .. } => shift.map(|node| self.engine.eval(node)),
-            _ => [0.0; 3],
-        };
-        let performed = stage.perform(motion, shift)?;
+        let values: Vec<f64> = motion.values().into_iter().map(|node| self.engine.eval(node)).collect();
+        let performed = stage.perform(motion, &values)?;
         Ok(performed.map(|performed| {
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()

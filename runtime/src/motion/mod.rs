@@ -10,6 +10,7 @@ mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod tilt;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};

@@ -5,7 +5,7 @@ use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Solver, Unreached};
-use matterix_motion::plan::{self, Blocked, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
@@ -18,12 +18,16 @@ use super::surroundings::{Surroundings, held};
 
 /// How near a gripper must be to what it grips, and what it holds to where it is put down: m and rad.
 pub const TOLERANCE: (f64, f64) = (0.010, 0.02);
+/// How far shapes of fingers and what a gripper is said to open may differ, m.
+const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
 const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
+/// How far what is held tilts while a gripper only turns, rad.
+const TURNING: f64 = 0.1;
 /// Samples drawn before a way counts as not found.
 const SAMPLES: usize = 60_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
@@ -72,6 +76,15 @@ impl Performed {
     }
 }
 
+/// How a tip is brought to a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    Free,
+    Straight,
+    /// What is held tilts by no more than this, rad.
+    Upright(f64),
+}
+
 /// Where a robot and what it holds are at one moment of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
@@ -104,6 +117,14 @@ pub enum Refused {
     Misplaced(f64, f64),
     /// It holds nothing that could be let go.
     NotHeld,
+    /// A thing is this wide, and the fingers open so far: m.
+    TooWide(f64, f64),
+    /// What is to stay upright tilts by so much where the way begins or ends, rad.
+    Tilted(f64),
+    /// So many positions were given for so many joints.
+    Joints(usize, usize),
+    /// This joint does not get to its position.
+    Beyond(String),
 }
 
 impl Refused {
@@ -115,16 +136,15 @@ impl Refused {
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
             Refused::Misplaced(..) | Refused::NotHeld => "missed",
+            Refused::TooWide(..) => "too_wide",
+            Refused::Tilted(_) => "no_way",
+            Refused::Joints(..) | Refused::Beyond(_) => "unreachable",
         }
     }
 
     /// In words, for the run of an operation.
     pub fn text(&self, scene: &Scene, operation: &Operation) -> String {
-        let mover = match &operation.motion {
-            Some(Motion::To { mover: by, .. } | Motion::By { mover: by, .. }) => *by,
-            Some(Motion::Grip { by, .. } | Motion::Free { by, .. }) => *by,
-            None => return String::new(),
-        };
+        let Some(mover) = operation.motion.as_ref().map(Motion::mover) else { return String::new() };
         let name = &scene.get(mover).name;
         match self {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
@@ -134,6 +154,12 @@ impl Refused {
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
+            Refused::TooWide(width, opening) => {
+                format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
+            }
+            Refused::Tilted(by) => format!("what `{name}` holds would tilt by {:.0} deg", by.to_degrees()),
+            Refused::Joints(given, there) => format!("{given} positions are given for {there} joints of `{name}`"),
+            Refused::Beyond(joint) => format!("`{joint}` of `{name}` does not get there"),
         }
     }
 }
@@ -154,8 +180,8 @@ pub struct Meeting {
 }
 
 impl Stage<'_> {
-    /// Carries out a motion. `shift` gives the values of a relative one, m.
-    pub fn perform(&mut self, motion: &Motion, shift: [f64; 3]) -> Result<Option<Performed>, Refused> {
+    /// Carries out a motion. `values` are those of [`Motion::values`], SI.
+    pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -163,13 +189,42 @@ impl Stage<'_> {
                 if to.is_empty() {
                     return Err(Refused::NoFrame);
                 }
-                self.go(robot, &to, *straight, Some(*goal)).map(Some)
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.go(robot, &to, way, Some(*goal)).map(Some)
+            }
+            Motion::Upright { mover, goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let to = targets(self, robot, *goal, frame);
+                if to.is_empty() {
+                    return Err(Refused::NoFrame);
+                }
+                let within = values.first().copied().unwrap_or_default();
+                self.go(robot, &to, Way::Upright(within), Some(*goal)).map(Some)
+            }
+            Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let parts = self.depart(robot, None)?;
+                let angle = values.first().copied().unwrap_or_default();
+                self.tilt(robot, (*item, point), (*goal, frame), angle, parts).map(Some)
+            }
+            Motion::Joints { mover, .. } => self.turn(*mover, values.to_vec()).map(Some),
+            Motion::Home { mover } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+                let home = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+                self.turn(robot, home).map(Some)
+            }
+            Motion::Fingers { by, open } => {
+                let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
+                let width = if *open { f64::INFINITY } else { 0.0 };
+                Ok(self.spread(robot, width).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::By { mover, straight, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
                 let mut to = self.tip(robot);
-                (0..3).for_each(|k| to.position[k] += shift[k]);
-                self.go(robot, &[to], *straight, None).map(Some)
+                to.position.iter_mut().zip(values).for_each(|(x, by)| *x += by);
+                let way = if *straight { Way::Straight } else { Way::Free };
+                self.go(robot, &[to], way, None).map(Some)
             }
             Motion::Grip { item, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
@@ -179,6 +234,12 @@ impl Stage<'_> {
                     return Err(Refused::Misplaced(far, turned));
                 }
                 let width = self.scene.get(*item).body().across_grasp();
+                let fingers = self.actors.get(&robot).and_then(|a| a.fingers.as_ref());
+                if let (Some(width), Some(fingers)) = (width, fingers)
+                    && width > fingers.opening() + NOMINAL
+                {
+                    return Err(Refused::TooWide(width, fingers.opening()));
+                }
                 self.carry(*item, Some(robot));
                 Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
@@ -248,20 +309,41 @@ impl Stage<'_> {
         all.min_by(|a, b| (a.0 + a.1).total_cmp(&(b.0 + b.1)))
     }
 
-    fn go(
-        &mut self,
-        robot: InstanceId,
-        to: &[Pose],
-        straight: bool,
-        goal: Option<InstanceId>,
-    ) -> Result<Performed, Refused> {
+    /// What comes before a motion: a gripper draws back from what it has let go, and opens for what it goes to. Nothing is
+    /// drawn back where `near` is what it let go.
+    pub(super) fn depart(&mut self, robot: InstanceId, near: Option<InstanceId>) -> Result<Vec<Part>, Refused> {
         let mut parts = Vec::new();
-        if let Some(item) = self.just_freed(robot).filter(|item| !straight || Some(*item) != goal) {
+        if let Some(item) = self.just_freed(robot).filter(|item| Some(*item) != near) {
             let mut back = self.tip(robot);
             back.position = back.point([0.0, 0.0, -RETREAT]);
-            parts.push(self.line(robot, &back, &[item])?);
+            parts.push(self.line(robot, &[back], &[item])?);
         }
         self.leave(robot);
+        Ok(parts)
+    }
+
+    /// Brings the joints that move the tip to positions.
+    fn turn(&mut self, mover: InstanceId, to: Vec<f64>) -> Result<Performed, Refused> {
+        let robot = self.actor_of(mover).ok_or(Refused::NoRobot)?;
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let variables = actor.chain.variables();
+        if to.len() != variables.len() {
+            return Err(Refused::Joints(to.len(), variables.len()));
+        }
+        let beyond = |(v, q): &(&matterix_motion::Variable, &f64)| {
+            v.is_bounded() && !(v.limits.lower..=v.limits.upper).contains(*q)
+        };
+        if let Some((variable, _)) = variables.iter().zip(&to).find(beyond) {
+            let joint = actor.assembly.robot.joints.get(variable.joint as usize);
+            return Err(Refused::Beyond(joint.map(|j| j.name.clone()).unwrap_or_default()));
+        }
+        let mut parts = self.depart(robot, None)?;
+        parts.push(self.way(robot, &to, None)?);
+        Ok(Performed { robot, parts })
+    }
+
+    fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {
+        let mut parts = self.depart(robot, goal.filter(|_| way == Way::Straight))?;
         if let Some(item) = goal.filter(|_| self.held(robot).is_none()) {
             parts.extend(self.make_room(robot, item).filter(|part| part.trajectory.duration() > 0.0));
         }
@@ -289,20 +371,31 @@ impl Stage<'_> {
         if !found.is_empty() {
             refused = Refused::NoWay;
         }
-        for (_, target, q) in found {
-            let tried = match straight {
-                true => self.line(robot, target, goal.as_slice()),
-                false => self.way(robot, &q),
+        let mut keep = |why: Refused| {
+            // What meets says more than that no way was found.
+            if !matches!(refused, Refused::Collides(_)) || matches!(why, Refused::Collides(_)) {
+                refused = why;
+            }
+        };
+        for (_, target, q) in &found {
+            let tried = match way {
+                Way::Straight => self.line(robot, std::slice::from_ref(*target), goal.as_slice()),
+                Way::Free => self.way(robot, q, None),
+                Way::Upright(within) => self.way(robot, q, Some(within)),
             };
             match tried {
                 Ok(part) => {
                     parts.push(part);
                     return Ok(Performed { robot, parts });
                 }
-                // What meets says more than that no way was found.
-                Err(why @ Refused::Collides(_)) => refused = why,
-                Err(why) if !matches!(refused, Refused::Collides(_)) => refused = why,
-                Err(_) => {}
+                Err(why) => keep(why),
+            }
+        }
+        // What is in the way beside a line may not be if the gripper turns before it sets out.
+        for (_, target, _) in found.iter().filter(|_| way == Way::Straight) {
+            if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
+                parts.extend(turned);
+                return Ok(Performed { robot, parts });
             }
         }
         // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
@@ -320,43 +413,78 @@ impl Stage<'_> {
         Err(refused)
     }
 
-    /// A free way to a configuration.
-    fn way(&mut self, robot: InstanceId, q: &[f64]) -> Result<Part, Refused> {
+    /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
+    fn turned_line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<[Part; 2], Refused> {
+        let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
+        let base = self.pose(robot).inverse();
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let before = actor.joints.clone();
+        let now = actor.configuration();
+        let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
+        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
+        let first = self.way(robot, &turned.q, Some(TURNING));
+        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
+            actor.joints = before;
+        }
+        both
+    }
+
+    /// A free way to a configuration; what is held tilts by no more than so much on it, rad.
+    pub(super) fn way(&mut self, robot: InstanceId, q: &[f64], within: Option<f64>) -> Result<Part, Refused> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let settings = Settings { iterations: SAMPLES, ..Settings::default() };
-        let route =
-            plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
-                plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-                _ => Refused::NoWay,
-            })?;
-        let part = timed(actor, &route.points, &mut checker)?;
+        let start = actor.configuration();
+        let refused = |failure| match failure {
+            plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+            plan::Failure::Tilt(_, by) => Refused::Tilted(by),
+            _ => Refused::NoWay,
+        };
+        let part = match within.and_then(|tilt| self.upright(robot, tilt)) {
+            Some(upright) => {
+                let mut solver = Solver::new(actor.chain.clone());
+                let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
+                let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut level)?
+            }
+            None => {
+                let route = plan::plan(&mut checker, &start, q, &settings).map_err(refused)?;
+                timed(actor, &route.points, &mut checker)?
+            }
+        };
         self.settle(robot, q);
         Ok(part)
     }
 
-    /// A straight line of the tip to a pose; things it comes up to or leaves may be touched.
-    fn line(&mut self, robot: InstanceId, to: &Pose, near: &[InstanceId]) -> Result<Part, Refused> {
+    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
             without.extend(self.below(*id).map(|below| self.whole(below)));
         }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)));
+        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
         let around = Surroundings::of(self, robot, &without);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let to = pose(&self.pose(robot).inverse().then(*to));
+        let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
         let mut solver = Solver::new(actor.chain.clone());
-        let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
-        let mut points = followed.map_err(|blocked| match blocked {
-            Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-            Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
-            Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
-        })?;
+        let mut points = vec![actor.configuration()];
+        for to in to {
+            let from = points.last().cloned().unwrap_or_default();
+            let to = pose(&base.then(*to));
+            let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
+            let followed = followed.map_err(|blocked| match blocked {
+                Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
+                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+                Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
+            })?;
+            points.extend(followed.into_iter().skip(1));
+        }
         let part = timed(actor, &points, &mut checker)?;
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
@@ -401,11 +529,11 @@ impl Stage<'_> {
     }
 }
 
-fn timed(actor: &Actor, points: &[Vec<f64>], checker: &mut Checker<'_>) -> Result<Part, Refused> {
+fn timed(actor: &Actor, points: &[Vec<f64>], judge: &mut dyn Judge) -> Result<Part, Refused> {
     let limits =
         |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
     let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
-    let trajectory = follow(points, &limits, Some(checker)).map_err(|_| Refused::NoWay)?;
+    let trajectory = follow(points, &limits, Some(judge)).map_err(|_| Refused::NoWay)?;
     Ok(Part { joints: actor.arm.clone(), trajectory })
 }
 

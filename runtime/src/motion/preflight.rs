@@ -10,7 +10,7 @@ use matterix_ir::model::{Action, Domain};
 use matterix_ir::plan::{Motion, Operation, Step, StepId};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
-use matterix_ir::{Diagnostic, Program, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Op, Program, Span, codes};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
@@ -163,33 +163,31 @@ impl<'p> Walk<'p> {
     }
 
     fn motion(&mut self, motion: &Motion) -> Result<(), Refused> {
-        let shift = match motion {
-            Motion::By { shift, .. } => {
-                let known: Option<Vec<f64>> =
-                    shift.iter().map(|node| self.program.model.graph.constant(*node)).collect();
-                // What only a run can tell is left to the run.
-                let Some(known) = known.and_then(|k| <[f64; 3]>::try_from(k).ok()) else { return Ok(()) };
-                known
-            }
-            _ => [0.0; 3],
-        };
-        self.stage.perform(motion, shift).map(|_| ())
+        let known = motion.values().into_iter().map(|node| self.known(node));
+        // What only a run can tell is left to the run.
+        let Some(values) = known.collect::<Option<Vec<f64>>>() else { return Ok(()) };
+        self.stage.perform(motion, &values).map(|_| ())
+    }
+
+    /// The value of a node that depends on nothing but parameters.
+    fn known(&self, node: NodeId) -> Option<f64> {
+        let model = &self.program.model;
+        let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
+        if model.graph.depends(node, live) {
+            return None;
+        }
+        let value = model.graph.eval_on(node, |leaf| match leaf {
+            Op::Const(value) => value,
+            Op::Param(index) => model.params.get(index as usize).map_or(f64::NAN, |p| p.value),
+            _ => f64::NAN,
+        });
+        value.is_finite().then_some(value)
     }
 
     fn finding(&self, motion: &Motion, refused: &Refused, span: Span) -> Option<Diagnostic> {
         let scene = &self.program.scene;
-        let (Motion::To { mover: robot, .. } | Motion::By { mover: robot, .. }) = motion else {
-            let (Motion::Grip { item, by } | Motion::Free { item, by, .. }) = motion else { return None };
-            let Refused::Misplaced(far, _) = refused else { return None };
-            let (item, by) = (&scene.get(*item).name, &scene.get(*by).name);
-            let headline = format!("`{by}` is not at `{item}`: {:.0} mm are between them", far * 1e3);
-            return Some(Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go"));
-        };
-        let name = &scene.get(*robot).name;
-        let goal = match motion {
-            Motion::To { goal, .. } => Some(*goal),
-            _ => None,
-        };
+        let name = &scene.get(motion.mover()).name;
+        let goal = motion.goal().map(|(goal, _)| goal);
         let to = goal.map_or("there".to_string(), |g| format!("`{}`", scene.get(g).name));
         let found = match refused {
             Refused::OutOfReach(far, _) => {
@@ -199,7 +197,7 @@ impl<'p> Walk<'p> {
                     _ => "it gets there, but not turned like this".to_string(),
                 };
                 let found = Diagnostic::error(codes::OUT_OF_REACH, span, headline, label);
-                match goal.and_then(|goal| self.nearer(*robot, motion, goal)) {
+                match motion.goal().and_then(|(goal, frame)| self.nearer(motion.mover(), goal, frame)) {
                     Some(help) => found.help(help),
                     None => found,
                 }
@@ -224,7 +222,32 @@ impl<'p> Walk<'p> {
                 format!("no way was found for `{name}` to {to}"),
                 "nothing is in the way at its end, but between",
             ),
-            Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
+            Refused::Misplaced(far, _) => {
+                let (Motion::Grip { item, .. } | Motion::Free { item, .. }) = motion else { return None };
+                let item = &scene.get(*item).name;
+                let headline = format!("`{name}` is not at `{item}`: {:.0} mm are between them", far * 1e3);
+                Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go")
+            }
+            Refused::TooWide(width, opening) => {
+                let Motion::Grip { item, .. } = motion else { return None };
+                let headline = format!("`{name}` does not open wide enough for `{}`", scene.get(*item).name);
+                let label = format!("it is {:.0} mm wide, and the fingers open {:.0} mm", width * 1e3, opening * 1e3);
+                Diagnostic::error(codes::TOO_WIDE, span, headline, label)
+            }
+            Refused::Tilted(by) => {
+                let headline = format!("what `{name}` holds tilts on its way to {to}");
+                let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
+                Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
+            }
+            Refused::Joints(given, there) => {
+                let headline = format!("{given} positions for the {there} joints of `{name}`");
+                Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "not one for each")
+            }
+            Refused::Beyond(joint) => {
+                let headline = format!("`{joint}` of `{name}` does not get to this position");
+                Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
+            }
+            Refused::NoRobot | Refused::NoFrame | Refused::NotHeld => return None,
         };
         Some(match goal.filter(|g| scene.get(*g).span != span) {
             Some(goal) => found.because(scene.get(goal).span, format!("`{}` stands here", scene.get(goal).name)),
@@ -233,8 +256,7 @@ impl<'p> Walk<'p> {
     }
 
     /// Where a thing out of reach could be reached: the nearest place on the line to the robot.
-    fn nearer(&self, robot: InstanceId, motion: &Motion, goal: InstanceId) -> Option<String> {
-        let Motion::To { frame, .. } = motion else { return None };
+    fn nearer(&self, robot: InstanceId, goal: InstanceId, frame: &str) -> Option<String> {
         let robot = self.stage.actor_of(robot)?;
         let targets = super::goal::targets(&self.stage, robot, goal, frame);
         let base = self.stage.pose(robot);

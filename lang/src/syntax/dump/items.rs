@@ -7,9 +7,9 @@ use super::{
     steps::{block, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine,
-    Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Member, MemberKind, Name, Process, Role,
-    StudyLine, Term, Wire, WireKind,
+    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine, Goal,
+    Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind, Name, Process,
+    Role, StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -228,10 +228,20 @@ fn clause(clause: &Clause) -> Sexp {
         ClauseKind::Says { text, when } => {
             node("says").with([super::steps::filled(text)]).with(maybe("when", when.as_ref()))
         }
-        ClauseKind::Moves { mover, straight, to, by } => node(if *straight { "moves straight" } else { "moves" })
-            .with([expr(mover)])
-            .with(maybe("to", to.as_ref()))
-            .with(maybe("by", by.as_ref())),
+        ClauseKind::Moves { mover, manner, to } => {
+            let moves = match manner {
+                Manner::Free => node("moves").with([expr(mover)]),
+                Manner::Straight => node("moves straight").with([expr(mover)]),
+                Manner::Upright(within) => node("moves upright").with([expr(mover), expr(within)]),
+                Manner::Tilted(angle, about) => node("moves tilted").with([expr(mover), expr(angle), expr(about)]),
+            };
+            match to {
+                Goal::Frame(to) => moves.with(maybe("to", Some(to))),
+                Goal::Shift(by) => moves.with(maybe("by", Some(by))),
+                Goal::Joints(to) => moves.with(maybe("to joints", Some(to))),
+                Goal::Home => moves.with([node("home")]),
+            }
+        }
         ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
         ClauseKind::Frees { item, on, by } => {
             node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])

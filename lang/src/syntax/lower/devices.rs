@@ -8,8 +8,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Grid, ItemKind, Member,
-    MemberKind, Name, Path, Role, Term,
+    AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Goal, Grid, ItemKind, Manner,
+    Member, MemberKind, Name, Path, Role, Term,
 };
 
 impl Lower<'_> {
@@ -144,11 +144,16 @@ impl Lower<'_> {
             }
             Rule::moves => {
                 let mover = self.expr_in(kids);
-                let straight = kids.has(Rule::kw_straight);
-                let by = !kids.has(Rule::kw_to);
-                let goal = self.expr_in(kids);
-                let (to, by) = if by { (None, Some(goal)) } else { (Some(goal), None) };
-                ClauseKind::Moves { mover, straight, to, by }
+                let manner = kids.eat(Rule::manner).map_or(Manner::Free, |node| self.manner(node));
+                let to = match (kids.has(Rule::kw_home), kids.has(Rule::kw_to)) {
+                    (true, _) => Goal::Home,
+                    (_, true) => match kids.eat(Rule::joints) {
+                        Some(joints) => Goal::Joints(self.expr_in(&mut Kids::of(joints))),
+                        None => Goal::Frame(self.expr_in(kids)),
+                    },
+                    _ => Goal::Shift(self.expr_in(kids)),
+                };
+                ClauseKind::Moves { mover, manner, to }
             }
             Rule::grips => {
                 let item = self.expr_in(kids);
@@ -166,6 +171,19 @@ impl Lower<'_> {
             Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
             _ => return None,
         })
+    }
+
+    fn manner(&mut self, node: Node) -> Manner {
+        let kids = &mut Kids::of(node);
+        if kids.has(Rule::kw_upright) {
+            return Manner::Upright(self.expr_in(kids));
+        }
+        if kids.has(Rule::kw_tilted) {
+            let angle = self.expr_in(kids);
+            kids.has(Rule::kw_about);
+            return Manner::Tilted(angle, self.expr_in(kids));
+        }
+        Manner::Straight
     }
 
     fn effect(&mut self, node: Node) -> Effect {

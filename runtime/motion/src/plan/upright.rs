@@ -23,6 +23,11 @@ pub struct Upright {
 }
 
 impl Upright {
+    /// Keeps the z axis of what is held (relative to the tip) along the z axis of the world (relative to the base).
+    pub fn of(held: &Pose, world: &Pose, tilt: f64) -> Self {
+        Self { axis: held.rotation * Vector3::z_axis(), up: world.rotation * Vector3::z_axis(), tilt }
+    }
+
     /// The angle between the tip's axis and up; rad.
     pub fn tilt_of(&self, tip: &Pose) -> f64 {
         (tip.rotation * self.axis.into_inner()).angle(&self.up)

@@ -1,0 +1,183 @@
+//! Keeping what is held upright, and tilting it about a point of it, as for pouring.
+
+use std::f64::consts::FRAC_PI_4;
+
+use matterix_ir::math::{acos, cos};
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::InstanceId;
+use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::plan::Upright;
+use matterix_motion::pose::{distance, pose};
+
+use super::perform::{Part, Performed, Refused};
+use super::stage::{Carried, Stage};
+
+/// What tilts by less than this counts as upright, rad.
+const LEVEL: f64 = 0.1;
+/// Greatest tilt between two poses on the way, rad.
+const STEP: f64 = 0.15;
+/// How many ways of tilting are tried, the nearest first.
+const TRIED: usize = 8;
+/// Greatest cosine between the way a vessel is tilted and the line from finger to finger: what flows out passes beside them.
+const BESIDE: f64 = 0.5;
+
+/// One way to tilt: poses of the tip by the angle of what it holds.
+struct Tilting {
+    to: Pose,
+    point: Pose,
+    inner: Pose,
+    /// How high the point is above the base of what is held, m.
+    height: f64,
+}
+
+impl Tilting {
+    /// With the point at the frame.
+    fn at(&self, angle: f64) -> Pose {
+        self.to.then(about_y(angle)).then(self.point).then(self.inner)
+    }
+
+    /// With the base no lower than the frame.
+    fn above(&self, angle: f64) -> Pose {
+        let mut at = self.at(angle);
+        at.position[2] += self.height * cos(angle).max(0.0);
+        at
+    }
+
+    /// From upright, or from one angle, to another: tilted above the frame, and brought down to it tilted.
+    fn poses(&self, from: Option<f64>, to: f64) -> Vec<Pose> {
+        let begin = from.unwrap_or(0.0);
+        let steps = ((to - begin).abs() / STEP).ceil().max(1.0) as u32;
+        let first = if from.is_some() { 0 } else { 1 };
+        let angle = |k: u32| begin + (to - begin) * f64::from(k) / f64::from(steps);
+        let down = (to > LEVEL).then(|| self.at(to));
+        (first..=steps).map(|k| self.above(angle(k))).chain(down).collect()
+    }
+}
+
+impl Stage<'_> {
+    /// What must not tilt while a robot moves, if it holds anything.
+    pub(super) fn upright(&self, robot: InstanceId, tilt: f64) -> Option<Upright> {
+        let (_, inner) = self.inner(robot)?;
+        Some(Upright::of(&pose(&inner), &pose(&self.pose(robot).inverse()), tilt))
+    }
+
+    /// What a robot holds and where, relative to its tip.
+    fn inner(&self, robot: InstanceId) -> Option<(InstanceId, Pose)> {
+        let held = self.held(robot)?;
+        match self.carried.get(held.0 as usize)? {
+            Carried::Held(_, inner) => Some((held, *inner)),
+            Carried::Stands(_) => None,
+        }
+    }
+
+    /// Tilts what a robot holds about a point of it that is brought to a frame.
+    pub(super) fn tilt(
+        &mut self,
+        robot: InstanceId,
+        (item, point): (InstanceId, &str),
+        (goal, frame): (InstanceId, &str),
+        angle: f64,
+        parts: Vec<Part>,
+    ) -> Result<Performed, Refused> {
+        let (_, inner) = self.inner(robot).filter(|(held, _)| *held == item).ok_or(Refused::NotHeld)?;
+        let to = self.frame(goal, frame).ok_or(Refused::NoFrame)?;
+        let point = self.scene.get(item).frames.iter().find(|f| f.name == point && !f.stand);
+        let point = point.map(|f| f.pose).ok_or(Refused::NoFrame)?;
+        let now = tilt_of(self.pose(item));
+        let ways = self.ways(robot, item, to, point, inner);
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let before = actor.joints.clone();
+        let mut refused = Refused::NoWay;
+        let mut keep = |why: Refused| {
+            if !matches!(refused, Refused::Collides(_)) {
+                refused = why;
+            }
+        };
+        for (way, q) in self.nearest_first(robot, ways, now, &mut keep) {
+            let mut done = parts.clone();
+            let brought = match now < LEVEL {
+                true => self.way(robot, &q, Some(LEVEL)).map(|part| done.push(part)),
+                false => Ok(()),
+            };
+            let poses = way.poses((now >= LEVEL).then_some(now), angle);
+            match brought.and_then(|()| self.line(robot, &poses, &[])) {
+                Ok(part) => {
+                    done.push(part);
+                    return Ok(Performed { robot, parts: done });
+                }
+                Err(why) => keep(why),
+            }
+            if let Some(actor) = self.actors.get_mut(&robot) {
+                actor.joints.clone_from(&before);
+            }
+        }
+        Err(refused)
+    }
+
+    /// All ways to tilt: from any side; what is round over any point of its rim that is not under a finger.
+    fn ways(&self, robot: InstanceId, item: InstanceId, to: Pose, point: Pose, inner: Pose) -> Vec<Tilting> {
+        let round = self.scene.get(item).shape.as_ref().is_some_and(|s| s.is_round());
+        let spins = if round { 8 } else { 1 };
+        let has_fingers = self.actors.get(&robot).is_some_and(|a| a.fingers.is_some());
+        let mut out = Vec::new();
+        for spin in 0..spins {
+            let point = about_z(f64::from(spin) * FRAC_PI_4).then(point);
+            let over = inner.then(point);
+            let (begin, end) = (over.position, over.point([1.0, 0.0, 0.0]));
+            if has_fingers && round && (end[1] - begin[1]).abs() > BESIDE {
+                continue;
+            }
+            for side in 0..8 {
+                let to = to.then(about_z(f64::from(side) * FRAC_PI_4));
+                let height = point.position[2];
+                out.push(Tilting { to, point: point.inverse(), inner: inner.inverse(), height });
+            }
+        }
+        out
+    }
+
+    /// The ways nearest to how a robot stands now, with the configurations in which they begin.
+    fn nearest_first(
+        &self,
+        robot: InstanceId,
+        ways: Vec<Tilting>,
+        now: f64,
+        missed: &mut dyn FnMut(Refused),
+    ) -> Vec<(Tilting, Vec<f64>)> {
+        let Some(actor) = self.actors.get(&robot) else { return Vec::new() };
+        let (base, here) = (self.pose(robot).inverse(), actor.configuration());
+        let mut solver = Solver::new(actor.chain.clone());
+        let mut found: Vec<(f64, Tilting, Vec<f64>)> = Vec::new();
+        for way in ways {
+            if now >= LEVEL {
+                let (far, turned) = distance(&pose(&way.at(now)), &pose(&self.tip(robot)));
+                found.push((far + turned, way, here.clone()));
+                continue;
+            }
+            match solver.solve(&Request::new(pose(&base.then(way.above(0.0))), &here)) {
+                Ok(solution) => {
+                    let far = solution.q.iter().zip(&here).map(|(a, b)| (a - b) * (a - b)).sum();
+                    found.push((far, way, solution.q));
+                }
+                Err(off) => missed(Refused::OutOfReach(off.linear, off.angular)),
+            }
+        }
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(TRIED);
+        found.into_iter().map(|(_, way, q)| (way, q)).collect()
+    }
+}
+
+/// The angle between a thing's z axis and up, rad.
+fn tilt_of(at: Pose) -> f64 {
+    let up = pose(&at).rotation.matrix()[(2, 2)];
+    acos(up.clamp(-1.0, 1.0))
+}
+
+fn about_y(angle: f64) -> Pose {
+    Pose::turned([0.0; 3], [0.0, angle, 0.0])
+}
+
+fn about_z(angle: f64) -> Pose {
+    Pose::turned([0.0; 3], [0.0, 0.0, angle])
+}
