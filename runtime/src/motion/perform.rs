@@ -399,9 +399,16 @@ impl Stage<'_> {
             }
         }
         // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
-        let others = if straight || matches!(refused, Refused::NoWay) { Vec::new() } else { postures(self, robot, to) };
+        let within = match way {
+            Way::Upright(within) => Some(within),
+            Way::Free | Way::Straight => None,
+        };
+        let others = match refused {
+            Refused::Collides(_) if way != Way::Straight => postures(self, robot, to),
+            _ => Vec::new(),
+        };
         for q in others {
-            match self.way(robot, &q) {
+            match self.way(robot, &q, within) {
                 Ok(part) => {
                     parts.push(part);
                     return Ok(Performed { robot, parts });
