@@ -74,9 +74,12 @@ pub struct CheckArgs {
     /// Take warnings for errors, and show advice as warnings.
     #[arg(long)]
     pub strict: bool,
-    /// How closely motions are looked at: with `motion` also what is out of reach of robots and what they run into.
-    #[arg(long, value_enum, default_value_t = Fidelity::Process)]
+    /// How closely motions are looked at: with `process` not what is out of reach of robots and what they run into.
+    #[arg(long, value_enum, default_value_t = Fidelity::Motion)]
     pub fidelity: Fidelity,
+    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    #[arg(long)]
+    pub no_cache: bool,
     /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
     #[arg(long)]
     pub contents: bool,
@@ -134,12 +137,15 @@ pub struct RunArgs {
     /// Where to write recording, table, plots and report; nothing is written without it.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// How closely motions are simulated.
+    /// How closely motions are simulated; with `motion` they are looked at before the run begins.
     #[arg(long, value_enum, default_value_t = Fidelity::Process)]
     pub fidelity: Fidelity,
     /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
     #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
     pub perturb: Option<Perturbation>,
+    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    #[arg(long)]
+    pub no_cache: bool,
     /// Form of the report.
     #[arg(long, value_enum, default_value_t = RunFormat::Human)]
     pub format: RunFormat,

@@ -732,18 +732,20 @@ pub enum ClauseKind {
         /// Where to.
         to: Goal,
     },
-    /// `grips item by arm`.
+    /// `grips item by arm`, `grips item at frame by arm`.
     Grips {
         /// What.
         item: Expr,
+        /// Where, if not at its frame `grasp`.
+        at: Option<Expr>,
         /// The robot.
         by: Expr,
     },
-    /// `frees item on target by arm`.
+    /// `frees item on target by arm`, `frees item to other by arm`.
     Frees {
         /// What.
         item: Expr,
-        /// What it stands on then.
+        /// What carries it then.
         on: Option<Expr>,
         /// The robot.
         by: Expr,

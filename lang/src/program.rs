@@ -551,6 +551,7 @@ fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
 fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
     let ItemKind::Lab { name, .. } = &lab.tables.names.decl(decl).item.kind else { return Scene::default() };
     let mut instances = Vec::new();
+    let placed = lab.whereabouts();
     for i in 0..lab.instances.len() {
         let id = InstanceId(i as u32);
         let inst = &lab.instances[i];
@@ -571,6 +572,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             owner,
             support,
             pose,
+            placed: placed[i],
             frames,
             shape,
             solids,

@@ -1,5 +1,6 @@
 //! A program from its initial state to its outcome.
 
+use matterix_ir::plan::{Plan, Step};
 use matterix_ir::{Program, codes};
 use serde::Serialize;
 
@@ -94,7 +95,7 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
     let mut sim = Sim::new(engine, &prepared, options.seed);
     if options.fidelity == Fidelity::Motion {
         sim = match Stage::new(&program.scene) {
-            Ok(stage) => sim.with_motion(stage),
+            Ok(stage) => sim.with_motion(stage, runs_beside(&program.plan)),
             Err(message) => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
         };
     }
@@ -110,6 +111,11 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
         outcome.suppressed.extend(outcome.failure.replace(trace));
     }
     outcome
+}
+
+/// Whether some steps of a plan run beside others.
+fn runs_beside(plan: &Plan) -> bool {
+    plan.steps.iter().any(|s| matches!(s.step, Step::Parallel(_) | Step::Start { .. }))
 }
 
 /// The program's parameters with those that differ.

@@ -7,6 +7,7 @@ use matterix_ir::{Severity, Sources};
 
 use crate::Exit;
 use crate::args::{CheckArgs, Color};
+use crate::cache;
 use crate::files;
 use crate::pipeline::{self, Input};
 use crate::report::points::{self, Found};
@@ -21,6 +22,7 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
     }
     let mut reporter = Reporter::new(args.format, terminal::look(Stream::Out, color));
     let mut exit = Exit::Fine;
+    let cache = cache::of(args.no_cache);
     for path in &args.files {
         let bytes = match files::read(path) {
             Ok(bytes) => bytes,
@@ -34,7 +36,7 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
         let (sources, mut diagnostics, known) = match args.contents {
             true => pipeline::contents(&input),
             false => {
-                let (sources, diagnostics) = pipeline::check(&input, args.fidelity);
+                let (sources, diagnostics) = pipeline::check(&input, args.fidelity, &*cache);
                 (sources, diagnostics, Vec::new())
             }
         };

@@ -8,7 +8,8 @@ use matterix_ir::{Diagnostic, Program, Severity};
 use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::perturb;
 
-use crate::args::{Color, RunArgs, RunFormat};
+use crate::args::{Color, Fidelity, RunArgs, RunFormat};
+use crate::cache;
 use crate::pipeline::{self, Choices, Input, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
@@ -39,6 +40,15 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         None => Vec::new(),
     };
 
+    if args.fidelity == Fidelity::Motion && !args.dry {
+        let found = pipeline::motions(&program, &*cache::of(args.no_cache));
+        let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
+        findings.show(&sources, found);
+        if is_wrong {
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    }
     let cancel = cancel::on_interrupt()?;
     let turns = match turns(args, &program, cancel)? {
         Ok(turns) => turns,

@@ -12,7 +12,7 @@ use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
 use crate::args::Fidelity;
-use matterix_runtime::motion::preflight;
+use matterix_runtime::motion::{Store, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
@@ -71,17 +71,24 @@ impl Input {
     }
 }
 
-/// Findings of a file; at the fidelity `motion` also those in the way of robots.
-pub fn check(input: &Input, fidelity: Fidelity) -> (Sources, Vec<Diagnostic>) {
+/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store.
+pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let found = match file {
         Ok(file) => match fidelity {
             Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
-            Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &input.neighbours(), &preflight),
+            Fidelity::Motion => {
+                matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| preflight(program, store))
+            }
         },
         Err(found) => vec![found],
     };
     (sources, found)
+}
+
+/// What would go wrong with the motions of a program.
+pub fn motions(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
+    preflight(program, store)
 }
 
 /// Findings of a file, and what is known at every statement of its workflows.

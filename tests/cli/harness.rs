@@ -31,6 +31,8 @@ impl Ended {
 pub fn command() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
     command.env_remove("NO_COLOR").stdin(Stdio::null());
+    // What was planned by an earlier test is the same for a later one.
+    command.env("XDG_CACHE_HOME", Path::new(env!("CARGO_TARGET_TMPDIR")).join("cache"));
     command
 }
 

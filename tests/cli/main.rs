@@ -12,6 +12,7 @@ mod files;
 mod findings;
 mod formatting;
 mod grids;
+mod gripping;
 mod harness;
 mod motion;
 mod new;

@@ -16,6 +16,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         owner: None,
         support: None,
         pose: Pose::at(at),
+        placed: true,
         frames: Vec::new(),
         solids: Vec::new(),
         articulation: None,

@@ -142,6 +142,7 @@ codes! {
     TRANSFER_FRACTION "transfer-fraction" "X0" "a transfer takes less than nothing or more than there is";
     RUN_FAILED "run-failed" "X0" "a step of the run failed and nothing handled it";
     EXPECTATION_FAILED "expectation-failed" "X0" "an expectation did not hold when it was judged";
+    ROBOTS_MEET "robots-meet" "R3" "two robots may be in one place at the same time, or must";
     CLAIMED_TWICE "claimed-twice" "R1" "two steps use the same instance at the same time";
     DEADLOCK "deadlock" "R2" "steps wait for each other and nothing can go on";
     WAITS_FOR_EVER "waits-for-ever" "X0" "the run waits for something that does not come";

@@ -23,7 +23,12 @@ impl Body<'_> {
     /// How wide it is between the fingers that grip it at its frame `grasp` and close along that frame's y axis, m.
     /// Where pieces overlap there, the widest of them; nothing where the frame lies in none.
     pub fn across_grasp(&self) -> Option<f64> {
-        let grasp = self.frames.iter().find(|f| f.name == frame::GRASP && !f.stand)?.pose;
+        self.across(frame::GRASP)
+    }
+
+    /// The same at another of its frames, m.
+    pub fn across(&self, frame: &str) -> Option<f64> {
+        let grasp = self.frames.iter().find(|f| f.name == frame && !f.stand)?.pose;
         let main = self.shape.map(|shape| across(shape, grasp));
         let more = self.solids.iter().map(|solid| across(&solid.shape, solid.pose.inverse().then(grasp)));
         main.into_iter().chain(more).flatten().max_by(f64::total_cmp)

@@ -199,10 +199,12 @@ pub enum Motion {
         /// Opens.
         open: bool,
     },
-    /// Closes its gripper on a thing.
+    /// Closes its gripper on a thing, which may be in the hand of another robot.
     Grip {
         /// The thing.
         item: InstanceId,
+        /// At which of its frames.
+        frame: String,
         /// The robot.
         by: InstanceId,
     },
@@ -210,7 +212,7 @@ pub enum Motion {
     Free {
         /// What it held.
         item: InstanceId,
-        /// What carries it then, if it is known.
+        /// What carries it then, if it is known: a surface, or a robot that grips it as well.
         on: Option<InstanceId>,
         /// The robot.
         by: InstanceId,

@@ -118,6 +118,9 @@ pub struct Instance {
     pub support: Option<InstanceId>,
     /// Where it stood when the run began, relative to its support or the lab.
     pub pose: Pose,
+    /// Whether that is known, seen from there: the text says it, or leaves no other choice.
+    #[serde(default)]
+    pub placed: bool,
     /// Its named points.
     pub frames: Vec<Frame>,
     /// Its body.
@@ -138,7 +141,7 @@ impl Instance {
 }
 
 /// What a thing stands on and where on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Stand {
     /// In the lab.
     Lab(Pose),

@@ -132,7 +132,7 @@ impl<'a> Elaborator<'a> {
             grids.len() - 1
         });
         let owner = self.instances[id.0 as usize].name.clone();
-        let (corner, mut twice) = (places[0], None);
+        let (corner, many, mut twice) = (places[0], places.len() > 1, None);
         for place in places {
             let name = match place.row {
                 Some(_) if index == 0 => format!("{owner}[{place}]"),
@@ -143,6 +143,8 @@ impl<'a> Elaborator<'a> {
             settings.extend(line.literal.fields.iter().map(|field| Setting { module, field, lab: false, of }));
             let child = self.instantiate(name, vec![kind], settings, of, line.literal.span);
             self.instances[child.0 as usize].pose = layout.pose(corner, place);
+            self.instances[child.0 as usize].at = line.at.is_some();
+            self.instances[child.0 as usize].one_of_many = many;
             if self.instances[id.0 as usize].grids[index].children.insert(place, child).is_some() {
                 twice = Some(place);
             }

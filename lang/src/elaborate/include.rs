@@ -290,6 +290,9 @@ impl<'a> Elaborator<'a> {
         for (within, relations, outer, module) in std::mem::take(&mut self.places) {
             let own = |i: &super::Instance<'a>| i.owner.is_none() && i.name.starts_with(&within) && i.placed.is_empty();
             let free: Vec<usize> = (0..self.instances.len()).filter(|i| own(&self.instances[*i])).collect();
+            // Where a lab stands that has no place of its own, is open to the one that includes it.
+            let stands = relations.iter().any(|(label, _)| label.text != "with");
+            free.iter().filter(|_| !stands).for_each(|i| self.instances[*i].at = false);
             for (label, operand) in relations {
                 let value = self
                     .within_lab(&outer, |this| this.expr(operand, &mut Scope { lab: true, ..Scope::module(module) }));

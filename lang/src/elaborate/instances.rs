@@ -69,6 +69,10 @@ pub struct Instance<'a> {
     pub placed: Vec<(String, InstanceId)>,
     /// Where.
     pub pose: Pose,
+    /// Whether the text says where.
+    pub at: bool,
+    /// Whether a line makes it together with others.
+    pub one_of_many: bool,
     /// Its declaration.
     pub span: Span,
 }

@@ -171,6 +171,7 @@ impl<'a> Elaborator<'a> {
                 ("at", Value::Tuple(items)) => {
                     if let Some(position) = self.position(&items, operand) {
                         self.instances[id.0 as usize].pose.position = position;
+                        self.instances[id.0 as usize].at = true;
                     }
                 }
                 ("at", other) => {

@@ -21,6 +21,7 @@ pub mod species;
 pub mod states;
 pub mod tables;
 pub mod units;
+mod whereabouts;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::RwLock;

@@ -9,7 +9,7 @@ use super::{Type, Value};
 use crate::elaborate::Elaborator;
 
 /// What can be measured.
-const MEASURES: &[&str] = &["grasp", "height", "foot", "top", "rise"];
+const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise"];
 
 impl Elaborator<'_> {
     /// A measure of an instance as a list of one length; an empty list where nothing is known of its shape.
@@ -31,7 +31,7 @@ impl Elaborator<'_> {
                 let geometry = self.geometry(id);
                 let body = Body { frames: &geometry.frames, shape: geometry.shape.as_ref(), solids: &geometry.solids };
                 match what {
-                    "grasp" => body.across_grasp(),
+                    "grasp" | "offer" => body.across(what),
                     "height" => body.height(),
                     "foot" => body.foot(),
                     _ => body.top(),

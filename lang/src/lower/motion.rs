@@ -1,7 +1,7 @@
 //! What a robot does with its body in a primitive: `moves`, `grips`, `frees`.
 
 use matterix_ir::plan::Motion;
-use matterix_ir::scene::InstanceId;
+use matterix_ir::scene::{InstanceId, frame};
 use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Planner;
@@ -13,10 +13,16 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn motion(&mut self, clause: &'a ClauseKind, scope: &mut Scope) -> Option<Motion> {
         match clause {
             ClauseKind::Moves { mover, manner, to } => self.moves(mover, manner, to, scope),
-            ClauseKind::Grips { item, by } => {
+            ClauseKind::Grips { item, at, by } => {
                 let by = self.thing(by, scope)?;
                 Some(match self.load(item, scope)? {
-                    Some(item) => Motion::Grip { item, by },
+                    Some(item) => {
+                        let frame = match at {
+                            Some(at) => self.frame_of(item, at, scope)?,
+                            None => frame::GRASP.to_string(),
+                        };
+                        Motion::Grip { item, frame, by }
+                    }
                     None => Motion::Fingers { by, open: false },
                 })
             }
@@ -129,6 +135,21 @@ impl<'a> Planner<'a, '_> {
                 None
             }
         }
+    }
+
+    /// The name of a frame of a thing.
+    fn frame_of(&mut self, thing: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<String> {
+        let (owner, frame) = self.goal(e, scope)?;
+        if owner != thing || frame.is_empty() {
+            self.lab.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                e.span,
+                "a thing is gripped at a frame of its own",
+                "a frame of something else",
+            ));
+            return None;
+        }
+        Some(frame)
     }
 
     fn goal(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<(InstanceId, String)> {

@@ -9,6 +9,7 @@ mod halton;
 pub mod inverse;
 mod jacobian;
 mod lanes;
+pub mod meet;
 pub mod plan;
 pub mod pose;
 pub mod spheres;

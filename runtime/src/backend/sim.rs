@@ -18,6 +18,7 @@ use crate::process::{Advance, Engine, Watch};
 /// Simulates at `process` fidelity, or with robots that move through space.
 pub struct Sim<'m> {
     stage: Option<Stage<'m>>,
+    beside: bool,
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
@@ -32,6 +33,9 @@ pub struct Sim<'m> {
 /// Longest time between two recorded moments of a motion, s.
 const FRAME: f64 = 0.04;
 
+/// How often it is looked whether a robot in the way has begun to move, s.
+const PATIENCE: f64 = 0.25;
+
 /// An operation that goes on.
 struct Running {
     ends: Ends,
@@ -44,6 +48,14 @@ enum Ends {
     When(NodeId),
     /// It cannot be done: a failure's name and what it says.
     Failed(String, String),
+    /// Another robot is in its way: tried again when something has moved, until its time is up, s.
+    Blocked {
+        operation: Box<Operation>,
+        begun: f64,
+        until: f64,
+        /// How often something had moved when it was last tried.
+        seen: u64,
+    },
     /// Looked at when a reading reports.
     Polled {
         condition: NodeId,
@@ -56,23 +68,47 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        Sim { stage: None, engine, prepared, seed, running, started: 0, sampled, told }
+        Sim { stage: None, beside: false, engine, prepared, seed, running, started: 0, sampled, told }
     }
 
     /// Robots move through space from now on: their motions take the time they need, and fail where there is no way.
-    pub fn with_motion(self, stage: Stage<'m>) -> Self {
-        Sim { stage: Some(stage), ..self }
+    /// `beside` is whether some steps of the plan run beside others, so that what is in the way may go away.
+    pub fn with_motion(self, stage: Stage<'m>, beside: bool) -> Self {
+        Sim { stage: Some(stage), beside, ..self }
     }
 
     /// Carries out the motion of an operation; how long it takes, if it takes time.
     fn perform(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Option<f64>, Refused> {
         let (Some(stage), Some(motion)) = (self.stage.as_mut(), &operation.motion) else { return Ok(None) };
         let values: Vec<f64> = motion.values().into_iter().map(|node| self.engine.eval(node)).collect();
-        let performed = stage.perform(motion, &values)?;
+        stage.come_to(self.engine.time());
+        let performed = stage.set_out(motion, &values)?;
         Ok(performed.map(|performed| {
             out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
             performed.duration()
         }))
+    }
+
+    /// How an operation with a motion goes on. One that another robot is in the way of waits for it to go away, no
+    /// longer than the bounds of its duration allow; `begun` is when it first tried, s.
+    fn attempt(&mut self, operation: &Operation, begun: f64, out: &mut dyn Listener) -> Result<Ends, Fault> {
+        let refused = match self.perform(operation, out) {
+            Ok(Some(duration)) => return Ok(Ends::At(self.engine.time() + duration)),
+            Ok(None) => return self.end_of(operation, out),
+            Err(refused) => refused,
+        };
+        let (now, stage) = (self.engine.time(), self.stage.as_ref());
+        let mut text = stage.map(|s| refused.text(s.scene, operation)).unwrap_or_default();
+        if self.beside && stage.is_some_and(|s| s.is_by_a_robot(&refused)) {
+            let bounds = operation.takes.and_then(|t| t.bounds);
+            let until = begun + bounds.map_or(0.0, |(_, most)| self.engine.eval(most));
+            if now < until {
+                let seen = stage.map_or(0, |s| s.changes());
+                return Ok(Ends::Blocked { operation: Box::new(operation.clone()), begun, until, seen });
+            }
+            text.push_str(&format!(", and it did not go away within {} s", show_number(now - begun)));
+        }
+        Ok(Ends::Failed(refused.failure().to_string(), text))
     }
 
     /// Things stand where the states of the model say.
@@ -146,6 +182,23 @@ impl<'m> Sim<'m> {
         }
     }
 
+    /// An operation that is blocked begins where what has moved meanwhile lets it, and fails when its time is up.
+    fn try_again(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<(), Fault> {
+        let Some(Running { ends: Ends::Blocked { operation, begun, until, seen }, .. }) = self.running.get(&ticket)
+        else {
+            return Ok(());
+        };
+        if self.stage.as_ref().is_some_and(|s| s.changes() == *seen) && self.engine.time() < *until {
+            return Ok(());
+        }
+        let (operation, begun) = (operation.clone(), *begun);
+        let ends = self.attempt(&operation, begun, out)?;
+        if let Some(running) = self.running.get_mut(&ticket) {
+            running.ends = ends;
+        }
+        Ok(())
+    }
+
     /// What is worth waiting for, or `None` if the operation is over.
     fn pending(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Option<Status> {
         let now = self.engine.time();
@@ -153,6 +206,9 @@ impl<'m> Sim<'m> {
             Ends::At(at) if now >= *at => return None,
             Ends::At(at) => return Some(Status::Running { until: Some(*at), watch: None }),
             Ends::Failed(..) => return None,
+            Ends::Blocked { until, .. } => {
+                return Some(Status::Running { until: Some((now + PATIENCE).min(*until)), watch: None });
+            }
             Ends::When(node) if self.engine.truth(*node) => return None,
             Ends::When(node) => return Some(Status::Running { until: None, watch: Some(*node) }),
             Ends::Polled { next, .. } if now < *next => {
@@ -189,15 +245,7 @@ impl Backend for Sim<'_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
-        let ends = match self.perform(operation, out) {
-            Ok(Some(duration)) => Ends::At(self.engine.time() + duration),
-            Ok(None) => self.end_of(operation, out)?,
-            Err(refused) => {
-                let scene = self.stage.as_ref().map(|s| s.scene);
-                let text = scene.map(|scene| refused.text(scene, operation)).unwrap_or_default();
-                Ends::Failed(refused.failure().to_string(), text)
-            }
-        };
+        let ends = self.attempt(operation, self.engine.time(), out)?;
         self.engine.apply(&operation.at_start, out)?;
         self.follow_supports(&operation.at_start);
         let ticket = Ticket(self.started);
@@ -207,6 +255,7 @@ impl Backend for Sim<'_> {
     }
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+        self.try_again(ticket, out)?;
         if let Some(status) = self.pending(ticket, out) {
             return Ok(status);
         }

@@ -11,32 +11,63 @@ use super::stage::{Carried, Stage};
 /// frame; none where the frame is unknown.
 ///
 /// What is held comes with its origin to the frame. An empty gripper comes with its z axis against the frame's, its
-/// fingers closing along the frame's y axis. What is round may be turned about its own axis.
+/// fingers closing along the frame's y axis or against it. What is round may be turned about its own axis.
 pub fn targets(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &str) -> Vec<Pose> {
+    let at = carried_to(stage, robot, goal, frame).and_then(|held| spots(stage, held, goal).into_iter().next());
+    targets_at(stage, robot, goal, frame, at.unwrap_or_default())
+}
+
+/// What a robot brings to a frame in its hand; nothing where it comes with an empty gripper, or for what it holds.
+pub fn carried_to(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &str) -> Option<InstanceId> {
+    stage.held(robot).filter(|held| *held != goal || stage.is_stand(goal, frame))
+}
+
+/// As [`targets`], for one spot beside the frame.
+pub fn targets_at(stage: &Stage<'_>, robot: InstanceId, goal: InstanceId, frame: &str, spot: Pose) -> Vec<Pose> {
     let Some(to) = stage.frame(goal, frame) else { return Vec::new() };
-    let own = |held: &InstanceId| *held == goal && !stage.is_stand(goal, frame);
-    let held = stage.held(robot).filter(|held| !own(held));
+    let held = carried_to(stage, robot, goal, frame);
     match held.map(|held| (held, stage.carried[held.0 as usize])) {
         Some((held, Carried::Held(_, inner))) => {
             let back = inner.inverse();
-            let to = to.then(spot(stage, held, goal));
+            let to = to.then(spot);
             turns(stage, held, 1).into_iter().map(|turn| to.then(turn).then(back)).collect()
         }
         _ => {
             let over = Pose::turned([0.0; 3], [PI, 0.0, 0.0]);
+            if !stage.is_stand(goal, frame) && !is_upright(stage, goal, &to) {
+                let own = stage.pose(goal);
+                let from = own.inverse().then(to);
+                return turns(stage, goal, 1)
+                    .into_iter()
+                    .flat_map(|about| [0.0, PI].map(|roll| (about, Pose::turned([0.0; 3], [0.0, 0.0, roll]))))
+                    .map(|(about, roll)| own.then(about).then(from).then(roll).then(over))
+                    .collect();
+            }
             turns(stage, goal, 2).into_iter().map(|turn| to.then(turn).then(over)).collect()
         }
     }
 }
 
-/// Distance of the places on a surface that are tried, m.
-const RASTER: f64 = 0.02;
+/// Whether a frame's z axis is that of its thing, so that turns about either are the same.
+fn is_upright(stage: &Stage<'_>, id: InstanceId, frame: &Pose) -> bool {
+    let axis = stage.pose(id).inverse().then(*frame);
+    let [x, y, _] = axis.position;
+    let tip = Pose { position: [0.0; 3], ..axis }.point([0.0, 0.0, 1.0]);
+    x.hypot(y) < 1e-6 && tip[2].abs() > 1.0 - 1e-9
+}
 
-/// How far from the frame `place` of a surface a thing finds room beside what stands there already; nothing where it
-/// finds none, or where the surface is no larger than a place for one thing.
-pub fn spot(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Pose {
+/// Distance of the places on a surface that are looked at, m.
+const RASTER: f64 = 0.02;
+/// How many places on a surface are tried, and how far apart they are at least, m.
+const SPOTS: (usize, f64) = (40, 0.08);
+
+/// How far from the frame `place` of a surface a thing finds room, the nearest spot first: right there, unless something
+/// stands there. Nothing but that where there is no room, or where the surface is no larger than a place for one thing.
+pub fn spots(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Vec<Pose> {
     let scene = stage.scene;
-    let (Some(top), Some(own)) = (&scene.get(surface).shape, &scene.get(item).shape) else { return Pose::IDENTITY };
+    let (Some(top), Some(own)) = (&scene.get(surface).shape, &scene.get(item).shape) else {
+        return vec![Pose::IDENTITY];
+    };
     let place = scene.surface(surface).position;
     let others: Vec<([f64; 3], [f64; 3])> = stage
         .carried
@@ -44,7 +75,8 @@ pub fn spot(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Pose {
         .enumerate()
         .filter_map(|(index, carried)| match carried {
             Carried::Stands(Stand::On(on, at)) if *on == surface && index != item.0 as usize => {
-                Some((at.position, footprint(stage, InstanceId(index as u32))?))
+                let id = InstanceId(index as u32);
+                Some((at.position, footprint(stage, id).filter(|_| !stage.unknown.places.contains(&id))?))
             }
             _ => None,
         })
@@ -61,16 +93,27 @@ pub fn spot(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Pose {
         (place[0] + x).abs() + own[0] / 2.0 <= top[0] / 2.0 && (place[1] + y).abs() + own[1] / 2.0 <= top[1] / 2.0
     };
     if free(0.0, 0.0) {
-        return Pose::IDENTITY;
+        return vec![Pose::IDENTITY];
     }
     let most = (top[0].max(top[1]) / RASTER) as i32;
     let mut places: Vec<(f64, f64)> = (-most..=most)
         .flat_map(|i| (-most..=most).map(move |j| (f64::from(i) * RASTER, f64::from(j) * RASTER)))
         .filter(|(x, y)| inside(*x, *y))
         .collect();
-    places.sort_by(|a, b| (a.0.hypot(a.1)).total_cmp(&b.0.hypot(b.1)));
-    let found = places.into_iter().find(|(x, y)| free(*x, *y));
-    found.map_or(Pose::IDENTITY, |(x, y)| Pose::at([x, y, 0.0]))
+    places.sort_by(|a, b| (a.0.hypot(a.1)).total_cmp(&(b.0.hypot(b.1))));
+    let mut chosen: Vec<(f64, f64)> = Vec::new();
+    for (x, y) in places.into_iter().filter(|(x, y)| free(*x, *y)) {
+        if chosen.len() == SPOTS.0 {
+            break;
+        }
+        if chosen.iter().all(|c| (c.0 - x).hypot(c.1 - y) >= SPOTS.1) {
+            chosen.push((x, y));
+        }
+    }
+    match chosen.is_empty() {
+        true => vec![Pose::IDENTITY],
+        false => chosen.into_iter().map(|(x, y)| Pose::at([x, y, 0.0])).collect(),
+    }
 }
 
 /// Room a thing takes where it stands, x, y, z in metres: that of its shape, or of the foot of a robot.

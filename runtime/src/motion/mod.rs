@@ -2,7 +2,9 @@
 
 pub mod assembly;
 pub mod fingers;
+pub mod flight;
 pub mod goal;
+mod hands;
 mod outline;
 pub mod perform;
 mod perturb;
@@ -11,9 +13,11 @@ mod preflight;
 pub mod stage;
 pub mod surroundings;
 mod tilt;
+mod together;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
 pub use perturb::{Moved, Perturbation, perturb};
-pub use preflight::{preflight, supported};
+pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
+pub use together::together;

@@ -9,9 +9,10 @@ use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, Trajectory, follow};
+use serde::{Deserialize, Serialize};
 
 use super::fingers::CLEARANCE;
-use super::goal::{spot, targets};
+use super::goal::{carried_to, spots, targets, targets_at};
 use super::postures::postures;
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -45,6 +46,8 @@ pub struct Performed {
 /// A motion of some of a robot's joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
+    /// How long it waits first when those before it have ended, s.
+    pub wait: f64,
     /// Which of all that move, by index.
     pub joints: Vec<usize>,
     /// Their way.
@@ -54,24 +57,32 @@ pub struct Part {
 impl Performed {
     /// How long it takes, s.
     pub fn duration(&self) -> f64 {
-        self.parts.iter().map(|part| part.trajectory.duration()).sum()
+        self.parts.iter().map(|part| part.wait + part.trajectory.duration()).sum()
+    }
+
+    /// Its parts, each with the time at which it begins, s since the motion did.
+    pub fn begins(&self) -> impl Iterator<Item = (f64, &Part)> {
+        self.parts.iter().scan(0.0, |time, part| {
+            let begin = *time + part.wait;
+            *time = begin + part.trajectory.duration();
+            Some((begin, part))
+        })
+    }
+
+    /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
+    pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
+        let mut own = self.begins().filter(|(_, part)| part.joints == joints);
+        let mut now = own.next()?;
+        own.take_while(|(begin, _)| *begin <= time).for_each(|next| now = next);
+        Some(now.1.trajectory.at(time - now.0).position)
     }
 
     /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
     pub fn bring(&self, actor: &mut Actor, time: f64) {
-        let mut ends = self.duration();
-        let mut begun: Vec<&[usize]> = Vec::new();
-        for part in self.parts.iter().rev() {
-            let begins = ends - part.trajectory.duration();
-            // Of the same joints, the last part that has begun says where they are, or else the first one.
-            if !begun.contains(&part.joints.as_slice()) {
-                let at = part.trajectory.at((time - begins).clamp(0.0, part.trajectory.duration()));
-                actor.set_some(&part.joints, &at.position);
+        for part in &self.parts {
+            if let Some(at) = self.at(&part.joints, time) {
+                actor.set_some(&part.joints, &at);
             }
-            if time >= begins {
-                begun.push(&part.joints);
-            }
-            ends = begins;
         }
     }
 }
@@ -101,7 +112,7 @@ pub struct Moment {
 }
 
 /// Why a motion cannot be carried out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Refused {
     /// The mover has no joints to move with.
     NoRobot,
@@ -115,8 +126,12 @@ pub enum Refused {
     NoWay,
     /// The thing to be gripped, or to be put down, is this far from where it should be: m and rad.
     Misplaced(f64, f64),
-    /// It holds nothing that could be let go.
+    /// It, or who is to take it over, does not hold what is to be let go.
     NotHeld,
+    /// It holds a thing that another robot holds as well.
+    Bound(InstanceId, InstanceId),
+    /// It stands on what it is to grip.
+    StandsOn,
     /// A thing is this wide, and the fingers open so far: m.
     TooWide(f64, f64),
     /// What is to stay upright tilts by so much where the way begins or ends, rad.
@@ -131,7 +146,7 @@ impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn => "unmovable",
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
@@ -150,9 +165,14 @@ impl Refused {
             Refused::NoRobot => format!("`{name}` has no joints to move with"),
             Refused::NoFrame => format!("`{name}` is sent to a frame that nothing gives a place"),
             Refused::OutOfReach(far, _) => format!("`{name}` stays {:.0} mm short of it", far * 1e3),
-            Refused::Collides(m) => format!("`{}` of `{name}` runs into `{}`", m.mine, m.other),
+            Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
+            Refused::Bound(item, other) => {
+                let (item, other) = (&scene.get(*item).name, &scene.get(*other).name);
+                format!("`{name}` and `{other}` both hold `{item}`")
+            }
+            Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
             Refused::TooWide(width, opening) => {
                 format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
@@ -165,18 +185,38 @@ impl Refused {
 }
 
 /// Two things in one place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Meeting {
     /// A link of the robot, or what it holds.
     pub mine: String,
     /// What it meets: an instance, or another link.
     pub other: String,
+    /// The link that it meets, if that is another robot's.
+    pub part: Option<String>,
     /// The instance it meets, if it is not the robot itself.
     pub with: Option<InstanceId>,
     /// Where, in the lab, m.
     pub at: [f64; 3],
     /// How deep, m.
     pub depth: f64,
+    /// Whether they are there before anything moves.
+    pub before: bool,
+}
+
+impl Meeting {
+    /// What it meets, in words.
+    pub fn whom(&self) -> String {
+        match &self.part {
+            Some(part) => format!("`{part}` of `{}`", self.other),
+            None => format!("`{}`", self.other),
+        }
+    }
+
+    /// Where, in words.
+    pub fn place(&self) -> String {
+        let [x, y, z] = self.at.map(|v| v * 1e3);
+        format!("({x:.0}, {y:.0}, {z:.0}) mm")
+    }
 }
 
 impl Stage<'_> {
@@ -185,21 +225,13 @@ impl Stage<'_> {
         match motion {
             Motion::To { mover, goal, frame, straight } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *goal, frame);
-                if to.is_empty() {
-                    return Err(Refused::NoFrame);
-                }
                 let way = if *straight { Way::Straight } else { Way::Free };
-                self.go(robot, &to, way, Some(*goal)).map(Some)
+                self.bring(robot, *goal, frame, way).map(Some)
             }
             Motion::Upright { mover, goal, frame, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *goal, frame);
-                if to.is_empty() {
-                    return Err(Refused::NoFrame);
-                }
                 let within = values.first().copied().unwrap_or_default();
-                self.go(robot, &to, Way::Upright(within), Some(*goal)).map(Some)
+                self.bring(robot, *goal, frame, Way::Upright(within)).map(Some)
             }
             Motion::Tilted { mover, about: (item, point), goal, frame, .. } => {
                 let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
@@ -226,21 +258,24 @@ impl Stage<'_> {
                 let way = if *straight { Way::Straight } else { Way::Free };
                 self.go(robot, &[to], way, None).map(Some)
             }
-            Motion::Grip { item, by } => {
+            Motion::Grip { item, frame, by } => {
                 let robot = self.actor_of(*by).ok_or(Refused::NoRobot)?;
-                let to = targets(self, robot, *item, frame::GRASP);
+                let to = targets(self, robot, *item, frame);
+                if self.stands_on(robot, *item) {
+                    return Err(Refused::StandsOn);
+                }
                 let (far, turned) = self.nearest(robot, &to).ok_or(Refused::NoFrame)?;
                 if far > TOLERANCE.0 || turned > TOLERANCE.1 {
                     return Err(Refused::Misplaced(far, turned));
                 }
-                let width = self.scene.get(*item).body().across_grasp();
+                let width = self.scene.get(*item).body().across(frame);
                 let fingers = self.actors.get(&robot).and_then(|a| a.fingers.as_ref());
                 if let (Some(width), Some(fingers)) = (width, fingers)
                     && width > fingers.opening() + NOMINAL
                 {
                     return Err(Refused::TooWide(width, fingers.opening()));
                 }
-                self.carry(*item, Some(robot));
+                self.grip(*item, robot);
                 Ok(width.and_then(|width| self.spread(robot, width)).map(|part| Performed { robot, parts: vec![part] }))
             }
             Motion::Free { item, on, by } => {
@@ -248,11 +283,15 @@ impl Stage<'_> {
                 if self.held(robot) != Some(*item) {
                     return Err(Refused::NotHeld);
                 }
-                let to = match on {
-                    Some(on) => self.surface(*on).then(spot(self, *item, *on)),
-                    None => self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item)),
+                if let Some(taker) = on.and_then(|on| self.actor_of(on)) {
+                    return if self.pass(*item, robot, taker) { Ok(None) } else { Err(Refused::NotHeld) };
+                }
+                let to: Vec<Pose> = match on {
+                    Some(on) => spots(self, *item, *on).into_iter().map(|s| self.surface(*on).then(s)).collect(),
+                    None => vec![self.frame(*item, frame::STAND).unwrap_or_else(|| self.pose(*item))],
                 };
-                let (far, _) = distance(&pose(&self.pose(*item)), &pose(&to));
+                let now = pose(&self.pose(*item));
+                let far = to.iter().map(|to| distance(&now, &pose(to)).0).fold(f64::INFINITY, f64::min);
                 if far > TOLERANCE.0 {
                     return Err(Refused::Misplaced(far, 0.0));
                 }
@@ -293,7 +332,7 @@ impl Stage<'_> {
         let to = fingers.at(&actor.tree, &actor.joints, width);
         let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
         actor.set_some(&fingers.joints, &to);
-        Some(Part { joints: fingers.joints, trajectory })
+        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
     }
 
     /// Opens a gripper further than a thing is wide.
@@ -312,6 +351,9 @@ impl Stage<'_> {
     /// What comes before a motion: a gripper draws back from what it has let go, and opens for what it goes to. Nothing is
     /// drawn back where `near` is what it let go.
     pub(super) fn depart(&mut self, robot: InstanceId, near: Option<InstanceId>) -> Result<Vec<Part>, Refused> {
+        if let Some((item, other)) = self.bound(robot) {
+            return Err(Refused::Bound(item, other));
+        }
         let mut parts = Vec::new();
         if let Some(item) = self.just_freed(robot).filter(|item| Some(*item) != near) {
             let mut back = self.tip(robot);
@@ -340,6 +382,43 @@ impl Stage<'_> {
         let mut parts = self.depart(robot, None)?;
         parts.push(self.way(robot, &to, None)?);
         Ok(Performed { robot, parts })
+    }
+
+    /// Brings a robot to a frame; what it holds to the nearest spot about it that is free and within reach.
+    fn bring(&mut self, robot: InstanceId, goal: InstanceId, frame: &str, way: Way) -> Result<Performed, Refused> {
+        let mut spots = match carried_to(self, robot, goal, frame) {
+            Some(held) => spots(self, held, goal),
+            None => vec![Pose::IDENTITY],
+        };
+        if way == Way::Straight && spots.len() > 1 {
+            // Straight down, not over to another spot.
+            let tip = self.tip(robot).position;
+            let far = |spot: &Pose| {
+                let to = targets_at(self, robot, goal, frame, *spot).first().map_or(tip, |p| p.position);
+                (0..3).map(|k| (to[k] - tip[k]) * (to[k] - tip[k])).sum::<f64>()
+            };
+            let mut near: Vec<(f64, Pose)> = spots.into_iter().map(|spot| (far(&spot), spot)).collect();
+            near.sort_by(|a, b| a.0.total_cmp(&b.0));
+            spots = near.into_iter().map(|n| n.1).take(1).collect();
+        }
+        let before = (spots.len() > 1).then(|| self.clone());
+        let mut refused = Refused::NoFrame;
+        for (k, spot) in spots.into_iter().enumerate() {
+            let to = targets_at(self, robot, goal, frame, spot);
+            if to.is_empty() {
+                return Err(Refused::NoFrame);
+            }
+            match self.go(robot, &to, way, Some(goal)) {
+                Ok(done) => return Ok(done),
+                // The first spot says best what is wrong.
+                Err(why) if k == 0 => refused = why,
+                Err(_) => {}
+            }
+            if let Some(before) = &before {
+                self.clone_from(before);
+            }
+        }
+        Err(refused)
     }
 
     fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {
@@ -443,10 +522,12 @@ impl Stage<'_> {
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
-        let settings = Settings { iterations: SAMPLES, ..Settings::default() };
+        let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
         let start = actor.configuration();
         let refused = |failure| match failure {
-            plan::Failure::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+            plan::Failure::Collision(end, contacts) => {
+                self.meeting(&figure, &around, &contacts, end == plan::End::Start)
+            }
             plan::Failure::Tilt(_, by) => Refused::Tilted(by),
             _ => Refused::NoWay,
         };
@@ -471,10 +552,12 @@ impl Stage<'_> {
         let mut without = self.carriers(robot);
         for id in near {
             without.push(*id);
-            without.extend(self.below(*id).map(|below| self.whole(below)));
+            // No hand that holds it.
+            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
         }
         without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
-        let around = Surroundings::of(self, robot, &without);
+        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
+        let around = Surroundings::of_but(self, robot, &without, &bodiless);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;
@@ -487,7 +570,7 @@ impl Stage<'_> {
             let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
             let followed = followed.map_err(|blocked| match blocked {
                 Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts),
+                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
                 Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
             })?;
             points.extend(followed.into_iter().skip(1));
@@ -498,7 +581,7 @@ impl Stage<'_> {
         Ok(part)
     }
 
-    fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
         Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &held).map_err(|_| Refused::NoRobot)
@@ -511,27 +594,32 @@ impl Stage<'_> {
     }
 
     /// The deepest contact in words.
-    fn meeting(
+    pub(super) fn meeting(
         &self,
         figure: &Figure,
         around: &Surroundings,
         contacts: &[matterix_motion::spheres::Contact],
+        before: bool,
     ) -> Refused {
         let Some(contact) = contacts.first() else { return Refused::NoWay };
-        let (other, with) = match contact.other {
+        let (other, part, with) = match contact.other {
             Other::Body(index) => {
                 let with = around.owners.get(index).copied();
-                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), with)
+                let robot = with.is_some_and(|w| self.actors.contains_key(&w));
+                let part = around.world.bodies.get(index).filter(|_| robot).map(|b| b.name.clone());
+                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), part, with)
             }
-            Other::Link(link) => (figure.name(link).to_string(), None),
+            Other::Link(link) => (figure.name(link).to_string(), None, None),
         };
         let at = [contact.point.x, contact.point.y, contact.point.z];
         Refused::Collides(Meeting {
             mine: figure.name(contact.link).to_string(),
             other,
+            part,
             with,
             at,
             depth: contact.depth,
+            before,
         })
     }
 }
@@ -541,7 +629,7 @@ fn timed(actor: &Actor, points: &[Vec<f64>], judge: &mut dyn Judge) -> Result<Pa
         |f: fn(&JointLimits) -> f64| -> Vec<f64> { actor.chain.variables().iter().map(|v| f(&v.limits)).collect() };
     let limits = Limits { velocity: limits(|l| l.velocity), acceleration: limits(acceleration), jerk: limits(jerk) };
     let trajectory = follow(points, &limits, Some(judge)).map_err(|_| Refused::NoWay)?;
-    Ok(Part { joints: actor.arm.clone(), trajectory })
+    Ok(Part { wait: 0.0, joints: actor.arm.clone(), trajectory })
 }
 
 /// The greatest acceleration of a joint, rad/s2 or m/s2.

@@ -1,6 +1,7 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
 
 use matterix_ir::pose::Pose;
@@ -8,12 +9,14 @@ use matterix_ir::robot::Robot;
 use matterix_ir::scene::{InstanceId, Scene, Stand};
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
+use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, assemble};
 use super::fingers::Fingers;
+use super::flight::Flight;
 
 /// What carries a thing and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Carried {
     /// It stands somewhere.
     Stands(Stand),
@@ -53,6 +56,27 @@ pub struct Stage<'p> {
     pub actors: BTreeMap<InstanceId, Actor>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// What a second robot grips as well, with that robot.
+    pub(super) shared: BTreeMap<InstanceId, InstanceId>,
+    /// s since the run began.
+    pub(super) now: f64,
+    /// Robots that are under way.
+    pub(super) flights: BTreeMap<InstanceId, Flight>,
+    /// Whether ways are planned around all that robots under way sweep.
+    pub(super) around_sweeps: bool,
+    /// How often something was moved so far.
+    pub(super) changes: u64,
+    /// What cannot be told: empty in a run.
+    pub unknown: Unknown,
+}
+
+/// What is not known of a lab at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Unknown {
+    /// Things of which it is not known where they are on what carries them.
+    pub places: BTreeSet<InstanceId>,
+    /// Robots of which it is not known how their joints stand.
+    pub postures: BTreeSet<InstanceId>,
 }
 
 impl<'p> Stage<'p> {
@@ -70,7 +94,19 @@ impl<'p> Stage<'p> {
             let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
             actors.insert(id, actor);
         }
-        Ok(Stage { scene, carried, before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+        Ok(Stage {
+            scene,
+            carried,
+            before: BTreeMap::new(),
+            actors,
+            freed: BTreeMap::new(),
+            shared: BTreeMap::new(),
+            now: 0.0,
+            flights: BTreeMap::new(),
+            around_sweeps: false,
+            changes: 0,
+            unknown: Unknown::default(),
+        })
     }
 
     /// The robot an instance is or is part of.
@@ -133,6 +169,7 @@ impl<'p> Stage<'p> {
     pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
         if let Some(carried) = self.carried.get_mut(id.0 as usize) {
             *carried = Carried::Stands(Stand::On(on, at));
+            self.changes += 1;
         }
     }
 
@@ -161,6 +198,36 @@ impl<'p> Stage<'p> {
             Carried::Stands(stand) => stand.below(),
             Carried::Held(by, _) => Some(*by),
         }
+    }
+
+    /// What a thing stands on or is part of; nothing where a robot holds it.
+    pub fn stand_of(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.carried.get(id.0 as usize)? {
+            Carried::Stands(stand) => stand.below(),
+            Carried::Held(..) => None,
+        }
+    }
+
+    /// Whether it cannot be told where an instance is in the lab.
+    pub fn is_unknown(&self, id: InstanceId) -> bool {
+        let here = |i: InstanceId| {
+            let in_hand = matches!(self.carried.get(i.0 as usize), Some(Carried::Held(by, _)) if self.unknown.postures.contains(by));
+            in_hand || self.unknown.places.contains(&i)
+        };
+        here(id) || self.carriers(id).into_iter().any(here)
+    }
+
+    /// Whether it cannot be told where a frame of an instance is in the lab.
+    pub fn is_frame_unknown(&self, id: InstanceId, frame: &str) -> bool {
+        match self.is_stand(id, frame) {
+            true => self.unknown.places.contains(&id) || self.stood_on(id).is_some_and(|on| self.is_unknown(on)),
+            false => self.is_unknown(id),
+        }
+    }
+
+    /// Whether a robot stands on a thing, or on what it carries: it cannot take that in its hand.
+    pub fn stands_on(&self, robot: InstanceId, id: InstanceId) -> bool {
+        robot == id || self.carriers(robot).contains(&id)
     }
 
     /// A robot's gripper still stands about what it has let go.
@@ -207,10 +274,33 @@ impl<'p> Stage<'p> {
         }
     }
 
+    /// Whether a thing, and all that carries it, is where it was when the run began.
+    pub fn is_where_it_was(&self, id: InstanceId) -> bool {
+        let first = self.scene.stands();
+        let unmoved = |i: InstanceId| {
+            let (now, first) = (self.carried.get(i.0 as usize), first.get(i.0 as usize));
+            matches!((now, first), (Some(Carried::Stands(now)), Some(first)) if now == first)
+        };
+        unmoved(id) && self.carriers(id).into_iter().all(unmoved)
+    }
+
+    /// What an instance is part of, and what that is part of.
+    pub fn owners(&self, id: InstanceId) -> Vec<InstanceId> {
+        std::iter::successors(self.scene.get(id).owner, |id| self.scene.get(*id).owner).collect()
+    }
+
     /// Whether what it is part of has a shape, of which it is taken to be a part.
     pub fn is_inside_a_shape(&self, id: InstanceId) -> bool {
         let owner = self.scene.get(id).owner;
         owner.is_some_and(|o| self.scene.get(o).shape.is_some() || self.is_inside_a_shape(o))
+    }
+
+    /// The robot that holds a thing.
+    pub fn holder(&self, id: InstanceId) -> Option<InstanceId> {
+        match self.carried.get(id.0 as usize)? {
+            Carried::Held(by, _) => Some(*by),
+            Carried::Stands(_) => None,
+        }
     }
 
     /// What a robot holds.
@@ -219,8 +309,12 @@ impl<'p> Stage<'p> {
         self.carried.iter().position(holds).map(|i| InstanceId(i as u32))
     }
 
-    /// A thing is carried by something else from now on, without moving: a robot takes it, or it is put down.
+    /// A thing is carried by something else from now on, without moving: a robot takes it, or it is put down. What would
+    /// have to carry itself stays where it is.
     pub fn carry(&mut self, id: InstanceId, by: Option<InstanceId>) {
+        if by.is_some_and(|by| self.stands_on(by, id)) {
+            return;
+        }
         let now = self.pose(id);
         let index = id.0 as usize;
         let Some(old) = self.carried.get(index).copied() else { return };
@@ -235,7 +329,93 @@ impl<'p> Stage<'p> {
             self.before.insert(id, old);
         }
         self.carried[index] = new;
+        self.changes += 1;
     }
+}
+
+/// What tells one moment of a lab from another.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Change {
+    carried: Vec<(InstanceId, Carried)>,
+    joints: Vec<(InstanceId, Vec<f64>)>,
+    freed: Vec<(InstanceId, Option<InstanceId>)>,
+}
+
+impl Stage<'_> {
+    /// What became different since an earlier moment, in what a motion can change.
+    pub fn since(&self, before: &Stage<'_>) -> Change {
+        let things = self.carried.iter().zip(&before.carried).enumerate();
+        let moved = self.actors.iter().filter(|(id, a)| before.actors.get(id).is_none_or(|b| a.joints != b.joints));
+        let freed = |id: &&InstanceId| self.freed.get(id) != before.freed.get(id);
+        Change {
+            carried: things.filter(|(_, (a, b))| a != b).map(|(i, (a, _))| (InstanceId(i as u32), *a)).collect(),
+            joints: moved.map(|(id, a)| (*id, a.joints.clone())).collect(),
+            freed: self.actors.keys().filter(freed).map(|id| (*id, self.freed.get(id).copied())).collect(),
+        }
+    }
+
+    /// Makes a change that has been seen before from the same moment. `None` where it is not of this lab.
+    pub fn change(&mut self, change: &Change) -> Option<()> {
+        for (id, carried) in &change.carried {
+            *self.carried.get_mut(id.0 as usize)? = *carried;
+        }
+        for (id, joints) in &change.joints {
+            let actor = self.actors.get_mut(id).filter(|a| a.joints.len() == joints.len())?;
+            actor.joints.clone_from(joints);
+        }
+        for (robot, item) in &change.freed {
+            match item {
+                Some(item) => self.freed.insert(*robot, *item),
+                None => self.freed.remove(robot),
+            };
+        }
+        Some(())
+    }
+
+    /// Feeds all that tells this moment from others of the same lab to a hash; with `coarse`, figures that differ by
+    /// less than that (m, rad) mostly count as the same.
+    pub fn digest(&self, coarse: Option<f64>, hash: &mut impl Hasher) {
+        let Stage { carried, before, actors, freed, shared, unknown, .. } = self;
+        for one in carried {
+            match one {
+                Carried::Stands(s) => write_stand(hash, s, coarse),
+                Carried::Held(by, p) => {
+                    hash.write_u64(u64::from(by.0) | 1 << 32);
+                    write_pose(hash, p, coarse);
+                }
+            }
+        }
+        for (id, s) in before {
+            hash.write_u64(u64::from(id.0) | 2 << 32);
+            write_stand(hash, s, coarse);
+        }
+        for (id, actor) in actors {
+            hash.write_u64(u64::from(id.0) | 3 << 32);
+            actor.joints.iter().for_each(|v| write_number(hash, *v, coarse));
+        }
+        for (a, b) in freed.iter().chain([(&InstanceId(u32::MAX), &InstanceId(u32::MAX))]).chain(shared) {
+            hash.write_u64(u64::from(a.0) << 32 | u64::from(b.0));
+        }
+        hash.write_u64(u64::MAX);
+        unknown.places.iter().for_each(|id| hash.write_u32(id.0));
+        hash.write_u64(u64::MAX);
+        unknown.postures.iter().for_each(|id| hash.write_u32(id.0));
+    }
+}
+
+fn write_number(hash: &mut impl Hasher, v: f64, coarse: Option<f64>) {
+    // Adding zero makes one number of the two zeros.
+    hash.write_u64(coarse.map_or(v, |step| (v / step).round() + 0.0).to_bits());
+}
+
+fn write_pose(hash: &mut impl Hasher, pose: &Pose, coarse: Option<f64>) {
+    pose.position.iter().chain(&pose.rotation).for_each(|v| write_number(hash, *v, coarse));
+}
+
+fn write_stand(hash: &mut impl Hasher, stand: &Stand, coarse: Option<f64>) {
+    hash.write_u64(stand.below().map_or(u64::MAX, |id| u64::from(id.0)));
+    let (Stand::Lab(pose) | Stand::On(_, pose) | Stand::PartOf(_, pose)) = stand;
+    write_pose(hash, pose, coarse);
 }
 
 impl Actor {

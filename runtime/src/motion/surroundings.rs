@@ -23,17 +23,30 @@ pub struct Surroundings {
 impl Surroundings {
     /// Everything but the robot, what carries it, what it holds and the things left out.
     pub fn of(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId]) -> Self {
+        Self::of_but(stage, robot, without, &[])
+    }
+
+    /// As [`Surroundings::of`], without the main body of some things: what stands in one of their places stands in it.
+    pub fn of_but(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId], bodiless: &[InstanceId]) -> Self {
         let mut out = Surroundings::default();
         for index in 0..stage.scene.instances.len() {
             let id = InstanceId(index as u32);
             let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
-            if mine || stage.is_in_any(id, without) {
+            if mine || stage.is_in_any(id, without) || stage.is_unknown(id) {
                 continue;
             }
             if stage.actors.contains_key(&id) {
+                if stage.unknown.postures.contains(&id) {
+                    continue;
+                }
                 out.add_robot(stage, id);
             } else if !stage.is_inside_a_shape(id) {
-                out.add_shapes(stage, id);
+                out.add_shapes(stage, id, !bodiless.contains(&id));
+            }
+        }
+        if stage.around_sweeps {
+            for (id, link, at, radius) in stage.sweeps(robot) {
+                out.push(id, &link, at, Solid::Sphere(radius));
             }
         }
         out
@@ -44,10 +57,10 @@ impl Surroundings {
         self.owners.push(owner);
     }
 
-    fn add_shapes(&mut self, stage: &Stage<'_>, id: InstanceId) {
+    fn add_shapes(&mut self, stage: &Stage<'_>, id: InstanceId, body: bool) {
         let instance = stage.scene.get(id);
         let at = stage.pose(id);
-        let main = instance.shape.iter().map(|shape| (shape, at));
+        let main = instance.shape.iter().filter(|_| body).map(|shape| (shape, at));
         let more = instance.solids.iter().map(|s| (&s.shape, at.then(s.pose)));
         for (shape, at) in main.chain(more) {
             let (solid, middle) = solid(shape);
@@ -55,7 +68,7 @@ impl Surroundings {
         }
     }
 
-    /// Another robot as it stands now, ball by ball.
+    /// Another robot as it stands now, ball by ball, each named after its link.
     fn add_robot(&mut self, stage: &Stage<'_>, id: InstanceId) {
         let Some(actor) = stage.actors.get(&id) else { return };
         let base = stage.pose(id);
@@ -63,7 +76,8 @@ impl Surroundings {
         for ball in &actor.assembly.robot.balls {
             let Some(link) = links.get(ball.link as usize) else { continue };
             let at = base.then(matterix_motion::placement(link)).then(Pose::at(ball.center));
-            self.push(id, &stage.scene.get(id).name, at, Solid::Sphere(ball.radius));
+            let name = actor.assembly.robot.links.get(ball.link as usize).map_or("", |l| l.name.as_str());
+            self.push(id, name, at, Solid::Sphere(ball.radius));
         }
     }
 }

@@ -50,6 +50,7 @@ impl Lab {
             owner: None,
             support: None,
             pose: Pose::default(),
+            placed: true,
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),

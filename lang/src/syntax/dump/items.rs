@@ -242,7 +242,9 @@ fn clause(clause: &Clause) -> Sexp {
                 Goal::Home => moves.with([node("home")]),
             }
         }
-        ClauseKind::Grips { item, by } => node("grips").with([expr(item), expr(by)]),
+        ClauseKind::Grips { item, at, by } => {
+            node("grips").with([expr(item)]).with(maybe("at", at.as_ref())).with([expr(by)])
+        }
         ClauseKind::Frees { item, on, by } => {
             node("frees").with([expr(item)]).with(maybe("on", on.as_ref())).with([expr(by)])
         }

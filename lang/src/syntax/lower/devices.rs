@@ -148,7 +148,11 @@ impl Lower<'_> {
                 let to = match (kids.has(Rule::kw_home), kids.has(Rule::kw_to)) {
                     (true, _) => Goal::Home,
                     (_, true) => match kids.eat(Rule::joints) {
-                        Some(joints) => Goal::Joints(self.expr_in(&mut Kids::of(joints))),
+                        Some(joints) => {
+                            let kids = &mut Kids::of(joints);
+                            kids.has(Rule::kw_joints);
+                            Goal::Joints(self.expr_in(kids))
+                        }
                         None => Goal::Frame(self.expr_in(kids)),
                     },
                     _ => Goal::Shift(self.expr_in(kids)),
@@ -157,15 +161,12 @@ impl Lower<'_> {
             }
             Rule::grips => {
                 let item = self.expr_in(kids);
-                ClauseKind::Grips { item, by: self.expr_in(kids) }
+                let (at, by) = self.maybe_before(kids);
+                ClauseKind::Grips { item, at, by }
             }
             Rule::frees => {
                 let item = self.expr_in(kids);
-                let first = self.expr_in(kids);
-                let (on, by) = match kids.eat(Rule::operand) {
-                    Some(by) => (Some(first), self.expr(by)),
-                    None => (None, first),
-                };
+                let (on, by) = self.maybe_before(kids);
                 ClauseKind::Frees { item, on, by }
             }
             Rule::option => ClauseKind::Option(self.param(kids.eat(Rule::option_param)?)),
@@ -184,6 +185,16 @@ impl Lower<'_> {
             return Manner::Tilted(angle, self.expr_in(kids));
         }
         Manner::Straight
+    }
+
+    /// An operand that may be left out before one that may not.
+    fn maybe_before(&mut self, kids: &mut Kids) -> (Option<Expr>, Expr) {
+        kids.has(Rule::kw_to);
+        let first = self.expr_in(kids);
+        match kids.eat(Rule::operand) {
+            Some(second) => (Some(first), self.expr(second)),
+            None => (None, first),
+        }
     }
 
     fn effect(&mut self, node: Node) -> Effect {

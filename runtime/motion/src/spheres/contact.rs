@@ -30,16 +30,7 @@ pub struct Contact {
 impl Figure {
     /// The deepest contact of every link with everything it must not touch, deepest first.
     pub fn contacts(&self, world: &World, q: &[f64]) -> Vec<Contact> {
-        let poses = self.poses(q);
-        let placed: Vec<(u32, Point3<f64>, f64)> = self
-            .rounds
-            .iter()
-            .filter_map(|(link, round)| {
-                let holder = self.holder(*link);
-                let pose = poses.get(holder as usize)?;
-                Some((*link, pose * Point3::from(round.center), round.radius))
-            })
-            .collect();
+        let placed = self.balls_at(q);
         let mut found: Vec<Contact> = Vec::new();
         let mut note = |contact: Contact| {
             if contact.depth <= 0.0 {

@@ -7,9 +7,11 @@ mod check;
 mod contact;
 mod cover;
 mod frames;
+mod placed;
 
 pub use check::Checker;
 pub use contact::{Contact, Other};
+pub use placed::Placed;
 
 use std::ops::Range;
 

@@ -44,6 +44,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         owner: None,
         support: support.map(InstanceId),
         pose: Pose::at(at),
+        placed: true,
         frames: vec![],
         shape,
         solids: Vec::new(),

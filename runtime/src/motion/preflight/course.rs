@@ -1,0 +1,104 @@
+//! One way that things may have gone up to a step of a plan.
+
+use std::hash::Hasher;
+
+use matterix_ir::model::Action;
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{InstanceId, Stand};
+use matterix_ir::{Diagnostic, Program, Span};
+use siphasher::sip128::{Hasher128, SipHasher13};
+
+use super::values::Values;
+use crate::motion::stage::{Carried, Stage};
+use crate::motion::supported;
+
+/// Moments that differ by less than this, m and rad, mostly count as the same.
+const COARSE: f64 = 1e-3;
+
+/// A refusal that ends a statement before its time.
+#[derive(Clone, Debug)]
+pub struct Refusal {
+    /// What a handler knows it by.
+    pub failure: &'static str,
+    /// What is said of it.
+    pub finding: Diagnostic,
+}
+
+/// One way that things may have gone.
+#[derive(Clone, Debug)]
+pub struct Course<'p> {
+    /// Where everything is.
+    pub stage: Stage<'p>,
+    /// What is known of the states.
+    pub values: Values,
+    /// What was decided on the way here and might have been otherwise: where, and whether the condition held.
+    pub choices: Vec<(Span, bool)>,
+    /// The statement being followed cannot be done: its other motions are passed over.
+    pub lost: Option<Box<Refusal>>,
+}
+
+impl Course<'_> {
+    /// The states change as an operation says, and things stand where they say.
+    pub fn act(&mut self, program: &Program, actions: &[Action]) {
+        for action in actions {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let value = self.values.assign(&program.model, *state, *value);
+            let Some(state) = program.model.states.get(*state as usize) else { continue };
+            let Some(id) = supported(&program.scene, &state.name, &state.domain) else { continue };
+            match value {
+                Some(value) => self.follow(id, (value >= 0.0).then_some(InstanceId(value as u32))),
+                None => {
+                    self.stage.unknown.places.insert(id);
+                }
+            }
+        }
+    }
+
+    /// A thing is carried by something else from now on, nobody says how: where it is then is known only where there is
+    /// nothing else.
+    pub fn follow(&mut self, id: InstanceId, by: Option<InstanceId>) {
+        let before = self.stage.below(id);
+        self.stage.follow(id, by);
+        let after = self.stage.below(id);
+        if before == after {
+            return;
+        }
+        match after.filter(|on| self.stage.actor_of(*on).is_none()) {
+            Some(on) => self.stands(id, on),
+            None => {
+                self.stage.unknown.places.insert(id);
+            }
+        }
+    }
+
+    /// A thing stands somewhere on a surface.
+    pub fn stands(&mut self, id: InstanceId, on: InstanceId) {
+        let another = |(index, carried): (usize, &Carried)| {
+            index != id.0 as usize && matches!(carried, Carried::Stands(Stand::On(below, _)) if *below == on)
+        };
+        let shared = self.stage.carried.iter().enumerate().any(another);
+        self.stage.put(id, on, Pose::IDENTITY);
+        match shared {
+            true => self.stage.unknown.places.insert(id),
+            false => self.stage.unknown.places.remove(&id),
+        };
+    }
+
+    /// How a robot stands cannot be told from here on.
+    pub fn drifts(&mut self, robot: InstanceId) {
+        self.stage.leave(robot);
+        self.stage.unknown.postures.insert(robot);
+    }
+
+    /// What tells it from other courses.
+    pub fn digest(&self) -> u128 {
+        let mut hash = SipHasher13::new();
+        self.stage.digest(Some(COARSE), &mut hash);
+        for (state, value) in self.values.iter() {
+            hash.write_u32(state);
+            hash.write_u64(value.to_bits());
+        }
+        hash.write_u8(u8::from(self.lost.is_some()));
+        hash.finish128().as_u128()
+    }
+}

@@ -1,0 +1,188 @@
+//! Looks at one motion of one course.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::plan::Motion;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Program, Span};
+
+use super::beside::Moved;
+use super::course::{Course, Refusal};
+use super::memory::{Memory, Outcome};
+use super::told;
+use crate::motion::perform::Refused;
+use crate::motion::stage::Stage;
+
+/// Looks at motions, each from the same moment only once.
+pub struct Looker<'p, 's> {
+    program: &'p Program,
+    memory: Memory<'s>,
+    /// Robots whose tool is described: only of them it is known what gets where.
+    equipped: BTreeSet<InstanceId>,
+    /// How many motions may still be planned.
+    left: usize,
+}
+
+/// How many motions are planned before a plan counts as too long to be looked at whole.
+const MOST: usize = 2000;
+
+impl<'p, 's> Looker<'p, 's> {
+    pub fn new(program: &'p Program, stage: &Stage<'p>, memory: Memory<'s>) -> Self {
+        // A tool is another link than the one that carries tools, or has joints beside those that move the tip.
+        let tool = |a: &&crate::motion::Actor| a.assembly.tip != a.assembly.flange || a.arm.len() < a.joints.len();
+        let equipped = stage.actors.iter().filter(|(_, a)| tool(a)).map(|(id, _)| *id).collect();
+        Looker { program, memory, equipped, left: MOST }
+    }
+
+    /// Whether nothing more is looked at.
+    pub fn is_done(&self) -> bool {
+        self.left == 0
+    }
+
+    /// Keeps what was found for another time.
+    pub fn keep(self) {
+        self.memory.keep();
+    }
+
+    /// Carries out a motion in a course; what cannot be done makes it lost, what cannot be told makes things unknown.
+    /// `site` is the statement to blame, `beside` what moves at the same time.
+    pub fn motion(&mut self, course: &mut Course<'p>, motion: &Motion, site: Span, beside: &Moved) {
+        let Some(robot) = course.stage.actor_of(motion.mover()) else { return };
+        match motion {
+            Motion::Grip { item, .. } => self.grip(course, motion, robot, *item, site, beside),
+            Motion::Free { item, on, .. } => self.free(course, motion, robot, (*item, *on), site, beside),
+            _ => self.go(course, motion, robot, site, beside),
+        }
+    }
+
+    fn go(&mut self, course: &mut Course<'p>, motion: &Motion, robot: InstanceId, site: Span, beside: &Moved) {
+        let stage = &course.stage;
+        let adrift = stage.unknown.postures.contains(&robot);
+        let held = stage.held(robot).is_some_and(|h| stage.unknown.places.contains(&h));
+        let somewhere = motion.goal().is_some_and(|(goal, frame)| stage.is_frame_unknown(goal, frame));
+        let goes_on = match motion {
+            Motion::To { straight, .. } => *straight,
+            Motion::By { .. } | Motion::Tilted { .. } | Motion::Fingers { .. } => true,
+            _ => false,
+        };
+        let unsure = held || somewhere || adrift && goes_on;
+        let blind = unsure || !self.equipped.contains(&robot) || stage.is_unknown(robot);
+        let known = motion.values().into_iter().map(|node| course.values.value(&self.program.model, node));
+        // What only a run can tell is left to the run.
+        let (Some(values), false) = (known.collect::<Option<Vec<f64>>>(), blind) else { return course.drifts(robot) };
+        // From nowhere in particular, only where it ends can be judged.
+        course.stage.unknown.postures.remove(&robot);
+        match self.outcome(course, motion, &values) {
+            Outcome::Done(_) => {}
+            Outcome::Refused { why, nearer } => {
+                let sure = match &why {
+                    Refused::OutOfReach(..) => true,
+                    Refused::Collides(m) => {
+                        !adrift && m.with.is_none_or(|w| !beside.robots.contains(&w) && !beside.items.contains(&w))
+                    }
+                    _ => !adrift && beside.is_empty(),
+                };
+                let finding = told::finding(&course.stage, motion, &why, nearer, site).filter(|_| sure);
+                course.drifts(robot);
+                course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
+            }
+        }
+    }
+
+    fn grip(
+        &mut self,
+        course: &mut Course<'p>,
+        motion: &Motion,
+        robot: InstanceId,
+        item: InstanceId,
+        site: Span,
+        beside: &Moved,
+    ) {
+        let stage = &mut course.stage;
+        let blind = !self.equipped.contains(&robot)
+            || stage.unknown.postures.contains(&robot)
+            || stage.is_unknown(robot)
+            || stage.is_unknown(item);
+        if blind && !stage.stands_on(robot, item) {
+            stage.carry(item, Some(robot));
+            stage.unknown.places.insert(item);
+            return;
+        }
+        if let Err(why) = stage.perform(motion, &[]) {
+            stage.carry(item, Some(robot));
+            stage.unknown.places.insert(item);
+            self.refuse(course, motion, &why, site, beside.items.contains(&item));
+        }
+    }
+
+    fn free(
+        &mut self,
+        course: &mut Course<'p>,
+        motion: &Motion,
+        robot: InstanceId,
+        (item, on): (InstanceId, Option<InstanceId>),
+        site: Span,
+        beside: &Moved,
+    ) {
+        let stage = &mut course.stage;
+        if stage.held(robot) != Some(item) {
+            return;
+        }
+        let below = on.or_else(|| stage.stood_on(item));
+        let blind = stage.unknown.postures.contains(&robot)
+            || stage.is_unknown(robot)
+            || stage.unknown.places.contains(&item)
+            || on.is_some_and(|on| stage.is_unknown(on));
+        if blind {
+            match below.filter(|on| stage.actor_of(*on).is_none()) {
+                Some(on) => course.stands(item, on),
+                None => stage.carry(item, None),
+            }
+            return;
+        }
+        if let Err(why) = stage.perform(motion, &[]) {
+            match below.filter(|on| stage.actor_of(*on).is_none()) {
+                Some(on) => course.stands(item, on),
+                None => stage.carry(item, below),
+            }
+            self.refuse(course, motion, &why, site, beside.items.contains(&item));
+        } else if on.is_some_and(|on| beside.surfaces.contains(&on)) {
+            // The others may have put something there before.
+            stage.unknown.places.insert(item);
+        }
+    }
+
+    fn refuse(&self, course: &mut Course<'p>, motion: &Motion, why: &Refused, site: Span, unsure: bool) {
+        let finding = told::finding(&course.stage, motion, why, None, site).filter(|_| !unsure);
+        course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
+    }
+
+    /// What becomes of a motion; the course is where it ends.
+    fn outcome(&mut self, course: &mut Course<'p>, motion: &Motion, values: &[f64]) -> Outcome {
+        let key = self.memory.key(&course.stage, motion, values);
+        if let Some(known) = self.memory.recall(&key) {
+            match &known {
+                Outcome::Done(change) if course.stage.change(change).is_none() => {}
+                _ => return known,
+            }
+        }
+        self.left = self.left.saturating_sub(1);
+        let before = course.stage.clone();
+        let outcome = match course.stage.perform(motion, values) {
+            Ok(_) => Outcome::Done(course.stage.since(&before)),
+            Err(why) => {
+                course.stage = before;
+                let far = matches!(why, Refused::OutOfReach(..));
+                let nearer = if far { told::nearer(&course.stage, motion) } else { None };
+                Outcome::Refused { why, nearer }
+            }
+        };
+        self.memory.learn(key, outcome.clone());
+        outcome
+    }
+}
+
+/// The finding of a refusal, with the step of the library it was found on.
+pub fn on_step(finding: Diagnostic, step: Span) -> Diagnostic {
+    if finding.span() == step { finding } else { finding.because(step, "on this step of it") }
+}

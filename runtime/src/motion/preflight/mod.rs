@@ -1,0 +1,51 @@
+//! Looks at the motions of a plan before anything moves: what is out of reach, what collides, what cannot be gripped.
+
+mod beside;
+mod course;
+mod look;
+mod memory;
+mod told;
+pub(super) mod values;
+mod walk;
+
+use matterix_ir::model::Domain;
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::{Diagnostic, Program};
+
+use super::stage::Stage;
+use super::together::together;
+pub use memory::{Nowhere, Store};
+
+/// What would go wrong with the motions of a program. Empty for labs without robots that have joints. What was planned
+/// before is taken from `store`, what is new goes there.
+pub fn preflight(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
+    let Ok(stage) = Stage::new(&program.scene) else { return Vec::new() };
+    if stage.actors.is_empty() {
+        return Vec::new();
+    }
+    let mut found = walk::follow(program, stage, memory::Memory::of(&program.scene, store));
+    found.extend(together(program));
+    found
+}
+
+/// The instance of which a state says what it stands on.
+pub fn supported(scene: &Scene, state: &str, domain: &Domain) -> Option<InstanceId> {
+    let owner = state.strip_suffix(".support").filter(|_| *domain == Domain::Instance)?;
+    scene.find(owner)
+}
+
+impl Stage<'_> {
+    /// Something else carries a thing from now on, as a state of the model says. Where that is not so already, the thing
+    /// comes to its new place at once.
+    pub fn follow(&mut self, id: InstanceId, by: Option<InstanceId>) {
+        let carrier = by.map(|by| self.actor_of(by).unwrap_or(by));
+        if self.below(id) == carrier || self.below(id) == by {
+            return;
+        }
+        match by.filter(|by| self.actor_of(*by).is_none()) {
+            Some(on) => self.put(id, on, Pose::IDENTITY),
+            None => self.carry(id, by),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! What is said of a motion that cannot be carried out.
+
+use matterix_ir::plan::Motion;
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::{Diagnostic, Span, codes};
+use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::pose::pose;
+
+use crate::motion::goal::targets;
+use crate::motion::perform::Refused;
+use crate::motion::stage::Stage;
+
+/// The finding for a refused motion of the statement at `span`; none where another check says it.
+pub fn finding(
+    stage: &Stage<'_>,
+    motion: &Motion,
+    refused: &Refused,
+    nearer: Option<[f64; 2]>,
+    span: Span,
+) -> Option<Diagnostic> {
+    let scene = stage.scene;
+    let name = |id: InstanceId| scene.get(id).name.as_str();
+    if let Motion::Grip { item, by, .. } | Motion::Free { item, by, .. } = motion {
+        return gripping(scene, *item, *by, refused, span);
+    }
+    let (robot, goal) = (motion.mover(), motion.goal().map(|(goal, _)| goal));
+    let to = goal.map_or("there".to_string(), |g| format!("`{}`", name(g)));
+    let mut found = match refused {
+        Refused::OutOfReach(far, _) => {
+            let label = match far * 1e3 {
+                mm if mm >= 1.0 => format!("its gripper stays {mm:.0} mm away"),
+                _ => "it gets there, but not turned like this".to_string(),
+            };
+            let headline = format!("`{}` does not reach {to}", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
+        }
+        Refused::Collides(meeting) => {
+            let [x, y, z] = meeting.at.map(|v| v * 1e3);
+            let headline = match meeting.before {
+                true => format!("`{}` stands in `{}` before it goes to {to}", name(robot), meeting.other),
+                false => format!("`{}` runs into `{}` on its way to {to}", name(robot), meeting.other),
+            };
+            let depth = (meeting.depth * 1e3).max(1.0);
+            let label = format!("`{}` meets it at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
+            Diagnostic::error(codes::COLLISION, span, headline, label)
+        }
+        Refused::NoWay => Diagnostic::error(
+            codes::COLLISION,
+            span,
+            format!("no way was found for `{}` to {to}", name(robot)),
+            "nothing is in the way at its end, but between",
+        ),
+        Refused::Bound(item, other) => {
+            let headline = format!("`{}` moves while `{}` holds `{}` as well", name(robot), name(*other), name(*item));
+            Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")
+                .help("let one of them let go first")
+        }
+        Refused::Tilted(by) => {
+            let headline = format!("what `{}` holds tilts on its way to {to}", name(robot));
+            let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
+        }
+        Refused::Joints(given, there) => {
+            let headline = format!("{given} positions for the {there} joints of `{}`", name(robot));
+            Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, "not one for each")
+        }
+        Refused::Beyond(joint) => {
+            let headline = format!("`{joint}` of `{}` does not get to this position", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
+        }
+        Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
+        Refused::StandsOn | Refused::TooWide(..) => return None,
+    };
+    let met = match refused {
+        Refused::Collides(meeting) => meeting.with,
+        _ => None,
+    };
+    let mut shown = Vec::new();
+    for id in met.into_iter().chain(goal) {
+        let at = scene.get(id).span;
+        if at == span || shown.contains(&at) {
+            continue;
+        }
+        shown.push(at);
+        // What has been moved is no longer where its line says.
+        if stage.is_where_it_was(id) {
+            found = found.because(at, format!("`{}` stands here", name(id)));
+        }
+    }
+    if let (Some(goal), Some([x, y])) = (goal, nearer) {
+        let moved = format!("{:.0}, {:.0}", x * 1e3, y * 1e3);
+        found = found.help(format!("`{}` is within reach if it stands ({moved}) mm from there", name(goal)));
+    }
+    Some(found)
+}
+
+fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, span: Span) -> Option<Diagnostic> {
+    let (item, by) = (scene.get(item), &scene.get(by).name);
+    match refused {
+        Refused::Misplaced(far, _) => {
+            let headline = format!("`{by}` is not at `{}`: {:.0} mm are between them", item.name, far * 1e3);
+            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "too far to grip or let go");
+            Some(found.help(format!("move `{by}` there first; `pick` and `place` do that")))
+        }
+        Refused::TooWide(width, opening) => {
+            let headline = format!("`{by}` does not open wide enough for `{}`", item.name);
+            let label = format!("it is {:.0} mm wide, and the fingers open {:.0} mm", width * 1e3, opening * 1e3);
+            Some(Diagnostic::error(codes::TOO_WIDE, span, headline, label))
+        }
+        Refused::StandsOn => {
+            let headline = format!("`{by}` cannot grip `{}`, on which it stands", item.name);
+            let found = Diagnostic::error(codes::MISPLACED_GRIP, span, headline, "it would have to carry itself");
+            Some(found.because(item.span, format!("`{by}` stands on this")))
+        }
+        _ => None,
+    }
+}
+
+/// How far a goal out of reach would have to be shifted to be reached, x and y in metres: the nearest place on the line to
+/// the robot.
+pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
+    let (goal, frame) = motion.goal()?;
+    let robot = stage.actor_of(motion.mover())?;
+    let base = stage.pose(robot);
+    let actor = stage.actors.get(&robot)?;
+    let mut solver = Solver::new(actor.chain.clone());
+    let now = actor.configuration();
+    let targets = targets(stage, robot, goal, frame);
+    for share in (1..20).map(|k| f64::from(k) * 0.05) {
+        for target in &targets {
+            let mut at: Pose = *target;
+            (0..2).for_each(|k| at.position[k] += share * (base.position[k] - at.position[k]));
+            let request = Request { attempts: 20, ..Request::new(pose(&base.inverse().then(at)), &now) };
+            if solver.solve(&request).is_ok() {
+                return Some([0, 1].map(|k| at.position[k] - target.position[k]));
+            }
+        }
+    }
+    None
+}

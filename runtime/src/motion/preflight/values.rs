@@ -1,0 +1,88 @@
+//! What is known of a lab's states while a plan is followed without being run.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::graph::{BinaryOp, apply};
+use matterix_ir::model::{Action, Domain, Model};
+use matterix_ir::{NodeId, Op};
+
+/// Values of states that are words, truths or instances, as far as they are known; quantities never are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Values {
+    by_state: BTreeMap<u32, f64>,
+}
+
+impl Values {
+    /// When the run begins. What an event changes is not known, as nobody says when.
+    pub fn at_start(model: &Model) -> Self {
+        let changes = model.events.iter().flat_map(|e| &e.actions).filter_map(|a| match a {
+            Action::Assign { state, .. } => Some(*state),
+            Action::Move { .. } => None,
+        });
+        let changes: BTreeSet<u32> = changes.collect();
+        let mut out = Values::default();
+        for (index, state) in model.states.iter().enumerate() {
+            let index = index as u32;
+            if matches!(state.domain, Domain::Quantity(_)) || changes.contains(&index) {
+                continue;
+            }
+            if let Some(value) = out.value(model, state.initial) {
+                out.by_state.insert(index, value);
+            }
+        }
+        out
+    }
+
+    /// An assignment: the new value, if it is known.
+    pub fn assign(&mut self, model: &Model, state: u32, value: NodeId) -> Option<f64> {
+        let value = self.value(model, value);
+        if model.states.get(state as usize).is_some_and(|s| !matches!(s.domain, Domain::Quantity(_))) {
+            match value {
+                Some(value) => self.by_state.insert(state, value),
+                None => self.by_state.remove(&state),
+            };
+        }
+        value
+    }
+
+    /// The value of an expression, if what is known settles it.
+    pub fn value(&self, model: &Model, node: NodeId) -> Option<f64> {
+        let graph = &model.graph;
+        let mut values: BTreeMap<NodeId, f64> = BTreeMap::new();
+        for node in graph.schedule([node]) {
+            let op = graph.op(node);
+            let leaf = |op: Op| match op {
+                Op::Const(v) => Some(v),
+                Op::State(s) => self.by_state.get(&s).copied(),
+                Op::Param(p) => model.params.get(p as usize).map(|p| p.value),
+                _ => None,
+            };
+            let at = |n: NodeId| values.get(&n).copied();
+            let value = match op {
+                _ if op.operands().next().is_none() => leaf(op),
+                // One side may settle it.
+                Op::Binary(BinaryOp::And, a, b) if at(a) == Some(0.0) || at(b) == Some(0.0) => Some(0.0),
+                Op::Binary(BinaryOp::Or, a, b) if [a, b].into_iter().any(|n| at(n).is_some_and(|v| v != 0.0)) => {
+                    Some(1.0)
+                }
+                Op::Select(c, a, b) => match at(c) {
+                    Some(c) => at(if c != 0.0 { a } else { b }),
+                    None => at(a).filter(|v| at(b) == Some(*v)),
+                },
+                _ if op.operands().all(|n| values.contains_key(&n)) => {
+                    Some(apply(op, |_| f64::NAN, |n| values.get(&n).copied().unwrap_or(f64::NAN)))
+                }
+                _ => None,
+            };
+            if let Some(value) = value.filter(|v| !v.is_nan()) {
+                values.insert(node, value);
+            }
+        }
+        values.get(&node).copied()
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.by_state.iter().map(|(state, value)| (*state, *value))
+    }
+}
