@@ -6,6 +6,7 @@ mod contents;
 mod determinism;
 mod devices;
 mod doc;
+mod environments;
 mod explain;
 mod faults;
 mod files;

@@ -31,7 +31,7 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
     let seen: Vec<&Thing> = things.iter().filter(|t| !t.shapes.is_empty()).collect();
     let owners = Owners::new(seen.iter().map(|t| t.name.as_str()));
     let made = seen.iter().enumerate().map(|(i, thing)| {
-        let hull = !thing.holds && !thing.link && encloses(thing, &seen);
+        let hull = !thing.holds && !thing.link && (encloses(thing, &seen) || roofs(thing));
         let (mut pieces, mut cavity) = (Vec::new(), None);
         for (at, shape, color) in &thing.shapes {
             let (at, color) = (*at, *color);
@@ -54,10 +54,12 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
                 }
             }
         }
+        let above = owners.above(&thing.name).or_else(|| first_link(thing, &seen)).filter(|&p| p != i as u32);
+        let is_robot = thing.link && above.is_none();
         Body {
-            name: thing.name.clone(),
+            name: if is_robot { robot(thing).to_owned() } else { thing.name.clone() },
             kind: thing.kind.clone(),
-            parent: owners.above(&thing.name).or_else(|| first_link(thing, &seen)).filter(|&p| p != i as u32),
+            parent: above,
             pose: pose(thing.at),
             pieces,
             cavity,
@@ -67,11 +69,16 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
     (made.collect(), owners)
 }
 
-/// The first link of the robot that a link belongs to: the whole robot goes by its name.
+/// The first link of the robot that a link belongs to: the whole robot goes by its own name.
 fn first_link(thing: &Thing, seen: &[&Thing]) -> Option<u32> {
-    let robot = |t: &Thing| t.name.split('.').next().map(str::to_owned);
-    let first = seen.iter().position(|other| other.link && robot(other) == robot(thing));
+    let is_of = |robot: &str| thing.name.strip_prefix(robot).is_some_and(|rest| rest.starts_with('.'));
+    let first = seen.iter().position(|other| other.link && is_of(robot(other)));
     first.filter(|_| thing.link).map(|i| i as u32)
+}
+
+/// The robot that a link of its own, not of a tool, belongs to.
+fn robot(link: &Thing) -> &str {
+    link.name.rsplit_once('.').map_or(&link.name, |(robot, _)| robot)
 }
 
 /// Bodies by name, and by the names of what is theirs.
@@ -185,6 +192,18 @@ fn encloses(thing: &Thing, seen: &[&Thing]) -> bool {
                 true => x * x + y * y < a * a / 4.0,
             };
             within && (TOUCHING..c - TOUCHING).contains(&z)
+        })
+    })
+}
+
+/// Whether one of its own points lies under a roof of it: a place in a hood or under a gantry.
+fn roofs(thing: &Thing) -> bool {
+    thing.frames.iter().any(|(_, point)| {
+        let point = thing.at.then(*point).position;
+        thing.shapes.iter().any(|(at, shape, _)| {
+            let [x, y, z] = thing.at.then(*at).inverse().point(point);
+            let [a, b, c] = shape.size();
+            matches!(shape, Shape::Box(_)) && x.abs() < a / 2.0 && y.abs() < b / 2.0 && z < -c
         })
     })
 }

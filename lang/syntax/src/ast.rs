@@ -754,7 +754,7 @@ pub enum ClauseKind {
 }
 
 /// How a robot moves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Manner {
     /// Any way that is free.
     Free,
@@ -767,7 +767,7 @@ pub enum Manner {
 }
 
 /// Where a robot moves to.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Goal {
     /// `to goal`.
     Frame(Expr),

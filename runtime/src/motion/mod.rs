@@ -5,7 +5,10 @@ pub mod fingers;
 pub mod flight;
 pub mod goal;
 mod hands;
+mod outline;
 pub mod perform;
+mod perturb;
+mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
@@ -14,6 +17,7 @@ mod together;
 
 pub use assembly::Assembly;
 pub use perform::{Meeting, Moment, Performed, Refused};
+pub use perturb::{Moved, Perturbation, perturb};
 pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

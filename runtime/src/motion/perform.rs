@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fingers::CLEARANCE;
 use super::goal::{carried_to, spots, targets, targets_at};
+use super::postures::postures;
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
@@ -474,6 +475,25 @@ impl Stage<'_> {
             if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
                 parts.extend(turned);
                 return Ok(Performed { robot, parts });
+            }
+        }
+        // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
+        let within = match way {
+            Way::Upright(within) => Some(within),
+            Way::Free | Way::Straight => None,
+        };
+        let others = match refused {
+            Refused::Collides(_) if way != Way::Straight => postures(self, robot, to),
+            _ => Vec::new(),
+        };
+        for q in others {
+            match self.way(robot, &q, within) {
+                Ok(part) => {
+                    parts.push(part);
+                    return Ok(Performed { robot, parts });
+                }
+                Err(Refused::NoWay) => break,
+                Err(_) => {}
             }
         }
         Err(refused)
