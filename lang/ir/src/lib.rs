@@ -7,8 +7,10 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+//! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
+pub mod bodies;
 pub mod codes;
 pub mod diagnostic;
 pub mod graph;

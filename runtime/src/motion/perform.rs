@@ -7,7 +7,7 @@ use matterix_motion::inverse::{Request, Solver, Unreached};
 use matterix_motion::plan::{self, Blocked, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
-use matterix_motion::time::{Limits, Trajectory, follow};
+use matterix_motion::time::{Limits, State, Trajectory, follow};
 
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
@@ -41,15 +41,15 @@ impl Performed {
         self.parts.iter().map(Trajectory::duration).sum()
     }
 
-    /// The joints that move the tip at a time since the beginning, s.
-    pub fn at(&self, mut time: f64) -> Vec<f64> {
+    /// What the joints that move the tip do at a time since the beginning, s.
+    pub fn at(&self, mut time: f64) -> State {
         for part in &self.parts {
             if time <= part.duration() {
-                return part.at(time).position;
+                return part.at(time);
             }
             time -= part.duration();
         }
-        self.parts.last().map(|p| p.at(p.duration()).position).unwrap_or_default()
+        self.parts.last().map(|p| p.at(p.duration())).unwrap_or_default()
     }
 }
 
@@ -62,6 +62,10 @@ pub struct Moment {
     pub robot: InstanceId,
     /// Positions of all its joints that move by themselves, rad or m.
     pub joints: Vec<f64>,
+    /// Their speeds, rad/s or m/s.
+    pub speeds: Vec<f64>,
+    /// Their accelerations, rad/s2 or m/s2.
+    pub accelerations: Vec<f64>,
     /// Its links in the lab, in the order of its assembly.
     pub links: Vec<Pose>,
     /// What it holds, in the lab.
@@ -189,7 +193,16 @@ impl Stage<'_> {
         let base = self.pose(robot);
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
-        Some(Moment { time, robot, joints: actor.joints.clone(), links, held })
+        let still = vec![0.0; actor.joints.len()];
+        Some(Moment {
+            time,
+            robot,
+            joints: actor.joints.clone(),
+            speeds: still.clone(),
+            accelerations: still,
+            links,
+            held,
+        })
     }
 
     /// Moments of a motion that has been carried out and began at a time, s, at most so far apart.
@@ -199,8 +212,15 @@ impl Stage<'_> {
         (0..=steps)
             .filter_map(|step| {
                 let since = performed.duration() * f64::from(step) / f64::from(steps);
-                stage.settle(performed.robot, &performed.at(since));
-                stage.moment(performed.robot, begin + since)
+                let state = performed.at(since);
+                stage.settle(performed.robot, &state.position);
+                let mut moment = stage.moment(performed.robot, begin + since)?;
+                let arm = &stage.actors.get(&performed.robot)?.arm;
+                for (&joint, (speed, acceleration)) in arm.iter().zip(state.velocity.iter().zip(&state.acceleration)) {
+                    moment.speeds[joint] = *speed;
+                    moment.accelerations[joint] = *acceleration;
+                }
+                Some(moment)
             })
             .collect()
     }

@@ -7,6 +7,7 @@ use matterix_ir::scene::{InstanceId, Pose, Shape, Stand};
 use mcap::McapResult;
 
 use super::Sink;
+use super::bodies;
 use super::foxglove::{
     self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, pose,
     quaternion, vector,
@@ -32,11 +33,12 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
     let supports = supports(run);
     let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
+    bodies::write(run, sink)?;
     let mut robots = Robots::begin(run, sink, entities, frames)?;
     let samples = run.recording.times.len().max(1);
     for sample in 0..samples {
         let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
-        let carried = robots.until(run, time, sink, frames)?;
+        let carried = robots.until(run, time, sink, frames, &stands)?;
         let mut moved = sample == 0;
         for (&(id, values), current) in supports.iter().zip(&mut supported) {
             let Some(&value) = values.get(sample) else { continue };
@@ -55,9 +57,11 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
         if !moved && !carried && tints.is_empty() {
             continue;
         }
-        let stand = |id: InstanceId| stands.get(id.0 as usize).copied();
-        let mut poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
-        robots.held.iter().for_each(|(id, at)| poses[*id] = *at);
+        let stand = |id: InstanceId| match robots.held.get(&(id.0 as usize)) {
+            Some(at) => Some(Stand::Lab(*at)),
+            None => stands.get(id.0 as usize).copied(),
+        };
+        let poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
             let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));

@@ -140,6 +140,10 @@ pub(super) struct JointState<'a> {
     pub(super) name: &'a str,
     /// rad or m.
     pub(super) position: f64,
+    /// rad/s or m/s.
+    pub(super) velocity: f64,
+    /// rad/s2 or m/s2.
+    pub(super) acceleration: f64,
 }
 
 /// `foxglove.JointStates`.
@@ -250,7 +254,12 @@ fn entity_schema() -> Value {
 pub(super) fn joints_schema() -> Value {
     let joint = object(
         "foxglove.JointState",
-        [("name", text("Name of the joint")), ("position", number("Position of the joint, in radians or metres"))],
+        [
+            ("name", text("Name of the joint")),
+            ("position", number("Position of the joint, in radians or metres")),
+            ("velocity", number("Velocity of the joint, in radians or metres a second")),
+            ("acceleration", number("Acceleration of the joint, in radians or metres a second squared")),
+        ],
     );
     object(
         "foxglove.JointStates",
