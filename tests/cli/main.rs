@@ -25,3 +25,4 @@ mod strict;
 mod time;
 mod types;
 mod usage;
+mod verify;

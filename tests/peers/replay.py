@@ -176,7 +176,7 @@ def main():
         far = 0.0
         for _, configuration, *_ in samples:
             own = link8(configuration)
-            tool = own.translation + own.rotation @ [0, 0, 0.1034]
+            tool = own.translation + own.rotation @ [0, 0, 0.103]
             far = max(far, numpy.linalg.norm(tool - panda_py.fk(configuration)[:3, 3]))
         judge("hand against panda_py", far, 1e-4, "m")
 

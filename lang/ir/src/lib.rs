@@ -15,6 +15,7 @@ pub mod codes;
 pub mod diagnostic;
 pub mod graph;
 pub mod math;
+pub mod mesh;
 pub mod model;
 pub mod plan;
 pub mod points;

@@ -1,8 +1,11 @@
 //! What there is: instances of assets, where they stand, and what their states mean.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::Span;
+use crate::mesh::Mesh;
 pub use crate::pose::Pose;
 use crate::robot::Robot;
 
@@ -50,6 +53,8 @@ pub enum Shape {
         /// From the bottom up.
         inside: Vec<[f64; 2]>,
     },
+    /// Triangles, the middle of the base of the box around them at the origin.
+    Mesh(Arc<Mesh>),
 }
 
 impl Shape {
@@ -63,12 +68,13 @@ impl Shape {
                 let greatest = |k: usize| outside.iter().map(|p| p[k]).fold(0.0, f64::max);
                 [2.0 * greatest(0), 2.0 * greatest(0), greatest(1)]
             }
+            Shape::Mesh(mesh) => mesh.size(),
         }
     }
 
     /// Whether turning it about its own axis changes nothing.
     pub fn is_round(&self) -> bool {
-        !matches!(self, Shape::Box(_))
+        !matches!(self, Shape::Box(_) | Shape::Mesh(_))
     }
 }
 

@@ -202,7 +202,7 @@ fn robot(machine: Machine, recording: &Recording, ways: &Ways, things: &[Thing])
             links,
         });
     }
-    let bodies = machine.robot.links.iter().map(|l| Body::of_pieces(&l.collision)).collect();
+    let bodies = Body::of_links(&machine.robot);
     let mut robot = Robot { name, machine, variables, bodies, samples, grips: Vec::new() };
     for (time, message) in topic(recording, "/grips").iter().flat_map(|t| &t.messages) {
         if text(message, "robot") == robot.name {

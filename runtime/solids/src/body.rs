@@ -1,15 +1,18 @@
 //! A body in convex pieces, and where it touches another one.
 
 use std::f64::consts::FRAC_PI_2;
+use std::fmt;
 
+use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
-use matterix_ir::robot::{Piece, Solid};
+use matterix_ir::robot::{Link, Robot, Solid};
 use matterix_ir::scene::Shape;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose as Isometry, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
 
+use crate::mesh::{self, hull};
 use crate::place::isometry;
 use crate::turned;
 
@@ -37,6 +40,12 @@ pub struct Touch {
     pub point: [f64; 3],
 }
 
+impl fmt::Debug for Body {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Body of {} pieces", self.pieces.len())
+    }
+}
+
 impl Body {
     /// Shapes of a thing, each with its pose; none where there are none.
     pub fn of_shapes<'a>(shapes: impl IntoIterator<Item = (&'a Shape, Pose)>) -> Option<Body> {
@@ -45,11 +54,14 @@ impl Body {
         Body::of(pieces)
     }
 
-    /// Solids of a link; none where there are none.
-    pub fn of_pieces<'a>(solids: impl IntoIterator<Item = &'a Piece>) -> Option<Body> {
-        let mut pieces = Vec::new();
-        solids.into_iter().for_each(|piece| add_solid(&piece.solid, &piece.placement, &mut pieces));
-        Body::of(pieces)
+    /// What collides of each link of a robot; none for links without that.
+    pub fn of_links(robot: &Robot) -> Vec<Option<Body>> {
+        let body = |link: &Link| {
+            let mut pieces = Vec::new();
+            link.collision.iter().for_each(|piece| add_solid(robot, &piece.solid, &piece.placement, &mut pieces));
+            Body::of(pieces)
+        };
+        robot.links.iter().map(body).collect()
     }
 
     fn of(pieces: Vec<Convex>) -> Option<Body> {
@@ -102,26 +114,30 @@ fn add_shape(shape: &Shape, at: &Pose, pieces: &mut Vec<Convex>) {
         Shape::Box([x, y, z]) => push(middle, SharedShape::cuboid(x / 2.0, y / 2.0, z / 2.0), pieces),
         Shape::Cylinder([d, h]) => push(middle * upright(), SharedShape::cylinder(h / 2.0, d / 2.0), pieces),
         Shape::Sphere(d) => push(middle, SharedShape::ball(d / 2.0), pieces),
+        Shape::Mesh(mesh) => mesh::pieces(mesh).into_iter().for_each(|piece| push(isometry(at), piece, pieces)),
         Shape::Turned { outside, inside } => {
             for corners in turned::pieces(outside, inside) {
                 // A slice without thickness is none.
-                if let Some(hull) = SharedShape::convex_hull(&corners) {
-                    push(isometry(at), hull, pieces);
-                }
+                hull(&corners).into_iter().for_each(|hull| push(isometry(at), hull, pieces));
             }
         }
     }
 }
 
 /// A solid of a robot has its origin at its middle.
-fn add_solid(solid: &Solid, at: &Pose, pieces: &mut Vec<Convex>) {
+fn add_solid(robot: &Robot, solid: &Solid, at: &Pose, pieces: &mut Vec<Convex>) {
     let at = isometry(at);
     match solid {
         Solid::Cuboid([x, y, z]) => push(at, SharedShape::cuboid(x / 2.0, y / 2.0, z / 2.0), pieces),
         Solid::Cylinder([r, length]) => push(at * upright(), SharedShape::cylinder(length / 2.0, *r), pieces),
         Solid::Sphere(r) => push(at, SharedShape::ball(*r), pieces),
-        // A mesh that was not read has no form.
-        Solid::Mesh(..) => {}
+        Solid::Mesh(name, scale) => {
+            // A mesh that was not found has no form.
+            if let Some(mesh) = robot.meshes.get(name) {
+                let mesh = Mesh::clone(mesh).scaled(*scale);
+                mesh::pieces(&mesh).into_iter().for_each(|piece| push(at, piece, pieces));
+            }
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, State, Trajectory, follow};
 
+use super::exact::Exact;
 use super::goal::{spot, targets};
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
@@ -294,7 +295,8 @@ impl Stage<'_> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS).overruled_by(&exact);
         let settings = Settings { iterations: SAMPLES, ..Settings::default() };
         let route =
             plan::plan(&mut checker, &actor.configuration(), q, &settings).map_err(|failure| match failure {
@@ -318,7 +320,8 @@ impl Stage<'_> {
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let to = pose(&self.pose(robot).inverse().then(*to));
         let figure = self.figure(robot, actor)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS).overruled_by(&exact);
         let mut solver = Solver::new(actor.chain.clone());
         let followed = plan::straight(&mut solver, &mut checker, &actor.configuration(), &to, &STRIDE);
         let mut points = followed.map_err(|blocked| match blocked {

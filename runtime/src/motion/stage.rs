@@ -8,6 +8,7 @@ use matterix_ir::robot::Robot;
 use matterix_ir::scene::{InstanceId, Scene, Stand};
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
+use matterix_solids::Body;
 
 use super::assembly::{Assembly, assemble};
 
@@ -35,6 +36,7 @@ pub struct Actor {
     pub arm: Vec<usize>,
     /// Shared by all copies of a stage.
     to_plan: Arc<OnceLock<Robot>>,
+    bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
 /// The lab at one moment.
@@ -50,6 +52,8 @@ pub struct Stage<'p> {
     pub actors: BTreeMap<InstanceId, Actor>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// Shared by all copies of a stage.
+    bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
 impl<'p> Stage<'p> {
@@ -67,7 +71,13 @@ impl<'p> Stage<'p> {
             let actor = Actor::new(assembly).map_err(|why| format!("`{}` cannot be moved: {why}", instance.name))?;
             actors.insert(id, actor);
         }
-        Ok(Stage { scene, carried, before: BTreeMap::new(), actors, freed: BTreeMap::new() })
+        let (before, freed, bodies) = (BTreeMap::new(), BTreeMap::new(), Arc::default());
+        Ok(Stage { scene, carried, before, actors, freed, bodies })
+    }
+
+    /// The true shapes of all instances, made when they are first asked for.
+    pub fn bodies(&self) -> &[Option<Body>] {
+        self.bodies.get_or_init(|| super::exact::bodies(self.scene))
     }
 
     /// The robot an instance is or is part of.
@@ -235,7 +245,7 @@ impl Actor {
         let all: Vec<u32> = tree.variables().iter().map(joint).collect();
         let arm = chain.variables().iter().filter_map(|v| all.iter().position(|j| *j == v.joint)).collect();
         let joints = assembly.home.clone();
-        Ok(Actor { assembly, tree, chain, joints, arm, to_plan: Arc::default() })
+        Ok(Actor { assembly, tree, chain, joints, arm, to_plan: Arc::default(), bodies: Arc::default() })
     }
 
     /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
@@ -246,6 +256,11 @@ impl Actor {
             robot.touching.extend(always_touching(&robot).unwrap_or_default());
             robot
         })
+    }
+
+    /// The true shapes of its links, made when they are first asked for.
+    pub fn bodies(&self) -> &[Option<Body>] {
+        self.bodies.get_or_init(|| Body::of_links(&self.assembly.robot))
     }
 
     /// The positions of the joints that move the tip.

@@ -72,7 +72,8 @@ impl Surroundings {
 fn solid(shape: &Shape) -> (Solid, f64) {
     let [x, y, z] = shape.size();
     let solid = match shape {
-        Shape::Box(_) => Solid::Cuboid([x / 2.0, y / 2.0, z / 2.0]),
+        // The box around a mesh; true shapes decide where that is too much.
+        Shape::Box(_) | Shape::Mesh(_) => Solid::Cuboid([x / 2.0, y / 2.0, z / 2.0]),
         Shape::Cylinder(_) | Shape::Turned { .. } => Solid::Cylinder(x / 2.0, z / 2.0),
         Shape::Sphere(_) => Solid::Sphere(x / 2.0),
     };

@@ -1,7 +1,9 @@
 //! `/scene` and `/tf`: what is seen and how it moves.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use matterix_ir::mesh::Mesh;
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::Shape;
 use serde_json::Value;
@@ -44,7 +46,7 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
             link: text(entity, "frame_id") == name,
         });
     }
-    let (bodies, owners) = bench::bodies(&things);
+    let (bodies, owners) = bench::bodies(&things, &mut document.meshes);
     document.bodies = bodies;
     for (name, way) in &ways {
         let Some(body) = owners.get(name) else { continue };
@@ -104,7 +106,19 @@ fn shapes(entity: &Value, at: Placement) -> Vec<(Placement, Shape, Option<[f32; 
     let spheres = list(entity, "spheres").iter().map(|s| read(s, |[x, _, _]| Shape::Sphere(x)));
     let cubes = list(entity, "cubes").iter().map(|c| read(c, Shape::Box));
     let cylinders = list(entity, "cylinders").iter().map(|c| read(c, |[x, _, z]| Shape::Cylinder([x, z])));
-    cubes.chain(cylinders).chain(spheres).collect()
+    let meshes = list(entity, "triangles").iter().map(|t| mesh(t, back));
+    cubes.chain(cylinders).chain(spheres).chain(meshes).collect()
+}
+
+/// A mesh in the frame that `back` leads to.
+fn mesh(triangles: &Value, back: Placement) -> (Placement, Shape, Option<[f32; 4]>) {
+    let at = back.then(placement(&triangles["pose"]["position"], &triangles["pose"]["orientation"]));
+    let point = |p: &Value| ["x", "y", "z"].map(|k| number(p, k));
+    let points: Vec<[f64; 3]> = list(triangles, "points").iter().map(point).collect();
+    let there = |i: &Value| u32::try_from(i.as_u64()?).ok().filter(|i| (*i as usize) < points.len());
+    let indices: Option<Vec<u32>> = list(triangles, "indices").iter().map(there).collect();
+    let triangles = indices.unwrap_or_default().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    (at, Shape::Mesh(Arc::new(Mesh { name: String::new(), points, triangles })), None)
 }
 
 fn placement(position: &Value, rotation: &Value) -> Placement {

@@ -103,7 +103,7 @@ pub fn search(checker: &mut Checker, start: &[f64], goal: &[f64], settings: &Set
     let to = within(checker, goal, End::Goal)?;
     if !checker.are_free(&[from.as_slice(), to.as_slice()].concat()) {
         let (q, which) = if checker.is_free(&from) { (goal, End::Goal) } else { (start, End::Start) };
-        return Err(Failure::Collision(which, checker.figure().contacts(checker.world(), q)));
+        return Err(Failure::Collision(which, checker.contacts(q)));
     }
     let found = connect::connect(checker, &from, &to, settings);
     match found.way {
@@ -135,7 +135,20 @@ fn rounded(way: &path::Way, start: &[f64], goal: &[f64], iterations: usize) -> R
     Route { points, cost: f64::from(way.cost()), iterations }
 }
 
+/// Samples drawn among true shapes, where each takes some hundred times as long.
+const ASKING: usize = 500;
+
 /// A short collision-free way, the same for the same question on every machine.
+///
+/// Where there is none among balls and the checker has a referee, one is searched among true shapes.
 pub fn plan(checker: &mut Checker, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
-    Ok(search(checker, start, goal, settings)?.simplified(checker, settings))
+    checker.ask(false);
+    let found = match search(checker, start, goal, settings) {
+        Err(Failure::Collision(..) | Failure::Unreached(_)) if checker.ask(true) => {
+            let settings = Settings { iterations: settings.iterations.min(ASKING), ..*settings };
+            search(checker, start, goal, &settings)
+        }
+        found => found,
+    };
+    Ok(found?.simplified(checker, settings))
 }

@@ -166,7 +166,7 @@ pub fn plan_upright(level: &mut Level, start: &[f64], goal: &[f64], settings: &S
     for (q, which) in ends {
         let q32 = within(level.checker, q, which)?;
         if !level.checker.is_free(&q32) {
-            return Err(Failure::Collision(which, level.checker.figure().contacts(level.checker.world(), q)));
+            return Err(Failure::Collision(which, level.checker.contacts(q)));
         }
         let tilt = level.upright.tilt_of(&level.solver.chain().tip(q));
         if !level.is_level(&q32) {

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
+use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
-use matterix_ir::robot::{Piece, Solid};
+use matterix_ir::robot::{Piece, Robot, Solid};
 use matterix_ir::scene::{InstanceId, Stand};
 use mcap::McapResult;
 
@@ -69,7 +70,7 @@ impl Robots {
             let joints = moving.map(|j| format!("{name}.{}", j.name)).collect();
             let kind = &run.program.scene.get(*id).kind;
             let drawn: Vec<Entity<'_>> =
-                robot.links.iter().zip(&links).filter_map(|(link, id)| entity(&link.visual, id, kind)).collect();
+                robot.links.iter().zip(&links).filter_map(|(link, id)| entity(robot, &link.visual, id, kind)).collect();
             sink.push(entities, 0.0, &SceneUpdate { deletions: [], entities: drawn })?;
             out.names.insert(*id, (links, joints));
             if let Some(moment) = stage.moment(*id, 0.0) {
@@ -161,7 +162,7 @@ fn transform(time: f64, name: &str, at: Pose) -> FrameTransform {
 }
 
 /// What is seen of a link, in the link's own frame.
-fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'a>> {
+fn entity<'a>(robot: &Robot, visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'a>> {
     let mut pieces = Pieces::default();
     for piece in visual {
         let [r, g, b, a] = piece.color.unwrap_or(GREY);
@@ -175,12 +176,15 @@ fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'
                 pieces.spheres.push(foxglove::Cube { pose: at, size: vector([2.0 * r; 3]), color: pieces.color });
             }
             Solid::Cylinder([r, length]) => pieces.cone(at, [2.0 * r, 2.0 * r, length], [1.0, 1.0]),
-            // Meshes are not carried in recordings.
-            Solid::Mesh(..) => {}
+            Solid::Mesh(ref file, scale) => {
+                if let Some(mesh) = robot.meshes.get(file) {
+                    pieces.mesh(at, &Mesh::clone(mesh).scaled(scale));
+                }
+            }
         }
     }
-    let Pieces { cubes, spheres, cylinders, .. } = pieces;
-    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() {
+    let Pieces { cubes, spheres, cylinders, triangles, .. } = pieces;
+    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() && triangles.is_empty() {
         return None;
     }
     Some(Entity {
@@ -195,7 +199,7 @@ fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'
         spheres,
         cylinders,
         lines: [],
-        triangles: [],
+        triangles,
         texts: Vec::new(),
         models: [],
     })
