@@ -12,6 +12,7 @@ mod findings;
 mod formatting;
 mod grids;
 mod harness;
+mod meshes;
 mod motion;
 mod new;
 mod pages;

@@ -8,3 +8,4 @@ mod syntax_nested;
 mod syntax_properties;
 mod syntax_recovery;
 mod syntax_trees;
+mod vessels;
