@@ -12,6 +12,7 @@ mod findings;
 mod formatting;
 mod grids;
 mod harness;
+mod hollow;
 mod meshes;
 mod motion;
 mod new;

@@ -14,6 +14,12 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// Whether all its triangles have their corners, and these are numbers.
+    pub fn is_sound(&self) -> bool {
+        self.triangles.iter().flatten().all(|i| (*i as usize) < self.points.len())
+            && self.points.iter().flatten().all(|v| v.is_finite())
+    }
+
     /// Least and greatest coordinates.
     pub fn bounds(&self) -> [[f64; 3]; 2] {
         let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];

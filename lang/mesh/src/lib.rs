@@ -47,13 +47,10 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     if triangles.len() > MOST_TRIANGLES {
         return Err(format!("it has {} triangles, more than {MOST_TRIANGLES}: simplify it", triangles.len()));
     }
-    if points.iter().flatten().any(|v| !v.is_finite()) {
-        return Err("a coordinate is no number".to_string());
-    }
-    if triangles.iter().flatten().any(|i| *i as usize >= points.len()) {
-        return Err("a triangle has a corner that is not there".to_string());
-    }
     let mesh = Mesh { name: name.to_string(), points, triangles };
+    if !mesh.is_sound() {
+        return Err("a corner of a triangle is not there, or is no number".to_string());
+    }
     if mesh.size().contains(&0.0) {
         return Err("it is flat: a body has a volume".to_string());
     }

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use matterix_ir::bodies::{Bodies, Machine};
+use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
+use matterix_ir::scene::Shape;
 use matterix_recording::{Recording, Topic, list, number, text};
 use matterix_solids::{Body, Isometry, isometry};
 use serde::Deserialize;
@@ -86,6 +88,9 @@ impl Film {
             ));
         };
         let bodies = Bodies::deserialize(bodies).map_err(|e| Unreadable(format!("`/bodies` is damaged: {e}")))?;
+        if !meshes(&bodies).all(Mesh::is_sound) {
+            return Err(Unreadable("`/bodies` is damaged: a mesh lacks corners".to_owned()));
+        }
         let things: Vec<Thing> = bodies
             .things
             .iter()
@@ -153,6 +158,15 @@ fn pose(position: &Value, rotation: &Value) -> Pose {
     let rotation = ["x", "y", "z", "w"].map(|k| number(rotation, k));
     let none = rotation.iter().all(|v| *v == 0.0);
     Pose { position, rotation: if none { Pose::IDENTITY.rotation } else { rotation } }
+}
+
+fn meshes(bodies: &Bodies) -> impl Iterator<Item = &Mesh> {
+    let shapes = bodies.things.iter().flat_map(|t| t.shape.iter().chain(t.solids.iter().map(|s| &s.shape)));
+    let of_things = shapes.filter_map(|shape| match shape {
+        Shape::Mesh(mesh) => Some(&**mesh),
+        _ => None,
+    });
+    of_things.chain(bodies.machines.iter().flat_map(|m| m.robot.meshes.values().map(|mesh| &**mesh)))
 }
 
 /// Links and joints name each other as a tree does; the file may say anything.

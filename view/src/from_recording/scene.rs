@@ -3,9 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use matterix_ir::bodies::Bodies;
 use matterix_ir::mesh::Mesh;
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::Shape;
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Topic, list, number, text};
@@ -24,6 +26,7 @@ const SHADE: f64 = 1.0 / 63.0;
 pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
     let (ways, points) = transforms(topics);
     let held: BTreeSet<&str> = topics.iter().filter_map(|t| t.name.strip_prefix("/contents/")).map(owner).collect();
+    let forms = forms(topics);
     let mut things: Vec<Thing> = Vec::new();
     let mut known = BTreeSet::new();
     let updates = topics.iter().filter(|t| t.name == "/scene").flat_map(|t| &t.messages);
@@ -46,6 +49,12 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
             link: text(entity, "frame_id") == name,
         });
     }
+    for thing in things.iter_mut().filter(|thing| !thing.link) {
+        if let Some(true_shapes) = forms.get(&thing.name) {
+            let color = thing.shapes.first().and_then(|(.., color)| *color);
+            thing.shapes = true_shapes.iter().map(|(at, shape)| (*at, shape.clone(), color)).collect();
+        }
+    }
     let (bodies, owners) = bench::bodies(&things, &mut document.meshes);
     document.bodies = bodies;
     for (name, way) in &ways {
@@ -61,6 +70,18 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
     }
     document.tracks.sort_by_key(|t| t.body);
     owners
+}
+
+/// The true shapes of things, where the recording has them: primitives say nothing of insides and of what is turned.
+fn forms(topics: &[Topic]) -> BTreeMap<String, Vec<(Placement, Shape)>> {
+    let told = topics.iter().filter(|t| t.name == "/bodies").flat_map(|t| &t.messages).next();
+    let bodies = told.and_then(|(_, message)| Bodies::deserialize(message).ok()).unwrap_or_default();
+    let form = |thing: matterix_ir::bodies::Thing| {
+        let main = thing.shape.map(|shape| (Placement::default(), shape));
+        let more = thing.solids.into_iter().map(|solid| (solid.pose, solid.shape));
+        (thing.name, main.into_iter().chain(more).collect())
+    };
+    bodies.things.into_iter().map(form).collect()
 }
 
 /// The thing that a mixture is in, by their names: `beaker` of `beaker.contents`.
