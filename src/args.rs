@@ -52,6 +52,8 @@ pub enum Command {
     Doc(DocArgs),
     /// Schedule a workflow: who has which instance when, so that the whole ends early.
     Plan(PlanArgs),
+    /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
+    Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
     View(ViewArgs),
     /// Explain a diagnostic code, or list them all.
@@ -261,6 +263,17 @@ pub struct DocArgs {
     /// Where to write it; to standard output without it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// `matterixc verify`.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// The recording that a run has written, or the folder it is in.
+    #[arg(value_name = "RUN")]
+    pub recording: PathBuf,
+    /// Form of the verdict.
+    #[arg(long, value_enum, default_value_t = RunFormat::Human)]
+    pub format: RunFormat,
 }
 
 /// `matterixc view`.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::Shape;
 
-use crate::document::{Body, Cavity, Finish, Frame, Piece, Solid};
+use crate::document::{Body, Cavity, Finish, Frame, Mesh, Piece, Solid};
 use crate::placement::pose;
 
 /// An instance as programs and recordings tell of it.
@@ -26,8 +26,8 @@ pub(crate) struct Thing {
     pub(crate) link: bool,
 }
 
-/// The bodies of all things that are seen, and the index of each by name.
-pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
+/// The bodies of all things that are seen, and the index of each by name; their triangles are added to `meshes`.
+pub(crate) fn bodies(things: &[Thing], meshes: &mut Vec<Mesh>) -> (Vec<Body>, Owners) {
     let seen: Vec<&Thing> = things.iter().filter(|t| !t.shapes.is_empty()).collect();
     let owners = Owners::new(seen.iter().map(|t| t.name.as_str()));
     let made = seen.iter().enumerate().map(|(i, thing)| {
@@ -41,7 +41,7 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
                 (true, true) => {
                     pieces.push(Piece {
                         pose: pose(at),
-                        solid: vessel(shape, wall),
+                        solid: vessel(shape, wall, meshes),
                         finish: Finish::Glass,
                         color: None,
                     });
@@ -50,7 +50,7 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
                 _ => {
                     let finish = if hull { Finish::Hull } else { Finish::Matte };
                     let middle = pose(at.then(Placement::up(middle(shape))));
-                    pieces.push(Piece { pose: middle, solid: solid(shape), finish, color });
+                    pieces.push(Piece { pose: middle, solid: solid(shape, meshes), finish, color });
                 }
             }
         }
@@ -106,9 +106,14 @@ impl Owners {
     }
 }
 
-/// A shape about the middle of its height, but for what is turned, which stands on its base.
-fn solid(shape: &Shape) -> Solid {
+/// A shape about the middle of its height, but for what is turned and for meshes, which stand on their base.
+fn solid(shape: &Shape, meshes: &mut Vec<Mesh>) -> Solid {
     match shape {
+        Shape::Mesh(mesh) => {
+            let positions = mesh.points.iter().flatten().map(|v| *v as f32).collect();
+            meshes.push(Mesh { positions, indices: mesh.triangles.iter().flatten().copied().collect() });
+            Solid::Mesh(meshes.len() as u32 - 1, [1.0; 3])
+        }
         Shape::Box(size) => Solid::Cuboid(size.map(|v| v as f32)),
         Shape::Cylinder([d, h]) => Solid::Cylinder([(d / 2.0) as f32, *h as f32]),
         Shape::Sphere(d) => Solid::Sphere((d / 2.0) as f32),
@@ -122,7 +127,7 @@ fn solid(shape: &Shape) -> Solid {
 /// How far above its base the origin of a shape's solid is, m.
 fn middle(shape: &Shape) -> f64 {
     match shape {
-        Shape::Turned { .. } => 0.0,
+        Shape::Turned { .. } | Shape::Mesh(_) => 0.0,
         _ => shape.size()[2] / 2.0,
     }
 }
@@ -135,9 +140,9 @@ fn wall(shape: &Shape) -> f64 {
 }
 
 /// A vessel with an open top; a box is shown by its outline.
-fn vessel(shape: &Shape, wall: f64) -> Solid {
+fn vessel(shape: &Shape, wall: f64, meshes: &mut Vec<Mesh>) -> Solid {
     let Shape::Cylinder([d, h]) = *shape else {
-        return solid(shape);
+        return solid(shape, meshes);
     };
     let (outer, inner) = (d / 2.0, d / 2.0 - wall);
     let edge = (0.06 * d).min(0.25 * h);
@@ -167,6 +172,10 @@ fn room(shape: &Shape, wall: f64, at: Placement) -> Cavity {
             Cavity::Round(room.iter().map(raised).collect())
         }
         Shape::Sphere(d) => Cavity::Round(vec![[0.0, low as f32], [(d / 2.0) as f32, (low + d) as f32]]),
+        Shape::Mesh(_) => {
+            let [x, y, z] = shape.size();
+            Cavity::Boxed([x - 2.0 * wall, y - 2.0 * wall, z - wall].map(|v| v as f32), low as f32)
+        }
         Shape::Box([x, y, z]) => {
             Cavity::Boxed([x - 2.0 * wall, y - 2.0 * wall, z - wall].map(|v| v as f32), low as f32)
         }

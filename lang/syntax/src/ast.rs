@@ -391,6 +391,8 @@ pub enum AssetLine {
         /// Its pose; at the origin without one.
         at: Option<At>,
     },
+    /// A mesh that a shape of the asset names at this place; none where it cannot be read.
+    Mesh(Span, Option<std::sync::Arc<matterix_ir::mesh::Mesh>>),
     /// Links and joints, from the file at this place.
     Robot(Box<matterix_ir::robot::Robot>, Span),
     /// `lid = Lid { ... }`: a child asset.

@@ -12,6 +12,8 @@ pub struct Assembly {
     pub tip: u32,
     /// The link that carries the tools: the robot's own tip.
     pub flange: u32,
+    /// Links from this one on are of tools.
+    pub tools: u32,
     /// Positions of the moving joints when the run begins, rad or m.
     pub home: Vec<f64>,
     /// Which instance each link belongs to.
@@ -25,6 +27,7 @@ pub fn assemble(scene: &Scene, id: InstanceId) -> Option<Assembly> {
         robot: own.robot.clone(),
         tip: own.tip,
         flange: own.tip,
+        tools: own.robot.links.len() as u32,
         home: own.home.clone(),
         owners: vec![id; own.robot.links.len()],
     };

@@ -8,9 +8,10 @@ use matterix_motion::inverse::{Request, Solver, Unreached};
 use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
-use matterix_motion::time::{Limits, Trajectory, follow};
+use matterix_motion::time::{Limits, State, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
+use super::exact::Exact;
 use super::fingers::CLEARANCE;
 use super::goal::{carried_to, spots, targets, targets_at};
 use super::postures::postures;
@@ -71,10 +72,15 @@ impl Performed {
 
     /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where they do not move.
     pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
+        Some(self.state(joints, time)?.position)
+    }
+
+    /// What some joints do at a time since the beginning, s; at rest while they wait. Nothing where they do not move.
+    fn state(&self, joints: &[usize], time: f64) -> Option<State> {
         let mut own = self.begins().filter(|(_, part)| part.joints == joints);
         let mut now = own.next()?;
         own.take_while(|(begin, _)| *begin <= time).for_each(|next| now = next);
-        Some(now.1.trajectory.at(time - now.0).position)
+        Some(now.1.trajectory.at(time - now.0))
     }
 
     /// Brings the robot to where it is at a time since the beginning, s. What has not moved yet is where it begins.
@@ -82,6 +88,18 @@ impl Performed {
         for part in &self.parts {
             if let Some(at) = self.at(&part.joints, time) {
                 actor.set_some(&part.joints, &at);
+            }
+        }
+    }
+
+    /// Gives a moment the speeds and accelerations that joints have at a time since the beginning, s.
+    fn rush(&self, moment: &mut Moment, time: f64) {
+        for part in &self.parts {
+            let Some(state) = self.state(&part.joints, time) else { continue };
+            for (joint, (speed, acceleration)) in part.joints.iter().zip(state.velocity.iter().zip(&state.acceleration)) {
+                if let (Some(v), Some(a)) = (moment.speeds.get_mut(*joint), moment.accelerations.get_mut(*joint)) {
+                    (*v, *a) = (*speed, *acceleration);
+                }
             }
         }
     }
@@ -105,6 +123,10 @@ pub struct Moment {
     pub robot: InstanceId,
     /// Positions of all its joints that move by themselves, rad or m.
     pub joints: Vec<f64>,
+    /// Their speeds, rad/s or m/s.
+    pub speeds: Vec<f64>,
+    /// Their accelerations, rad/s2 or m/s2.
+    pub accelerations: Vec<f64>,
     /// Its links in the lab, in the order of its assembly.
     pub links: Vec<Pose>,
     /// What it holds, in the lab.
@@ -309,7 +331,16 @@ impl Stage<'_> {
         let base = self.pose(robot);
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
-        Some(Moment { time, robot, joints: actor.joints.clone(), links, held })
+        let still = vec![0.0; actor.joints.len()];
+        Some(Moment {
+            time,
+            robot,
+            joints: actor.joints.clone(),
+            speeds: still.clone(),
+            accelerations: still,
+            links,
+            held,
+        })
     }
 
     /// Moments of a motion that has been carried out and began at a time, s, at most so far apart.
@@ -320,7 +351,9 @@ impl Stage<'_> {
             .filter_map(|step| {
                 let since = performed.duration() * f64::from(step) / f64::from(steps);
                 performed.bring(stage.actors.get_mut(&performed.robot)?, since);
-                stage.moment(performed.robot, begin + since)
+                let mut moment = stage.moment(performed.robot, begin + since)?;
+                performed.rush(&mut moment, since);
+                Some(moment)
             })
             .collect()
     }
@@ -521,7 +554,8 @@ impl Stage<'_> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
         let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
         let start = actor.configuration();
         let refused = |failure| match failure {
@@ -561,7 +595,8 @@ impl Stage<'_> {
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
         let mut solver = Solver::new(actor.chain.clone());
         let mut points = vec![actor.configuration()];
         for to in to {
@@ -579,6 +614,12 @@ impl Stage<'_> {
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &end);
         Ok(part)
+    }
+
+    /// Says what collides. What others sweep are balls, and a way around them is not worth asking true shapes.
+    fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
+        let checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
+        if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }
 
     pub(super) fn figure(&self, robot: InstanceId, actor: &Actor) -> Result<Figure, Refused> {

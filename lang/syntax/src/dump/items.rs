@@ -148,6 +148,7 @@ fn asset_line(line: &AssetLine) -> Sexp {
         AssetLine::Error(_) => leaf("error"),
         AssetLine::Field(of) => field(of),
         AssetLine::Frame { name: word, at } => node("frame").with([name(word)]).with(place(at)),
+        AssetLine::Mesh(_, mesh) => node("mesh").with(mesh.iter().map(|mesh| quoted(&mesh.name))),
         AssetLine::Robot(robot, _) => node("robot").with([quoted(&robot.name)]),
         AssetLine::Solid { shape, at } => node("solid").with([expr(shape)]).with(at.iter().flat_map(place)),
         AssetLine::Grid(of) => node("grid")
