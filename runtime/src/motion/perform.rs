@@ -96,11 +96,13 @@ impl Performed {
     fn rush(&self, moment: &mut Moment, time: f64) {
         for part in &self.parts {
             let Some(state) = self.state(&part.joints, time) else { continue };
-            for (joint, (speed, acceleration)) in part.joints.iter().zip(state.velocity.iter().zip(&state.acceleration)) {
-                if let (Some(v), Some(a)) = (moment.speeds.get_mut(*joint), moment.accelerations.get_mut(*joint)) {
-                    (*v, *a) = (*speed, *acceleration);
+            let put = |values: &[f64], all: &mut [f64]| {
+                for (joint, value) in part.joints.iter().zip(values) {
+                    all.get_mut(*joint).into_iter().for_each(|v| *v = *value);
                 }
-            }
+            };
+            put(&state.velocity, &mut moment.speeds);
+            put(&state.acceleration, &mut moment.accelerations);
         }
     }
 }
