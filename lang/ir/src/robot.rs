@@ -144,6 +144,7 @@ pub struct Robot {
     /// Pairs of links that may touch, by index, the lower first.
     pub touching: Vec<[u32; 2]>,
     /// Meshes that were found, by the names that solids have for them; before they are scaled.
+    #[serde(default)]
     pub meshes: BTreeMap<String, Arc<Mesh>>,
 }
 

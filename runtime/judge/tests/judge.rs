@@ -80,7 +80,6 @@ impl Run {
                 json!({ "joints": [{ "name": "slide.x", "position": x, "velocity": v, "acceleration": a }] }),
             );
         }
-        drop(push);
         writer.finish().expect("an end");
         drop(writer);
         out.into_inner()

@@ -79,5 +79,5 @@ fn where_balls_collide_the_referee_decides() {
     }
     let mut checker = Checker::new(&figure, &world, 32.0);
     let alone = plan(&mut checker, &START, &GOAL, &Settings::default());
-    assert!(matches!(alone, Err(Failure::Collision(End::Goal, _))), "{alone:?}");
+    assert!(matches!(alone, Err(Failure::Collision(..))), "{alone:?}");
 }
