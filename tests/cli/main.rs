@@ -25,5 +25,6 @@ mod screening;
 mod slips;
 mod strict;
 mod time;
+mod together;
 mod types;
 mod usage;
