@@ -10,20 +10,12 @@ fn environments() -> Vec<String> {
 }
 
 #[test]
-fn environments_have_no_findings() {
+fn environments_have_no_findings_and_end_as_expected() {
     for file in environments() {
-        let ended = matterixc(&["check", &file, "--fidelity", "motion"]);
-        assert_eq!((ended.code, ended.out.trim()), (0, "no findings"), "{file}");
-    }
-}
-
-#[test]
-fn environments_end_as_expected_at_both_fidelities() {
-    for file in environments() {
-        for fidelity in ["process", "motion"] {
-            let ended = matterixc(&["run", &file, "--fidelity", fidelity]);
-            assert_eq!(ended.code, 0, "{file} at {fidelity}: {}{}", ended.out, ended.err);
-        }
+        let checked = matterixc(&["check", &file]);
+        assert_eq!((checked.code, checked.out.trim()), (0, "no findings"), "{file}");
+        let ended = matterixc(&["run", &file]);
+        assert_eq!(ended.code, 0, "{file}: {}{}", ended.out, ended.err);
     }
 }
 
@@ -35,6 +27,30 @@ fn environments_end_as_expected_from_places_near_by() {
             let ended = matterixc(&args);
             assert_eq!(ended.code, 0, "{file} from {seed}: {}{}", ended.out, ended.err);
         }
+    }
+}
+
+#[test]
+fn environments_can_be_looked_at_before_and_after_a_run() {
+    let dir = folder("environments_view");
+    for file in environments() {
+        let page = dir.join("page.html");
+        let page = page.to_str().expect("text");
+        let ended = matterixc(&["view", &file, "--export", page]);
+        assert_eq!(ended.code, 0, "{file}: {}", ended.err);
+        let text = std::fs::read_to_string(page).expect("a page");
+        let arms = ["panda", "fr3"].iter().filter(|arm| text.contains(&format!("\"name\":\"{arm}\""))).count();
+        assert_eq!(arms, 1, "{file}: the arm is shown under its name");
+    }
+    let out = dir.to_str().expect("text");
+    let ended = matterixc(&["run", "examples/environments/funnel.mtx", "--fidelity", "motion", "--out", out]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let page = dir.join("run.html");
+    let ended = matterixc(&["view", out, "--export", page.to_str().expect("text")]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let text = std::fs::read_to_string(page).expect("a page");
+    for name in ["panda", "funnel", "panda.wrist.wrist_horn", "panda.gripper.robotiq_85_base_link"] {
+        assert!(text.contains(&format!("\"name\":\"{name}\"")), "{name}");
     }
 }
 

@@ -28,6 +28,7 @@ mod screening;
 mod slips;
 mod strict;
 mod time;
+mod together;
 mod types;
 mod usage;
 mod verify;

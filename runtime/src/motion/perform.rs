@@ -506,8 +506,10 @@ impl Stage<'_> {
             }
         }
         // What is in the way beside a line may not be if the gripper turns before it sets out.
-        for (_, target, _) in found.iter().filter(|_| way == Way::Straight) {
-            if let Ok(turned) = self.turned_line(robot, target, goal.as_slice()) {
+        for (_, target, q) in found.iter().filter(|_| way == Way::Straight) {
+            if self.is_free_there(robot, q, goal)
+                && let Ok(turned) = self.turned_line(robot, target, goal.as_slice())
+            {
                 parts.extend(turned);
                 return Ok(Performed { robot, parts });
             }
@@ -532,6 +534,26 @@ impl Stage<'_> {
             }
         }
         Err(refused)
+    }
+
+    /// Whether nothing is in the way of a robot where a straight line to something ends.
+    fn is_free_there(&self, robot: InstanceId, q: &[f64], goal: Option<InstanceId>) -> bool {
+        let around = self.beside_line(robot, goal.as_slice());
+        let figure = self.actors.get(&robot).and_then(|actor| self.figure(robot, actor).ok());
+        figure.is_some_and(|figure| figure.contacts(&around.world, q).is_empty())
+    }
+
+    /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
+    fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
+        let mut without = self.carriers(robot);
+        for id in near {
+            without.push(*id);
+            // No hand that holds it.
+            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
+        }
+        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
+        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
+        Surroundings::of_but(self, robot, &without, &bodiless)
     }
 
     /// Turns the tip where it is as a pose is turned, then brings it there on a straight line.
@@ -585,15 +607,7 @@ impl Stage<'_> {
 
     /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
     pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
-        let mut without = self.carriers(robot);
-        for id in near {
-            without.push(*id);
-            // No hand that holds it.
-            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
-        }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
-        let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
-        let around = Surroundings::of_but(self, robot, &without, &bodiless);
+        let around = self.beside_line(robot, near);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let base = self.pose(robot).inverse();
         let figure = self.figure(robot, actor)?;

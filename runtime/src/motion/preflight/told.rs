@@ -42,7 +42,8 @@ pub fn finding(
                 false => format!("`{}` runs into `{}` on its way to {to}", name(robot), meeting.other),
             };
             let depth = (meeting.depth * 1e3).max(1.0);
-            let label = format!("`{}` meets it at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
+            let met = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
+            let label = format!("`{}` meets {met} at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
         Refused::NoWay => Diagnostic::error(

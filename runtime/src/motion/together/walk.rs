@@ -181,11 +181,11 @@ impl<'p> Walk<'p, '_> {
             return list.iter().for_each(|id| self.step(*id));
         };
         list[..first].iter().for_each(|id| self.step(*id));
-        let Step::Start { job: name, .. } = &plan.get(list[first]).step else { return };
+        let Step::Start { job: name, body } = &plan.get(list[first]).step else { return };
         let awaits = |id: &StepId| matches!(&plan.get(*id).step, Step::Await { job } if job == name);
         let rest = &list[first + 1..];
         let (meanwhile, later) = rest.split_at(rest.iter().position(awaits).unwrap_or(rest.len()));
-        self.beside(&[vec![list[first]], meanwhile.to_vec()]);
+        self.beside(&[vec![*body], meanwhile.to_vec()]);
         self.sequence(later);
     }
 
