@@ -6,14 +6,14 @@ use std::hash::Hasher;
 use std::path::{Path, PathBuf};
 
 /// Where a motion is planned and what it is planned with, seen from this crate.
-const SOURCES: &[&str] = &["src/motion", "motion/src", "../lang/ir/src"];
+const SOURCES: &[&str] = &["src/motion", "motion/src", "solids/src", "src/backend/noise.rs", "../lang/ir/src"];
 
 fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     let mut files = Vec::new();
-    for folder in SOURCES {
-        println!("cargo::rerun-if-changed={folder}");
-        collect(&root.join(folder), &mut files);
+    for source in SOURCES {
+        println!("cargo::rerun-if-changed={source}");
+        collect(&root.join(source), &mut files);
     }
     files.sort();
     let mut hash = DefaultHasher::new();
@@ -23,13 +23,10 @@ fn main() {
     println!("cargo::rustc-env=MATTERIX_MOTION_SOURCES={:016x}", hash.finish());
 }
 
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
-    for path in entries {
-        if path.is_dir() {
-            collect(&path, files);
-        } else {
-            files.push(path);
-        }
+fn collect(path: &Path, files: &mut Vec<PathBuf>) {
+    if !path.is_dir() {
+        return files.push(path.to_path_buf());
     }
+    let entries = fs::read_dir(path).into_iter().flatten().flatten().map(|e| e.path());
+    entries.for_each(|entry| collect(&entry, files));
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use matterix_runtime::motion::Perturbation;
 
 use crate::pipeline::Options;
 
@@ -51,6 +52,8 @@ pub enum Command {
     Doc(DocArgs),
     /// Schedule a workflow: who has which instance when, so that the whole ends early.
     Plan(PlanArgs),
+    /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
+    Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
     View(ViewArgs),
     /// Explain a diagnostic code, or list them all.
@@ -139,6 +142,9 @@ pub struct RunArgs {
     /// How closely motions are simulated; with `motion` they are looked at before the run begins.
     #[arg(long, value_enum, default_value_t = Fidelity::Process)]
     pub fidelity: Fidelity,
+    /// Move what can be gripped and stands freely by up to so much each way, as the seed has it: `--perturb 20mm,10deg`.
+    #[arg(long, value_name = "LENGTH[,ANGLE]", value_parser = perturbation)]
+    pub perturb: Option<Perturbation>,
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
@@ -259,6 +265,17 @@ pub struct DocArgs {
     pub out: Option<PathBuf>,
 }
 
+/// `matterixc verify`.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// The recording that a run has written, or the folder it is in.
+    #[arg(value_name = "RUN")]
+    pub recording: PathBuf,
+    /// Form of the verdict.
+    #[arg(long, value_enum, default_value_t = RunFormat::Human)]
+    pub format: RunFormat,
+}
+
 /// `matterixc view`.
 #[derive(Debug, Args)]
 pub struct ViewArgs {
@@ -299,16 +316,39 @@ fn setting(text: &str) -> Result<(String, String), String> {
     }
 }
 
-fn time(text: &str) -> Result<Duration, String> {
+/// Sizes of units.
+type Units = [(&'static str, f64)];
+
+/// A number with one of these units; nothing where the unit is none of them.
+fn measure(text: &str, units: &Units) -> Result<Option<f64>, String> {
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let (number, unit) = text.split_at(digits);
-    let size = match unit.trim() {
-        "ms" => 1e-3,
-        "s" => 1.0,
-        "min" => 60.0,
-        "h" => 3600.0,
-        _ => return Err("write a time with its unit, as in \"30 s\" or \"5 min\"".to_string()),
-    };
+    let Some((_, size)) = units.iter().find(|(name, _)| *name == unit.trim()) else { return Ok(None) };
     let number: f64 = number.parse().map_err(|_| format!("`{number}` is not a number"))?;
-    Duration::try_from_secs_f64(number * size).map_err(|_| "this time is too long".to_string())
+    Ok(Some(number * size))
+}
+
+/// A length, an angle, or both.
+fn perturbation(text: &str) -> Result<Perturbation, String> {
+    let wrong = || "write a length, an angle, or both, as in \"20mm,10deg\"".to_string();
+    let (mut shift, mut turn) = (None, None);
+    for part in text.split(',').map(str::trim) {
+        let length = measure(part, &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)])?;
+        let angle = measure(part, &[("deg", std::f64::consts::PI / 180.0), ("rad", 1.0)])?;
+        let (slot, value) = match (length, angle) {
+            (Some(length), _) => (&mut shift, length),
+            (_, Some(angle)) => (&mut turn, angle),
+            (None, None) => return Err(wrong()),
+        };
+        if slot.replace(value).is_some() {
+            return Err(wrong());
+        }
+    }
+    Ok(Perturbation { shift: shift.unwrap_or_default(), turn: turn.unwrap_or_default() })
+}
+
+fn time(text: &str) -> Result<Duration, String> {
+    let seconds = measure(text, &[("ms", 1e-3), ("s", 1.0), ("min", 60.0), ("h", 3600.0)])?
+        .ok_or("write a time with its unit, as in \"30 s\" or \"5 min\"")?;
+    Duration::try_from_secs_f64(seconds).map_err(|_| "this time is too long".to_string())
 }

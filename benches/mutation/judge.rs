@@ -111,6 +111,10 @@ impl Loader for Original {
         std::fs::read_to_string(&path).ok().map(|text| (path.display().to_string(), text))
     }
 
+    fn bytes(&self, _: FileId, path: &str) -> Result<Vec<u8>, String> {
+        std::fs::read(self.dir.join(path)).map_err(|e| e.to_string())
+    }
+
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
         std::fs::read_to_string(self.dir.join(path)).map_err(|e| e.to_string())
     }

@@ -1,8 +1,11 @@
-//! Assets from files of other formats: `asset X from labware "plate.json"`, `asset X from urdf "arm.urdf"`.
+//! Assets from files of other formats: `asset X from labware "plate.json"`, `asset X from urdf "arm.urdf"`; meshes of shapes.
 
+use std::sync::Arc;
+
+use matterix_ir::mesh::Mesh;
 use matterix_ir::{Diagnostic, FileId, codes};
 
-use crate::ast::{AssetLine, File, ItemKind, Name, Path};
+use crate::ast::{AssetLine, ExprKind, Field, FieldValue, File, ItemKind, Name, Path};
 use crate::loader::Loader;
 use crate::{labware, library};
 
@@ -15,11 +18,23 @@ struct Format {
     code: codes::Code,
     /// What its files hold, for messages.
     holds: &'static str,
-    read: fn(&str, &Name) -> Result<Given, String>,
+    read: fn(&str, &Name, &mut Beside<'_>) -> Result<Given, String>,
+}
+
+/// Files beside one that is being read.
+struct Beside<'l> {
+    from: FileId,
+    loader: &'l dyn Loader,
+    found: Vec<Diagnostic>,
 }
 
 const FORMATS: &[Format] = &[
-    Format { word: "labware", code: codes::LABWARE_FILE, holds: "labware definition", read: labware::lines },
+    Format {
+        word: "labware",
+        code: codes::LABWARE_FILE,
+        holds: "labware definition",
+        read: |text, path, _| labware::lines(text, path),
+    },
     Format { word: "urdf", code: codes::URDF_FILE, holds: "description of a robot", read: urdf },
 ];
 
@@ -30,12 +45,16 @@ pub fn is_known(format: &Name) -> bool {
 
 /// Replaces each `from FORMAT "file"` of a module by the lines of that file.
 pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
+    let mut beside = Beside { from: file, loader, found: Vec::new() };
     for item in &mut tree.items {
-        let ItemKind::Asset { source: Some((word, path)), extends, lines, .. } = &mut item.kind else { continue };
+        let ItemKind::Asset { source, extends, lines, .. } = &mut item.kind else { continue };
+        let meshes: Vec<AssetLine> = lines.iter().filter_map(|line| beside.mesh_of(line)).collect();
+        lines.extend(meshes);
+        let Some((word, path)) = source else { continue };
         let Some(format) = FORMATS.iter().find(|f| f.word == word.text) else { continue };
         let read = text(file, &path.text, loader).and_then(|text| {
-            (format.read)(&text, path).map_err(|reason| format!("`{}` is no {}: {reason}", path.text, format.holds))
+            (format.read)(&text, path, &mut beside)
+                .map_err(|reason| format!("`{}` is no {}: {reason}", path.text, format.holds))
         });
         match read {
             Ok((given, kind)) => {
@@ -45,13 +64,63 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
                 lines.extend(given);
             }
             Err(headline) => {
-                found.push(Diagnostic::error(format.code, path.span, headline, "this file"));
+                beside.found.push(Diagnostic::error(format.code, path.span, headline, "this file"));
                 // What it would have given is not missed again.
                 lines.push(AssetLine::Error(path.span));
             }
         }
     }
-    found
+    beside.found
+}
+
+impl Beside<'_> {
+    /// The mesh that the shape of a line names.
+    fn mesh_of(&mut self, line: &AssetLine) -> Option<AssetLine> {
+        let shape = match line {
+            AssetLine::Solid { shape, .. } => shape,
+            AssetLine::Field(Field { key, value: FieldValue::Expr(e), .. }) if key.text == "shape" => e,
+            _ => return None,
+        };
+        let ExprKind::Call(callee, args) = &*shape.kind else { return None };
+        let file = &args.first()?.value;
+        match (&*callee.kind, &*file.kind) {
+            (ExprKind::Name(name), ExprKind::Text(path)) if name.text == "mesh" => {
+                let read =
+                    self.loader.bytes(self.from, path).map_err(|reason| format!("cannot read `{path}`: {reason}"));
+                let mesh = read.and_then(|bytes| {
+                    matterix_mesh::read(path, &bytes).map_err(|reason| format!("`{path}` is no mesh: {reason}"))
+                });
+                let mesh = mesh.map_err(|headline| {
+                    self.found.push(Diagnostic::error(codes::MESH_FILE, file.span, headline, "this file"));
+                });
+                Some(AssetLine::Mesh(file.span, mesh.ok().map(Arc::new)))
+            }
+            _ => None,
+        }
+    }
+
+    /// A mesh that a description of a robot names, if there is such a file beside it.
+    fn mesh(&mut self, description: &Name, uri: &str) -> Option<Mesh> {
+        matterix_mesh::is_metric(uri)?;
+        let folder = description.text.rsplit_once('/').map_or(String::new(), |(folder, _)| format!("{folder}/"));
+        // The first part of such a name is a package, whose folder the description lies in, or in one below.
+        let rest = uri.strip_prefix("package://").map(|rest| rest.split_once('/').map_or(rest, |(_, rest)| rest));
+        let name = uri.rsplit_once('/').map_or(uri, |(_, name)| name);
+        let places = match rest {
+            Some(rest) => vec![format!("{folder}{rest}"), format!("{folder}../{rest}"), format!("{folder}{name}")],
+            None => vec![format!("{folder}{uri}")],
+        };
+        let (path, bytes) =
+            places.into_iter().find_map(|p| Some((p.clone(), self.loader.bytes(self.from, &p).ok()?)))?;
+        match matterix_mesh::read(&path, &bytes) {
+            Ok(mesh) => Some(Mesh { name: path, ..mesh }),
+            Err(reason) => {
+                let headline = format!("`{path}` is no mesh: {reason}");
+                self.found.push(Diagnostic::error(codes::MESH_FILE, description.span, headline, "named in this file"));
+                None
+            }
+        }
+    }
 }
 
 /// The text of a file beside the module, or else of one of the library's.
@@ -66,7 +135,7 @@ fn text(from: FileId, path: &str, loader: &dyn Loader) -> Result<String, String>
 }
 
 /// A robot's links and joints.
-fn urdf(text: &str, path: &Name) -> Result<Given, String> {
-    let robot = matterix_urdf::read(text).map_err(|problem| problem.to_string())?;
+fn urdf(text: &str, path: &Name, beside: &mut Beside<'_>) -> Result<Given, String> {
+    let robot = matterix_urdf::read_with(text, |uri| beside.mesh(path, uri)).map_err(|problem| problem.to_string())?;
     Ok((vec![AssetLine::Robot(Box::new(robot), path.span)], None))
 }

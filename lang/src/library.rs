@@ -48,6 +48,7 @@ files! {
     "robots/kmr_iiwa/" => "kmr_iiwa.urdf"
     "robots/ot2/" => "ot2.urdf"
     "robots/panda/" => "panda.urdf"
+    "robots/plate_gripper/" => "plate_gripper.urdf"
     "robots/robotiq_2f85/" => "robotiq_2f85.urdf"
     "robots/ur3e/" => "ur3e.urdf"
     "robots/ur5e/" => "ur5e.urdf"

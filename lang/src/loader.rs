@@ -7,6 +7,9 @@ pub trait Loader {
     /// The module `module` (`sn1`, `parts::racks`) as seen from the file `from`: its display name and text.
     fn load(&self, from: FileId, module: &str) -> Option<(String, String)>;
 
+    /// The bytes of a data file as named in the file `from`, or in words why it cannot be read.
+    fn bytes(&self, from: FileId, path: &str) -> Result<Vec<u8>, String>;
+
     /// The text of a data file as named in the file `from`, or in words why it cannot be read.
     fn file(&self, from: FileId, path: &str) -> Result<String, String>;
 }
@@ -17,6 +20,10 @@ pub struct LibraryOnly;
 impl Loader for LibraryOnly {
     fn load(&self, _: FileId, _: &str) -> Option<(String, String)> {
         None
+    }
+
+    fn bytes(&self, _: FileId, _: &str) -> Result<Vec<u8>, String> {
+        Err("there is no such file".into())
     }
 
     fn file(&self, _: FileId, _: &str) -> Result<String, String> {

@@ -9,6 +9,7 @@ mod new;
 mod plan;
 mod run;
 mod test;
+mod verify;
 mod view;
 
 pub use bill::bill;
@@ -20,6 +21,7 @@ pub use new::new;
 pub use plan::plan;
 pub use run::run;
 pub use test::test;
+pub use verify::verify;
 pub use view::view;
 
 use crate::Exit;

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use matterix_ir::{Diagnostic, Program, Severity};
 use matterix_runtime::exec::Turn;
+use matterix_runtime::motion::perturb;
 
 use crate::args::{Color, Fidelity, RunArgs, RunFormat};
 use crate::cache;
@@ -30,9 +31,13 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
     let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, diagnostics);
-    let Some(program) = program.filter(|_| !is_wrong) else {
+    let Some(mut program) = program.filter(|_| !is_wrong) else {
         findings.end();
         return Ok(Exit::Findings);
+    };
+    let moved = match args.perturb {
+        Some(by) => perturb(&mut program, by, args.seed)?,
+        None => Vec::new(),
     };
 
     if args.fidelity == Fidelity::Motion && !args.dry {
@@ -54,7 +59,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         }
     };
     let mut progress = Progress::new(&program.plan, kind(args.format));
-    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns };
+    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 

@@ -91,7 +91,8 @@ impl Trial {
             return self.tell(file, sources, test, None, found);
         };
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
-        let choices = Choices { seed: self.seed, fidelity: Fidelity::Process, dry: false, turns: Vec::new() };
+        let choices =
+            Choices { seed: self.seed, fidelity: Fidelity::Process, dry: false, turns: Vec::new(), moved: Vec::new() };
         let ran = pipeline::run(program, sources, &choices, self.cancel, &mut progress);
         progress.finish();
         let found = if ran.passed { test.diagnostics.clone() } else { ran.diagnostics.clone() };

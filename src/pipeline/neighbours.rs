@@ -10,6 +10,9 @@ use crate::files;
 /// Bytes of the largest data file that is read; definitions of labware have some ten thousand.
 const LARGEST: u64 = 16 << 20;
 
+/// The same of meshes.
+const LARGEST_MESH: u64 = 64 << 20;
+
 /// Loads `sn1` from `sn1.mtx` and `parts::racks` from `parts/racks.mtx` in one folder.
 pub(super) struct Neighbours {
     dir: PathBuf,
@@ -19,6 +22,17 @@ impl Neighbours {
     /// The modules in a folder.
     pub(super) fn of(dir: &Path) -> Self {
         Neighbours { dir: dir.to_path_buf() }
+    }
+
+    /// Where a data file is, if it is one of at most so many bytes.
+    fn data(&self, path: &str, largest: u64) -> Result<PathBuf, String> {
+        let path = self.dir.join(path);
+        match std::fs::metadata(&path) {
+            Ok(about) if about.is_dir() => Err("it is a directory".to_string()),
+            Ok(about) if about.len() > largest => Err(format!("it is larger than {} MiB", largest >> 20)),
+            Ok(_) => Ok(path),
+            Err(e) => Err(files::reason(&e)),
+        }
     }
 }
 
@@ -37,13 +51,11 @@ impl Loader for Neighbours {
         Some((path.display().to_string(), text))
     }
 
+    fn bytes(&self, _: FileId, path: &str) -> Result<Vec<u8>, String> {
+        std::fs::read(self.data(path, LARGEST_MESH)?).map_err(|e| files::reason(&e))
+    }
+
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
-        let path = self.dir.join(path);
-        match std::fs::metadata(&path) {
-            Ok(about) if about.is_dir() => Err("it is a directory".to_string()),
-            Ok(about) if about.len() > LARGEST => Err(format!("it is larger than {} MiB", LARGEST >> 20)),
-            Ok(_) => std::fs::read_to_string(&path).map_err(|e| files::reason(&e)),
-            Err(e) => Err(files::reason(&e)),
-        }
+        std::fs::read_to_string(self.data(path, LARGEST)?).map_err(|e| files::reason(&e))
     }
 }

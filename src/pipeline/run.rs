@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Label, Program, Severity, Sources, Unit};
 use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
-use matterix_runtime::motion::Moment;
+use matterix_runtime::motion::{Moment, Moved};
 use matterix_runtime::process::{Engine, Observer};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
@@ -29,6 +29,8 @@ pub struct Choices {
     pub dry: bool,
     /// The turns of claims, where a schedule is followed.
     pub turns: Vec<Turn>,
+    /// What stands away from the place it was given.
+    pub moved: Vec<Moved>,
 }
 
 impl Choices {
@@ -53,6 +55,16 @@ pub fn run<'a>(
     let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
     let options = RunOptions { seed: choices.seed, fidelity, limits, ..RunOptions::default() };
     let mut follower = Follower { recording: Recording::new(program), progress };
+    for moved in &choices.moved {
+        let instance = program.scene.get(moved.thing);
+        let [x, y] = moved.shift.map(|m| m * 1e3);
+        let text = format!(
+            "`{}` stands ({x:.1}, {y:.1}) mm from its place, turned by {:.1} deg",
+            instance.name,
+            moved.turn.to_degrees()
+        );
+        follower.recording.log(0.0, Level::Info, text, Some(instance.span));
+    }
     let outcome = matterix_runtime::run::run(program, &options, &mut follower);
     let mut recording = follower.recording;
     recording.reach(outcome.end_time);

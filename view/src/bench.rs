@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::Shape;
 
-use crate::document::{Body, Cavity, Finish, Frame, Piece, Solid};
+use crate::document::{Body, Cavity, Finish, Frame, Mesh, Piece, Solid};
 use crate::placement::pose;
 
 /// An instance as programs and recordings tell of it.
@@ -26,12 +26,12 @@ pub(crate) struct Thing {
     pub(crate) link: bool,
 }
 
-/// The bodies of all things that are seen, and the index of each by name.
-pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
+/// The bodies of all things that are seen, and the index of each by name; their triangles are added to `meshes`.
+pub(crate) fn bodies(things: &[Thing], meshes: &mut Vec<Mesh>) -> (Vec<Body>, Owners) {
     let seen: Vec<&Thing> = things.iter().filter(|t| !t.shapes.is_empty()).collect();
     let owners = Owners::new(seen.iter().map(|t| t.name.as_str()));
     let made = seen.iter().enumerate().map(|(i, thing)| {
-        let hull = !thing.holds && !thing.link && encloses(thing, &seen);
+        let hull = !thing.holds && !thing.link && (encloses(thing, &seen) || roofs(thing));
         let (mut pieces, mut cavity) = (Vec::new(), None);
         for (at, shape, color) in &thing.shapes {
             let (at, color) = (*at, *color);
@@ -41,7 +41,7 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
                 (true, true) => {
                     pieces.push(Piece {
                         pose: pose(at),
-                        solid: vessel(shape, wall),
+                        solid: vessel(shape, wall, meshes),
                         finish: Finish::Glass,
                         color: None,
                     });
@@ -50,14 +50,16 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
                 _ => {
                     let finish = if hull { Finish::Hull } else { Finish::Matte };
                     let middle = pose(at.then(Placement::up(middle(shape))));
-                    pieces.push(Piece { pose: middle, solid: solid(shape), finish, color });
+                    pieces.push(Piece { pose: middle, solid: solid(shape, meshes), finish, color });
                 }
             }
         }
+        let above = owners.above(&thing.name).or_else(|| first_link(thing, &seen)).filter(|&p| p != i as u32);
+        let is_robot = thing.link && above.is_none();
         Body {
-            name: thing.name.clone(),
+            name: if is_robot { robot(thing).to_owned() } else { thing.name.clone() },
             kind: thing.kind.clone(),
-            parent: owners.above(&thing.name).or_else(|| first_link(thing, &seen)).filter(|&p| p != i as u32),
+            parent: above,
             pose: pose(thing.at),
             pieces,
             cavity,
@@ -67,11 +69,16 @@ pub(crate) fn bodies(things: &[Thing]) -> (Vec<Body>, Owners) {
     (made.collect(), owners)
 }
 
-/// The first link of the robot that a link belongs to: the whole robot goes by its name.
+/// The first link of the robot that a link belongs to: the whole robot goes by its own name.
 fn first_link(thing: &Thing, seen: &[&Thing]) -> Option<u32> {
-    let robot = |t: &Thing| t.name.split('.').next().map(str::to_owned);
-    let first = seen.iter().position(|other| other.link && robot(other) == robot(thing));
+    let is_of = |robot: &str| thing.name.strip_prefix(robot).is_some_and(|rest| rest.starts_with('.'));
+    let first = seen.iter().position(|other| other.link && is_of(robot(other)));
     first.filter(|_| thing.link).map(|i| i as u32)
+}
+
+/// The robot that a link of its own, not of a tool, belongs to.
+fn robot(link: &Thing) -> &str {
+    link.name.rsplit_once('.').map_or(&link.name, |(robot, _)| robot)
 }
 
 /// Bodies by name, and by the names of what is theirs.
@@ -99,9 +106,14 @@ impl Owners {
     }
 }
 
-/// A shape about the middle of its height, but for what is turned, which stands on its base.
-fn solid(shape: &Shape) -> Solid {
+/// A shape about the middle of its height, but for what is turned and for meshes, which stand on their base.
+fn solid(shape: &Shape, meshes: &mut Vec<Mesh>) -> Solid {
     match shape {
+        Shape::Mesh(mesh) => {
+            let positions = mesh.points.iter().flatten().map(|v| *v as f32).collect();
+            meshes.push(Mesh { positions, indices: mesh.triangles.iter().flatten().copied().collect() });
+            Solid::Mesh(meshes.len() as u32 - 1, [1.0; 3])
+        }
         Shape::Box(size) => Solid::Cuboid(size.map(|v| v as f32)),
         Shape::Cylinder([d, h]) => Solid::Cylinder([(d / 2.0) as f32, *h as f32]),
         Shape::Sphere(d) => Solid::Sphere((d / 2.0) as f32),
@@ -115,7 +127,7 @@ fn solid(shape: &Shape) -> Solid {
 /// How far above its base the origin of a shape's solid is, m.
 fn middle(shape: &Shape) -> f64 {
     match shape {
-        Shape::Turned { .. } => 0.0,
+        Shape::Turned { .. } | Shape::Mesh(_) => 0.0,
         _ => shape.size()[2] / 2.0,
     }
 }
@@ -128,9 +140,9 @@ fn wall(shape: &Shape) -> f64 {
 }
 
 /// A vessel with an open top; a box is shown by its outline.
-fn vessel(shape: &Shape, wall: f64) -> Solid {
+fn vessel(shape: &Shape, wall: f64, meshes: &mut Vec<Mesh>) -> Solid {
     let Shape::Cylinder([d, h]) = *shape else {
-        return solid(shape);
+        return solid(shape, meshes);
     };
     let (outer, inner) = (d / 2.0, d / 2.0 - wall);
     let edge = (0.06 * d).min(0.25 * h);
@@ -160,6 +172,10 @@ fn room(shape: &Shape, wall: f64, at: Placement) -> Cavity {
             Cavity::Round(room.iter().map(raised).collect())
         }
         Shape::Sphere(d) => Cavity::Round(vec![[0.0, low as f32], [(d / 2.0) as f32, (low + d) as f32]]),
+        Shape::Mesh(_) => {
+            let [x, y, z] = shape.size();
+            Cavity::Boxed([x - 2.0 * wall, y - 2.0 * wall, z - wall].map(|v| v as f32), low as f32)
+        }
         Shape::Box([x, y, z]) => {
             Cavity::Boxed([x - 2.0 * wall, y - 2.0 * wall, z - wall].map(|v| v as f32), low as f32)
         }
@@ -185,6 +201,18 @@ fn encloses(thing: &Thing, seen: &[&Thing]) -> bool {
                 true => x * x + y * y < a * a / 4.0,
             };
             within && (TOUCHING..c - TOUCHING).contains(&z)
+        })
+    })
+}
+
+/// Whether one of its own points lies under a roof of it: a place in a hood or under a gantry.
+fn roofs(thing: &Thing) -> bool {
+    thing.frames.iter().any(|(_, point)| {
+        let point = thing.at.then(*point).position;
+        thing.shapes.iter().any(|(at, shape, _)| {
+            let [x, y, z] = thing.at.then(*at).inverse().point(point);
+            let [a, b, c] = shape.size();
+            matches!(shape, Shape::Box(_)) && x.abs() < a / 2.0 && y.abs() < b / 2.0 && z < -c
         })
     })
 }

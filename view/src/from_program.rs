@@ -29,13 +29,15 @@ pub fn from_program(program: &Program, sources: &Sources) -> Document {
         link: false,
     };
     let things: Vec<Thing> = scene.instances.iter().enumerate().map(thing).collect();
-    let (bodies, owners) = bench::bodies(&things);
+    let mut meshes = Vec::new();
+    let (bodies, owners) = bench::bodies(&things, &mut meshes);
     let mut document = Document {
         version: DOCUMENT_VERSION,
         workflow: program.plan.workflow.clone(),
         lab: scene.lab.clone(),
         facts: program.plan.arguments.clone(),
         bodies,
+        meshes,
         ..Document::default()
     };
     contents(program, &owners, &mut document);

@@ -55,11 +55,12 @@ pub fn add(
             added.push(None);
             continue;
         }
-        // The whole robot goes by the name of the first of its links that is seen.
+        // The whole robot goes by its own name, at the first of its links that is seen.
         let first = added.iter().copied().flatten().next();
+        let above = parent.or(first);
         document.bodies.push(Body {
-            name: format!("{name}.{}", link.name),
-            parent: parent.or(first),
+            name: if above.is_none() { name.to_owned() } else { format!("{name}.{}", link.name) },
+            parent: above,
             pose: pose(at.get(i).copied().unwrap_or_default()),
             pieces,
             ..Body::default()

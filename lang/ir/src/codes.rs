@@ -41,6 +41,7 @@ codes! {
     SYNTAX "syntax" "P0" "the text is not what the grammar expects here";
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
+    MESH_FILE "mesh-file" "N0" "a mesh cannot be read";
     LABWARE_FILE "labware-file" "N0" "a labware definition cannot be read";
     URDF_FILE "urdf-file" "N0" "a description of a robot cannot be read";
     UNKNOWN_NAME "unknown-name" "N0" "a name is not declared";

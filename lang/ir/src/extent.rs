@@ -43,20 +43,22 @@ impl Body<'_> {
 
     /// The narrowest width of the foot it stands on, m.
     pub fn foot(&self) -> Option<f64> {
-        self.shape.map(|shape| match shape {
+        self.shape.and_then(|shape| match shape {
             Shape::Turned { outside, .. } => {
                 let lowest = outside.first().map_or(0.0, |p| p[1]);
-                2.0 * outside.iter().filter(|p| p[1] <= lowest).map(|p| p[0]).fold(0.0, f64::max)
+                Some(2.0 * outside.iter().filter(|p| p[1] <= lowest).map(|p| p[0]).fold(0.0, f64::max))
             }
-            Shape::Sphere(_) => 0.0,
-            Shape::Box([x, y, _]) => x.min(*y),
-            Shape::Cylinder([d, _]) => *d,
+            Shape::Sphere(_) => Some(0.0),
+            Shape::Box([x, y, _]) => Some(x.min(*y)),
+            Shape::Cylinder([d, _]) => Some(*d),
+            Shape::Mesh(_) => None,
         })
     }
 
     /// The narrowest width of what things stand on, m.
     pub fn top(&self) -> Option<f64> {
-        self.shape.map(|shape| shape.size()).map(|[x, y, _]| x.min(y))
+        let known = self.shape.filter(|shape| !matches!(shape, Shape::Mesh(_)));
+        known.map(|shape| shape.size()).map(|[x, y, _]| x.min(y))
     }
 }
 
@@ -88,6 +90,7 @@ fn across(shape: &Shape, at: Pose) -> Option<f64> {
         Shape::Cylinder([d, _]) => d / 2.0,
         Shape::Sphere(d) => (d * d / 4.0 - (z - d / 2.0).powi(2)).max(0.0).sqrt(),
         Shape::Turned { outside, .. } => radius_at(outside, z),
+        Shape::Mesh(_) => return None,
     };
     if x.hypot(y) > radius + near {
         return None;

@@ -7,13 +7,16 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+//! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
+pub mod bodies;
 pub mod codes;
 pub mod diagnostic;
 pub mod extent;
 pub mod graph;
 pub mod math;
+pub mod mesh;
 pub mod model;
 pub mod plan;
 pub mod points;

@@ -1,6 +1,11 @@
 //! Robots as trees of links and joints: what kinematics, planning and pictures need of one, in SI units.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+
+use crate::mesh::Mesh;
 
 pub use crate::pose::Pose as Placement;
 
@@ -138,6 +143,9 @@ pub struct Robot {
     pub balls: Vec<Ball>,
     /// Pairs of links that may touch, by index, the lower first.
     pub touching: Vec<[u32; 2]>,
+    /// Meshes that were found, by the names that solids have for them; before they are scaled.
+    #[serde(default)]
+    pub meshes: BTreeMap<String, Arc<Mesh>>,
 }
 
 impl Robot {
@@ -177,6 +185,7 @@ impl Robot {
                 .iter()
                 .filter_map(|[a, b]| Some([number(&links, *a)?, number(&links, *b)?]))
                 .collect(),
+            meshes: self.meshes.clone(),
         }
     }
 
@@ -211,6 +220,7 @@ impl Robot {
             mimic: joint.mimic.map(|m| Mimic { joint: joints + 1 + m.joint, ..m }),
             ..joint.clone()
         }));
+        self.meshes.extend(tool.meshes.iter().map(|(name, mesh)| (name.clone(), mesh.clone())));
         self.balls.extend(tool.balls.iter().map(|ball| Ball { link: links + ball.link, ..*ball }));
         self.touching.extend(tool.touching.iter().map(|[a, b]| [links + a, links + b]));
         let solid = |l: &u32| !self.links[*l as usize].collision.is_empty();

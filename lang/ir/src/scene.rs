@@ -1,8 +1,11 @@
 //! What there is: instances of assets, where they stand, and what their states mean.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::extent::Body;
+use crate::mesh::Mesh;
 pub use crate::pose::Pose;
 use crate::robot::Robot;
 use crate::{NodeId, Span};
@@ -54,6 +57,8 @@ pub enum Shape {
         /// From the bottom up.
         inside: Vec<[f64; 2]>,
     },
+    /// Triangles, the middle of the base of the box around them at the origin.
+    Mesh(Arc<Mesh>),
 }
 
 impl Shape {
@@ -67,6 +72,7 @@ impl Shape {
                 let greatest = |k: usize| outside.iter().map(|p| p[k]).fold(0.0, f64::max);
                 [2.0 * greatest(0), 2.0 * greatest(0), greatest(1)]
             }
+            Shape::Mesh(mesh) => mesh.size(),
         }
     }
 
@@ -77,12 +83,13 @@ impl Shape {
             Shape::Cylinder([d, _]) => d / 2.0,
             Shape::Sphere(_) => 0.0,
             Shape::Turned { outside, .. } => outside.last().map_or(0.0, |p| p[0]),
+            Shape::Mesh(mesh) => mesh.size()[0] / 2.0,
         }
     }
 
     /// Whether turning it about its own axis changes nothing.
     pub fn is_round(&self) -> bool {
-        !matches!(self, Shape::Box(_))
+        !matches!(self, Shape::Box(_) | Shape::Mesh(_))
     }
 }
 

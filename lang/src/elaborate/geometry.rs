@@ -1,5 +1,8 @@
 //! Where things are and how they are shaped: poses, frames, shapes.
 
+use std::sync::Arc;
+
+use matterix_ir::mesh::Mesh;
 use matterix_ir::scene::{Frame, InstanceId, Pose, Shape, Solid, frame};
 use matterix_ir::{Diagnostic, Span, codes};
 
@@ -13,6 +16,7 @@ const SHAPES: &[(&str, &str)] = &[
     ("box", "three lengths: `box(x, y, z)`"),
     ("cylinder", "diameter and height: `cylinder(70 mm, 95 mm)`"),
     ("sphere", "a diameter: `sphere(20 mm)`"),
+    ("mesh", "a file and how long one unit of it is: `mesh(\"bottle.stl\", 1 mm)`"),
     ("vessel", "diameter, height, wall and floor: `vessel(70 mm, 95 mm, 1.5 mm, 2 mm)`"),
     (
         "turned",
@@ -43,13 +47,13 @@ impl<'a> Elaborator<'a> {
         if let Some(setting) = self.instances[id.0 as usize].setting("shape")
             && let FieldValue::Expr(e) = setting.value()
         {
-            out.shape = self.shape(e, &mut setting.scope());
+            out.shape = self.shape(id, e, &mut setting.scope());
         }
         out.frames = self.frames(id, out.shape.as_ref());
         for (module, line) in self.lines(id) {
             let AssetLine::Solid { shape, at } = line else { continue };
             let mut scope = Scope::of(id, module);
-            let Some(shape) = self.shape(shape, &mut scope) else { continue };
+            let Some(shape) = self.shape(id, shape, &mut scope) else { continue };
             let place = match at {
                 Some(at) => self.pose(id, at, &out, &mut scope),
                 None => Some((Pose::IDENTITY, false, None)),
@@ -217,7 +221,7 @@ impl<'a> Elaborator<'a> {
         Some(out)
     }
 
-    fn shape(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
+    fn shape(&mut self, id: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
         let found = call(e).and_then(|(name, args)| {
             let known = SHAPES.iter().find(|(n, _)| *n == name);
             known.map(|(name, given)| (*name, *given, args))
@@ -231,6 +235,14 @@ impl<'a> Elaborator<'a> {
             return None;
         };
         let shape = match name {
+            "mesh" => match args {
+                [file] => return self.mesh(id, e.span, &file.value, None),
+                [file, unit] => {
+                    let unit = self.extent(&unit.value, name, scope)?;
+                    return self.mesh(id, e.span, &file.value, Some(unit));
+                }
+                _ => None,
+            },
             "turned" => match args {
                 [outside, inside] => {
                     let outside = self.outline(&outside.value, scope)?;
@@ -261,6 +273,41 @@ impl<'a> Elaborator<'a> {
             ));
         }
         shape
+    }
+
+    /// The mesh in a file, of which one unit is so long, m.
+    fn mesh(&mut self, id: InstanceId, span: Span, file: &'a Expr, unit: Option<f64>) -> Option<Shape> {
+        let ExprKind::Text(name) = &*file.kind else {
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, file.span, "a mesh is named by its file", "not a text");
+            self.report(d.help("`mesh(\"bottle.stl\", 1 mm)`"));
+            return None;
+        };
+        let read = self.lines(id).into_iter().find_map(|(_, line)| match line {
+            AssetLine::Mesh(at, mesh) if *at == file.span => Some(mesh.as_ref()),
+            _ => None,
+        });
+        let Some(read) = read else {
+            let headline = "a mesh is given where its asset is declared";
+            self.report(Diagnostic::error(codes::UNSUPPORTED, file.span, headline, "not here"));
+            return None;
+        };
+        // What cannot be read has been reported.
+        let mesh = read?;
+        let unit = match (unit, matterix_mesh::is_metric(name)) {
+            (Some(unit), _) => unit,
+            (None, Some(true)) => 1.0,
+            (None, _) => {
+                let d = Diagnostic::error(
+                    codes::WRONG_ARGUMENTS,
+                    span,
+                    format!("`{name}` does not say its unit"),
+                    "how long is one unit of it",
+                );
+                self.report(d.help(format!("`mesh(\"{name}\", 1 mm)` where it is drawn in millimetres")));
+                return None;
+            }
+        };
+        Some(Shape::Mesh(Arc::new(Mesh::clone(mesh).scaled([unit; 3]).grounded())))
     }
 
     /// A straight beaker: an open cylinder with a wall and a floor.

@@ -210,13 +210,22 @@ pub(super) fn clothe(robot: &mut Robot, solids: Vec<(u32, Solid)>) {
     for (index, Solid { shape, pose }) in solids {
         let [x, y, z] = shape.size();
         let solid = match shape {
-            Shape::Box(size) => Body::Cuboid(size),
+            // What meets a mesh is told by the box around it.
+            Shape::Box(_) | Shape::Mesh(_) => Body::Cuboid([x, y, z]),
             Shape::Sphere(d) => Body::Sphere(d / 2.0),
             Shape::Cylinder(_) | Shape::Turned { .. } => Body::Cylinder([x.max(y) / 2.0, z]),
         };
         let piece = Piece { placement: pose.then(Pose::up(z / 2.0)), solid, color: None };
+        let seen = match shape {
+            Shape::Mesh(mesh) => {
+                let name = mesh.name.clone();
+                robot.meshes.insert(name.clone(), mesh);
+                Piece { placement: pose, solid: Body::Mesh(name, [1.0; 3]), color: None }
+            }
+            _ => piece.clone(),
+        };
         if let Some(link) = robot.links.get_mut(index as usize) {
-            link.visual.push(piece.clone());
+            link.visual.push(seen);
             link.collision.push(piece);
         }
     }

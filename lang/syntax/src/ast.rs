@@ -415,6 +415,8 @@ pub enum AssetLine {
     },
     /// `joint lid turns (1, 0, 0) at (0, 0, 90) mm by choose(lid == open, 100 deg, 0 deg)`: a part of it that moves.
     Joint(Box<Jointed>),
+    /// A mesh that a shape of the asset names at this place; none where it cannot be read.
+    Mesh(Span, Option<std::sync::Arc<matterix_ir::mesh::Mesh>>),
     /// Links and joints, from the file at this place.
     Robot(Box<matterix_ir::robot::Robot>, Span),
     /// `lid = Lid { ... }`: a child asset.

@@ -5,12 +5,12 @@ use matterix_ir::robot::{Ball, JointKind, Piece, Robot, Solid};
 /// How far a sphere may stand out of a cylinder or cuboid it covers, relative to its half width.
 const SLACK: f64 = 0.12;
 
-/// Spheres that together cover the collision shapes of all links; none where one of them is a mesh.
+/// Spheres that together cover the collision shapes of all links; none where one of them is a mesh that is not known.
 pub(crate) fn balls(robot: &Robot) -> Vec<Ball> {
     let mut balls = Vec::new();
     for (link, body) in robot.links.iter().enumerate() {
         for piece in &body.collision {
-            let Some(spheres) = spheres(&piece.solid) else { return Vec::new() };
+            let Some(spheres) = spheres(robot, &piece.solid) else { return Vec::new() };
             let ball = |(center, radius)| Ball { link: link as u32, center: placed(piece, center), radius };
             balls.extend(spheres.into_iter().map(ball));
         }
@@ -19,8 +19,15 @@ pub(crate) fn balls(robot: &Robot) -> Vec<Ball> {
 }
 
 /// Spheres that cover a solid, about its middle; `None` for meshes.
-fn spheres(solid: &Solid) -> Option<Vec<([f64; 3], f64)>> {
+fn spheres(robot: &Robot, solid: &Solid) -> Option<Vec<([f64; 3], f64)>> {
     match *solid {
+        Solid::Mesh(ref name, scale) => {
+            // The box around it is covered; true shapes decide where that is too much.
+            let [low, high] = robot.meshes.get(name)?.bounds();
+            let middle: [f64; 3] = std::array::from_fn(|k| scale[k] * (low[k] + high[k]) / 2.0);
+            let cells = grid(std::array::from_fn(|k| (scale[k] * (high[k] - low[k])).abs()));
+            Some(cells.into_iter().map(|(c, r)| (std::array::from_fn(|k| c[k] + middle[k]), r)).collect())
+        }
         Solid::Sphere(radius) => Some(vec![([0.0; 3], radius)]),
         Solid::Cylinder([radius, length]) => {
             // The ends of slice i lie on a sphere about its middle; a flat disc is covered as a cuboid is.
@@ -32,7 +39,6 @@ fn spheres(solid: &Solid) -> Option<Vec<([f64; 3], f64)>> {
             Some((0..count).map(|i| ([0.0, 0.0, middle(i, slice, length)], bound)).collect())
         }
         Solid::Cuboid(edges) => Some(grid(edges)),
-        Solid::Mesh(..) => None,
     }
 }
 

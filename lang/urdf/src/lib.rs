@@ -13,8 +13,10 @@ mod tree;
 mod xml;
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use matterix_ir::robot::{Inertial, Link, Robot};
+use matterix_ir::mesh::Mesh;
+use matterix_ir::robot::{Inertial, Link, Robot, Solid};
 use roxmltree::{Document, Node, ParsingOptions};
 
 pub use problem::Problem;
@@ -26,9 +28,14 @@ pub const MOST_BYTES: usize = 16 << 20;
 /// Robots with more links are refused.
 pub const MOST_LINKS: usize = 4096;
 
-/// The robot a text describes, with spheres that cover its collision shapes where these are no meshes, and the pairs of
-/// links that a joint keeps in touch.
+/// The robot a text describes; its meshes are kept by name.
 pub fn read(text: &str) -> Result<Robot, Problem> {
+    read_with(text, |_| None)
+}
+
+/// The robot a text describes, with its meshes as far as `mesh` knows them by name, with spheres that cover its collision shapes where these are known, and the pairs of
+/// links that a joint keeps in touch.
+pub fn read_with(text: &str, mut mesh: impl FnMut(&str) -> Option<Mesh>) -> Result<Robot, Problem> {
     if text.len() > MOST_BYTES {
         return Err(Problem::new(1, format!("the text is longer than {} MiB", MOST_BYTES >> 20)));
     }
@@ -63,6 +70,14 @@ pub fn read(text: &str) -> Result<Robot, Problem> {
     }
     let joints = joints::read(&root, &index)?;
     let mut robot = tree::grow(&root, &elements, links, joints)?;
+    for piece in robot.links.iter().flat_map(|link| link.visual.iter().chain(&link.collision)) {
+        let Solid::Mesh(name, _) = &piece.solid else { continue };
+        if !robot.meshes.contains_key(name)
+            && let Some(found) = mesh(name)
+        {
+            robot.meshes.insert(name.clone(), Arc::new(found));
+        }
+    }
     robot.balls = cover::balls(&robot);
     robot.touching = cover::touching(&robot);
     Ok(robot)

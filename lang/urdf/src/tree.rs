@@ -72,7 +72,7 @@ pub(crate) fn grow(
     };
     let joints = order.iter().map(|&old| joint(old)).collect();
     let name = root.given("name").unwrap_or_default().to_string();
-    Ok(Robot { name, links, joints, balls: Vec::new(), touching: Vec::new() })
+    Ok(Robot { name, links, joints, ..Robot::default() })
 }
 
 /// The element of a link.

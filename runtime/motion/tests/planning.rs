@@ -162,7 +162,14 @@ fn branching() -> matterix_ir::robot::Robot {
         ball(4, [0.0, 0.2, 0.2], 0.05),
         ball(5, [0.0, 0.0, 0.2], 0.05),
     ];
-    Robot { name: "two arms".into(), links: links.into(), joints, balls, touching: vec![[0, 1], [4, 5]] }
+    Robot {
+        name: "two arms".into(),
+        links: links.into(),
+        joints,
+        balls,
+        touching: vec![[0, 1], [4, 5]],
+        ..Robot::default()
+    }
 }
 
 #[test]

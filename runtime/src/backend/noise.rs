@@ -30,7 +30,8 @@ fn report(reading: &Reading, time: f64) -> u64 {
     period(reading).map_or(time.to_bits(), |p| (time / p + 1e-9).floor() as u64)
 }
 
-fn key(seed: u64, index: usize, report: u64) -> u64 {
+/// Where the numbers of one thing begin.
+pub(crate) fn key(seed: u64, index: usize, report: u64) -> u64 {
     mix(mix(mix(seed) ^ index as u64) ^ report)
 }
 
@@ -41,12 +42,12 @@ fn normal(key: u64) -> f64 {
 }
 
 /// In `(0, 1]`, from the upper 53 bits.
-fn uniform(bits: u64) -> f64 {
+pub(crate) fn uniform(bits: u64) -> f64 {
     ((bits >> 11) + 1) as f64 / (1u64 << 53) as f64
 }
 
 /// One output of SplitMix64 (Steele, Lea, Flood 2014) at state `x`.
-fn mix(x: u64) -> u64 {
+pub(crate) fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     let x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

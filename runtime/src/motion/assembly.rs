@@ -14,6 +14,8 @@ pub struct Assembly {
     pub flange: u32,
     /// The link from which its arm reaches; what is before it drives that about.
     pub base: u32,
+    /// Links from this one on are of tools.
+    pub tools: u32,
     /// Positions of the moving joints when the run begins, rad or m.
     pub home: Vec<f64>,
     /// Which instance each link belongs to.
@@ -28,6 +30,7 @@ pub fn assemble(scene: &Scene, id: InstanceId) -> Option<Assembly> {
         tip: own.tip,
         flange: own.tip,
         base: own.base,
+        tools: own.robot.links.len() as u32,
         home: own.home.clone(),
         owners: vec![id; own.robot.links.len()],
     };

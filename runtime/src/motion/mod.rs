@@ -2,13 +2,17 @@
 
 pub mod assembly;
 mod drive;
+pub mod exact;
 pub mod fingers;
 pub mod fixture;
 pub mod flight;
 mod gantry;
 pub mod goal;
 mod hands;
+mod outline;
 pub mod perform;
+mod perturb;
+mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
@@ -19,6 +23,7 @@ mod turn;
 pub use assembly::Assembly;
 pub use fixture::Fixture;
 pub use perform::{Meeting, Moment, Part, Performed, Refused};
+pub use perturb::{Moved, Perturbation, perturb};
 pub use preflight::{Nowhere, Store, preflight, supported};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

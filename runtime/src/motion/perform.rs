@@ -8,11 +8,13 @@ use matterix_motion::inverse::{Request, Solver, Unreached};
 use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
-use matterix_motion::time::{Limits, Trajectory, follow};
+use matterix_motion::time::{Limits, State, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
+use super::exact::Exact;
 use super::fixture::Led;
 use super::goal::{carried_to, spots, targets, targets_at};
+use super::postures::postures;
 use super::stage::{Actor, Stage};
 use super::surroundings::{Surroundings, held};
 
@@ -76,13 +78,28 @@ impl Performed {
     /// Some joints at a time since the beginning, s; while they wait, where they are. Nothing where one of them does not
     /// move.
     pub fn at(&self, joints: &[usize], time: f64) -> Option<Vec<f64>> {
-        let of_one = |joint: &usize| {
+        Some(self.state(joints, time)?.position)
+    }
+
+    /// What some joints do at a time since the beginning, s; at rest while they wait. Nothing where one of them does not
+    /// move.
+    fn state(&self, joints: &[usize], time: f64) -> Option<State> {
+        let mut out = State::default();
+        for joint in joints {
             let mut own = self.begins().filter_map(|(t, p)| Some((t, p, p.joints.iter().position(|j| j == joint)?)));
             let mut now = own.next()?;
             own.take_while(|(begin, ..)| *begin <= time).for_each(|next| now = next);
-            now.1.trajectory.at(time - now.0).position.get(now.2).copied()
-        };
-        joints.iter().map(of_one).collect()
+            let (begin, part, index) = now;
+            let all = part.trajectory.at(time - begin);
+            if part.joints == joints {
+                return Some(all);
+            }
+            out.position.push(*all.position.get(index)?);
+            out.velocity.push(*all.velocity.get(index)?);
+            out.acceleration.push(*all.acceleration.get(index)?);
+            out.jerk.push(*all.jerk.get(index)?);
+        }
+        Some(out)
     }
 
     /// Which joints it moves of those that move the tip and that drive the robot about.
@@ -97,6 +114,20 @@ impl Performed {
             if let Some(at) = self.at(&part.joints, time) {
                 actor.set_some(&part.joints, &at);
             }
+        }
+    }
+
+    /// Gives a moment the speeds and accelerations that joints have at a time since the beginning, s.
+    fn rush(&self, moment: &mut Moment, time: f64) {
+        for part in &self.parts {
+            let Some(state) = self.state(&part.joints, time) else { continue };
+            let put = |values: &[f64], all: &mut [f64]| {
+                for (joint, value) in part.joints.iter().zip(values) {
+                    all.get_mut(*joint).into_iter().for_each(|v| *v = *value);
+                }
+            };
+            put(&state.velocity, &mut moment.speeds);
+            put(&state.acceleration, &mut moment.accelerations);
         }
     }
 }
@@ -119,6 +150,10 @@ pub struct Moment {
     pub robot: InstanceId,
     /// Positions of all its joints that move by themselves, rad or m.
     pub joints: Vec<f64>,
+    /// Their speeds, rad/s or m/s.
+    pub speeds: Vec<f64>,
+    /// Their accelerations, rad/s2 or m/s2.
+    pub accelerations: Vec<f64>,
     /// Its links in the lab, in the order of its assembly.
     pub links: Vec<Pose>,
     /// What it holds, in the lab.
@@ -347,12 +382,23 @@ impl Stage<'_> {
         let base = self.pose(robot);
         if let Some(fixture) = self.fixtures.get(&robot) {
             let links = fixture.links().into_iter().map(|l| base.then(l)).collect();
-            return Some(Moment { time, robot, joints: fixture.joints.clone(), links, held: None });
+            let (joints, still) = (fixture.joints.clone(), vec![0.0; fixture.joints.len()]);
+            let (speeds, accelerations) = (still.clone(), still);
+            return Some(Moment { time, robot, joints, speeds, accelerations, links, held: None });
         }
         let actor = self.actors.get(&robot)?;
         let links = actor.tree.poses(&actor.joints).iter().map(|l| base.then(matterix_motion::placement(l))).collect();
         let held = self.held(robot).map(|id| (id, self.pose(id)));
-        Some(Moment { time, robot, joints: actor.joints.clone(), links, held })
+        let still = vec![0.0; actor.joints.len()];
+        Some(Moment {
+            time,
+            robot,
+            joints: actor.joints.clone(),
+            speeds: still.clone(),
+            accelerations: still,
+            links,
+            held,
+        })
     }
 
     /// Moments of a motion that has been carried out and began at a time, s, at most so far apart.
@@ -371,7 +417,10 @@ impl Stage<'_> {
                 let item = stage.dragged(led, robot);
                 out.extend(stage.moment(item, begin + since));
             }
-            out.extend(stage.moment(robot, begin + since));
+            if let Some(mut moment) = stage.moment(robot, begin + since) {
+                performed.rush(&mut moment, since);
+                out.push(moment);
+            }
         }
         out
     }
@@ -526,6 +575,22 @@ impl Stage<'_> {
                 return Ok(turned.into());
             }
         }
+        // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
+        let within = match way {
+            Way::Upright(within) => Some(within),
+            Way::Free | Way::Straight => None,
+        };
+        let others = match refused {
+            Refused::Collides(_) if way != Way::Straight => postures(self, robot, to),
+            _ => Vec::new(),
+        };
+        for q in others {
+            match self.way(robot, &arm, &q, within) {
+                Ok(part) => return Ok(vec![part]),
+                Err(Refused::NoWay) => break,
+                Err(_) => {}
+            }
+        }
         Err(refused)
     }
 
@@ -533,7 +598,11 @@ impl Stage<'_> {
     fn is_free_there(&self, robot: InstanceId, q: &[f64], goal: Option<InstanceId>) -> bool {
         let around = self.beside_line(robot, goal.as_slice());
         let figure = self.actors.get(&robot).and_then(|actor| self.figure(robot, actor, &actor.arm).ok());
-        figure.is_some_and(|figure| figure.contacts(&around.world, q).is_empty())
+        figure.is_some_and(|figure| {
+            let exact = Exact::of(self, robot, &figure, &around);
+            let mut checker = self.checker(&figure, &around, &exact);
+            checker.contacts(q).is_empty() || checker.ask(true) && checker.contacts(q).is_empty()
+        })
     }
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
@@ -561,7 +630,8 @@ impl Stage<'_> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor, variables)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
         let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
         let start = actor.positions(variables);
         let refused = |failure| match failure {
@@ -593,7 +663,8 @@ impl Stage<'_> {
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (base, arm) = (self.foot(robot).inverse(), actor.arm.clone());
         let figure = self.figure(robot, actor, &arm)?;
-        let mut checker = Checker::new(&figure, &around.world, 1.0 / FINENESS);
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
         let mut solver = Solver::new(actor.chain.clone());
         let mut points = vec![actor.configuration()];
         for to in to {
@@ -611,6 +682,12 @@ impl Stage<'_> {
         let end = points.pop().unwrap_or_default();
         self.settle(robot, &arm, &end);
         Ok(part)
+    }
+
+    /// Says what collides. What others sweep are balls, and a way around them is not worth asking true shapes.
+    fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
+        let checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
+        if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }
 
     pub(super) fn figure(&self, robot: InstanceId, actor: &Actor, moved: &[usize]) -> Result<Figure, Refused> {

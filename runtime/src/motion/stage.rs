@@ -10,6 +10,7 @@ use matterix_ir::robot::Robot;
 use matterix_ir::scene::{InstanceId, Scene, Stand, frame};
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
+use matterix_solids::Body;
 use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, assemble};
@@ -45,6 +46,7 @@ pub struct Actor {
     pub drive: Vec<usize>,
     /// Shared by all copies of a stage.
     to_plan: Arc<OnceLock<Robot>>,
+    bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
 /// The lab at one moment.
@@ -76,6 +78,8 @@ pub struct Stage<'p> {
     pub(super) changes: u64,
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
+    /// Shared by all copies of a stage.
+    bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
 /// What is not known of a lab at one moment.
@@ -122,9 +126,15 @@ impl<'p> Stage<'p> {
             around_sweeps: false,
             changes: 0,
             unknown: Unknown::default(),
+            bodies: Arc::default(),
         };
         stage.follow_joints(|node| Some(initial(program, node)));
         Ok(stage)
+    }
+
+    /// The true shapes of all instances, made when they are first asked for.
+    pub fn bodies(&self) -> &[Option<Body>] {
+        self.bodies.get_or_init(|| super::exact::bodies(self.scene))
     }
 
     /// The robot an instance is or is part of.
@@ -510,7 +520,8 @@ impl Actor {
         let (arm, drive) = (which(&chain), which(&drive));
         let joints = assembly.home.clone();
         let fingers = Fingers::of(&assembly, &tree, &arm);
-        Ok(Actor { assembly, tree, chain, joints, arm, fingers, drive, to_plan: Arc::default() })
+        let (to_plan, bodies) = (Arc::default(), Arc::default());
+        Ok(Actor { assembly, tree, chain, joints, arm, fingers, drive, to_plan, bodies })
     }
 
     /// The robot as planning needs it: with the links that are always in touch, found when it is first asked for, as
@@ -521,6 +532,11 @@ impl Actor {
             robot.touching.extend(always_touching(&robot).unwrap_or_default());
             robot
         })
+    }
+
+    /// The true shapes of its links, made when they are first asked for.
+    pub fn bodies(&self) -> &[Option<Body>] {
+        self.bodies.get_or_init(|| Body::of_links(&self.assembly.robot))
     }
 
     /// The positions of the joints that move the tip.

@@ -20,6 +20,8 @@ pub struct Surroundings {
     pub world: World,
     /// By body of the world.
     pub owners: Vec<InstanceId>,
+    /// Those without their main body.
+    pub bodiless: Vec<InstanceId>,
 }
 
 impl Surroundings {
@@ -30,7 +32,7 @@ impl Surroundings {
 
     /// As [`Surroundings::of`], without the main body of some things: what stands in one of their places stands in it.
     pub fn of_but(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId], bodiless: &[InstanceId]) -> Self {
-        let mut out = Surroundings::default();
+        let mut out = Surroundings { bodiless: bodiless.to_vec(), ..Surroundings::default() };
         for index in 0..stage.scene.instances.len() {
             let id = InstanceId(index as u32);
             let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
@@ -107,7 +109,8 @@ fn piece_of(solid: &robot::Solid) -> Option<Solid> {
 fn solid(shape: &Shape) -> (Solid, f64) {
     let [x, y, z] = shape.size();
     let solid = match shape {
-        Shape::Box(_) => Solid::Cuboid([x / 2.0, y / 2.0, z / 2.0]),
+        // The box around a mesh; true shapes decide where that is too much.
+        Shape::Box(_) | Shape::Mesh(_) => Solid::Cuboid([x / 2.0, y / 2.0, z / 2.0]),
         Shape::Cylinder(_) | Shape::Turned { .. } => Solid::Cylinder(x / 2.0, z / 2.0),
         Shape::Sphere(_) => Solid::Sphere(x / 2.0),
     };

@@ -1,16 +1,15 @@
 //! A `recording.mcap` as a document. What the file holds is described in `docs/recording.md`.
 
-mod file;
 mod scene;
 mod story;
 mod tables;
 
-use std::collections::BTreeMap;
 use std::fmt;
 
-use serde_json::Value;
+pub use matterix_recording::is_recording;
+use matterix_recording::{Topic, list, number, text};
 
-use crate::document::{DOCUMENT_VERSION, Document};
+use crate::document::{DOCUMENT_VERSION, Document, Source};
 
 /// Why a file cannot be shown.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,39 +23,22 @@ impl fmt::Display for RecordingError {
 
 impl std::error::Error for RecordingError {}
 
-/// The first bytes of every such file.
-const MAGIC: &[u8] = b"\x89MCAP";
-
-/// Whether a file is one, by its first bytes.
-pub fn is_recording(file: &[u8]) -> bool {
-    file.starts_with(MAGIC)
-}
-
-/// A topic with its messages in the order of the file: time in s, and content.
-struct Topic {
-    name: String,
-    /// What the file says of it: `unit FIELD`.
-    metadata: BTreeMap<String, String>,
-    messages: Vec<(f64, Value)>,
-}
-
-impl Topic {
-    /// The unit of a field; empty where there is none.
-    fn unit(&self, field: &str) -> &str {
-        self.metadata.get(&format!("unit {field}")).map_or("", String::as_str)
-    }
-}
-
 /// Reads a whole recording.
 pub fn from_recording(file: &[u8]) -> Result<Document, RecordingError> {
-    if !is_recording(file) {
-        return Err(RecordingError("this is not an MCAP file".to_owned()));
-    }
+    let recording = matterix_recording::read(file).map_err(|damaged| RecordingError(damaged.0))?;
     let mut document = Document { version: DOCUMENT_VERSION, ..Document::default() };
-    let file::Content { mut topics, texts, end } = file::read(file, &mut document)?;
+    for (name, value) in recording.facts {
+        match name.as_str() {
+            "workflow" => document.workflow = value,
+            "lab" => document.lab = value,
+            _ => document.facts.push((name.strip_prefix("argument ").unwrap_or(&name).to_owned(), value)),
+        }
+    }
+    let texts: Vec<Source> = recording.texts.into_iter().map(|(name, text)| Source { name, text }).collect();
+    let mut topics = recording.topics;
     // By name, whatever the order in which they were declared.
     topics.sort_by(|a, b| a.name.cmp(&b.name));
-    document.duration = Some(end);
+    document.duration = Some(recording.end);
     let owners = scene::read(&topics, &mut document);
     tables::read(&topics, &owners, &mut document);
     story::read(&topics, &texts, &mut document);
@@ -64,19 +46,4 @@ pub fn from_recording(file: &[u8]) -> Result<Document, RecordingError> {
         return Err(RecordingError("this MCAP file has no `/scene` and no `/plan`: it is not of a run".to_owned()));
     }
     Ok(document)
-}
-
-/// The text under a key; empty where there is none.
-fn text<'a>(of: &'a Value, key: &str) -> &'a str {
-    of.get(key).and_then(Value::as_str).unwrap_or("")
-}
-
-/// The number under a key; 0 where there is none.
-fn number(of: &Value, key: &str) -> f64 {
-    of.get(key).and_then(Value::as_f64).unwrap_or(0.0)
-}
-
-/// The entries of the list under a key.
-fn list<'a>(of: &'a Value, key: &str) -> &'a [Value] {
-    of.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }

@@ -1,9 +1,13 @@
 //! `/scene` and `/tf`: what is seen and how it moves.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
+use matterix_ir::bodies::Bodies;
+use matterix_ir::mesh::Mesh;
 use matterix_ir::robot::Placement;
 use matterix_ir::scene::Shape;
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Topic, list, number, text};
@@ -22,6 +26,7 @@ const SHADE: f64 = 1.0 / 63.0;
 pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
     let (ways, points) = transforms(topics);
     let held: BTreeSet<&str> = topics.iter().filter_map(|t| t.name.strip_prefix("/contents/")).map(owner).collect();
+    let forms = forms(topics);
     let mut things: Vec<Thing> = Vec::new();
     let mut known = BTreeSet::new();
     let updates = topics.iter().filter(|t| t.name == "/scene").flat_map(|t| &t.messages);
@@ -44,7 +49,13 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
             link: text(entity, "frame_id") == name,
         });
     }
-    let (bodies, owners) = bench::bodies(&things);
+    for thing in things.iter_mut().filter(|thing| !thing.link) {
+        if let Some(true_shapes) = forms.get(&thing.name) {
+            let color = thing.shapes.first().and_then(|(.., color)| *color);
+            thing.shapes = true_shapes.iter().map(|(at, shape)| (*at, shape.clone(), color)).collect();
+        }
+    }
+    let (bodies, owners) = bench::bodies(&things, &mut document.meshes);
     document.bodies = bodies;
     for (name, way) in &ways {
         let Some(body) = owners.get(name) else { continue };
@@ -59,6 +70,18 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
     }
     document.tracks.sort_by_key(|t| t.body);
     owners
+}
+
+/// The true shapes of things, where the recording has them: primitives say nothing of insides and of what is turned.
+fn forms(topics: &[Topic]) -> BTreeMap<String, Vec<(Placement, Shape)>> {
+    let told = topics.iter().filter(|t| t.name == "/bodies").flat_map(|t| &t.messages).next();
+    let bodies = told.and_then(|(_, message)| Bodies::deserialize(message).ok()).unwrap_or_default();
+    let form = |thing: matterix_ir::bodies::Thing| {
+        let main = thing.shape.map(|shape| (Placement::default(), shape));
+        let more = thing.solids.into_iter().map(|solid| (solid.pose, solid.shape));
+        (thing.name, main.into_iter().chain(more).collect())
+    };
+    bodies.things.into_iter().map(form).collect()
 }
 
 /// The thing that a mixture is in, by their names: `beaker` of `beaker.contents`.
@@ -104,7 +127,19 @@ fn shapes(entity: &Value, at: Placement) -> Vec<(Placement, Shape, Option<[f32; 
     let spheres = list(entity, "spheres").iter().map(|s| read(s, |[x, _, _]| Shape::Sphere(x)));
     let cubes = list(entity, "cubes").iter().map(|c| read(c, Shape::Box));
     let cylinders = list(entity, "cylinders").iter().map(|c| read(c, |[x, _, z]| Shape::Cylinder([x, z])));
-    cubes.chain(cylinders).chain(spheres).collect()
+    let meshes = list(entity, "triangles").iter().map(|t| mesh(t, back));
+    cubes.chain(cylinders).chain(spheres).chain(meshes).collect()
+}
+
+/// A mesh in the frame that `back` leads to.
+fn mesh(triangles: &Value, back: Placement) -> (Placement, Shape, Option<[f32; 4]>) {
+    let at = back.then(placement(&triangles["pose"]["position"], &triangles["pose"]["orientation"]));
+    let point = |p: &Value| ["x", "y", "z"].map(|k| number(p, k));
+    let points: Vec<[f64; 3]> = list(triangles, "points").iter().map(point).collect();
+    let there = |i: &Value| u32::try_from(i.as_u64()?).ok().filter(|i| (*i as usize) < points.len());
+    let indices: Option<Vec<u32>> = list(triangles, "indices").iter().map(there).collect();
+    let triangles = indices.unwrap_or_default().chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    (at, Shape::Mesh(Arc::new(Mesh { name: String::new(), points, triangles })), None)
 }
 
 fn placement(position: &Value, rotation: &Value) -> Placement {

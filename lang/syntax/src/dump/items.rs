@@ -156,6 +156,7 @@ fn asset_line(line: &AssetLine) -> Sexp {
             });
             node("joint").with([name(&joint.name)]).with(way).with(maybe("by", Some(&joint.by)))
         }
+        AssetLine::Mesh(_, mesh) => node("mesh").with(mesh.iter().map(|mesh| quoted(&mesh.name))),
         AssetLine::Robot(robot, _) => node("robot").with([quoted(&robot.name)]),
         AssetLine::Solid { shape, at } => node("solid").with([expr(shape)]).with(at.iter().flat_map(place)),
         AssetLine::Grid(of) => node("grid")

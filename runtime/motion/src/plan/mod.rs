@@ -37,6 +37,16 @@ impl Default for Settings {
     }
 }
 
+/// Samples drawn among true shapes, where each takes some hundred times as long.
+const ASKING: usize = 500;
+
+impl Settings {
+    /// The same for a search in which a referee is asked.
+    fn asking(&self) -> Self {
+        Self { iterations: self.iterations.min(ASKING), ..*self }
+    }
+}
+
 /// One of the two ends of a way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
@@ -103,7 +113,7 @@ pub fn search(checker: &mut Checker, start: &[f64], goal: &[f64], settings: &Set
     let to = within(checker, goal, End::Goal)?;
     if !checker.are_free(&[from.as_slice(), to.as_slice()].concat()) {
         let (q, which) = if checker.is_free(&from) { (goal, End::Goal) } else { (start, End::Start) };
-        return Err(Failure::Collision(which, checker.figure().contacts(checker.world(), q)));
+        return Err(Failure::Collision(which, checker.contacts(q)));
     }
     let found = connect::connect(checker, &from, &to, settings);
     match found.way {
@@ -136,6 +146,15 @@ fn rounded(way: &path::Way, start: &[f64], goal: &[f64], iterations: usize) -> R
 }
 
 /// A short collision-free way, the same for the same question on every machine.
+///
+/// Where there is none among balls and the checker has a referee, one is searched among true shapes.
 pub fn plan(checker: &mut Checker, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
-    Ok(search(checker, start, goal, settings)?.simplified(checker, settings))
+    checker.ask(false);
+    let found = match search(checker, start, goal, settings) {
+        Err(Failure::Collision(..) | Failure::Unreached(_)) if checker.ask(true) => {
+            search(checker, start, goal, &settings.asking())
+        }
+        found => found,
+    };
+    Ok(found?.simplified(checker, settings))
 }

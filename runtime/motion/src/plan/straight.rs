@@ -48,8 +48,22 @@ pub fn between(from: &Pose, to: &Pose, share: f64) -> Pose {
 }
 
 /// Configurations from `start` that lead the solver's tip straight to a pose, free of collisions as far as `checker`
-/// can tell. Poses are relative to the solver's chain's base, whose variables must be those the checker plans for.
+/// can tell: among true shapes, if balls collide and it has a referee, which is then asked from there on. Poses are relative
+/// to the solver's chain's base, whose variables must be those the checker plans for.
 pub fn straight(
+    solver: &mut Solver,
+    checker: &mut Checker,
+    start: &[f64],
+    to: &Pose,
+    stride: &Stride,
+) -> Result<Vec<Vec<f64>>, Blocked> {
+    match lead(solver, checker, start, to, stride) {
+        Err(Blocked::Collision(..)) if checker.ask(true) => lead(solver, checker, start, to, stride),
+        found => found,
+    }
+}
+
+fn lead(
     solver: &mut Solver,
     checker: &mut Checker,
     start: &[f64],
@@ -83,7 +97,7 @@ pub fn straight(
         let mut vector = vec![0.0; a.len()];
         let length = super::path::gap(&a, &b, &mut vector);
         if !checker.is_clear(&a, &vector, length) {
-            return Err(Blocked::Collision(share, checker.figure().contacts(checker.world(), &next)));
+            return Err(Blocked::Collision(share, checker.contacts(&next)));
         }
         points.push(next.clone());
         here = next;

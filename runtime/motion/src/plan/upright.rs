@@ -165,13 +165,25 @@ impl Grown {
 }
 
 /// A short way from one configuration to another on which nothing collides and the tip's axis stays upright.
+///
+/// Where there is none among balls and the checker has a referee, one is searched among true shapes.
 pub fn plan_upright(level: &mut Level, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
+    level.checker.ask(false);
+    match search(level, start, goal, settings) {
+        Err(Failure::Collision(..) | Failure::Unreached(_)) if level.checker.ask(true) => {
+            search(level, start, goal, &settings.asking())
+        }
+        found => found,
+    }
+}
+
+fn search(level: &mut Level, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
     let ends = [(start, End::Start), (goal, End::Goal)];
     let mut single = Vec::with_capacity(2);
     for (q, which) in ends {
         let q32 = within(level.checker, q, which)?;
         if !level.checker.is_free(&q32) {
-            return Err(Failure::Collision(which, level.checker.figure().contacts(level.checker.world(), q)));
+            return Err(Failure::Collision(which, level.checker.contacts(q)));
         }
         let tilt = level.upright.tilt_of(&level.solver.chain().tip(q));
         if !level.is_level(&q32) {

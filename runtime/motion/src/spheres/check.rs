@@ -1,7 +1,7 @@
 //! Whether configurations, and straight ways between them, are free of collisions.
 
 use super::frames::{Frame, place};
-use super::{Figure, Group};
+use super::{Contact, Figure, Group, Referee};
 use crate::lanes::{Kernel, Lanes, Row, WIDTH, dispatch, sin_cos};
 use crate::vector::{Axes, Placed, Vector};
 use crate::world::{Obstacle, World};
@@ -21,6 +21,9 @@ pub struct Checker<'a> {
     resolution: f32,
     scratch: Scratch,
     checks: u64,
+    referee: Option<&'a dyn Referee>,
+    /// Whether the referee is asked.
+    asks: bool,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -60,9 +63,42 @@ impl<'a> Checker<'a> {
             hits: Vec::new(),
             inner: Vec::new(),
         };
-        let mut checker = Self { figure, world, near, stuck: false, resolution: resolution as f32, scratch, checks: 0 };
+        let mut checker = Self {
+            figure,
+            world,
+            near,
+            stuck: false,
+            resolution: resolution as f32,
+            scratch,
+            checks: 0,
+            referee: None,
+            asks: false,
+        };
         checker.stuck = dispatch(Stuck(&mut checker));
         checker
+    }
+
+    /// The same with a referee, who decides where balls collide once [`Checker::ask`] has been called.
+    pub fn overruled_by(self, referee: &'a dyn Referee) -> Self {
+        Self { referee: Some(referee), ..self }
+    }
+
+    /// Whether the referee is asked from now on where balls collide; false where there is none.
+    pub fn ask(&mut self, asks: bool) -> bool {
+        self.asks = asks && self.referee.is_some();
+        self.asks
+    }
+
+    fn referee(&self) -> Option<&'a dyn Referee> {
+        self.referee.filter(|_| self.asks)
+    }
+
+    /// What collides in a configuration, deepest first: as the referee has it, if it is asked.
+    pub fn contacts(&self, q: &[f64]) -> Vec<Contact> {
+        match self.referee() {
+            Some(referee) => referee.contacts(q),
+            None => self.figure.contacts(self.world, q),
+        }
     }
 
     /// The robot.
@@ -87,7 +123,10 @@ impl<'a> Checker<'a> {
 
     /// Whether the robot is free in all of these configurations, which follow one another.
     pub fn are_free(&mut self, points: &[f32]) -> bool {
-        !self.stuck && dispatch(Batch { checker: self, points })
+        let free = !self.stuck && dispatch(Batch { checker: self, points });
+        free || self.referee().is_some_and(|referee| {
+            points.chunks_exact(self.figure.limits().len().max(1)).all(|q| referee.is_free(&wide(q)))
+        })
     }
 
     /// Whether the robot is free in this configuration.
@@ -97,12 +136,25 @@ impl<'a> Checker<'a> {
 
     /// Whether the robot is free all along `from + t * vector`, `t` above 0 and up to 1; `length` is the vector's.
     pub fn is_clear(&mut self, from: &[f32], vector: &[f32], length: f32) -> bool {
-        if self.stuck {
-            return false;
-        }
         let blocks = (length * self.resolution / WIDTH as f32).ceil().max(1.0) as usize;
-        dispatch(Sweep { checker: self, from, vector, blocks })
+        let clear = !self.stuck && dispatch(Sweep { checker: self, from, vector, blocks });
+        clear || self.referee().is_some_and(|referee| is_clear_to(referee, from, vector, length))
     }
+}
+
+fn wide(q: &[f32]) -> Vec<f64> {
+    q.iter().map(|&x| f64::from(x)).collect()
+}
+
+/// Whether a referee finds nothing along `from + t * vector`; the middle is looked at first, where a way is blocked as a rule.
+fn is_clear_to(referee: &dyn Referee, from: &[f32], vector: &[f32], length: f32) -> bool {
+    let steps = (f64::from(length) * referee.resolution()).ceil().max(1.0) as u32;
+    let free = |step: u32| {
+        let share = f64::from(step) / f64::from(steps);
+        let q: Vec<f64> = from.iter().zip(vector).map(|(a, v)| f64::from(*a) + share * f64::from(*v)).collect();
+        referee.is_free(&q)
+    };
+    free(steps.div_ceil(2)) && (1..=steps).all(free)
 }
 
 struct Stuck<'c, 'a>(&'c mut Checker<'a>);

@@ -8,10 +8,12 @@ mod contact;
 mod cover;
 mod frames;
 mod placed;
+mod referee;
 
 pub use check::Checker;
 pub use contact::{Contact, Other};
 pub use placed::Placed;
+pub use referee::Referee;
 
 use std::ops::Range;
 
@@ -145,6 +147,11 @@ impl Figure {
     /// Lower and upper limits of what is planned for; rad or m.
     pub fn limits(&self) -> &[[f64; 2]] {
         &self.limits
+    }
+
+    /// Pairs of links that must not meet; held things have the indices after the links'.
+    pub fn apart(&self) -> &[[u32; 2]] {
+        &self.apart
     }
 
     /// Configurations spread over the limits.

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use matterix_ir::scene::{InstanceId, Pose, Shape, Stand};
+use matterix_ir::mesh::Mesh;
+use matterix_ir::scene::{Instance, InstanceId, Pose, Shape, Stand};
 use mcap::McapResult;
 
 use super::Sink;
+use super::bodies;
 use super::foxglove::{
-    self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, pose,
-    quaternion, vector,
+    self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, Triangles,
+    pose, quaternion, vector,
 };
 use super::robots::Robots;
 use crate::motion::supported;
@@ -32,11 +34,12 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
     let supports = supports(run);
     let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
+    bodies::write(run, sink)?;
     let mut robots = Robots::begin(run, sink, entities, frames)?;
     let samples = run.recording.times.len().max(1);
     for sample in 0..samples {
         let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
-        let carried = robots.until(run, time, sink, frames)?;
+        let carried = robots.until(run, time, sink, frames, &stands)?;
         let mut moved = sample == 0;
         for (&(id, values), current) in supports.iter().zip(&mut supported) {
             let Some(&value) = values.get(sample) else { continue };
@@ -55,25 +58,32 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
         if !moved && !carried && tints.is_empty() {
             continue;
         }
-        let stand = |id: InstanceId| stands.get(id.0 as usize).copied();
-        let mut poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
-        robots.held.iter().for_each(|(id, at)| poses[*id] = *at);
+        let stand = |id: InstanceId| match robots.held.get(&(id.0 as usize)) {
+            Some(at) => Some(Stand::Lab(*at)),
+            None => stands.get(id.0 as usize).copied(),
+        };
+        let poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
             let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));
             if now != shown[i] {
                 let displaced = shown[i].map(|(before, _)| before) != Some(at);
+                let repainted = shown[i].map(|(_, before)| Some(before) != now.map(|(_, tint)| tint)) != Some(false);
                 shown[i] = now;
-                changed.push((i, displaced));
+                changed.push((i, displaced, repainted || !scene.instances.get(i).is_some_and(has_mesh)));
             }
         }
-        let drawn: Vec<Entity<'_>> = changed.iter().filter_map(|&(i, _)| entity(run, i, time, shown[i]?)).collect();
+        let drawn: Vec<Entity<'_>> = changed
+            .iter()
+            .filter(|(.., drawn)| *drawn)
+            .filter_map(|&(i, ..)| entity(run, i, time, shown[i]?))
+            .collect();
         if !drawn.is_empty() {
             sink.push(entities, time, &SceneUpdate { deletions: [], entities: drawn })?;
         }
-        let displaced = changed.iter().filter(|(_, displaced)| *displaced);
+        let displaced = changed.iter().filter(|(_, displaced, _)| *displaced);
         let transforms: Vec<FrameTransform> =
-            displaced.flat_map(|&(i, _)| transforms(run, i, time, poses[i])).collect();
+            displaced.flat_map(|&(i, ..)| transforms(run, i, time, poses[i])).collect();
         if !transforms.is_empty() {
             sink.push(frames, time, &FrameTransforms { transforms })?;
         }
@@ -126,6 +136,7 @@ pub(super) struct Pieces {
     pub(super) cubes: Vec<Cube>,
     pub(super) spheres: Vec<Cube>,
     pub(super) cylinders: Vec<Cylinder>,
+    pub(super) triangles: Vec<Triangles>,
     /// Height of its main shape, m.
     top: f64,
 }
@@ -141,6 +152,7 @@ impl Pieces {
         match shape {
             Shape::Box(_) => self.cubes.push(Cube { pose: middle, size: vector(size), color }),
             Shape::Sphere(_) => self.spheres.push(Cube { pose: middle, size: vector(size), color }),
+            Shape::Mesh(mesh) => self.mesh(pose(at), mesh),
             Shape::Cylinder(_) => self.cone(middle, size, [1.0, 1.0]),
             Shape::Turned { outside, .. } => {
                 for step in outside.windows(2) {
@@ -155,6 +167,12 @@ impl Pieces {
         }
     }
 
+    pub(super) fn mesh(&mut self, pose: foxglove::Pose, mesh: &Mesh) {
+        let points = mesh.points.iter().map(|p| vector(*p)).collect();
+        let indices = mesh.triangles.iter().flatten().copied().collect();
+        self.triangles.push(Triangles { pose, points, color: self.color, colors: [], indices });
+    }
+
     pub(super) fn cone(&mut self, pose: foxglove::Pose, size: [f64; 3], [bottom_scale, top_scale]: [f64; 2]) {
         self.cylinders.push(Cylinder { pose, size: vector(size), bottom_scale, top_scale, color: self.color });
     }
@@ -162,13 +180,14 @@ impl Pieces {
 
 fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) -> Option<Entity<'a>> {
     let instance = run.program.scene.instances.get(index)?;
+    let (frame_id, at) = if has_mesh(instance) { (instance.name.as_str(), Pose::IDENTITY) } else { (LAB, at) };
     let shape = instance.shape.iter().map(|shape| (shape, at));
     let solids = instance.solids.iter().map(|solid| (&solid.shape, at.then(solid.pose)));
     let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
     let mut pieces = Pieces { color: Color { r, g, b, a: 0.85 }, ..Pieces::default() };
     shape.chain(solids).for_each(|(shape, at)| pieces.add(shape, at));
-    let Pieces { cubes, spheres, cylinders, top, .. } = pieces;
-    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() {
+    let Pieces { cubes, spheres, cylinders, triangles, top, .. } = pieces;
+    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() && triangles.is_empty() {
         return None;
     }
     let label = Text {
@@ -181,7 +200,7 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) 
     };
     Some(Entity {
         timestamp: Time::new(time),
-        frame_id: LAB,
+        frame_id,
         id: &instance.name,
         lifetime: Time::new(0.0),
         frame_locked: true,
@@ -191,10 +210,16 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) 
         spheres,
         cylinders,
         lines: [],
-        triangles: [],
+        triangles,
         texts: vec![label],
         models: [],
     })
+}
+
+/// Whether there are triangles in it: it is written in its own frame, so that it need not be written again where it moves.
+fn has_mesh(instance: &Instance) -> bool {
+    let mut shapes = instance.shape.iter().chain(instance.solids.iter().map(|solid| &solid.shape));
+    shapes.any(|shape| matches!(shape, Shape::Mesh(_)))
 }
 
 /// The instance in the lab, and its named points in the instance.

@@ -82,6 +82,16 @@ pub(super) struct Cylinder {
     pub(super) color: Color,
 }
 
+/// Triangles without normals, each corner for itself or by index.
+#[derive(Serialize)]
+pub(super) struct Triangles {
+    pub(super) pose: Pose,
+    pub(super) points: Vec<Vector3>,
+    pub(super) color: Color,
+    pub(super) colors: [(); 0],
+    pub(super) indices: Vec<u32>,
+}
+
 #[derive(Serialize)]
 pub(super) struct Text<'a> {
     pub(super) pose: Pose,
@@ -112,7 +122,7 @@ pub(super) struct Entity<'a> {
     pub(super) spheres: Vec<Cube>,
     pub(super) cylinders: Vec<Cylinder>,
     pub(super) lines: [(); 0],
-    pub(super) triangles: [(); 0],
+    pub(super) triangles: Vec<Triangles>,
     pub(super) texts: Vec<Text<'a>>,
     pub(super) models: [(); 0],
 }
@@ -140,6 +150,10 @@ pub(super) struct JointState<'a> {
     pub(super) name: &'a str,
     /// rad or m.
     pub(super) position: f64,
+    /// rad/s or m/s.
+    pub(super) velocity: f64,
+    /// rad/s2 or m/s2.
+    pub(super) acceleration: f64,
 }
 
 /// `foxglove.JointStates`.
@@ -217,6 +231,13 @@ fn entity_schema() -> Value {
         ("top_scale", number("0-1, ratio of the diameter of the top face to the bounding box")),
         ("color", color_schema()),
     ];
+    let triangles = [
+        ("pose", pose_schema()),
+        ("points", list(vector_schema("Vertex"))),
+        ("color", color_schema()),
+        ("colors", list(color_schema())),
+        ("indices", list(count("Index into the points"))),
+    ];
     let label = [
         ("pose", pose_schema()),
         ("billboard", truth("Whether the text should always face the camera")),
@@ -239,7 +260,7 @@ fn entity_schema() -> Value {
             ("spheres", list(object("foxglove.SpherePrimitive", cube.clone()))),
             ("cylinders", list(object("foxglove.CylinderPrimitive", cylinder))),
             ("lines", unused("foxglove.LinePrimitive")),
-            ("triangles", unused("foxglove.TriangleListPrimitive")),
+            ("triangles", list(object("foxglove.TriangleListPrimitive", triangles))),
             ("texts", list(object("foxglove.TextPrimitive", label))),
             ("models", unused("foxglove.ModelPrimitive")),
         ],
@@ -250,7 +271,12 @@ fn entity_schema() -> Value {
 pub(super) fn joints_schema() -> Value {
     let joint = object(
         "foxglove.JointState",
-        [("name", text("Name of the joint")), ("position", number("Position of the joint, in radians or metres"))],
+        [
+            ("name", text("Name of the joint")),
+            ("position", number("Position of the joint, in radians or metres")),
+            ("velocity", number("Velocity of the joint, in radians or metres a second")),
+            ("acceleration", number("Acceleration of the joint, in radians or metres a second squared")),
+        ],
     );
     object(
         "foxglove.JointStates",

@@ -4,6 +4,7 @@
 //! `foxglove.Log`; everything else is plain numbers that its plots, tables and state time lines take by field name.
 
 mod bench;
+mod bodies;
 mod foxglove;
 mod robots;
 mod schema;

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
+use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
-use matterix_ir::robot::{Piece, Solid};
-use matterix_ir::scene::InstanceId;
+use matterix_ir::robot::{Piece, Robot, Solid};
+use matterix_ir::scene::{InstanceId, Stand};
 use mcap::McapResult;
 
 use super::Sink;
 use super::bench::{LAB, Pieces};
+use super::bodies;
 use super::foxglove::{
     self, Color, Entity, FrameTransform, FrameTransforms, JointState, JointStates, KeyValue, SceneUpdate, Time, pose,
     quaternion, vector,
@@ -25,10 +27,11 @@ pub(super) struct Robots {
     /// Names of the links of each robot, and of its joints.
     names: BTreeMap<InstanceId, (Vec<String>, Vec<String>)>,
     joints: u16,
+    grips: u16,
+    /// By robot, what it last held.
+    hands: BTreeMap<InstanceId, InstanceId>,
     /// The first moment that has not been written.
     next: usize,
-    /// What each robot holds.
-    hands: BTreeMap<InstanceId, usize>,
     /// What is in hand, by instance, in the lab.
     pub(super) held: BTreeMap<usize, Pose>,
     /// Where things were when they were last in hand.
@@ -44,13 +47,21 @@ impl Robots {
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
-        let (hands, held, left) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let mut out = Robots { names: BTreeMap::new(), joints: 0, next: 0, hands, held, left };
+        let mut out = Robots {
+            names: BTreeMap::new(),
+            joints: 0,
+            grips: 0,
+            hands: BTreeMap::new(),
+            next: 0,
+            held: BTreeMap::new(),
+            left: BTreeMap::new(),
+        };
         let Ok(stage) = Stage::new(run.program) else { return Ok(out) };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
         out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
+        out.grips = sink.channel("/grips", "matterix.Grip", &bodies::grip_schema(), &units)?;
         for (id, robot, tree) in stage.movers() {
             let name = &run.program.scene.get(id).name;
             let links: Vec<String> = robot.links.iter().map(|l| format!("{name}.{}", l.name)).collect();
@@ -58,7 +69,7 @@ impl Robots {
             let joints = moving.map(|j| format!("{name}.{}", j.name)).collect();
             let kind = &run.program.scene.get(id).kind;
             let drawn: Vec<Entity<'_>> =
-                robot.links.iter().zip(&links).filter_map(|(link, id)| entity(&link.visual, id, kind)).collect();
+                robot.links.iter().zip(&links).filter_map(|(link, id)| entity(robot, &link.visual, id, kind)).collect();
             sink.push(entities, 0.0, &SceneUpdate { deletions: [], entities: drawn })?;
             out.names.insert(id, (links, joints));
             if let Some(moment) = stage.moment(id, 0.0) {
@@ -75,17 +86,18 @@ impl Robots {
         time: f64,
         sink: &mut Sink<W>,
         frames: u16,
+        stands: &[Stand],
     ) -> McapResult<bool> {
         let mut carried = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
-            self.write(moment, sink, frames)?;
-            if let Some(item) = self.hands.remove(&moment.robot) {
-                self.held.remove(&item);
+            if let Some(item) = self.hands.get(&moment.robot) {
+                self.held.remove(&(item.0 as usize));
             }
+            self.grip(run, moment, sink, stands)?;
+            self.write(moment, sink, frames)?;
             if let Some((id, at)) = moment.held {
                 let index = id.0 as usize;
-                self.hands.insert(moment.robot, index);
                 self.held.insert(index, at);
                 self.left.insert(index, at);
                 carried = true;
@@ -98,11 +110,40 @@ impl Robots {
         Ok(carried)
     }
 
+    /// Writes what is in a hand where that is something else than before, with all that goes along.
+    fn grip<W: Write + Seek>(
+        &mut self,
+        run: &Run<'_>,
+        moment: &Moment,
+        sink: &mut Sink<W>,
+        stands: &[Stand],
+    ) -> McapResult<()> {
+        let now = moment.held.map(|(id, _)| id);
+        if self.hands.get(&moment.robot).copied() == now {
+            return Ok(());
+        }
+        match now {
+            Some(id) => self.hands.insert(moment.robot, id),
+            None => self.hands.remove(&moment.robot),
+        };
+        let scene = &run.program.scene;
+        let items = now.map(|id| bodies::along(scene, id, stands)).unwrap_or_default();
+        let robot = &scene.get(moment.robot).name;
+        sink.push(self.grips, moment.time, &bodies::Grip { robot, items })
+    }
+
     fn write<W: Write + Seek>(&self, moment: &Moment, sink: &mut Sink<W>, frames: u16) -> McapResult<()> {
         let Some((links, joints)) = self.names.get(&moment.robot) else { return Ok(()) };
         let transforms = links.iter().zip(&moment.links).map(|(name, at)| transform(moment.time, name, *at)).collect();
         sink.push(frames, moment.time, &FrameTransforms { transforms })?;
-        let joints = joints.iter().zip(&moment.joints).map(|(name, position)| JointState { name, position: *position });
+        let moving = moment.speeds.iter().zip(&moment.accelerations).map(|(v, a)| (*v, *a));
+        let states = joints.iter().zip(&moment.joints).zip(moving);
+        let joints = states.map(|((name, position), (velocity, acceleration))| JointState {
+            name,
+            position: *position,
+            velocity,
+            acceleration,
+        });
         sink.push(
             self.joints,
             moment.time,
@@ -122,7 +163,7 @@ fn transform(time: f64, name: &str, at: Pose) -> FrameTransform {
 }
 
 /// What is seen of a link, in the link's own frame.
-fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'a>> {
+fn entity<'a>(robot: &Robot, visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'a>> {
     let mut pieces = Pieces::default();
     for piece in visual {
         let [r, g, b, a] = piece.color.unwrap_or(GREY);
@@ -136,12 +177,15 @@ fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'
                 pieces.spheres.push(foxglove::Cube { pose: at, size: vector([2.0 * r; 3]), color: pieces.color });
             }
             Solid::Cylinder([r, length]) => pieces.cone(at, [2.0 * r, 2.0 * r, length], [1.0, 1.0]),
-            // Meshes are not carried in recordings.
-            Solid::Mesh(..) => {}
+            Solid::Mesh(ref file, scale) => {
+                if let Some(mesh) = robot.meshes.get(file) {
+                    pieces.mesh(at, &Mesh::clone(mesh).scaled(scale));
+                }
+            }
         }
     }
-    let Pieces { cubes, spheres, cylinders, .. } = pieces;
-    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() {
+    let Pieces { cubes, spheres, cylinders, triangles, .. } = pieces;
+    if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() && triangles.is_empty() {
         return None;
     }
     Some(Entity {
@@ -156,7 +200,7 @@ fn entity<'a>(visual: &[Piece], name: &'a str, kind: &'a str) -> Option<Entity<'
         spheres,
         cylinders,
         lines: [],
-        triangles: [],
+        triangles,
         texts: Vec::new(),
         models: [],
     })

@@ -1,35 +1,70 @@
-//! The records of an MCAP file, read without trusting what it claims of its lengths.
+//! A `recording.mcap` as topics of JSON messages. What they hold is described in `docs/recording.md`.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, McapResult, parse_record};
+use serde_json::Value;
 
-use super::{RecordingError, Topic};
-use crate::document::{Document, Source};
+/// The first bytes of every such file.
+const MAGIC: &[u8] = b"\x89MCAP";
 
 /// More than LZ4 can make of one byte.
 const EXPANSION: u64 = 256;
 
-/// What a file holds.
-#[derive(Default)]
-pub(super) struct Content {
-    /// In the order in which they were declared.
-    pub(super) topics: Vec<Topic>,
-    /// Attached files.
-    pub(super) texts: Vec<Source>,
-    /// Time of the last message, s.
-    pub(super) end: f64,
+/// Whether a file is a recording, by its first bytes.
+pub fn is_recording(file: &[u8]) -> bool {
+    file.starts_with(MAGIC)
 }
 
-/// Reads all records; what the run says of itself goes into the document.
-pub(super) fn read(file: &[u8], document: &mut Document) -> Result<Content, RecordingError> {
-    let damaged = |e: McapError| RecordingError(format!("the recording is damaged: {e}"));
+/// What a file holds.
+#[derive(Debug, Default)]
+pub struct Recording {
+    /// In the order in which they were declared.
+    pub topics: Vec<Topic>,
+    /// Attached files, by name.
+    pub texts: Vec<(String, String)>,
+    /// What the run says of itself, by name.
+    pub facts: BTreeMap<String, String>,
+    /// Time of the last message, s.
+    pub end: f64,
+}
+
+/// A topic with its messages in the order of the file: time in s, and content.
+#[derive(Debug)]
+pub struct Topic {
+    /// As in `/tf`.
+    pub name: String,
+    /// What the file says of it: `unit FIELD`.
+    pub metadata: BTreeMap<String, String>,
+    /// Times in s.
+    pub messages: Vec<(f64, Value)>,
+}
+
+/// What is wrong with a file, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Damaged(pub String);
+
+impl fmt::Display for Damaged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for Damaged {}
+
+/// Reads all records.
+pub fn read(file: &[u8]) -> Result<Recording, Damaged> {
+    if !is_recording(file) {
+        return Err(Damaged("this is not an MCAP file".to_owned()));
+    }
+    let damaged = |e: McapError| Damaged(format!("the recording is damaged: {e}"));
     let options = LinearReaderOptions::default()
         .with_record_length_limit(largest(file).map_err(damaged)?)
         .with_validate_chunk_crcs(true);
-    let mut content = Content::default();
+    let mut content = Recording::default();
     let mut by_channel: BTreeMap<u16, usize> = BTreeMap::new();
     let mut reader = LinearReader::new_with_options(options);
     let mut rest = file;
@@ -55,24 +90,15 @@ pub(super) fn read(file: &[u8], document: &mut Document) -> Result<Content, Reco
             Record::Message { header, data } => {
                 let Some(topic) = by_channel.get(&header.channel_id).map(|&i| &mut content.topics[i]) else { continue };
                 let message = serde_json::from_slice(&data)
-                    .map_err(|e| RecordingError(format!("a message of `{}` is damaged: {e}", topic.name)))?;
+                    .map_err(|e| Damaged(format!("a message of `{}` is damaged: {e}", topic.name)))?;
                 let time = header.log_time as f64 * 1e-9;
                 content.end = content.end.max(time);
                 topic.messages.push((time, message));
             }
             Record::Attachment { header, data, .. } => {
-                let text = String::from_utf8_lossy(&data).into_owned();
-                content.texts.push(Source { name: header.name, text });
+                content.texts.push((header.name, String::from_utf8_lossy(&data).into_owned()));
             }
-            Record::Metadata(Metadata { name, metadata }) if name == "matterix.run" => {
-                for (name, value) in metadata {
-                    match name.as_str() {
-                        "workflow" => document.workflow = value,
-                        "lab" => document.lab = value,
-                        _ => document.facts.push((name.strip_prefix("argument ").unwrap_or(&name).to_owned(), value)),
-                    }
-                }
-            }
+            Record::Metadata(Metadata { name, metadata }) if name == "matterix.run" => content.facts.extend(metadata),
             _ => {}
         }
     }
@@ -93,4 +119,26 @@ fn largest(file: &[u8]) -> McapResult<usize> {
         }
     }
     Ok(largest)
+}
+
+impl Topic {
+    /// The unit of a field; empty where there is none.
+    pub fn unit(&self, field: &str) -> &str {
+        self.metadata.get(&format!("unit {field}")).map_or("", String::as_str)
+    }
+}
+
+/// The text under a key; empty where there is none.
+pub fn text<'a>(of: &'a Value, key: &str) -> &'a str {
+    of.get(key).and_then(Value::as_str).unwrap_or("")
+}
+
+/// The number under a key; 0 where there is none.
+pub fn number(of: &Value, key: &str) -> f64 {
+    of.get(key).and_then(Value::as_f64).unwrap_or(0.0)
+}
+
+/// The entries of the list under a key; none where there is none.
+pub fn list<'a>(of: &'a Value, key: &str) -> &'a [Value] {
+    of.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }

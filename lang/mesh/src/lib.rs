@@ -1,0 +1,58 @@
+//! Meshes from STL (text and binary), OBJ and glTF (`.glb`, and `.gltf` with its data inside), or in words what is wrong.
+//!
+//! Coordinates stay in the unit of the file. Those of glTF are metres by its standard; its y axis, which points up there,
+//! becomes z.
+
+mod gltf;
+mod obj;
+mod stl;
+
+use matterix_ir::mesh::Mesh;
+
+/// Files with more triangles are refused: shapes for planning have some hundred.
+pub const MOST_TRIANGLES: usize = 1 << 16;
+
+/// Larger files are refused, in bytes.
+pub const MOST_BYTES: usize = 64 << 20;
+
+/// Kinds of files, by the ends of their names, and whether the kind says its unit (then metres).
+const KINDS: &[(&str, bool, fn(&[u8]) -> Result<Surface, String>)] =
+    &[("stl", false, stl::read), ("obj", false, obj::read), ("glb", true, gltf::read), ("gltf", true, gltf::read)];
+
+/// Points and triangles.
+type Surface = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
+/// Whether files of this name are in metres by their standard; none for names of no kind that is read.
+pub fn is_metric(name: &str) -> Option<bool> {
+    kind(name).map(|(_, metric, _)| *metric)
+}
+
+fn kind(name: &str) -> Option<&'static (&'static str, bool, fn(&[u8]) -> Result<Surface, String>)> {
+    let end = name.rsplit_once('.').map_or("", |(_, end)| end).to_ascii_lowercase();
+    KINDS.iter().find(|(known, ..)| *known == end)
+}
+
+/// The mesh in a file, in the unit of the file.
+pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
+    let Some((.., read)) = kind(name) else {
+        return Err("meshes are read from `.stl`, `.obj`, `.glb` and `.gltf`".to_string());
+    };
+    if bytes.len() > MOST_BYTES {
+        return Err(format!("it is larger than {} MiB", MOST_BYTES >> 20));
+    }
+    let (points, triangles) = read(bytes)?;
+    if triangles.is_empty() {
+        return Err("it has no triangles".to_string());
+    }
+    if triangles.len() > MOST_TRIANGLES {
+        return Err(format!("it has {} triangles, more than {MOST_TRIANGLES}: simplify it", triangles.len()));
+    }
+    let mesh = Mesh { name: name.to_string(), points, triangles };
+    if !mesh.is_sound() {
+        return Err("a corner of a triangle is not there, or is no number".to_string());
+    }
+    if mesh.size().contains(&0.0) {
+        return Err("it is flat: a body has a volume".to_string());
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,147 @@
+//! A body in convex pieces, and where it touches another one.
+
+use std::f64::consts::FRAC_PI_2;
+use std::fmt;
+
+use matterix_ir::mesh::Mesh;
+use matterix_ir::pose::Pose;
+use matterix_ir::robot::{Link, Robot, Solid};
+use matterix_ir::scene::Shape;
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::math::{Pose as Isometry, Vector};
+use parry3d_f64::query;
+use parry3d_f64::shape::SharedShape;
+
+use crate::mesh::{self, hull};
+use crate::place::isometry;
+use crate::turned;
+
+/// Something rigid, of one or more convex pieces.
+#[derive(Clone)]
+pub struct Body {
+    pieces: Vec<Convex>,
+    around: Aabb,
+}
+
+#[derive(Clone)]
+struct Convex {
+    at: Isometry,
+    shape: SharedShape,
+    /// In the frame of the body.
+    around: Aabb,
+}
+
+/// Where two bodies are nearest, or reach deepest into each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Their distance; below 0 how far they reach into each other; m.
+    pub distance: f64,
+    /// On the other body, in the frame that both were placed in; m.
+    pub point: [f64; 3],
+}
+
+impl fmt::Debug for Body {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Body of {} pieces", self.pieces.len())
+    }
+}
+
+impl Body {
+    /// Shapes of a thing, each with its pose; none where there are none.
+    pub fn of_shapes<'a>(shapes: impl IntoIterator<Item = (&'a Shape, Pose)>) -> Option<Body> {
+        let mut pieces = Vec::new();
+        shapes.into_iter().for_each(|(shape, at)| add_shape(shape, &at, &mut pieces));
+        Body::of(pieces)
+    }
+
+    /// What collides of each link of a robot; none for links without that.
+    pub fn of_links(robot: &Robot) -> Vec<Option<Body>> {
+        let body = |link: &Link| {
+            let mut pieces = Vec::new();
+            link.collision.iter().for_each(|piece| add_solid(robot, &piece.solid, &piece.placement, &mut pieces));
+            Body::of(pieces)
+        };
+        robot.links.iter().map(body).collect()
+    }
+
+    fn of(pieces: Vec<Convex>) -> Option<Body> {
+        let around = pieces.iter().map(|p| p.around).reduce(|a, b| a.merged(&b))?;
+        Some(Body { pieces, around })
+    }
+
+    /// How far its farthest point may be from the origin of its frame, m.
+    pub fn reach(&self) -> f64 {
+        self.around.mins.abs().max(self.around.maxs.abs()).length()
+    }
+
+    /// The nearest or deepest touch of two bodies, if they are no farther apart than `within`, m.
+    pub fn touch(&self, at: &Isometry, other: &Body, other_at: &Isometry, within: f64) -> Option<Touch> {
+        // The other in the frame of this one.
+        let between = at.inv_mul(other_at);
+        if !self.around.loosened(within).intersects(&other.around.transform_by(&between)) {
+            return None;
+        }
+        let mut least: Option<Touch> = None;
+        for theirs in &other.pieces {
+            let box_of_theirs = theirs.around.transform_by(&between).loosened(within);
+            if !box_of_theirs.intersects(&self.around) {
+                continue;
+            }
+            let theirs_at = between * theirs.at;
+            for mine in self.pieces.iter().filter(|mine| mine.around.intersects(&box_of_theirs)) {
+                let found = query::contact(&mine.at, mine.shape.as_ref(), &theirs_at, theirs.shape.as_ref(), within);
+                // Only pairs of convex pieces are asked about, which all are supported.
+                let Ok(Some(found)) = found else { continue };
+                if least.is_none_or(|l| found.dist < l.distance) {
+                    least = Some(Touch { distance: found.dist, point: at.transform_point(found.point2).to_array() });
+                }
+            }
+        }
+        least
+    }
+}
+
+fn push(at: Isometry, shape: SharedShape, pieces: &mut Vec<Convex>) {
+    let around = shape.compute_aabb(&at);
+    pieces.push(Convex { at, shape, around });
+}
+
+/// A shape of a scene has its origin at the middle of its base.
+fn add_shape(shape: &Shape, at: &Pose, pieces: &mut Vec<Convex>) {
+    let size = shape.size();
+    let middle = isometry(&at.then(Pose::up(size[2] / 2.0)));
+    match shape {
+        Shape::Box([x, y, z]) => push(middle, SharedShape::cuboid(x / 2.0, y / 2.0, z / 2.0), pieces),
+        Shape::Cylinder([d, h]) => push(middle * upright(), SharedShape::cylinder(h / 2.0, d / 2.0), pieces),
+        Shape::Sphere(d) => push(middle, SharedShape::ball(d / 2.0), pieces),
+        Shape::Mesh(mesh) => mesh::pieces(mesh).into_iter().for_each(|piece| push(isometry(at), piece, pieces)),
+        Shape::Turned { outside, inside } => {
+            for corners in turned::pieces(outside, inside) {
+                // A slice without thickness is none.
+                hull(&corners).into_iter().for_each(|hull| push(isometry(at), hull, pieces));
+            }
+        }
+    }
+}
+
+/// A solid of a robot has its origin at its middle.
+fn add_solid(robot: &Robot, solid: &Solid, at: &Pose, pieces: &mut Vec<Convex>) {
+    let at = isometry(at);
+    match solid {
+        Solid::Cuboid([x, y, z]) => push(at, SharedShape::cuboid(x / 2.0, y / 2.0, z / 2.0), pieces),
+        Solid::Cylinder([r, length]) => push(at * upright(), SharedShape::cylinder(length / 2.0, *r), pieces),
+        Solid::Sphere(r) => push(at, SharedShape::ball(*r), pieces),
+        Solid::Mesh(name, scale) => {
+            // A mesh that was not found has no form.
+            if let Some(mesh) = robot.meshes.get(name) {
+                let mesh = Mesh::clone(mesh).scaled(*scale);
+                mesh::pieces(&mesh).into_iter().for_each(|piece| push(at, piece, pieces));
+            }
+        }
+    }
+}
+
+/// Parry's cylinders stand along y.
+fn upright() -> Isometry {
+    Isometry::rotation(Vector::new(FRAC_PI_2, 0.0, 0.0))
+}

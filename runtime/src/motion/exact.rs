@@ -1,0 +1,162 @@
+//! The narrow phase: a robot and what is around it in their true shapes, asked where balls collide.
+
+use std::borrow::Cow;
+use std::cell::OnceCell;
+use std::collections::BTreeSet;
+
+use matterix_ir::pose::Pose;
+use matterix_ir::scene::{Instance, InstanceId, Scene, Shape};
+use matterix_motion::placement;
+use matterix_motion::spheres::{Contact, Figure, Other, Referee};
+use matterix_solids::{Body, Isometry, Touch, isometry};
+use nalgebra::Point3;
+
+use super::fixture::following;
+use super::stage::Stage;
+use super::surroundings::Surroundings;
+
+/// How far true shapes may reach into each other before it counts, m: what stands on something touches it.
+const TOUCH: f64 = 1e-3;
+/// Configurations for every rad of a way: 4 mm of a point at a metre's reach.
+const RESOLUTION: f64 = 250.0;
+
+/// Robot and surroundings of one motion; put together when they are first asked about.
+#[derive(Debug)]
+pub struct Exact<'s> {
+    stage: &'s Stage<'s>,
+    robot: InstanceId,
+    figure: &'s Figure,
+    surroundings: &'s Surroundings,
+    parts: OnceCell<Parts<'s>>,
+}
+
+#[derive(Debug, Default)]
+struct Parts<'s> {
+    /// By link, then what is held: the link it is on, where, and its body.
+    mine: Vec<Option<(usize, Isometry, &'s Body)>>,
+    /// Each with the index of the first solid of the surroundings that is of the same thing.
+    around: Vec<(usize, Isometry, Cow<'s, Body>)>,
+}
+
+impl<'s> Exact<'s> {
+    /// What the balls of `figure` and the solids of `surroundings` stand for.
+    pub fn of(stage: &'s Stage<'_>, robot: InstanceId, figure: &'s Figure, surroundings: &'s Surroundings) -> Self {
+        Exact { stage, robot, figure, surroundings, parts: OnceCell::new() }
+    }
+
+    fn parts(&self) -> &Parts<'s> {
+        self.parts.get_or_init(|| self.put_together().unwrap_or_default())
+    }
+
+    fn put_together(&self) -> Option<Parts<'s>> {
+        let stage = self.stage;
+        let actor = stage.actors.get(&self.robot)?;
+        let on_itself = |(l, body): (usize, &'s Option<Body>)| Some((l, Isometry::identity(), body.as_ref()?));
+        let mut mine: Vec<_> = actor.bodies().iter().enumerate().map(on_itself).collect();
+        if let Some(held) = stage.held(self.robot) {
+            let inner = stage.tip(self.robot).inverse().then(stage.pose(held));
+            let body = stage.bodies().get(held.0 as usize)?.as_ref();
+            mine.push(body.map(|body| (actor.assembly.tip as usize, isometry(&inner), body)));
+        }
+        let mut around = Vec::new();
+        let mut seen = BTreeSet::new();
+        for (index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
+            let at = stage.pose(*id);
+            match stage.actors.get(id) {
+                Some(actor) => {
+                    let links = actor.tree.poses(&actor.joints);
+                    for (link, body) in links.iter().zip(actor.bodies()) {
+                        let at = isometry(&at.then(placement(link)));
+                        around.extend(body.iter().map(|body| (index, at, Cow::Borrowed(body))));
+                    }
+                }
+                None if self.surroundings.bodiless.contains(id) => {
+                    let body = Body::of_shapes(solids(stage.scene.get(*id)));
+                    around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
+                }
+                None => {
+                    if let (Some(fixture), Some(own)) = (stage.fixtures.get(id), following(stage.scene, *id)) {
+                        for (link, body) in fixture.links().iter().zip(Body::of_links(&own.robot)) {
+                            let at = isometry(&at.then(*link));
+                            around.extend(body.map(|body| (index, at, Cow::Owned(body))));
+                        }
+                    }
+                    let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
+                    around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
+                }
+            }
+        }
+        Some(Parts { mine, around })
+    }
+
+    /// Every touch that counts, until `tell` says that it is enough.
+    fn look(&self, q: &[f64], mut tell: impl FnMut(u32, Other, Touch) -> bool) {
+        let links: Vec<Isometry> = self.figure.poses(q).iter().map(|p| isometry(&placement(p))).collect();
+        let parts = self.parts();
+        let placed: Vec<Option<(Isometry, &Body)>> = parts
+            .mine
+            .iter()
+            .map(|mine| mine.and_then(|(link, inner, body)| Some((*links.get(link)? * inner, body))))
+            .collect();
+        let counts = |touch: Option<Touch>| touch.filter(|t| t.distance < -TOUCH);
+        for (link, mine) in placed.iter().enumerate() {
+            let Some((at, body)) = mine else { continue };
+            for (index, other_at, other) in &parts.around {
+                let found = counts(body.touch(at, other, other_at, 0.0));
+                if found.is_some_and(|touch| tell(link as u32, Other::Body(*index), touch)) {
+                    return;
+                }
+            }
+        }
+        for [a, b] in self.figure.apart() {
+            let (Some(Some((at, body))), Some(Some((other_at, other)))) =
+                (placed.get(*a as usize), placed.get(*b as usize))
+            else {
+                continue;
+            };
+            let found = counts(body.touch(at, other, other_at, 0.0));
+            if found.is_some_and(|touch| tell(*a, Other::Link(*b), touch)) {
+                return;
+            }
+        }
+    }
+}
+
+impl Referee for Exact<'_> {
+    fn contacts(&self, q: &[f64]) -> Vec<Contact> {
+        let mut out = Vec::new();
+        self.look(q, |link, other, touch| {
+            out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
+            false
+        });
+        out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        out
+    }
+
+    fn is_free(&self, q: &[f64]) -> bool {
+        let mut free = true;
+        self.look(q, |_, _, _| {
+            free = false;
+            true
+        });
+        free
+    }
+
+    fn resolution(&self) -> f64 {
+        RESOLUTION
+    }
+}
+
+/// The true shapes of all instances.
+pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
+    let body = |instance: &Instance| {
+        let main = instance.shape.iter().map(|shape| (shape, Pose::IDENTITY));
+        Body::of_shapes(main.chain(solids(instance)))
+    };
+    scene.instances.iter().map(body).collect()
+}
+
+/// More of the body of an instance than its main shape.
+fn solids(instance: &Instance) -> impl Iterator<Item = (&Shape, Pose)> {
+    instance.solids.iter().map(|solid| (&solid.shape, solid.pose))
+}

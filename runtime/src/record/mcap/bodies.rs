@@ -1,0 +1,86 @@
+//! `/bodies`: true shapes and joints, once; `/grips`: what is in the hands of robots, whenever that changes.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use matterix_ir::Program;
+use matterix_ir::bodies::{Bodies, Machine, Thing};
+use matterix_ir::scene::{InstanceId, Scene, Stand};
+use mcap::McapResult;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::Sink;
+use super::schema::{list, object, text};
+use crate::motion::Stage;
+use crate::record::run::Run;
+
+/// What a robot holds from now on.
+#[derive(Serialize)]
+pub(super) struct Grip<'a> {
+    pub(super) robot: &'a str,
+    /// What it grips, then its parts and what stands on it; none when it lets go.
+    pub(super) items: Vec<&'a str>,
+}
+
+/// Schema of [`Grip`].
+pub(super) fn grip_schema() -> Value {
+    let items = list(text("What it grips, then what goes along"));
+    object("matterix.Grip", [("robot", text("Name of the robot")), ("items", items)])
+}
+
+/// Writes the bodies of a lab, if there are any.
+pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
+    let bodies = bodies(run.program);
+    if bodies == Bodies::default() {
+        return Ok(());
+    }
+    let schema = json!({ "title": "matterix.Bodies", "type": "object" });
+    let channel = sink.channel("/bodies", "matterix.Bodies", &schema, &BTreeMap::new())?;
+    sink.push(channel, 0.0, &bodies)
+}
+
+fn bodies(program: &Program) -> Bodies {
+    let scene = &program.scene;
+    let mut out = Bodies::default();
+    for instance in scene.instances.iter().filter(|i| i.shape.is_some() || !i.solids.is_empty()) {
+        let mut whole = instance;
+        while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
+            whole = owner;
+        }
+        out.things.push(Thing {
+            name: instance.name.clone(),
+            whole: whole.name.clone(),
+            shape: instance.shape.clone(),
+            solids: instance.solids.clone(),
+        });
+    }
+    // A robot that cannot be moved is no machine here; who moves it says why.
+    let Ok(stage) = Stage::new(program) else { return out };
+    for (id, robot, _) in stage.movers() {
+        let assembly = stage.actors.get(&id).map(|actor| &actor.assembly);
+        out.machines.push(Machine {
+            name: scene.get(id).name.clone(),
+            robot: robot.clone(),
+            tip: assembly.map_or(0, |a| a.tip),
+            tools: assembly.map_or(robot.links.len() as u32, |a| a.tools),
+        });
+    }
+    out
+}
+
+/// A thing, its parts and what stands on any of these, by name.
+pub(super) fn along<'a>(scene: &'a Scene, id: InstanceId, stands: &[Stand]) -> Vec<&'a str> {
+    let mut going = vec![id];
+    let mut next = 0;
+    while let Some(&carrier) = going.get(next) {
+        next += 1;
+        for (index, stand) in stands.iter().enumerate() {
+            let other = InstanceId(index as u32);
+            if stand.below() == Some(carrier) && !going.contains(&other) {
+                going.push(other);
+            }
+        }
+    }
+    going.into_iter().map(|id| scene.get(id).name.as_str()).collect()
+}
