@@ -540,7 +540,11 @@ impl Stage<'_> {
     fn is_free_there(&self, robot: InstanceId, q: &[f64], goal: Option<InstanceId>) -> bool {
         let around = self.beside_line(robot, goal.as_slice());
         let figure = self.actors.get(&robot).and_then(|actor| self.figure(robot, actor).ok());
-        figure.is_some_and(|figure| figure.contacts(&around.world, q).is_empty())
+        figure.is_some_and(|figure| {
+            let exact = Exact::of(self, robot, &figure, &around);
+            let mut checker = self.checker(&figure, &around, &exact);
+            checker.contacts(q).is_empty() || checker.ask(true) && checker.contacts(q).is_empty()
+        })
     }
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
