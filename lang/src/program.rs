@@ -551,8 +551,7 @@ fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
 fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
     let ItemKind::Lab { name, .. } = &lab.tables.names.decl(decl).item.kind else { return Scene::default() };
     let mut instances = Vec::new();
-    let placed = lab.whereabouts();
-    for i in 0..lab.instances.len() {
+    for (i, placed) in lab.whereabouts().into_iter().enumerate() {
         let id = InstanceId(i as u32);
         let inst = &lab.instances[i];
         let capabilities = {
@@ -583,7 +582,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             link,
             support,
             pose,
-            placed: placed[i],
+            placed: placed,
             frames,
             shape,
             solids,

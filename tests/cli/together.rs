@@ -156,7 +156,7 @@ fn nearest(text: &str) -> (f64, f64) {
     let options = RunOptions { fidelity: Fidelity::Motion, ..RunOptions::default() };
     let outcome = matterix_runtime::run::run(&program, &options, &mut seen);
     assert_eq!(outcome.status, RunStatus::Passed, "{:?}", outcome.failure);
-    let mut stage = Stage::new(&program.scene).expect("robots that move");
+    let mut stage = Stage::new(&program).expect("robots that move");
     let robots: Vec<InstanceId> = seen.0.keys().copied().collect();
     assert_eq!(robots.len(), 2);
     let mut least = f64::INFINITY;

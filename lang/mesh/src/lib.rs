@@ -16,8 +16,11 @@ pub const MOST_TRIANGLES: usize = 1 << 16;
 pub const MOST_BYTES: usize = 64 << 20;
 
 /// Kinds of files, by the ends of their names, and whether the kind says its unit (then metres).
-const KINDS: &[(&str, bool, fn(&[u8]) -> Result<Surface, String>)] =
+const KINDS: &[Kind] =
     &[("stl", false, stl::read), ("obj", false, obj::read), ("glb", true, gltf::read), ("gltf", true, gltf::read)];
+
+/// The end of a name, whether the kind is in metres, and what reads it.
+type Kind = (&'static str, bool, fn(&[u8]) -> Result<Surface, String>);
 
 /// Points and triangles.
 type Surface = (Vec<[f64; 3]>, Vec<[u32; 3]>);
@@ -27,7 +30,7 @@ pub fn is_metric(name: &str) -> Option<bool> {
     kind(name).map(|(_, metric, _)| *metric)
 }
 
-fn kind(name: &str) -> Option<&'static (&'static str, bool, fn(&[u8]) -> Result<Surface, String>)> {
+fn kind(name: &str) -> Option<&'static Kind> {
     let end = name.rsplit_once('.').map_or("", |(_, end)| end).to_ascii_lowercase();
     KINDS.iter().find(|(known, ..)| *known == end)
 }

@@ -37,8 +37,8 @@ pub(crate) fn judge(film: &Film, index: usize, looked: &mut Looked, wrong: &mut 
         gripped(film, grip, looked, wrong);
     }
     for pair in robot.grips.windows(2) {
-        if let (Some(let_go), true) = (pair[0].items.first(), pair[1].items.is_empty()) {
-            put_down(film, let_go.0, &pair[0].items, pair[1].time, wrong);
+        if pair[1].items.is_empty() {
+            put_down(film, index, &pair[0].items, pair[1].time, wrong);
         }
     }
 }
@@ -215,8 +215,13 @@ fn gripped(film: &Film, grip: &Grip, looked: &mut Looked, wrong: &mut Vec<Wrong>
     }
 }
 
-/// Something must be below what was let go.
-fn put_down(film: &Film, item: usize, along: &[(usize, Isometry)], time: f64, wrong: &mut Vec<Wrong>) {
+/// Something must be below what was let go, or another robot must hold it.
+fn put_down(film: &Film, by: usize, along: &[(usize, Isometry)], time: f64, wrong: &mut Vec<Wrong>) {
+    let Some(&(item, _)) = along.first() else { return };
+    let mut others = film.robots.iter().enumerate().filter(|(i, _)| *i != by);
+    if others.any(|(_, robot)| robot.held(time).first().is_some_and(|(held, _)| *held == item)) {
+        return;
+    }
     let thing = &film.things[item];
     let (Some(body), Some(at)) = (thing.body.as_ref(), thing.at(time)) else { return };
     let below =

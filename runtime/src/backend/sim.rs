@@ -124,11 +124,17 @@ impl<'m> Sim<'m> {
         };
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
-        let performed = stage.set_out(&motion, &values)?;
-        Ok(performed.map(|performed| {
-            out.travels(&stage.moments(&performed, self.engine.time(), FRAME));
-            performed.duration()
-        }))
+        let now = self.engine.time();
+        let Some(performed) = stage.set_out(&motion, &values)? else {
+            // What changes hands does so while both stand still.
+            if let Motion::Free { on: Some(on), by, .. } = &motion {
+                let robots = [*by, *on].into_iter().filter_map(|id| stage.actor_of(id));
+                out.travels(&robots.filter_map(|robot| stage.moment(robot, now)).collect::<Vec<_>>());
+            }
+            return Ok(None);
+        };
+        out.travels(&stage.moments(&performed, now, FRAME));
+        Ok(Some(performed.duration()))
     }
 
     /// How an operation with a motion goes on. One that another robot is in the way of waits for it to go away, no
