@@ -582,7 +582,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             link,
             support,
             pose,
-            placed: placed,
+            placed,
             frames,
             shape,
             solids,
