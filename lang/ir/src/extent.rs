@@ -121,7 +121,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     fn body(shape: &Shape, grasp: Pose) -> Option<f64> {
-        let frames = [Frame { name: frame::GRASP.into(), pose: grasp, stand: false }];
+        let frames = [Frame { name: frame::GRASP.into(), pose: grasp, stand: false, link: None }];
         Body { frames: &frames, shape: Some(shape), solids: &[] }.across_grasp()
     }
 
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn a_handle_counts_where_it_is_gripped() {
-        let frames = [Frame { name: frame::GRASP.into(), pose: Pose::up(0.11), stand: false }];
+        let frames = [Frame { name: frame::GRASP.into(), pose: Pose::up(0.11), stand: false, link: None }];
         let handle = Solid { shape: Shape::Box([0.1, 0.02, 0.03]), pose: Pose::up(0.1) };
         let crate_ = Shape::Box([0.4, 0.3, 0.1]);
         let body = Body { frames: &frames, shape: Some(&crate_), solids: &[handle] };

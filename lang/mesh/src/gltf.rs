@@ -11,7 +11,7 @@ use crate::{MOST_TRIANGLES, Surface};
 const DEEPEST: u32 = 64;
 
 pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
-    let file = Gltf::from_slice(bytes).map_err(|e| format!("it is no glTF: {e}"))?;
+    let file = file(bytes)?;
     let buffers = buffers(&file)?;
     fits(&file.document, &buffers)?;
     let Some(scene) = file.default_scene().or_else(|| file.scenes().next()) else {
@@ -24,6 +24,18 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Surface, String> {
     // The y axis points up there.
     out.0.iter_mut().for_each(|p| *p = [p[0], -p[2], p[1]]);
     Ok(out)
+}
+
+/// The file, valid by its standard. Attributes are looked at first, as the validation takes their accessors to be there.
+fn file(bytes: &[u8]) -> Result<Gltf, String> {
+    let wrong = |e: gltf::Error| format!("it is no glTF: {e}");
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes).map_err(wrong)?;
+    let root = document.into_json();
+    let mut attributes = root.meshes.iter().flat_map(|m| &m.primitives).flat_map(|p| p.attributes.values());
+    if attributes.any(|accessor| accessor.value() >= root.accessors.len()) {
+        return Err("it refers to data that it does not describe".to_string());
+    }
+    Ok(Gltf { document: Document::from_json(root).map_err(wrong)?, blob })
 }
 
 /// Columns of a matrix that moves points.

@@ -142,7 +142,7 @@ mod tests {
             links: vec![link("foot"), link("hand")],
             joints: vec![joint],
             balls: vec![ball],
-            touching: Vec::new(),
+            ..Robot::default()
         };
         Figure::new(&robot, &Pose::identity(), &[0], &[0.0], &[]).expect("a robot")
     }

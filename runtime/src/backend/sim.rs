@@ -128,7 +128,7 @@ impl<'m> Sim<'m> {
         let Some(performed) = stage.set_out(&motion, &values)? else {
             // What changes hands does so while both stand still.
             if let Motion::Free { on: Some(on), by, .. } = &motion {
-                let robots = [*by, *on].into_iter().filter_map(|id| stage.actor_of(id));
+                let robots = [*by, *on].into_iter().filter_map(|id| stage.hand_of(id));
                 out.travels(&robots.filter_map(|robot| stage.moment(robot, now)).collect::<Vec<_>>());
             }
             return Ok(None);

@@ -357,7 +357,7 @@ impl Stage<'_> {
                 if self.held(robot) != Some(*item) {
                     return Err(Refused::NotHeld);
                 }
-                if let Some(taker) = on.and_then(|on| self.actor_of(on)) {
+                if let Some(taker) = on.and_then(|on| self.hand_of(on)) {
                     return if self.pass(*item, robot, taker) { Ok(None) } else { Err(Refused::NotHeld) };
                 }
                 let to: Vec<Pose> = match on {
@@ -440,12 +440,24 @@ impl Stage<'_> {
         }
         let mut parts = Vec::new();
         if let Some(item) = self.just_freed(robot).filter(|item| Some(*item) != near) {
-            let mut back = self.tip(robot);
-            back.position = back.point([0.0, 0.0, -RETREAT]);
-            parts.push(self.line(robot, &[back], &[item])?);
+            parts.push(self.retreat(robot, item)?);
         }
         self.leave(robot);
         Ok(parts)
+    }
+
+    /// Draws a gripper back from what it has let go; where that leads beyond reach, less far.
+    fn retreat(&mut self, robot: InstanceId, item: InstanceId) -> Result<Part, Refused> {
+        let tip = self.tip(robot);
+        let mut back = |far: f64| {
+            let to = Pose { position: tip.point([0.0, 0.0, -far]), ..tip };
+            self.line(robot, &[to], &[item])
+        };
+        let beyond = |why: &Refused| matches!(why, Refused::OutOfReach(..));
+        match back(RETREAT) {
+            Err(why) if beyond(&why) => [0.5, 0.25].iter().find_map(|share| back(share * RETREAT).ok()).ok_or(why),
+            whole => whole,
+        }
     }
 
     /// Brings a robot to a frame, or so far from it, m; what it holds to the nearest spot about it that is free and within
@@ -497,16 +509,20 @@ impl Stage<'_> {
         Err(refused)
     }
 
-    /// Whether a short search finds a posture for one spot beside a frame.
+    /// Whether a short search finds a posture for one spot beside a frame, and for letting go there.
     fn may_reach(&self, robot: InstanceId, goal: InstanceId, frame: &str, spot: Pose) -> bool {
         let Some(actor) = self.actors.get(&robot) else { return false };
         if !actor.drive.is_empty() {
             return true;
         }
-        let Some(to) = targets_at(self, robot, goal, frame, spot).into_iter().next() else { return false };
-        let now = actor.configuration();
-        let request = Request { attempts: 6, ..Request::new(pose(&self.foot(robot).inverse().then(to)), &now) };
-        Solver::new(actor.chain.clone()).solve(&request).is_ok()
+        let (base, now) = (self.foot(robot).inverse(), actor.configuration());
+        let mut solver = Solver::new(actor.chain.clone());
+        let mut reaches = |frame: &str| {
+            let to = targets_at(self, robot, goal, frame, spot).into_iter().next()?;
+            let request = Request { attempts: 6, ..Request::new(pose(&base.then(to)), &now) };
+            Some(solver.solve(&request).is_ok())
+        };
+        reaches(frame) == Some(true) && reaches(frame::PLACE) != Some(false)
     }
 
     fn go(&mut self, robot: InstanceId, to: &[Pose], way: Way, goal: Option<InstanceId>) -> Result<Performed, Refused> {
@@ -573,6 +589,14 @@ impl Stage<'_> {
                 && let Ok(turned) = self.turned_line(robot, target, goal.as_slice())
             {
                 return Ok(turned.into());
+            }
+        }
+        // A line that ends beyond what a posture reaches may be within what another one does.
+        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..)) {
+            for (_, target, _) in &found {
+                if let Ok(parts) = self.line_from_elsewhere(robot, target, goal.as_slice()) {
+                    return Ok(parts.into());
+                }
             }
         }
         // Another posture may be free where the nearest is not; a search that finds no way to one takes long.

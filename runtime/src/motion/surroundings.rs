@@ -1,5 +1,8 @@
 //! What a robot must not run into, as solids, and what it holds, as balls.
 
+use std::f64::consts::TAU;
+
+use matterix_ir::math;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot;
 use matterix_ir::scene::{InstanceId, Shape};
@@ -130,7 +133,15 @@ pub fn held(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Vec<Held> {
     vec![Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching }]
 }
 
-/// Balls that fill a shape, no larger than it: a row of them along each of its edges and through its middle.
+/// Balls along the edges and the wall of what is round, so that it does not count as rounded off: their radius, and how far
+/// rings of them are apart, m.
+const EDGE: (f64, f64) = (0.003, 0.02);
+
+/// As [`SLACK`], of these, m: what they cut off a rim stays below 2 mm.
+const EDGE_SLACK: f64 = 5e-4;
+
+/// Balls that fill a shape, no larger than it: a row of them along each of its edges and through its middle; of what is
+/// round, small ones along its wall.
 fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
     let [x, y, z] = shape.size();
     let radius = (x.min(y).min(z) / 2.0).max(1e-3);
@@ -152,6 +163,17 @@ fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
             for pz in along(z) {
                 out.push((at.point([px, py, z / 2.0 + pz]), radius - SLACK.min(radius / 2.0)));
             }
+        }
+    }
+    let (small, apart) = EDGE;
+    if shape.is_round() && !matches!(shape, Shape::Sphere(_)) && radius > small {
+        let (ring, high) = (x / 2.0 - small, z - 2.0 * small);
+        let (turns, rings) = ((TAU * ring / (1.5 * small)).ceil() as u32, (high / apart).ceil().max(1.0) as u32);
+        for (turn, level) in (0..turns).flat_map(|turn| (0..=rings).map(move |level| (turn, level))) {
+            let angle = TAU * f64::from(turn) / f64::from(turns);
+            let up = small + high * f64::from(level) / f64::from(rings);
+            let place = [ring * math::cos(angle), ring * math::sin(angle), up];
+            out.push((at.point(place), small - EDGE_SLACK));
         }
     }
     out

@@ -7,10 +7,13 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
 use super::perform::{Part, Performed, Refused};
+use super::postures::postures;
 use super::stage::Stage;
 
 /// How far what is held tilts while a gripper only turns, rad.
 const TURNING: f64 = 0.1;
+/// Postures that are tried for a line beyond reach.
+const POSTURES: usize = 4;
 
 impl Stage<'_> {
     /// Brings the joints that move the tip to positions.
@@ -54,5 +57,27 @@ impl Stage<'_> {
             actor.joints = before;
         }
         both
+    }
+
+    /// Takes another posture with the tip where it is, from which it is then brought to a pose on a straight line.
+    pub(super) fn line_from_elsewhere(
+        &mut self,
+        robot: InstanceId,
+        to: &Pose,
+        near: &[InstanceId],
+    ) -> Result<[Part; 2], Refused> {
+        let arm = self.arm(robot);
+        let before = self.actors.get(&robot).map(|actor| actor.joints.clone()).ok_or(Refused::NoRobot)?;
+        for q in postures(self, robot, &[self.tip(robot)]).into_iter().take(POSTURES) {
+            let first = self.way(robot, &arm, &q, Some(TURNING));
+            let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+            if both.is_ok() {
+                return both;
+            }
+            if let Some(actor) = self.actors.get_mut(&robot) {
+                actor.joints.clone_from(&before);
+            }
+        }
+        Err(Refused::NoWay)
     }
 }

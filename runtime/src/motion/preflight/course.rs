@@ -71,7 +71,7 @@ impl Course<'_> {
         if before == after {
             return;
         }
-        match after.filter(|on| self.stage.actor_of(*on).is_none()) {
+        match after.filter(|on| self.stage.hand_of(*on).is_none()) {
             Some(on) => self.stands(id, on),
             None => {
                 self.stage.unknown.places.insert(id);

@@ -159,14 +159,14 @@ impl<'p, 's> Looker<'p, 's> {
             || stage.unknown.places.contains(&item)
             || on.is_some_and(|on| stage.is_unknown(on));
         if blind {
-            match below.filter(|on| stage.actor_of(*on).is_none()) {
+            match below.filter(|on| stage.hand_of(*on).is_none()) {
                 Some(on) => course.stands(item, on),
                 None => stage.carry(item, None),
             }
             return;
         }
         if let Err(why) = stage.perform(motion, &[]) {
-            match below.filter(|on| stage.actor_of(*on).is_none()) {
+            match below.filter(|on| stage.hand_of(*on).is_none()) {
                 Some(on) => course.stands(item, on),
                 None => stage.carry(item, below),
             }

@@ -35,7 +35,26 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     if bodies == Bodies::default() {
         return Ok(());
     }
-    let schema = json!({ "title": "matterix.Bodies", "type": "object" });
+    let index = json!({ "type": "integer", "minimum": 0 });
+    let thing = object(
+        "matterix.Thing",
+        [
+            ("name", text("Its name")),
+            ("whole", text("What it is a part of, or its own name")),
+            ("shape", json!({ "description": "Its main shape, m" })),
+            ("solids", json!({ "description": "More of its body, each with a pose" })),
+        ],
+    );
+    let machine = object(
+        "matterix.Machine",
+        [
+            ("name", text("Its name")),
+            ("robot", json!({ "description": "Links, joints and shapes, as in a description of a robot" })),
+            ("tip", index.clone()),
+            ("tools", index),
+        ],
+    );
+    let schema = object("matterix.Bodies", [("things", list(thing)), ("machines", list(machine))]);
     let channel = sink.channel("/bodies", "matterix.Bodies", &schema, &BTreeMap::new())?;
     sink.push(channel, 0.0, &bodies)
 }
