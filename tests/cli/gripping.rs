@@ -54,7 +54,7 @@ fn gap(stage: &Stage<'_>, robot: InstanceId) -> f64 {
 
 /// Carries out the motions of a workflow; how far the fingers are apart after each.
 fn gaps(program: &Program) -> Vec<f64> {
-    let mut stage = Stage::new(&program).expect("a stage");
+    let mut stage = Stage::new(program).expect("a stage");
     let panda = program.scene.find("panda").expect("it is there");
     let perform = |(motion, values): (Motion, Vec<f64>)| {
         let done = stage.perform(&motion, &values).unwrap_or_else(|why| panic!("{motion:?}: {why:?}"));
