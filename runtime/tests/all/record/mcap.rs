@@ -79,6 +79,7 @@ fn every_message_has_exactly_the_fields_of_its_schema() {
     }
     let topics: Vec<&str> = seen.iter().map(|s| s.0.as_str()).collect();
     let wanted = [
+        "/bodies",
         "/contents/beaker.contents",
         "/events",
         "/expectations",
