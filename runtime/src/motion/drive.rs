@@ -63,7 +63,7 @@ impl Stage<'_> {
     /// Whether a robot stands for good, or so that its tip gets on from one of these poses.
     fn has_room(&self, robot: InstanceId, to: &[Pose]) -> bool {
         let Some(actor) = self.actors.get(&robot).filter(|a| !a.drive.is_empty()) else { return true };
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let tip = self.tip(robot);
         let near = |at: &&Pose| (0..3).all(|k| (at.position[k] - tip.position[k]).abs() < 1e-3);
         to.iter().filter(near).any(|at| gets_on(&mut solver, &self.foot(robot), at, &actor.configuration()))
@@ -104,7 +104,7 @@ impl Stage<'_> {
         let around = Surroundings::of(self, robot, &self.carriers(robot));
         let Ok(figure) = self.figure(robot, actor, drive) else { return Vec::new() };
         let mut checker = Checker::new(&figure, &around.world, 1.0);
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let home: Vec<f64> = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
         let now = actor.positions(drive);
         let own = self.pose(robot).inverse();

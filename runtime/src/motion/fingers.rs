@@ -141,7 +141,7 @@ impl Stage<'_> {
         let to = fingers.at(&actor.tree, &actor.joints, width);
         let trajectory = fingers.travel(&actor.tree, &actor.joints, &to)?;
         actor.set_some(&fingers.joints, &to);
-        Some(Part { wait: 0.0, joints: fingers.joints, trajectory })
+        Some(Part { wait: 0.0, joints: fingers.joints.clone(), trajectory })
     }
 
     /// Opens a gripper further than a thing is wide.

@@ -1,5 +1,7 @@
 //! Things with parts that move as the model says: lids, sashes, knobs; and hands that take such parts along.
 
+use std::sync::Arc;
+
 use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{JointKind, Robot};
@@ -18,8 +20,8 @@ const PIECE: f64 = 0.05;
 /// A thing with joints that follow the model, and how they stand.
 #[derive(Clone, Debug)]
 pub struct Fixture {
-    /// Every link.
-    pub tree: Tree,
+    /// Every link; shared by all copies of a stage.
+    pub tree: Arc<Tree>,
     /// Positions of all that moves, rad or m.
     pub joints: Vec<f64>,
 }
@@ -65,7 +67,7 @@ impl Fixture {
     /// Joints as a description has them at first.
     pub fn new(articulation: &Articulation) -> Result<Self, String> {
         let tree = Tree::new(&articulation.robot).map_err(|why| why.to_string())?;
-        Ok(Fixture { tree, joints: articulation.home.clone() })
+        Ok(Fixture { tree: Arc::new(tree), joints: articulation.home.clone() })
     }
 
     /// The links, relative to the thing.

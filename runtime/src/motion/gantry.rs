@@ -1,5 +1,7 @@
 //! Gantries: robots whose joints all slide. They go up, across and down.
 
+use std::sync::Arc;
+
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointKind;
 use matterix_ir::scene::InstanceId;
@@ -41,7 +43,8 @@ impl Stage<'_> {
         let chain = Chain::new(&actor.assembly.robot, actor.assembly.base, link).map_err(|_| Refused::NoRobot)?;
         let place = |v: &Variable| actor.tree.variables().iter().position(|other| other.joint == v.joint);
         actor.arm = chain.variables().iter().filter_map(place).collect();
-        (actor.assembly.tip, actor.chain) = (link, chain);
+        Arc::make_mut(&mut actor.assembly).tip = link;
+        actor.chain = Arc::new(chain);
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
-use matterix_motion::inverse::{Request, Solver, Unreached};
+use matterix_motion::inverse::{Request, Unreached};
 use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
@@ -281,8 +281,7 @@ impl Stage<'_> {
                 let shift = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or_default());
                 let gantry = self.actors.get(&robot).is_some_and(Actor::is_gantry);
                 if gantry || within.is_some() {
-                    let mut to = targets(self, robot, *goal, frame);
-                    to.iter_mut().for_each(|to| (0..3).for_each(|k| to.position[k] += shift[k]));
+                    let to = shifted(targets(self, robot, *goal, frame), shift);
                     match to.is_empty() {
                         true if within.is_some() => return Ok(None),
                         true => return Err(Refused::NoFrame),
@@ -491,8 +490,7 @@ impl Stage<'_> {
         let before = (spots.len() > 1).then(|| self.clone());
         let mut refused = Refused::NoFrame;
         for (k, spot) in spots.into_iter().enumerate() {
-            let mut to = targets_at(self, robot, goal, frame, spot);
-            to.iter_mut().for_each(|to| (0..3).for_each(|k| to.position[k] += shift[k]));
+            let to = shifted(targets_at(self, robot, goal, frame, spot), shift);
             if to.is_empty() {
                 return Err(Refused::NoFrame);
             }
@@ -516,7 +514,7 @@ impl Stage<'_> {
             return true;
         }
         let (base, now) = (self.foot(robot).inverse(), actor.configuration());
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let mut reaches = |frame: &str| {
             let to = targets_at(self, robot, goal, frame, spot).into_iter().next()?;
             let request = Request { attempts: 6, ..Request::new(pose(&base.then(to)), &now) };
@@ -545,7 +543,7 @@ impl Stage<'_> {
         let base = self.foot(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (now, arm) = (actor.configuration(), actor.arm.clone());
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let mut found: Vec<(f64, &Pose, Vec<f64>)> = Vec::new();
         let mut missed: Option<Unreached> = None;
         for target in to {
@@ -667,7 +665,7 @@ impl Stage<'_> {
         };
         let part = match within.and_then(|tilt| self.upright(robot, tilt)) {
             Some(upright) => {
-                let mut solver = Solver::new(actor.chain.clone());
+                let mut solver = actor.solver();
                 let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
                 let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
                 timed(actor, variables, &route.points, Some(&mut level))?
@@ -689,7 +687,7 @@ impl Stage<'_> {
         let figure = self.figure(robot, actor, &arm)?;
         let exact = Exact::of(self, robot, &figure, &around);
         let mut checker = self.checker(&figure, &around, &exact);
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let mut points = vec![actor.configuration()];
         for to in to {
             let from = points.last().cloned().unwrap_or_default();
@@ -761,6 +759,12 @@ impl Stage<'_> {
             before,
         })
     }
+}
+
+/// Poses so far from where they were, m.
+fn shifted(mut all: Vec<Pose>, by: [f64; 3]) -> Vec<Pose> {
+    all.iter_mut().for_each(|at| (0..3).for_each(|k| at.position[k] += by[k]));
+    all
 }
 
 /// The motion of some joints of a robot from point to point, as fast as they may.

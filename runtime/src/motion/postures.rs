@@ -2,7 +2,7 @@
 
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
-use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
 
 use super::stage::Stage;
@@ -19,7 +19,7 @@ pub fn postures(stage: &Stage<'_>, robot: InstanceId, to: &[Pose]) -> Vec<Vec<f6
     let Some(actor) = stage.actors.get(&robot) else { return Vec::new() };
     let base = stage.foot(robot).inverse();
     let now = actor.configuration();
-    let mut solver = Solver::new(actor.chain.clone());
+    let mut solver = actor.solver();
     let mut found: Vec<(f64, Vec<f64>)> = Vec::new();
     for (index, target) in to.iter().enumerate() {
         let target = pose(&base.then(*target));

@@ -8,6 +8,7 @@ use matterix_ir::Program;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::Robot;
 use matterix_ir::scene::{InstanceId, Scene, Stand, frame};
+use matterix_motion::inverse::Solver;
 use matterix_motion::touching::always_touching;
 use matterix_motion::{Chain, Tree};
 use matterix_solids::Body;
@@ -27,21 +28,21 @@ pub enum Carried {
     Held(InstanceId, Pose),
 }
 
-/// A robot and how it stands.
+/// A robot and how it stands. What stays the same is shared by all copies of a stage.
 #[derive(Clone, Debug)]
 pub struct Actor {
     /// All of it.
-    pub assembly: Assembly,
+    pub assembly: Arc<Assembly>,
     /// Every link.
-    pub tree: Tree,
+    pub tree: Arc<Tree>,
     /// From the link it reaches from to what is brought to a goal.
-    pub chain: Chain,
+    pub chain: Arc<Chain>,
     /// Positions of all that moves, rad or m.
     pub joints: Vec<f64>,
     /// Indices into `joints` of those that move the tip.
     pub arm: Vec<usize>,
     /// What opens and closes its gripper.
-    pub fingers: Option<Fingers>,
+    pub fingers: Option<Arc<Fingers>>,
     /// Of those that drive it about.
     pub drive: Vec<usize>,
     /// Shared by all copies of a stage.
@@ -154,9 +155,9 @@ impl<'p> Stage<'p> {
 
     /// Things whose links move, with their descriptions.
     pub fn movers(&self) -> impl Iterator<Item = (InstanceId, &Robot, &Tree)> {
-        let robots = self.actors.iter().map(|(id, actor)| (*id, &actor.assembly.robot, &actor.tree));
+        let robots = self.actors.iter().map(|(id, actor)| (*id, &actor.assembly.robot, &*actor.tree));
         let fixtures = self.fixtures.iter().filter_map(|(id, fixture)| {
-            following(self.scene, *id).map(|articulation| (*id, &articulation.robot, &fixture.tree))
+            following(self.scene, *id).map(|articulation| (*id, &articulation.robot, &*fixture.tree))
         });
         robots.chain(fixtures)
     }
@@ -519,7 +520,8 @@ impl Actor {
         };
         let (arm, drive) = (which(&chain), which(&drive));
         let joints = assembly.home.clone();
-        let fingers = Fingers::of(&assembly, &tree, &arm);
+        let fingers = Fingers::of(&assembly, &tree, &arm).map(Arc::new);
+        let (assembly, tree, chain) = (Arc::new(assembly), Arc::new(tree), Arc::new(chain));
         let (to_plan, bodies) = (Arc::default(), Arc::default());
         Ok(Actor { assembly, tree, chain, joints, arm, fingers, drive, to_plan, bodies })
     }
@@ -537,6 +539,11 @@ impl Actor {
     /// The true shapes of its links, made when they are first asked for.
     pub fn bodies(&self) -> &[Option<Body>] {
         self.bodies.get_or_init(|| Body::of_links(&self.assembly.robot))
+    }
+
+    /// What finds postures that bring its tip to a pose.
+    pub fn solver(&self) -> Solver {
+        Solver::new(Chain::clone(&self.chain))
     }
 
     /// The positions of the joints that move the tip.

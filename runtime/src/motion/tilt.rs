@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use matterix_ir::math::{acos, cos};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
-use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::inverse::Request;
 use matterix_motion::plan::Upright;
 use matterix_motion::pose::{distance, pose};
 
@@ -149,7 +149,7 @@ impl Stage<'_> {
     ) -> Vec<(Tilting, Vec<f64>)> {
         let Some(actor) = self.actors.get(&robot) else { return Vec::new() };
         let (base, here) = (self.foot(robot).inverse(), actor.configuration());
-        let mut solver = Solver::new(actor.chain.clone());
+        let mut solver = actor.solver();
         let mut found: Vec<(f64, Tilting, Vec<f64>)> = Vec::new();
         for way in ways {
             if now >= LEVEL {

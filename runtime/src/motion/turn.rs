@@ -3,7 +3,7 @@
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::Variable;
-use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
 
 use super::perform::{Part, Performed, Refused};
@@ -45,18 +45,12 @@ impl Stage<'_> {
         near: &[InstanceId],
     ) -> Result<[Part; 2], Refused> {
         let here = Pose { position: self.tip(robot).position, rotation: to.rotation };
-        let (base, arm) = (self.foot(robot).inverse(), self.arm(robot));
+        let base = self.foot(robot).inverse();
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
-        let before = actor.joints.clone();
         let now = actor.configuration();
         let request = Request { attempts: 60, ..Request::new(pose(&base.then(here)), &now) };
-        let turned = Solver::new(actor.chain.clone()).solve(&request).map_err(|_| Refused::NoWay)?;
-        let first = self.way(robot, &arm, &turned.q, Some(TURNING));
-        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
-        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
-            actor.joints = before;
-        }
-        both
+        let turned = actor.solver().solve(&request).map_err(|_| Refused::NoWay)?;
+        self.way_and_line(robot, &turned.q, to, near)
     }
 
     /// Takes another posture with the tip where it is, from which it is then brought to a pose on a straight line.
@@ -66,18 +60,25 @@ impl Stage<'_> {
         to: &Pose,
         near: &[InstanceId],
     ) -> Result<[Part; 2], Refused> {
-        let arm = self.arm(robot);
-        let before = self.actors.get(&robot).map(|actor| actor.joints.clone()).ok_or(Refused::NoRobot)?;
-        for q in postures(self, robot, &[self.tip(robot)]).into_iter().take(POSTURES) {
-            let first = self.way(robot, &arm, &q, Some(TURNING));
-            let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
-            if both.is_ok() {
-                return both;
-            }
-            if let Some(actor) = self.actors.get_mut(&robot) {
-                actor.joints.clone_from(&before);
-            }
+        let mut others = postures(self, robot, &[self.tip(robot)]).into_iter().take(POSTURES);
+        others.find_map(|q| self.way_and_line(robot, &q, to, near).ok()).ok_or(Refused::NoWay)
+    }
+
+    /// Takes a posture, then brings the tip to a pose on a straight line; stays as it is where either cannot be done.
+    fn way_and_line(
+        &mut self,
+        robot: InstanceId,
+        q: &[f64],
+        to: &Pose,
+        near: &[InstanceId],
+    ) -> Result<[Part; 2], Refused> {
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let (before, arm) = (actor.joints.clone(), actor.arm.clone());
+        let first = self.way(robot, &arm, q, Some(TURNING));
+        let both = first.and_then(|first| Ok([first, self.line(robot, std::slice::from_ref(to), near)?]));
+        if let (Err(_), Some(actor)) = (&both, self.actors.get_mut(&robot)) {
+            actor.joints = before;
         }
-        Err(Refused::NoWay)
+        both
     }
 }

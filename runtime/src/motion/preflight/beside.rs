@@ -8,6 +8,33 @@ use matterix_ir::scene::InstanceId;
 use super::course::Course;
 use crate::motion::stage::Stage;
 
+/// The first job that a sequence starts: it runs beside what follows until it is awaited.
+pub struct Job<'l> {
+    /// What comes first.
+    pub before: &'l [StepId],
+    /// The start of the job.
+    pub start: &'l StepId,
+    /// What it does.
+    pub body: StepId,
+    /// What runs beside it.
+    pub meanwhile: &'l [StepId],
+    /// From where it is awaited.
+    pub later: &'l [StepId],
+}
+
+impl<'l> Job<'l> {
+    /// The first one of a sequence; none where it starts none.
+    pub fn first(plan: &Plan, list: &'l [StepId]) -> Option<Self> {
+        let at = list.iter().position(|id| matches!(plan.get(*id).step, Step::Start { .. }))?;
+        let (before, rest) = list.split_at(at);
+        let (start, rest) = rest.split_first()?;
+        let Step::Start { job: name, body } = &plan.get(*start).step else { return None };
+        let awaits = |id: &StepId| matches!(&plan.get(*id).step, Step::Await { job } if job == name);
+        let (meanwhile, later) = rest.split_at(rest.iter().position(awaits).unwrap_or(rest.len()));
+        Some(Job { before, start, body: *body, meanwhile, later })
+    }
+}
+
 /// What a part of a plan moves.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Moved {

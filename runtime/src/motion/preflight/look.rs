@@ -58,20 +58,10 @@ impl<'p, 's> Looker<'p, 's> {
             Motion::Grip { item, .. } => self.grip(course, &motion, robot, *item, site, beside),
             Motion::Free { item, on, .. } => self.free(course, &motion, robot, (*item, *on), site, beside),
             _ => {
-                let values = self.values(course, &motion, operation);
+                let values = course.values.of_motion(model, &course.stage, &motion, operation);
                 self.go(course, (&motion, values), robot, site, beside);
             }
         }
-    }
-
-    /// The values of a motion; nothing where only a run can tell them.
-    fn values(&self, course: &Course<'p>, motion: &Motion, operation: &Operation) -> Option<Vec<f64>> {
-        let model = &self.program.model;
-        if let Some(led) = course.stage.led_by(motion) {
-            let after = course.values.after(model, operation.at_start.iter().chain(&operation.at_end));
-            return after.value(model, led).map(|to| vec![to]);
-        }
-        motion.values().into_iter().map(|node| course.values.value(model, node)).collect()
     }
 
     fn go(

@@ -1,6 +1,6 @@
 //! Looks at the motions of a plan before anything moves: what is out of reach, what collides, what cannot be gripped.
 
-mod beside;
+pub(super) mod beside;
 mod course;
 mod look;
 mod memory;
@@ -24,8 +24,8 @@ pub fn preflight(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     if stage.actors.is_empty() {
         return Vec::new();
     }
-    let mut found = walk::follow(program, stage, memory::Memory::of(&program.scene, store));
-    found.extend(together(program));
+    let mut found = walk::follow(program, stage.clone(), memory::Memory::of(&program.scene, store));
+    found.extend(together(program, stage));
     found
 }
 

@@ -4,7 +4,7 @@ use matterix_ir::plan::Motion;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Scene, Stand};
 use matterix_ir::{Diagnostic, Span, codes};
-use matterix_motion::inverse::{Request, Solver};
+use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
 
 use crate::motion::goal::targets;
@@ -141,7 +141,7 @@ pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
     let robot = stage.actor_of(motion.mover())?;
     let base = stage.foot(robot);
     let actor = stage.actors.get(&robot)?;
-    let mut solver = Solver::new(actor.chain.clone());
+    let mut solver = actor.solver();
     let now = actor.configuration();
     let targets = targets(stage, robot, goal, frame);
     let mut shifted = |share: f64| {

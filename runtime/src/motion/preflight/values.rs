@@ -4,7 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::graph::{BinaryOp, apply};
 use matterix_ir::model::{Action, Domain, Model};
+use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::{NodeId, Op};
+
+use crate::motion::stage::Stage;
 
 /// Values of states that are words, truths or instances, as far as they are known; quantities never are.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,7 +49,7 @@ impl Values {
     }
 
     /// What is known when actions have been carried out, the quantities that they set included.
-    pub fn after<'a>(&self, model: &Model, actions: impl Iterator<Item = &'a Action>) -> Values {
+    fn after<'a>(&self, model: &Model, actions: impl Iterator<Item = &'a Action>) -> Values {
         let mut out = self.clone();
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
@@ -56,6 +59,21 @@ impl Values {
             };
         }
         out
+    }
+
+    /// The values of the motion of an operation, as [`Stage::perform`] takes them; nothing where only a run can tell them.
+    pub fn of_motion(
+        &self,
+        model: &Model,
+        stage: &Stage<'_>,
+        motion: &Motion,
+        operation: &Operation,
+    ) -> Option<Vec<f64>> {
+        if let Some(led) = stage.led_by(motion) {
+            let after = self.after(model, operation.at_start.iter().chain(&operation.at_end));
+            return after.value(model, led).map(|to| vec![to]);
+        }
+        motion.values().into_iter().map(|node| self.value(model, node)).collect()
     }
 
     /// The value of an expression, if what is known settles it.

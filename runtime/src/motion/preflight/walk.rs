@@ -7,7 +7,7 @@ use matterix_ir::plan::{Caught, Condition, Operation, Step, StepId};
 use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span};
 
-use super::beside::Moved;
+use super::beside::{Job, Moved};
 use super::course::Course;
 use super::look::{Looker, on_step};
 use super::memory::Memory;
@@ -221,16 +221,10 @@ impl<'p> Walk<'p, '_> {
     /// One after the other; a job runs beside what follows it, until it is awaited.
     fn sequence(&mut self, list: &[StepId], mut courses: Courses<'p>) -> Courses<'p> {
         let plan = &self.program.plan;
-        let Some(first) = list.iter().position(|id| matches!(plan.get(*id).step, Step::Start { .. })) else {
+        let Some(Job { before, start, meanwhile, later, .. }) = Job::first(plan, list) else {
             return list.iter().fold(courses, |courses, id| self.step(*id, courses));
         };
-        let (before, rest) = list.split_at(first);
         courses = before.iter().fold(courses, |courses, id| self.step(*id, courses));
-        let Some((start, rest)) = rest.split_first() else { return courses };
-        let Step::Start { job: name, .. } = &plan.get(*start).step else { return courses };
-        let awaits = |id: &StepId| matches!(&plan.get(*id).step, Step::Await { job } if job == name);
-        let end = rest.iter().position(awaits).unwrap_or(rest.len());
-        let (meanwhile, later) = rest.split_at(end);
         let Some(stage) = courses.first().map(|c| &c.stage) else { return courses };
         let moved = |ids: &[StepId]| {
             ids.iter().map(|id| Moved::by(plan, *id, stage)).fold(Moved::default(), |all, one| all.and(&one))

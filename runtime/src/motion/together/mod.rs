@@ -15,10 +15,7 @@ use matterix_ir::{Diagnostic, Program};
 
 use super::stage::Stage;
 
-/// Robots of a program that may meet, or must.
-pub fn together(program: &Program) -> Vec<Diagnostic> {
-    match Stage::new(program) {
-        Ok(stage) if stage.actors.len() > 1 => walk::follow(program, stage),
-        _ => Vec::new(),
-    }
+/// Robots of a program that may meet, or must; `stage` is its lab when the run begins.
+pub fn together<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
+    if stage.actors.len() > 1 { walk::follow(program, stage) } else { Vec::new() }
 }

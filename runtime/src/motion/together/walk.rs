@@ -10,6 +10,7 @@ use matterix_ir::{Diagnostic, Program, Span};
 use super::grid::{Line, deadlock};
 use super::leg::Leg;
 use super::pair::{Times, finding, may_meet};
+use crate::motion::preflight::beside::Job;
 use crate::motion::preflight::supported;
 use crate::motion::preflight::values::Values;
 use crate::motion::stage::Stage;
@@ -145,13 +146,7 @@ impl<'p> Walk<'p, '_> {
         let model = &self.program.model;
         // What only a run can tell is left to the run.
         let Some(motion) = &motion.chosen(|node| self.values.value(model, node)) else { return self.perhaps(true) };
-        let values = match self.stage.led_by(motion) {
-            Some(led) => {
-                let after = self.values.after(model, operation.at_start.iter().chain(&operation.at_end));
-                after.value(model, led).map(|to| vec![to])
-            }
-            None => motion.values().into_iter().map(|node| self.values.value(model, node)).collect(),
-        };
+        let values = self.values.of_motion(model, &self.stage, motion, operation);
         let Some(values) = values else { return self.perhaps(true) };
         let straight = matches!(motion, Motion::By { straight: true, .. } | Motion::To { straight: true, .. });
         let before = self.stage.clone();
@@ -187,17 +182,12 @@ impl<'p> Walk<'p, '_> {
 
     /// One after the other; a job runs beside what follows it, until it is awaited.
     fn sequence(&mut self, list: &[StepId]) {
-        let plan = &self.program.plan;
-        let Some(first) = list.iter().position(|id| matches!(plan.get(*id).step, Step::Start { .. })) else {
+        let Some(job) = Job::first(&self.program.plan, list) else {
             return list.iter().for_each(|id| self.step(*id));
         };
-        list[..first].iter().for_each(|id| self.step(*id));
-        let Step::Start { job: name, body } = &plan.get(list[first]).step else { return };
-        let awaits = |id: &StepId| matches!(&plan.get(*id).step, Step::Await { job } if job == name);
-        let rest = &list[first + 1..];
-        let (meanwhile, later) = rest.split_at(rest.iter().position(awaits).unwrap_or(rest.len()));
-        self.beside(&[vec![*body], meanwhile.to_vec()]);
-        self.sequence(later);
+        job.before.iter().for_each(|id| self.step(*id));
+        self.beside(&[vec![job.body], job.meanwhile.to_vec()]);
+        self.sequence(job.later);
     }
 
     /// Lines that run beside each other: what is said of their robots, and then all of them, one after the other.
