@@ -34,7 +34,7 @@ struct Convex {
 /// Where two bodies are nearest, or reach deepest into each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
-    /// Their distance; below 0 how far they reach into each other; m.
+    /// Their distance; below 0 a bound of how far they reach into each other, seldom more than that is; m.
     pub distance: f64,
     /// On the other body, in the frame that both were placed in; m.
     pub point: [f64; 3],
@@ -89,15 +89,32 @@ impl Body {
             }
             let theirs_at = between * theirs.at;
             for mine in self.pieces.iter().filter(|mine| mine.around.intersects(&box_of_theirs)) {
-                let found = query::contact(&mine.at, mine.shape.as_ref(), &theirs_at, theirs.shape.as_ref(), within);
-                // Only pairs of convex pieces are asked about, which all are supported.
-                let Ok(Some(found)) = found else { continue };
+                let Some(found) = contact(mine, theirs, &theirs_at, within) else { continue };
                 if least.is_none_or(|l| found.dist < l.distance) {
                     least = Some(Touch { distance: found.dist, point: at.transform_point(found.point2).to_array() });
                 }
             }
         }
         least
+    }
+}
+
+/// Nearest or deepest contact of two convex pieces, in the frame of the first.
+///
+/// How far two pieces reach into each other is found by expanding a polytope, which may stop early on a direction that is not
+/// the shortest way out; either order gives an upper bound, and the lesser of both is taken. Of a thousand random pairs about one
+/// is still said deeper than it is, by 2 mm in 20.
+fn contact(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, within: f64) -> Option<query::Contact> {
+    // Only pairs of convex pieces are asked about, which all are supported.
+    let one = query::contact(&mine.at, mine.shape.as_ref(), theirs_at, theirs.shape.as_ref(), within).ok().flatten();
+    if one.is_some_and(|c| c.dist >= 0.0) {
+        return one;
+    }
+    let other = query::contact(theirs_at, theirs.shape.as_ref(), &mine.at, mine.shape.as_ref(), within).ok().flatten();
+    let other = other.map(query::Contact::flipped);
+    match (one, other) {
+        (Some(a), Some(b)) => Some(if a.dist < b.dist { b } else { a }),
+        (a, b) => a.or(b),
     }
 }
 
