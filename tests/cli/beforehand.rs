@@ -27,6 +27,9 @@ fn check(dir: &Path, text: &str, more: &[&str]) -> String {
     String::from_utf8(ended.stdout).expect("text")
 }
 
+/// The file of the cache that says what was found in whole programs; each of the others is about a lab.
+const PROGRAMS: &str = "programs.motions";
+
 /// The files of the cache.
 fn kept(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir.join("cache/matterixc")).into_iter().flatten().flatten();
@@ -81,20 +84,22 @@ fn what_was_planned_is_remembered_and_said_in_the_same_bytes() {
     assert!(without.contains("error[out-of-reach]"), "{without}");
     assert!(kept(&dir).is_empty(), "nothing is kept with `--no-cache`");
     let cold = check(&dir, &text, &[]);
-    let files = kept(&dir);
-    assert_eq!(files.len(), 1, "one lab");
-    let bytes = fs::read(&files[0]).expect("the cache");
+    let (labs, programs) = kept(&dir).into_iter().partition::<Vec<_>, _>(|file| !file.ends_with(PROGRAMS));
+    assert_eq!((labs.len(), programs.len()), (1, 1), "one lab, and what was found in programs");
+    let (lab, found) = (fs::read(&labs[0]).expect("the cache"), fs::read(&programs[0]).expect("the cache"));
     let warm = check(&dir, &text, &[]);
     assert_eq!((&without, &cold), (&cold, &warm));
-    assert_eq!(fs::read(&files[0]).expect("the cache"), bytes, "nothing new, nothing written");
+    assert_eq!(fs::read(&labs[0]).expect("the cache"), lab, "nothing new, nothing written");
+    assert_eq!(fs::read(&programs[0]).expect("the cache"), found, "nothing new, nothing written");
 
     // The same motions on other lines are not planned again.
     let moved = bench(NEAR, "    note \"first\"\n    place beaker on plate by panda\n    place beaker on far by panda");
     assert!(check(&dir, &moved, &[]).contains("bench.mtx:20:5: error[out-of-reach]"));
-    assert_eq!(fs::read(&files[0]).expect("the cache"), bytes);
+    assert_eq!(fs::read(&labs[0]).expect("the cache"), lab);
+    assert_ne!(fs::read(&programs[0]).expect("the cache"), found, "another text is another program");
     // Another lab is another matter.
     check(&dir, &bench(" at (440, -250) mm", "    place beaker on plate by panda"), &[]);
-    assert_eq!(kept(&dir).len(), 2);
+    assert_eq!(kept(&dir).len(), 3);
 }
 
 #[test]
@@ -102,15 +107,21 @@ fn a_damaged_cache_is_ignored_and_written_anew() {
     let dir = folder("beforehand_damaged");
     let text = bench(NEAR, "    place beaker on far by panda");
     let first = check(&dir, &text, &[]);
-    let file = kept(&dir).remove(0);
-    let good = fs::read(&file).expect("the cache");
-    let foreign = [&b"0123456789abcdef0123456789abcdef\n{}"[..], b"", b"\xff\xfe", &good[..good.len() / 2]];
-    let mut bent = good.clone();
-    let middle = bent.len() / 2;
-    bent[middle] ^= 1;
-    for damaged in foreign.into_iter().chain([bent.as_slice()]) {
-        fs::write(&file, damaged).expect("the cache can be written");
+    let files = kept(&dir);
+    let good: Vec<_> = files.iter().map(|file| fs::read(file).expect("the cache")).collect();
+    for damage in [
+        |_: &[u8]| b"0123456789abcdef0123456789abcdef\n{}".to_vec(),
+        |_: &[u8]| Vec::new(),
+        |_: &[u8]| b"\xff\xfe".to_vec(),
+        |good: &[u8]| good[..good.len() / 2].to_vec(),
+        |good: &[u8]| good.iter().enumerate().map(|(i, byte)| byte ^ u8::from(i == good.len() / 2)).collect(),
+    ] {
+        for (file, good) in files.iter().zip(&good) {
+            fs::write(file, damage(good)).expect("the cache can be written");
+        }
         assert_eq!(check(&dir, &text, &[]), first);
-        assert_eq!(fs::read(&file).expect("the cache"), good);
+        for (file, good) in files.iter().zip(&good) {
+            assert_eq!(&fs::read(file).expect("the cache"), good);
+        }
     }
 }

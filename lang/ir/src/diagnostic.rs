@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Code, Span};
 
 /// How bad it is: a *must* fault is an error, a *may* fault a warning.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The program is not run.
@@ -17,7 +17,7 @@ pub enum Severity {
 }
 
 /// A remark attached to a place in the text: the cause (primary) or a step of its history.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Label {
     /// Where.
     pub span: Span,
@@ -37,7 +37,7 @@ pub struct Edit {
 }
 
 /// A machine-applicable correction.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fix {
     /// What it does, as an instruction.
     pub title: String,
@@ -46,7 +46,7 @@ pub struct Fix {
 }
 
 /// One finding: *what* in the headline, *where* in the labels, *how to mend* in the help.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Diagnostic {
     /// The registered kind of finding.
     pub code: Code,

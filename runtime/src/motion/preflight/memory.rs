@@ -11,29 +11,11 @@ use std::io;
 use matterix_ir::plan::Motion;
 use matterix_ir::scene::{InstanceId, Scene};
 use serde::{Deserialize, Serialize};
-use siphasher::sip128::{Hasher128, SipHasher13};
+use siphasher::sip128::SipHasher13;
 
+use super::seal::{self, MADE_BY, Store};
 use crate::motion::perform::Refused;
 use crate::motion::stage::{Change, Stage};
-
-/// Keeps bytes under a name for another time. Nothing depends on it but the time that a check takes.
-pub trait Store {
-    /// What was kept under a name, if it still is.
-    fn load(&self, name: &str) -> Option<Vec<u8>>;
-    /// Keeps bytes under a name.
-    fn save(&self, name: &str, bytes: &[u8]);
-}
-
-/// Keeps nothing.
-pub struct Nowhere;
-
-impl Store for Nowhere {
-    fn load(&self, _: &str) -> Option<Vec<u8>> {
-        None
-    }
-
-    fn save(&self, _: &str, _: &[u8]) {}
-}
 
 /// What became of a motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,8 +31,6 @@ pub enum Outcome {
     },
 }
 
-/// Which code it was that planned: another one may plan otherwise.
-const MADE_BY: &str = concat!(env!("CARGO_PKG_VERSION"), "-", env!("MATTERIX_MOTION_SOURCES"));
 /// How many motions of a lab are kept.
 const MOST: usize = 4000;
 
@@ -75,7 +55,9 @@ impl<'s> Memory<'s> {
     /// What is known of a lab.
     pub fn of(scene: &Scene, store: &'s dyn Store) -> Self {
         let lab = digest_of(scene);
-        let outcomes = store.load(&lab).and_then(|bytes| read(&bytes, &lab)).unwrap_or_default();
+        let outcomes = store.load(&lab).and_then(|bytes| seal::opened::<Kept>(&bytes));
+        let outcomes =
+            outcomes.filter(|k| k.made_by == MADE_BY && k.lab == lab).map(|k| k.outcomes).unwrap_or_default();
         Memory { store, lab, outcomes, asked: RefCell::default(), news: false }
     }
 
@@ -107,7 +89,7 @@ impl<'s> Memory<'s> {
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
         values.iter().for_each(|v| hash.write_u64(v.to_bits()));
-        hex(&hash)
+        seal::hex(&hash)
     }
 
     /// What became of a motion, if it is known.
@@ -137,34 +119,10 @@ impl<'s> Memory<'s> {
             outcomes.entry(key).or_insert(outcome);
         }
         let kept = Kept { made_by: MADE_BY.to_string(), lab: self.lab, outcomes };
-        if let Ok(body) = serde_json::to_vec(&kept) {
-            let mut bytes = sum(&body).into_bytes();
-            bytes.push(b'\n');
-            bytes.extend(body);
+        if let Some(bytes) = seal::closed(&kept) {
             self.store.save(&kept.lab, &bytes);
         }
     }
-}
-
-/// The outcomes that were kept of a lab; none where something else was kept, or not all of it is there.
-fn read(bytes: &[u8], lab: &str) -> Option<BTreeMap<String, Outcome>> {
-    let end = bytes.iter().position(|b| *b == b'\n')?;
-    let (line, body) = (bytes.get(..end)?, bytes.get(end + 1..)?);
-    if line != sum(body).as_bytes() {
-        return None;
-    }
-    let kept: Kept = serde_json::from_slice(body).ok()?;
-    (kept.made_by == MADE_BY && kept.lab == lab).then_some(kept.outcomes)
-}
-
-fn sum(bytes: &[u8]) -> String {
-    let mut hash = SipHasher13::new();
-    hash.write(bytes);
-    hex(&hash)
-}
-
-fn hex(hash: &SipHasher13) -> String {
-    format!("{:032x}", hash.finish128().as_u128())
 }
 
 /// What a lab is known by: everything of it but where in the text it stands.
@@ -187,5 +145,5 @@ fn digest_of(scene: &Scene) -> String {
         // A hash takes whatever it is given.
         let _ = serde_json::to_writer(&mut feed, &what);
     }
-    hex(&feed.0)
+    seal::hex(&feed.0)
 }

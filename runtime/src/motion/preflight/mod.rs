@@ -4,8 +4,10 @@ pub(super) mod beside;
 mod course;
 mod look;
 mod memory;
+mod seal;
 mod told;
 pub(super) mod values;
+mod verdicts;
 mod walk;
 
 use matterix_ir::model::Domain;
@@ -15,11 +17,18 @@ use matterix_ir::{Diagnostic, Program};
 
 use super::stage::Stage;
 use super::together::together;
-pub use memory::{Nowhere, Store};
+pub use seal::{Nowhere, Store};
 
-/// What would go wrong with the motions of a program. Empty for labs without robots that have joints. What was planned
+/// What would go wrong with the motions of a program. Empty for labs without robots that have joints. What was found
 /// before is taken from `store`, what is new goes there.
 pub fn preflight(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
+    if program.scene.instances.iter().all(|i| i.articulation.is_none()) {
+        return Vec::new();
+    }
+    verdicts::of(program, store, || look(program, store))
+}
+
+fn look(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     let Ok(stage) = Stage::new(program) else { return Vec::new() };
     if stage.actors.is_empty() {
         return Vec::new();

@@ -1,0 +1,37 @@
+//! What was found in whole programs, so that a check of what has not changed is instant.
+
+use matterix_ir::{Diagnostic, Program};
+use serde::{Deserialize, Serialize};
+
+use super::seal::{self, MADE_BY, Store};
+
+/// What they are kept under.
+const NAME: &str = "programs";
+/// How many programs are kept, the last ones looked at.
+const MOST: usize = 64;
+
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    made_by: String,
+    verdicts: Vec<(String, Vec<Diagnostic>)>,
+}
+
+/// The findings of a program: those that are kept, or else what `look` finds, which is kept.
+///
+/// A program is known by all of it, texts and their places included, as findings quote them.
+pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let Ok(bytes) = postcard::to_allocvec(program) else { return look() };
+    let key = seal::sum(&bytes);
+    let kept = store.load(NAME).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
+    let mut verdicts = kept.map(|k| k.verdicts).unwrap_or_default();
+    if let Some((_, found)) = verdicts.iter().find(|(k, _)| *k == key) {
+        return found.clone();
+    }
+    let found = look();
+    verdicts.insert(0, (key, found.clone()));
+    verdicts.truncate(MOST);
+    if let Some(bytes) = seal::closed(&Kept { made_by: MADE_BY.to_string(), verdicts }) {
+        store.save(NAME, &bytes);
+    }
+    found
+}
