@@ -4,6 +4,7 @@ use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
+use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
@@ -376,7 +377,9 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         planner.to_run = to_run;
         planner.draft = draft;
         let plan = planner.task(task);
-        elaborator.initialise();
+        if !draft {
+            elaborator.initialise();
+        }
         elaborator.close_holds();
         let mut events = elaborator.events();
         elaborator.close_holds();
@@ -388,7 +391,9 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             continue;
         }
         let (derivatives, balances) = elaborator.close();
-        let observables = observables(&mut elaborator);
+        // A look at motions asks for neither what is recorded nor what is used up.
+        let told = matches!(wanted, Wanted::Program | Wanted::Contents);
+        let observables = if told { observables(&mut elaborator) } else { Vec::new() };
         let mut starts = checks::starts(&elaborator, lab);
         checks::model(&mut elaborator);
         let questions = (wanted == Wanted::Contents)
@@ -412,7 +417,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let mixtures = mixtures(&elaborator, &observables);
         let scene = scene(&mut elaborator, lab);
         let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
-        let stock = crate::stock::stock(&mut elaborator, sources, &mixtures, workflow);
+        let stock =
+            if told { crate::stock::stock(&mut elaborator, sources, &mixtures, workflow) } else { Stock::default() };
         let model = Model {
             params: elaborator.params,
             states: elaborator.states,

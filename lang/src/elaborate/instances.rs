@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{NodeId, Span};
 
+use rustc_hash::FxHashMap;
+
 use super::grids::Grid;
 use super::tables::MemberRef;
 use super::{Elaborator, MemberKey, SpeciesId};
@@ -58,7 +60,7 @@ pub struct Instance<'a> {
     /// Its grids of child assets.
     pub grids: Vec<Grid>,
     /// Values of its members, as far as they were asked for.
-    pub values: BTreeMap<MemberKey, Value>,
+    pub values: FxHashMap<MemberKey, Value>,
     /// State of each amount per species.
     pub amounts: BTreeMap<(String, SpeciesId), u32>,
     /// What it holds at the start: mol (or kg where counted by mass).
@@ -339,7 +341,7 @@ impl<'a> Elaborator<'a> {
 
     /// The type of an extensive quantity.
     pub fn extensive_type(&mut self, id: InstanceId, member: &str) -> Option<(Type, MemberRef<'a>)> {
-        let m = self.members_of(id, member).into_iter().next()?;
+        let m = self.members_of(id, member).first().copied()?;
         let MemberKind::Value { ty, .. } = &m.member.kind else { return None };
         Some((self.resolve_type(ty, m.module), m))
     }

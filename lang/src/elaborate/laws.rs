@@ -326,7 +326,7 @@ impl<'a> Elaborator<'a> {
             },
             _ => return None,
         };
-        let m = self.members_of(id, &name.text).into_iter().next()?;
+        let m = self.members_of(id, &name.text).first().copied()?;
         matches!(&m.member.kind, MemberKind::Value { role: Role::Flow, .. }).then_some((id, m))
     }
 

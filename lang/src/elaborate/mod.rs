@@ -41,10 +41,25 @@ use crate::names::DeclId;
 use crate::units::Dimension;
 
 pub use instances::Instance;
-pub use tables::Tables;
+pub use tables::{MemberRef, Tables};
 
-/// A member in one way of looking: capability, name, initial value or current one, readings or true values.
-pub type MemberKey = (DeclId, String, bool, bool);
+/// A member in one way of looking.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MemberKey {
+    /// Where its declaration is in memory, which stays there.
+    declared: usize,
+    /// Its value when the run begins, not the current one.
+    initial: bool,
+    /// As an instrument reads it, not as it is.
+    read: bool,
+}
+
+impl MemberKey {
+    /// That of a member, `initial` or current, `read` or true.
+    pub fn of(m: MemberRef<'_>, initial: bool, read: bool) -> Self {
+        MemberKey { declared: std::ptr::from_ref(m.member).addr(), initial, read }
+    }
+}
 
 /// A pair parameter as a lab gives it: `between a and b { name: value }`.
 #[derive(Debug)]
@@ -228,6 +243,8 @@ pub struct Elaborator<'a> {
     pub open_calls: Vec<DeclId>,
     /// Constants being evaluated.
     pub open_consts: Vec<DeclId>,
+    /// Constants that were evaluated without a finding.
+    pub known_consts: FxHashMap<DeclId, Value>,
 }
 
 impl<'a> Elaborator<'a> {
@@ -291,6 +308,7 @@ impl<'a> Elaborator<'a> {
             open_members: Vec::new(),
             open_calls: Vec::new(),
             open_consts: Vec::new(),
+            known_consts: FxHashMap::default(),
         }
     }
 

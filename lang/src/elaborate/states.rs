@@ -5,7 +5,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::tables::MemberRef;
-use super::{Elaborator, ExtensiveKey, SpeciesId};
+use super::{Elaborator, ExtensiveKey, MemberKey, SpeciesId};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
 use crate::eval::{Num, Scope, Type, Value};
 
@@ -35,7 +35,7 @@ impl<'a> Elaborator<'a> {
             for initial in [false, true] {
                 for live in [false, true] {
                     if !initial {
-                        let key = (m.owner, name.text.clone(), initial, live);
+                        let key = MemberKey::of(m, initial, live);
                         self.instances[id.0 as usize].values.insert(key, value.clone());
                     }
                 }
@@ -210,7 +210,7 @@ impl<'a> Elaborator<'a> {
                     continue;
                 };
                 let value = self.member_value(id, m, name.span);
-                let current = self.instances[i as usize].values.get(&(m.owner, name.text.clone(), false, false));
+                let current = self.instances[i as usize].values.get(&MemberKey::of(m, false, false));
                 let index = match current {
                     Some(
                         Value::Num(Num { node, .. })

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::sync::{Arc, RwLock};
 
 use matterix_ir::{Diagnostic, Span, Unit, codes};
+use rustc_hash::FxHashMap;
 
 use super::species::SpeciesTable;
 use super::units;
@@ -42,7 +43,7 @@ pub struct Kind<'a> {
     /// The member that counts amounts per species, if there is one.
     pub per_species: Option<MemberRef<'a>>,
     /// The visible ones by name; more than one is ambiguous.
-    by_name: BTreeMap<&'a str, Vec<MemberRef<'a>>>,
+    by_name: FxHashMap<&'a str, Vec<MemberRef<'a>>>,
     /// Lines of all its assets, most derived first, with their module.
     pub lines: Vec<(usize, &'a AssetLine)>,
     /// Where its name stands.
@@ -160,7 +161,7 @@ impl<'a> Tables<'a> {
             members: Vec::new(),
             visible: Vec::new(),
             per_species: None,
-            by_name: BTreeMap::new(),
+            by_name: FxHashMap::default(),
             lines: Vec::new(),
             span: name.span,
         };

@@ -231,6 +231,10 @@ impl<'a> Elaborator<'a> {
                     ));
                     return Value::Error;
                 }
+                if let Some(known) = self.known_consts.get(&id) {
+                    return known.clone();
+                }
+                let reported = self.reported;
                 self.open_consts.push(id);
                 let mut scope = Scope::module(decl.module);
                 let v = match ty {
@@ -241,6 +245,9 @@ impl<'a> Elaborator<'a> {
                     None => self.expr(value, &mut scope),
                 };
                 self.open_consts.pop();
+                if self.reported == reported {
+                    self.known_consts.insert(id, v.clone());
+                }
                 v
             }
             ItemKind::Species { .. } => self.tables.species.of_decl(id).map_or(Value::Error, Value::Species),

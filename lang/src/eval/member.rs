@@ -1,5 +1,7 @@
 //! Members of instances: parameters, states, derived quantities, flows, parts; and what stands in `[ ]`.
 
+use std::borrow::Cow;
+
 use matterix_ir::model::{Domain, Reading};
 use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
@@ -10,7 +12,7 @@ use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
 use crate::elaborate::grids::Place;
 use crate::elaborate::instances::Setting;
 use crate::elaborate::tables::MemberRef;
-use crate::elaborate::{Elaborator, MemberKey};
+use crate::elaborate::{Elaborator, MemberKey, Tables};
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
@@ -177,23 +179,30 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The members an instance has under a name; more than one is ambiguous.
-    pub fn members_of(&self, id: InstanceId, name: &str) -> Vec<MemberRef<'a>> {
+    pub fn members_of(&self, id: InstanceId, name: &str) -> Cow<'a, [MemberRef<'a>]> {
+        let tables: &'a Tables<'a> = self.tables;
+        let kinds = &self.instances[id.0 as usize].kinds;
+        if let [kind] = kinds.as_slice()
+            && let found @ ([] | [_]) = tables.members(*kind, name)
+        {
+            return Cow::Borrowed(found);
+        }
         let mut found: Vec<MemberRef<'a>> = Vec::new();
-        for kind in &self.instances[id.0 as usize].kinds {
+        for kind in kinds {
             for m in self.tables.members(*kind, name) {
                 if !found.iter().any(|f| std::ptr::eq(f.member, m.member)) {
                     found.push(*m);
                 }
             }
         }
-        if found.len() > 1 { self.tables.visible(found) } else { found }
+        Cow::Owned(if found.len() > 1 { self.tables.visible(found) } else { found })
     }
 
     /// Of several members with one name, the one that the text of a capability means: its own or an inherited one.
     pub fn own_member(&self, id: InstanceId, owner: Option<DeclId>, name: &str) -> Option<MemberRef<'a>> {
         let found = self.members_of(id, name);
         let own = self.tables.members(owner.filter(|_| found.len() > 1)?, name);
-        let mut meant = found.into_iter().filter(|f| own.iter().any(|o| std::ptr::eq(o.member, f.member)));
+        let mut meant = found.iter().copied().filter(|f| own.iter().any(|o| std::ptr::eq(o.member, f.member)));
         meant.next().filter(|_| meant.next().is_none())
     }
 
@@ -264,13 +273,13 @@ impl<'a> Elaborator<'a> {
         if *role == Role::Flow {
             return self.read_flow(id, m, at);
         }
-        let key: MemberKey = (m.owner, name.text.clone(), self.initial_mode, self.readings_live);
+        let key = MemberKey::of(m, self.initial_mode, self.readings_live);
         if let Some(v) = self.instances[id.0 as usize].values.get(&key) {
             let v = v.clone();
             self.note_term(id, m, &v);
             return v;
         }
-        let open = (id, key.clone());
+        let open = (id, key);
         if self.open_members.contains(&open) {
             self.report(Diagnostic::error(
                 codes::CIRCULAR,

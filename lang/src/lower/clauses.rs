@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use matterix_ir::Span;
 use matterix_ir::model::Action;
-use matterix_ir::plan::{Condition, Takes};
+use matterix_ir::plan::{Condition, Motion, Takes};
 use matterix_ir::scene::InstanceId;
 use rustc_hash::{FxHashMap, FxHasher};
 
@@ -20,6 +20,7 @@ pub(super) enum Outcome {
     Condition(Arc<Condition>),
     Takes(Takes),
     Effect(Vec<Action>),
+    Motion(Motion),
 }
 
 /// Outcomes for different arguments that read the same ones of them; a hash of their values leads to the candidates.

@@ -105,18 +105,14 @@ impl<'a> Planner<'a, '_> {
                 operation.fails.extend(names.iter().map(|n| n.text.clone()));
                 continue;
             }
-            if clause.kind.is_motion() {
-                if operation.motion.is_some() {
-                    self.lab.report(Diagnostic::error(
-                        codes::MISPLACED,
-                        clause.span,
-                        "one step of a robot is one motion",
-                        "a second motion",
-                    ));
-                    return None;
-                }
-                operation.motion = Some(self.motion(&clause.kind, inner)?);
-                continue;
+            if clause.kind.is_motion() && operation.motion.is_some() {
+                self.lab.report(Diagnostic::error(
+                    codes::MISPLACED,
+                    clause.span,
+                    "one step of a robot is one motion",
+                    "a second motion",
+                ));
+                return None;
             }
             if !matches!(clause.kind, ClauseKind::Effect(_)) && self.is_drafted(clause.span) {
                 continue;
@@ -136,6 +132,7 @@ impl<'a> Planner<'a, '_> {
                 (Outcome::Condition(c), _) => invariants.push(Arc::unwrap_or_clone(c)),
                 (Outcome::Takes(takes), _) => operation.takes = Some(takes),
                 (Outcome::Effect(actions), _) => operation.at_end.extend(actions),
+                (Outcome::Motion(motion), _) => operation.motion = Some(motion),
             }
         }
         if let Some(sound) = sound {
@@ -156,13 +153,11 @@ impl<'a> Planner<'a, '_> {
             ClauseKind::Effect(effects) => {
                 Outcome::Effect(effects.iter().flat_map(|e| self.effect(e, clause.span, inner)).collect())
             }
-            ClauseKind::Fails(_)
-            | ClauseKind::Option(_)
-            | ClauseKind::Says { .. }
-            | ClauseKind::Moves { .. }
+            ClauseKind::Moves { .. }
             | ClauseKind::Grips { .. }
             | ClauseKind::Frees { .. }
-            | ClauseKind::Leads { .. } => return None,
+            | ClauseKind::Leads { .. } => Outcome::Motion(self.motion(&clause.kind, inner)?),
+            ClauseKind::Fails(_) | ClauseKind::Option(_) | ClauseKind::Says { .. } => return None,
         })
     }
 

@@ -11,7 +11,7 @@ use matterix_ir::{NodeId, Op, Sources, Span, Unit};
 
 use crate::ast::{MemberKind, Role};
 use crate::check::{Known, Seen};
-use crate::elaborate::Elaborator;
+use crate::elaborate::{Elaborator, MemberKey};
 use crate::eval::{Num, Value as State};
 
 use units::Written;
@@ -188,7 +188,7 @@ fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
         if options.iter().any(|o| o.name.text == "hidden") {
             continue;
         }
-        let current = lab.instances[id.0 as usize].values.get(&(m.owner, name.text.clone(), false, false));
+        let current = lab.instances[id.0 as usize].values.get(&MemberKey::of(m, false, false));
         let Some(State::Num(Num { node, .. }) | State::Bool(node) | State::InstanceNode(node) | State::Enum(node, _)) =
             current
         else {
