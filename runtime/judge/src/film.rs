@@ -95,12 +95,10 @@ impl Film {
             .things
             .iter()
             .map(|thing| {
-                let main = thing.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-                let more = thing.solids.iter().map(|solid| (&solid.shape, solid.pose));
                 Thing {
                     name: thing.name.clone(),
                     whole: thing.whole.clone(),
-                    body: Body::of_shapes(main.chain(more)),
+                    body: Body::of_shapes(thing.hull()),
                     points: points.get(&thing.name).cloned().unwrap_or_default(),
                     way: ways.get(&thing.name).cloned().unwrap_or_default(),
                 }
@@ -161,7 +159,7 @@ fn pose(position: &Value, rotation: &Value) -> Pose {
 }
 
 fn meshes(bodies: &Bodies) -> impl Iterator<Item = &Mesh> {
-    let shapes = bodies.things.iter().flat_map(|t| t.shape.iter().chain(t.solids.iter().map(|s| &s.shape)));
+    let shapes = bodies.things.iter().flat_map(|t| t.hull().map(|(shape, _)| shape));
     let of_things = shapes.filter_map(|shape| match shape {
         Shape::Mesh(mesh) => Some(&**mesh),
         _ => None,

@@ -181,11 +181,9 @@ impl Pieces {
 fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) -> Option<Entity<'a>> {
     let instance = run.program.scene.instances.get(index)?;
     let (frame_id, at) = if has_mesh(instance) { (instance.name.as_str(), Pose::IDENTITY) } else { (LAB, at) };
-    let shape = instance.shape.iter().map(|shape| (shape, at));
-    let solids = instance.solids.iter().map(|solid| (&solid.shape, at.then(solid.pose)));
     let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
     let mut pieces = Pieces { color: Color { r, g, b, a: 0.85 }, ..Pieces::default() };
-    shape.chain(solids).for_each(|(shape, at)| pieces.add(shape, at));
+    instance.seen().for_each(|(shape, inner)| pieces.add(shape, at.then(inner)));
     let Pieces { cubes, spheres, cylinders, triangles, top, .. } = pieces;
     if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() && triangles.is_empty() {
         return None;
@@ -218,8 +216,7 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) 
 
 /// Whether there are triangles in it: it is written in its own frame, so that it need not be written again where it moves.
 fn has_mesh(instance: &Instance) -> bool {
-    let mut shapes = instance.shape.iter().chain(instance.solids.iter().map(|solid| &solid.shape));
-    shapes.any(|shape| matches!(shape, Shape::Mesh(_)))
+    instance.seen().any(|(shape, _)| matches!(shape, Shape::Mesh(_)))
 }
 
 /// The instance in the lab, and its named points in the instance.

@@ -43,6 +43,10 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
             ("whole", text("What it is a part of, or its own name")),
             ("shape", json!({ "description": "Its main shape, m" })),
             ("solids", json!({ "description": "More of its body, each with a pose" })),
+            ("collision", json!({ "description": "What others run into instead, each with a pose; empty for the body" })),
+            ("visual", json!({ "description": "What is seen instead; null for the body" })),
+            ("inertial", json!({ "description": "Mass in kg, centre of mass, xx xy xz yy yz zz in kg m2; null if unknown" })),
+            ("friction", json!({ "description": "Coefficient of friction; null if unknown" })),
         ],
     );
     let machine = object(
@@ -62,7 +66,7 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
 fn bodies(program: &Program) -> Bodies {
     let scene = &program.scene;
     let mut out = Bodies::default();
-    for instance in scene.instances.iter().filter(|i| i.shape.is_some() || !i.solids.is_empty()) {
+    for instance in scene.instances.iter().filter(|i| i.seen().chain(i.hull()).next().is_some()) {
         let mut whole = instance;
         while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
             whole = owner;
@@ -72,6 +76,10 @@ fn bodies(program: &Program) -> Bodies {
             whole: whole.name.clone(),
             shape: instance.shape.clone(),
             solids: instance.solids.clone(),
+            collision: instance.collision.clone(),
+            visual: instance.visual.clone(),
+            inertial: instance.inertial,
+            friction: instance.friction,
         });
     }
     // A robot that cannot be moved is no machine here; who moves it says why.

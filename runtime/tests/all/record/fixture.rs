@@ -49,6 +49,10 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         frames: vec![],
         shape,
         solids: Vec::new(),
+        collision: Vec::new(),
+        visual: None,
+        inertial: None,
+        friction: None,
         articulation: None,
         span: line(2),
     }
