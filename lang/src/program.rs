@@ -596,5 +596,5 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             span,
         });
     }
-    Scene { lab: name.text.clone(), instances }
+    Scene { lab: name.text.clone(), instances, carriers: lab.carriers() }
 }

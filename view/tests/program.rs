@@ -95,7 +95,7 @@ fn program() -> (Program, Sources) {
         limits: Vec::new(),
         ends: Vec::new(),
     };
-    let scene = Scene { lab: "l".into(), instances };
+    let scene = Scene { lab: "l".into(), instances, ..Scene::default() };
     let files = vec!["lab.mtx".into()];
     (Program { version: PROGRAM_VERSION, files, scene, model, plan, stock: Default::default() }, sources)
 }

@@ -138,14 +138,7 @@ pub fn of_shapes<'s>(mass: f64, shapes: impl IntoIterator<Item = (&'s Shape, Pos
     let density = mass / all.volume;
     let own = square(|i, j| density * (all.second[i][j] - all.volume * centre[i] * centre[j]));
     let sum = own[0][0] + own[1][1] + own[2][2];
-    let inertia = [
-        sum - own[0][0],
-        -own[0][1],
-        -own[0][2],
-        sum - own[1][1],
-        -own[1][2],
-        sum - own[2][2],
-    ];
+    let inertia = [sum - own[0][0], -own[0][1], -own[0][2], sum - own[1][1], -own[1][2], sum - own[2][2]];
     Some(Inertial { mass, placement: Pose::at(centre), inertia })
 }
 
@@ -231,8 +224,7 @@ mod tests {
         let halves = of_shapes(1.0, [(&half, at(-0.01)), (&half, at(0.01))]).expect("a volume");
         assert!(near(&whole.inertia, &halves.inertia));
         let turn = Pose::turned([0.3, 0.0, 0.0], [0.0, 0.0, 0.5]);
-        let [xx, xy, _, yy, ..] =
-            of_shapes(1.0, [(&Shape::Box([0.04, 0.02, 0.01]), turn)]).expect("a volume").inertia;
+        let [xx, xy, _, yy, ..] = of_shapes(1.0, [(&Shape::Box([0.04, 0.02, 0.01]), turn)]).expect("a volume").inertia;
         let (s, c) = (0.5f64.sin(), 0.5f64.cos());
         let [a, b] = [whole.inertia[0], whole.inertia[3]];
         assert!(near(&[xx, yy, xy], &[c * c * a + s * s * b, s * s * a + c * c * b, s * c * (a - b)]));

@@ -34,7 +34,7 @@ pub mod frame {
     pub const PLACE: &str = "place";
     /// Where a thing is gripped, its z axis towards the gripper.
     pub const GRASP: &str = "grasp";
-    /// The point of a tool that meets the tip of the robot it is part of.
+    /// The point of a tool that meets the tip of the robot it is part of, and of a thing that meets what takes it along.
     pub const MOUNT: &str = "mount";
     /// Where a thing last stood before it was picked up.
     pub const STAND: &str = "stand";
@@ -230,6 +230,18 @@ pub struct Scene {
     pub lab: String,
     /// By [`InstanceId`].
     pub instances: Vec<Instance>,
+    /// What takes things along beside surfaces and grippers.
+    #[serde(default)]
+    pub carriers: Vec<Carrier>,
+}
+
+/// An instance that takes along what one of its states names: the frame `mount` of that comes to its origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Carrier {
+    /// Who takes it along.
+    pub by: InstanceId,
+    /// The state, by index into those of the model.
+    pub state: u32,
 }
 
 impl Scene {

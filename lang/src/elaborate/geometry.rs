@@ -293,13 +293,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The mesh in a file, of which one unit is so long, m.
-    pub(super) fn mesh(
-        &mut self,
-        id: InstanceId,
-        span: Span,
-        file: &'a Expr,
-        unit: Option<f64>,
-    ) -> Option<Shape> {
+    pub(super) fn mesh(&mut self, id: InstanceId, span: Span, file: &'a Expr, unit: Option<f64>) -> Option<Shape> {
         let ExprKind::Text(name) = &*file.kind else {
             let d = Diagnostic::error(codes::TYPE_MISMATCH, file.span, "a mesh is named by its file", "not a text");
             self.report(d.help("`mesh(\"bottle.stl\", 1 mm)`"));

@@ -59,7 +59,9 @@ impl<'a> Elaborator<'a> {
         let moments = self.moments(e, &mut setting.scope())?;
         if let Some(why) = impossible(moments) {
             let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, "no body has such an inertia", why);
-            self.report(d.help("about the centre of mass, along the axes of the asset; leave it out to have it from mass and shape"));
+            self.report(d.help(
+                "about the centre of mass, along the axes of the asset; leave it out to have it from mass and shape",
+            ));
             return None;
         }
         Some((moments, e.span))

@@ -71,7 +71,7 @@ fn scene() -> Scene {
         contents,
         instance("panda", "FrankaPanda", Some(0), [0.0; 3], Some(Shape::Cylinder([0.15, 0.6]))),
     ];
-    Scene { lab: "bench".into(), instances }
+    Scene { lab: "bench".into(), instances, ..Scene::default() }
 }
 
 fn state(name: &str, domain: Domain, initial: matterix_ir::NodeId) -> State {
