@@ -103,6 +103,7 @@ impl<'s> Memory<'s> {
             }
             Motion::Joints { mover, .. } => write(8, &[*mover], ""),
             Motion::Home { mover } => write(9, &[*mover], ""),
+            Motion::Drive { mover, goal, frame } => write(15, &[*mover, *goal], frame),
             Motion::Lead { item, frame, by } => write(14, &[*by, *item], frame),
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
