@@ -61,7 +61,9 @@ fn kind(name: &str) -> Option<&'static Kind> {
 /// The mesh in a file, in the unit of the file.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     let Some((.., read)) = kind(name) else {
-        return Err("meshes are read from `.stl`, `.obj`, `.glb`, `.gltf` and `.usd`, `.usda`, `.usdc`, `.usdz`".to_string());
+        return Err(
+            "meshes are read from `.stl`, `.obj`, `.glb`, `.gltf` and `.usd`, `.usda`, `.usdc`, `.usdz`".to_string()
+        );
     };
     if bytes.len() > MOST_BYTES {
         return Err(format!("it is larger than {} MiB", MOST_BYTES >> 20));

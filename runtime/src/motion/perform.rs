@@ -197,7 +197,9 @@ impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn | Refused::Fixed => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn | Refused::Fixed => {
+                "unmovable"
+            }
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
