@@ -1,5 +1,7 @@
 //! USD: the triangles of all meshes of the stage that a file holds, each in its place; other shapes, what is not seen and what
 //! only guides are left out. Files that it refers to are read only where they are in the same archive.
+//!
+//! Text is safe whatever it holds. A damaged binary file may end the program: openusd 0.6 sets memory aside by what it claims.
 
 use std::io::{self, Cursor, Read};
 
@@ -35,6 +37,12 @@ pub(crate) fn usdz(bytes: &[u8]) -> Result<Surface, String> {
 }
 
 fn read(name: &'static str, bytes: &[u8]) -> Result<Surface, String> {
+    // The library expects files to be whole.
+    let caught = std::panic::catch_unwind(|| surface(name, bytes));
+    caught.unwrap_or_else(|_| Err("it is no USD, or one that the library for it cannot read".to_string()))
+}
+
+fn surface(name: &'static str, bytes: &[u8]) -> Result<Surface, String> {
     let wrong = |e: &dyn std::fmt::Display| format!("it is no USD: {e:#}");
     let only = Only { name, bytes: bytes.to_vec() };
     let stage = Stage::builder().resolver(only).open(name).map_err(|e| wrong(&e))?;
@@ -127,8 +135,8 @@ fn to_stage(mesh: &Mesh) -> Result<gf::Matrix4d, Caught> {
     let mut matrix = gf::Matrix4d::IDENTITY;
     let mut next = Some(mesh.path().clone());
     while let Some(path) = next.filter(|path| *path != Path::abs_root()) {
-        let placed = Placed(mesh.stage().prim_at(path.clone()));
-        matrix = matrix * placed.local_to_parent_transform(TimeCode::DEFAULT)?;
+        let placed = Placed(mesh.stage().prim(path.clone()));
+        matrix = matrix * placed.local_to_parent_transform(TimeCode::EARLIEST)?;
         next = if placed.resets_xform_stack()? { None } else { path.parent() };
     }
     Ok(matrix)
