@@ -5,7 +5,7 @@ use std::sync::Arc;
 use matterix_ir::mesh::Mesh;
 use matterix_ir::{Diagnostic, FileId, codes};
 
-use crate::ast::{AssetLine, ExprKind, Field, FieldValue, File, ItemKind, Name, Path};
+use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, File, ItemKind, Name, Path};
 use crate::loader::Loader;
 use crate::{labware, library};
 
@@ -48,7 +48,7 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
     let mut beside = Beside { from: file, loader, found: Vec::new() };
     for item in &mut tree.items {
         let ItemKind::Asset { source, extends, lines, .. } = &mut item.kind else { continue };
-        let meshes: Vec<AssetLine> = lines.iter().filter_map(|line| beside.mesh_of(line)).collect();
+        let meshes: Vec<AssetLine> = lines.iter().flat_map(shapes_of).filter_map(|s| beside.mesh_of(s)).collect();
         lines.extend(meshes);
         let Some((word, path)) = source else { continue };
         let Some(format) = FORMATS.iter().find(|f| f.word == word.text) else { continue };
@@ -73,17 +73,31 @@ pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnos
     beside.found
 }
 
+/// The shapes that a line of an asset gives.
+fn shapes_of(line: &AssetLine) -> Vec<&Expr> {
+    let given = match line {
+        AssetLine::Solid { shape, .. } => shape,
+        AssetLine::Field(Field { key, value: FieldValue::Expr(e), .. })
+            if ["shape", "mesh", "collision"].contains(&key.text.as_str()) =>
+        {
+            e
+        }
+        _ => return Vec::new(),
+    };
+    match &*given.kind {
+        ExprKind::List(pieces) => pieces.iter().collect(),
+        _ => vec![given],
+    }
+}
+
 impl Beside<'_> {
-    /// The mesh that the shape of a line names.
-    fn mesh_of(&mut self, line: &AssetLine) -> Option<AssetLine> {
-        let shape = match line {
-            AssetLine::Solid { shape, .. } => shape,
-            AssetLine::Field(Field { key, value: FieldValue::Expr(e), .. }) if key.text == "shape" => e,
+    /// The mesh that a shape names.
+    fn mesh_of(&mut self, shape: &Expr) -> Option<AssetLine> {
+        let (called, file) = match &*shape.kind {
+            ExprKind::Call(callee, args) => (&*callee.kind, &args.first()?.value),
             _ => return None,
         };
-        let ExprKind::Call(callee, args) = &*shape.kind else { return None };
-        let file = &args.first()?.value;
-        match (&*callee.kind, &*file.kind) {
+        match (called, &*file.kind) {
             (ExprKind::Name(name), ExprKind::Text(path)) if name.text == "mesh" => {
                 let read =
                     self.loader.bytes(self.from, path).map_err(|reason| format!("cannot read `{path}`: {reason}"));

@@ -579,7 +579,9 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             Some(frame) => (frame.pose.then(pose), frame.link),
             None => (pose, None),
         };
-        let Geometry { frames, shape, solids, moving } = lab.geometry(id);
+        let geometry = lab.geometry(id);
+        let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
+        let Geometry { frames, shape, solids, moving, collision, visual } = geometry;
         instances.push(SceneInstance {
             name,
             kind: lab.kind_names(id),
@@ -592,9 +594,13 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             frames,
             shape,
             solids,
+            collision,
+            visual,
+            inertial,
+            friction,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });
     }
-    Scene { lab: name.text.clone(), instances }
+    Scene { lab: name.text.clone(), instances, carriers: lab.carriers() }
 }

@@ -1,5 +1,6 @@
 //! The command from outside: what is typed, what comes back, what is left on disk.
 
+mod along;
 mod beforehand;
 mod bill;
 mod contents;
@@ -21,6 +22,7 @@ mod meshes;
 mod motion;
 mod new;
 mod pages;
+mod physique;
 mod pipeline_tests;
 mod plan;
 mod reference;

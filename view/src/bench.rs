@@ -16,6 +16,8 @@ pub(crate) struct Thing {
     pub(crate) kind: String,
     /// Primitives, each with its place relative to the thing and its colour.
     pub(crate) shapes: Vec<(Placement, Shape, Option<[f32; 4]>)>,
+    /// What is seen instead of them.
+    pub(crate) visual: Option<Shape>,
     /// In the lab, at the start.
     pub(crate) at: Placement,
     /// Named points, relative to the thing.
@@ -28,7 +30,7 @@ pub(crate) struct Thing {
 
 /// The bodies of all things that are seen, and the index of each by name; their triangles are added to `meshes`.
 pub(crate) fn bodies(things: &[Thing], meshes: &mut Vec<Mesh>) -> (Vec<Body>, Owners) {
-    let seen: Vec<&Thing> = things.iter().filter(|t| !t.shapes.is_empty()).collect();
+    let seen: Vec<&Thing> = things.iter().filter(|t| !t.shapes.is_empty() || t.visual.is_some()).collect();
     let owners = Owners::new(seen.iter().map(|t| t.name.as_str()));
     let made = seen.iter().enumerate().map(|(i, thing)| {
         let hull = !thing.holds && !thing.link && (encloses(thing, &seen) || roofs(thing));
@@ -53,6 +55,11 @@ pub(crate) fn bodies(things: &[Thing], meshes: &mut Vec<Mesh>) -> (Vec<Body>, Ow
                     pieces.push(Piece { pose: middle, solid: solid(shape, meshes), finish, color });
                 }
             }
+        }
+        if let Some(shape) = &thing.visual {
+            let finish = if thing.holds { Finish::Glass } else { Finish::Matte };
+            let at = pose(Placement::up(middle(shape)));
+            pieces = vec![Piece { pose: at, solid: solid(shape, meshes), finish, color: None }];
         }
         let above = owners.above(&thing.name).or_else(|| first_link(thing, &seen)).filter(|&p| p != i as u32);
         let is_robot = thing.link && above.is_none();

@@ -23,6 +23,7 @@ pub fn from_program(program: &Program, sources: &Sources) -> Document {
         name: instance.name.clone(),
         kind: instance.kind.clone(),
         shapes: shapes(instance),
+        visual: instance.visual.clone(),
         at: scene.in_lab(InstanceId(i as u32), |id| stands.get(id.0 as usize).copied()),
         frames: instance.frames.iter().filter(|f| !f.stand).map(|f| (f.name.clone(), f.pose)).collect(),
         holds: holds(i),

@@ -20,6 +20,10 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         placed: true,
         frames: Vec::new(),
         solids: Vec::new(),
+        collision: Vec::new(),
+        visual: None,
+        inertial: None,
+        friction: None,
         articulation: None,
         shape,
         span: Span::default(),
@@ -91,7 +95,7 @@ fn program() -> (Program, Sources) {
         limits: Vec::new(),
         ends: Vec::new(),
     };
-    let scene = Scene { lab: "l".into(), instances };
+    let scene = Scene { lab: "l".into(), instances, ..Scene::default() };
     let files = vec!["lab.mtx".into()];
     (Program { version: PROGRAM_VERSION, files, scene, model, plan, stock: Default::default() }, sources)
 }

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::robot::Robot;
+use crate::pose::Pose;
+use crate::robot::{Inertial, Robot};
 use crate::scene::{Shape, Solid};
 
 /// All bodies of a lab.
@@ -15,7 +16,7 @@ pub struct Bodies {
 }
 
 /// A rigid thing; where it is, the recording tells under its name.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Thing {
     /// Full name.
     pub name: String,
@@ -25,6 +26,28 @@ pub struct Thing {
     pub shape: Option<Shape>,
     /// More of it.
     pub solids: Vec<Solid>,
+    /// What others run into instead of it; the body itself where there is nothing here.
+    #[serde(default)]
+    pub collision: Vec<Solid>,
+    /// What is seen instead of it; the body itself where there is nothing here.
+    #[serde(default)]
+    pub visual: Option<Shape>,
+    /// Its mass, empty, and how that is distributed, if both are known.
+    #[serde(default)]
+    pub inertial: Option<Inertial>,
+    /// Coefficient of friction of its surface, if that is known.
+    #[serde(default)]
+    pub friction: Option<f64>,
+}
+
+impl Thing {
+    /// What others run into.
+    pub fn hull(&self) -> impl Iterator<Item = (&Shape, Pose)> {
+        let own = self.collision.is_empty();
+        let main = self.shape.iter().filter(move |_| own).map(|shape| (shape, Pose::IDENTITY));
+        let more = if own { &self.solids } else { &self.collision };
+        main.chain(more.iter().map(|solid| (&solid.shape, solid.pose)))
+    }
 }
 
 /// A robot with the tools mounted on it; where its links are, the recording tells as `NAME.LINK`.

@@ -15,6 +15,7 @@ pub mod codes;
 pub mod diagnostic;
 pub mod extent;
 pub mod graph;
+pub mod inertia;
 pub mod math;
 pub mod mesh;
 pub mod model;

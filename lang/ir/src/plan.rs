@@ -186,6 +186,15 @@ pub enum Motion {
         /// From upright, rad.
         angle: NodeId,
     },
+    /// Drives itself to a frame: its origin comes above or below that, its x axis along the frame's.
+    Drive {
+        /// The robot.
+        mover: InstanceId,
+        /// Whose frame.
+        goal: InstanceId,
+        /// Its name; empty for the thing itself.
+        frame: String,
+    },
     /// Brings the joints that move its tip to positions, rad or m.
     Joints {
         /// The robot.
@@ -240,6 +249,7 @@ impl Motion {
         match self {
             Motion::To { mover, .. } | Motion::By { mover, .. } | Motion::Upright { mover, .. } => *mover,
             Motion::Tilted { mover, .. } | Motion::Joints { mover, .. } | Motion::Home { mover } => *mover,
+            Motion::Drive { mover, .. } => *mover,
             Motion::Fingers { by, .. } | Motion::Grip { by, .. } => *by,
             Motion::Free { by, .. } | Motion::Lead { by, .. } => *by,
         }
@@ -250,6 +260,7 @@ impl Motion {
         match self {
             Motion::To { goal, frame, .. } | Motion::Upright { goal, frame, .. } => Some((*goal, frame)),
             Motion::Tilted { goal, frame, .. } | Motion::Lead { item: goal, frame, .. } => Some((*goal, frame)),
+            Motion::Drive { goal, frame, .. } => Some((*goal, frame)),
             _ => None,
         }
     }

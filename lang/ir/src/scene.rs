@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::extent::Body;
 use crate::mesh::Mesh;
 pub use crate::pose::Pose;
-use crate::robot::Robot;
+use crate::robot::{Inertial, Robot};
 use crate::{NodeId, Span};
 
 /// An instance, by its index in the [`Scene`]. The graph stores instances as this number, "nothing" as -1.
@@ -34,10 +34,12 @@ pub mod frame {
     pub const PLACE: &str = "place";
     /// Where a thing is gripped, its z axis towards the gripper.
     pub const GRASP: &str = "grasp";
-    /// The point of a tool that meets the tip of the robot it is part of.
+    /// The point of a tool that meets the tip of the robot it is part of, and of a thing that meets what takes it along.
     pub const MOUNT: &str = "mount";
     /// Where a thing last stood before it was picked up.
     pub const STAND: &str = "stand";
+    /// The centre of mass of a thing, where its shape does not tell it.
+    pub const CENTRE: &str = "centre";
 }
 
 /// A shape, its origin at the middle of its base; metres.
@@ -155,6 +157,19 @@ pub struct Instance {
     pub shape: Option<Shape>,
     /// More of its body.
     pub solids: Vec<Solid>,
+    /// What others run into instead of its body, if that is something else.
+    #[serde(default)]
+    pub collision: Vec<Solid>,
+    /// What is seen of it instead of its body, if that is something else.
+    #[serde(default)]
+    pub visual: Option<Shape>,
+    /// Its mass, empty, and how that is distributed; of what has joints, that of what does not move. None where either is
+    /// not known.
+    #[serde(default)]
+    pub inertial: Option<Inertial>,
+    /// Coefficient of friction of its surface, if that is known.
+    #[serde(default)]
+    pub friction: Option<f64>,
     /// Its links and joints.
     pub articulation: Option<Box<Articulation>>,
     /// Its declaration.
@@ -165,6 +180,25 @@ impl Instance {
     /// What it is made of, for its measures.
     pub fn body(&self) -> Body<'_> {
         Body { frames: &self.frames, shape: self.shape.as_ref(), solids: &self.solids }
+    }
+
+    /// What others run into of its main body: its shape, or what is given in its place.
+    pub fn hull(&self) -> impl Iterator<Item = (&Shape, Pose)> {
+        let shape = self.shape.iter().filter(|_| self.collision.is_empty()).map(|shape| (shape, Pose::IDENTITY));
+        shape.chain(self.collision.iter().map(|solid| (&solid.shape, solid.pose)))
+    }
+
+    /// What others run into beside that.
+    pub fn more(&self) -> impl Iterator<Item = (&Shape, Pose)> {
+        let solids = self.solids.iter().filter(|_| self.collision.is_empty());
+        solids.map(|solid| (&solid.shape, solid.pose))
+    }
+
+    /// What is seen of it.
+    pub fn seen(&self) -> impl Iterator<Item = (&Shape, Pose)> {
+        let own = self.visual.is_none();
+        let shape = self.visual.as_ref().or(self.shape.as_ref()).map(|shape| (shape, Pose::IDENTITY));
+        shape.into_iter().chain(self.solids.iter().filter(move |_| own).map(|solid| (&solid.shape, solid.pose)))
     }
 }
 
@@ -196,6 +230,18 @@ pub struct Scene {
     pub lab: String,
     /// By [`InstanceId`].
     pub instances: Vec<Instance>,
+    /// What takes things along beside surfaces and grippers.
+    #[serde(default)]
+    pub carriers: Vec<Carrier>,
+}
+
+/// An instance that takes along what one of its states names: the frame `mount` of that comes to its origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Carrier {
+    /// Who takes it along.
+    pub by: InstanceId,
+    /// The state, by index into those of the model.
+    pub state: u32,
 }
 
 impl Scene {

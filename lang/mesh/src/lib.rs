@@ -1,11 +1,14 @@
-//! Meshes from STL (text and binary), OBJ and glTF (`.glb`, and `.gltf` with its data inside), or in words what is wrong.
+//! Meshes from STL (text and binary), OBJ, glTF (`.glb`, and `.gltf` with its data inside) and, with the feature `usd`, USD
+//! (`.usda`, `.usdc`, `.usd` and `.usdz`), or in words what is wrong.
 //!
-//! Coordinates stay in the unit of the file. Those of glTF are metres by its standard; its y axis, which points up there,
-//! becomes z.
+//! Coordinates stay in the unit of the file. Those of glTF are metres by its standard, those of USD become metres by what the
+//! file says; the y axis, where it points up there, becomes z.
 
 mod gltf;
 mod obj;
 mod stl;
+#[cfg(feature = "usd")]
+mod usd;
 
 use matterix_ir::mesh::Mesh;
 
@@ -16,8 +19,28 @@ pub const MOST_TRIANGLES: usize = 1 << 16;
 pub const MOST_BYTES: usize = 64 << 20;
 
 /// Kinds of files, by the ends of their names, and whether the kind says its unit (then metres).
-const KINDS: &[Kind] =
-    &[("stl", false, stl::read), ("obj", false, obj::read), ("glb", true, gltf::read), ("gltf", true, gltf::read)];
+const KINDS: &[Kind] = &[
+    ("stl", false, stl::read),
+    ("obj", false, obj::read),
+    ("glb", true, gltf::read),
+    ("gltf", true, gltf::read),
+    ("usd", true, usd::usd),
+    ("usda", true, usd::usda),
+    ("usdc", true, usd::usdc),
+    ("usdz", true, usd::usdz),
+];
+
+/// What is said of USD files where they are not read.
+#[cfg(not(feature = "usd"))]
+mod usd {
+    use crate::Surface;
+
+    pub(crate) fn read(_: &[u8]) -> Result<Surface, String> {
+        Err("this program was built without USD: `cargo install --features usd` builds it with".to_string())
+    }
+
+    pub(crate) use {read as usd, read as usda, read as usdc, read as usdz};
+}
 
 /// The end of a name, whether the kind is in metres, and what reads it.
 type Kind = (&'static str, bool, fn(&[u8]) -> Result<Surface, String>);
@@ -38,7 +61,9 @@ fn kind(name: &str) -> Option<&'static Kind> {
 /// The mesh in a file, in the unit of the file.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Mesh, String> {
     let Some((.., read)) = kind(name) else {
-        return Err("meshes are read from `.stl`, `.obj`, `.glb` and `.gltf`".to_string());
+        return Err(
+            "meshes are read from `.stl`, `.obj`, `.glb`, `.gltf` and `.usd`, `.usda`, `.usdc`, `.usdz`".to_string()
+        );
     };
     if bytes.len() > MOST_BYTES {
         return Err(format!("it is larger than {} MiB", MOST_BYTES >> 20));

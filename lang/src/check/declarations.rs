@@ -209,7 +209,9 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     }
     let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
     lab.use_lines(this);
-    let moving = lab.geometry(this).moving;
+    let geometry = lab.geometry(this);
+    lab.inertial(this, &geometry);
+    let moving = geometry.moving;
     lab.articulation(this, moving);
     for m in lab.all_members(this) {
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {

@@ -7,6 +7,7 @@ use matterix_ir::scene::{Frame, InstanceId, Pose, Shape, Solid, frame};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Elaborator;
+use super::coverings::is_place;
 use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
 use crate::eval::{Scope, Type, Value};
 use crate::names::near::{nearest, question};
@@ -38,6 +39,10 @@ pub struct Geometry {
     pub solids: Vec<Solid>,
     /// More of it on links that move, by index.
     pub moving: Vec<(u32, Solid)>,
+    /// What others run into instead of shape and solids.
+    pub collision: Vec<Solid>,
+    /// What is seen instead of them.
+    pub visual: Option<Shape>,
 }
 
 impl<'a> Elaborator<'a> {
@@ -49,6 +54,7 @@ impl<'a> Elaborator<'a> {
         {
             out.shape = self.shape(id, e, &mut setting.scope());
         }
+        self.coverings(id, &mut out);
         out.frames = self.frames(id, out.shape.as_ref());
         for (module, line) in self.lines(id) {
             let AssetLine::Solid { shape, at } = line else { continue };
@@ -221,10 +227,21 @@ impl<'a> Elaborator<'a> {
         Some(out)
     }
 
-    fn shape(&mut self, id: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
+    pub(super) fn shape(&mut self, id: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
+        if let Some(arg) = call(e).and_then(|(_, args)| args.iter().find(|arg| is_place(arg))) {
+            let headline = "a place is given in the pieces of `collision` only";
+            let d = Diagnostic::error(codes::WRONG_ARGUMENTS, arg.value.span, headline, "not here");
+            self.report(d.help("a line `solid box(...) at (x, y, z) mm` adds a piece somewhere else"));
+            return None;
+        }
+        self.placed_shape(id, e, scope)
+    }
+
+    /// A shape; what its arguments say of its place is left to the caller.
+    pub(super) fn placed_shape(&mut self, id: InstanceId, e: &'a Expr, scope: &mut Scope) -> Option<Shape> {
         let found = call(e).and_then(|(name, args)| {
             let known = SHAPES.iter().find(|(n, _)| *n == name);
-            known.map(|(name, given)| (*name, *given, args))
+            known.map(|(name, given)| (*name, *given, args.iter().filter(|arg| !is_place(arg)).collect::<Vec<_>>()))
         });
         let Some((name, given, args)) = found else {
             let names: Vec<String> = SHAPES.iter().map(|(n, _)| format!("`{n}`")).collect();
@@ -235,7 +252,7 @@ impl<'a> Elaborator<'a> {
             return None;
         };
         let shape = match name {
-            "mesh" => match args {
+            "mesh" => match args.as_slice() {
                 [file] => return self.mesh(id, e.span, &file.value, None),
                 [file, unit] => {
                     let unit = self.extent(&unit.value, name, scope)?;
@@ -243,7 +260,7 @@ impl<'a> Elaborator<'a> {
                 }
                 _ => None,
             },
-            "turned" => match args {
+            "turned" => match args.as_slice() {
                 [outside, inside] => {
                     let outside = self.outline(&outside.value, scope)?;
                     Some(Shape::Turned { outside, inside: self.outline(&inside.value, scope)? })
@@ -276,7 +293,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The mesh in a file, of which one unit is so long, m.
-    fn mesh(&mut self, id: InstanceId, span: Span, file: &'a Expr, unit: Option<f64>) -> Option<Shape> {
+    pub(super) fn mesh(&mut self, id: InstanceId, span: Span, file: &'a Expr, unit: Option<f64>) -> Option<Shape> {
         let ExprKind::Text(name) = &*file.kind else {
             let d = Diagnostic::error(codes::TYPE_MISMATCH, file.span, "a mesh is named by its file", "not a text");
             self.report(d.help("`mesh(\"bottle.stl\", 1 mm)`"));
@@ -369,7 +386,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A number of a dimension that is known before the run, in SI.
-    fn figure(&mut self, e: &'a Expr, dimension: &str, what: &str, scope: &mut Scope) -> Option<f64> {
+    pub(super) fn figure(&mut self, e: &'a Expr, dimension: &str, what: &str, scope: &mut Scope) -> Option<f64> {
         let ty = Type::Quantity { dimension: self.tables.units.named(dimension), point: false, optional: false };
         let value = self.expr(e, scope);
         match self.coerce(value, &ty, e.span, what) {
@@ -391,7 +408,7 @@ impl<'a> Elaborator<'a> {
 }
 
 /// `NAME(...)`.
-fn call(e: &Expr) -> Option<(&str, &[Arg])> {
+pub(super) fn call(e: &Expr) -> Option<(&str, &[Arg])> {
     let ExprKind::Call(callee, args) = &*e.kind else { return None };
     let ExprKind::Name(name) = &*callee.kind else { return None };
     Some((name.text.as_str(), args))

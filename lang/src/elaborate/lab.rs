@@ -8,15 +8,11 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::instances::Setting;
 use super::{Elaborator, Pair};
 use crate::ast::{self, AssetLine, AssetLiteral, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path};
-use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
 
-/// Fields every asset may have beside the members of its capabilities: geometry, of which only the shape is used yet.
-const GEOMETRY: &[&str] = &["shape", "tip", "base", "home", "mounted", "mesh", "collision", "inertia", "friction"];
-
-/// Those of them that nothing uses yet.
-const UNUSED: &[&str] = &["mesh", "collision", "inertia", "friction"];
+/// Fields every asset may have beside the members of its capabilities: geometry, and what follows from it.
+const GEOMETRY: &[&str] = &["shape", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
 
 impl<'a> Elaborator<'a> {
     /// Builds the instances of a lab, then their states.
@@ -48,6 +44,7 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             self.declare_states(InstanceId(i));
         }
+        self.judge_coverings();
     }
 
     pub(super) fn lab_setting(&mut self, name: &'a Name, value: &'a Expr, module: usize) {
@@ -148,10 +145,6 @@ impl<'a> Elaborator<'a> {
         super::fields::unknown_fields(fields, &keys, &format!("`{}`", info.name), &mut found);
         for d in found {
             self.report(d);
-        }
-        for f in fields.iter().filter(|f| UNUSED.contains(&f.key.text.as_str())) {
-            let d = unsupported(f.key.span, "meshes, collision shapes, inertia and friction");
-            self.report(Diagnostic { severity: matterix_ir::Severity::Warning, ..d });
         }
     }
 

@@ -3,11 +3,13 @@
 pub mod articulation;
 pub mod balances;
 pub mod contents;
+mod coverings;
 pub mod fields;
 pub mod geometry;
 pub mod grids;
 pub mod hazards;
 pub mod include;
+mod inertia;
 pub mod instances;
 mod joints;
 pub mod lab;

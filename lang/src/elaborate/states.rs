@@ -1,7 +1,7 @@
 //! States: allocated once all instances exist, before anything reads them.
 
 use matterix_ir::model::{Domain, State};
-use matterix_ir::scene::InstanceId;
+use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::tables::MemberRef;
@@ -67,6 +67,24 @@ impl<'a> Elaborator<'a> {
         self.state_owner.push(owner);
         self.states.push(State { name, domain, initial, scale, span });
         index
+    }
+
+    /// Instances with the states whose instances go along with them: `{ carries: true }`.
+    pub fn carriers(&self) -> Vec<Carrier> {
+        let mut out = Vec::new();
+        for index in 0..self.instances.len() as u32 {
+            let by = InstanceId(index);
+            for m in self.all_members(by) {
+                let MemberKind::Value { role: Role::State, name, options, .. } = &m.member.kind else { continue };
+                if !options.iter().any(|o| o.name.text == "carries") {
+                    continue;
+                }
+                let full = format!("{}.{}", self.instances[index as usize].name, name.text);
+                let is_it = |s: &State| s.domain == Domain::Instance && s.name == full;
+                out.extend(self.states.iter().position(is_it).map(|state| Carrier { by, state: state as u32 }));
+            }
+        }
+        out
     }
 
     fn state_node(&mut self, index: u32, ty: &Type) -> Value {

@@ -3,7 +3,8 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
-use super::{Num, Type, Value};
+use super::{Num, Scope, Type, Value};
+use crate::ast::ItemKind;
 use crate::elaborate::Elaborator;
 use crate::names::DeclId;
 use crate::units::Dimension;
@@ -45,6 +46,8 @@ enum Bound {
     Displacement,
     /// How large an instance is in one way, if its shape is known.
     Measures,
+    /// A number that a material states; without end where it states none.
+    Stated,
     /// What the lab placed the instance on, by one of these prepositions.
     Placed,
     /// Whether one mixture has touched something that another has not.
@@ -75,6 +78,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("position", Bound::Position),
     ("placed", Bound::Placed),
     ("soils", Bound::Soils),
+    ("stated", Bound::Stated),
     ("wholes", Bound::Wholes),
 ];
 
@@ -158,6 +162,8 @@ impl Elaborator<'_> {
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
+            (Bound::Stated, [Value::Material(id), Value::Text(what)]) => self.stated(*id, what),
+            (Bound::Stated, [Value::Nothing, Value::Text(_)]) => Value::Unlimited,
             (_, values) if values.contains(&Value::Error) => Value::Error,
             _ => self.wrong_arguments(name, at),
         };
@@ -200,6 +206,16 @@ impl Elaborator<'_> {
             }
             (Value::Error, _) | (_, Value::Error) => Value::Error,
             (a, _) => self.expected("two alike values", &a, at),
+        }
+    }
+
+    fn stated(&mut self, id: DeclId, what: &str) -> Value {
+        let names = self.tables.names;
+        let ItemKind::Material { fields, .. } = &names.decl(id).item.kind else { return Value::Error };
+        let field = fields.iter().find(|f| f.key.text == what);
+        match field.and_then(|f| Self::field_expr(&f.value)) {
+            Some(e) => self.expr(e, &mut Scope::module(names.decl(id).module)),
+            None => Value::Unlimited,
         }
     }
 

@@ -1,18 +1,21 @@
 //! How large things are, for what grips them and what they stand on or under.
 
 use matterix_ir::extent::Body;
+use matterix_ir::inertia::of_shapes;
+use matterix_ir::math::acos;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, frame};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{Type, Value};
 use crate::elaborate::Elaborator;
+use crate::elaborate::geometry::Geometry;
 
 /// What can be measured.
-const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise"];
+const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise", "centre", "tilt"];
 
 impl Elaborator<'_> {
-    /// A measure of an instance as a list of one length; an empty list where nothing is known of its shape.
+    /// A measure of an instance as a list of one length, or angle; an empty list where nothing is known of its shape.
     pub(super) fn measures(&mut self, id: InstanceId, what: &str, at: Span) -> Value {
         if !MEASURES.contains(&what) {
             let known: Vec<String> = MEASURES.iter().map(|m| format!("`{m}`")).collect();
@@ -20,13 +23,14 @@ impl Elaborator<'_> {
             self.report(d.help(format!("one of {}", known.join(", "))));
             return Value::Error;
         }
-        let length = self.tables.units.named("Length");
+        let dimension = self.tables.units.named(if what == "tilt" { "Angle" } else { "Length" });
         if self.prototype {
-            let ty = Type::Quantity { dimension: length, point: false, optional: false };
+            let ty = Type::Quantity { dimension, point: false, optional: false };
             return Value::List(vec![self.placeholder(&ty, what)]);
         }
         let found = match what {
             "rise" => self.rise(id),
+            "tilt" => self.tilt(id),
             _ => {
                 let geometry = self.geometry(id);
                 let body = Body { frames: &geometry.frames, shape: geometry.shape.as_ref(), solids: &geometry.solids };
@@ -34,11 +38,53 @@ impl Elaborator<'_> {
                     "grasp" | "offer" => body.across(what),
                     "height" => body.height(),
                     "foot" => body.foot(),
+                    "centre" => self.centre(&geometry),
                     _ => body.top(),
                 }
             }
         };
-        Value::List(found.map(|metres| self.number(metres, length, false)).into_iter().collect())
+        Value::List(found.map(|value| self.number(value, dimension, false)).into_iter().collect())
+    }
+
+    /// How high the centre of mass of a body is above its base, m.
+    fn centre(&self, geometry: &Geometry) -> Option<f64> {
+        let named = geometry.frames.iter().find(|f| f.name == frame::CENTRE && !f.stand && f.link.is_none());
+        let main = geometry.shape.iter().map(|shape| (shape, Pose::IDENTITY));
+        let shapes = main.chain(geometry.solids.iter().map(|solid| (&solid.shape, solid.pose)));
+        let middle = named.map(|f| f.pose.position).or_else(|| Some(of_shapes(1.0, shapes)?.placement.position));
+        middle.map(|at| at[2])
+    }
+
+    /// How far where things stand on an instance is from level in the lab as it is set up, rad; of what goes with a joint
+    /// nothing is known.
+    fn tilt(&mut self, id: InstanceId) -> Option<f64> {
+        let mut at = self.place_on(id)?;
+        let mut next = id;
+        for _ in 0..=self.instances.len() {
+            let instance = &self.instances[next.0 as usize];
+            let (own, owner, below) = (instance.pose, instance.owner, instance.placed.first().map(|p| p.1));
+            at = own.then(at);
+            next = match (owner, below) {
+                (Some(owner), _) => owner,
+                (None, Some(below)) => {
+                    at = self.place_on(below)?.then(at);
+                    below
+                }
+                (None, None) => break,
+            };
+        }
+        let up = at.point([0.0, 0.0, 1.0])[2] - at.position[2];
+        // Rounding does not make a level place slope.
+        Some(if up >= 1.0 - 1e-12 { 0.0 } else { acos(up.clamp(-1.0, 1.0)) })
+    }
+
+    /// Where things stand on an instance; nothing where that goes with a joint.
+    fn place_on(&mut self, id: InstanceId) -> Option<Pose> {
+        let frames = self.geometry(id).frames;
+        match frames.iter().find(|f| f.name == frame::PLACE) {
+            Some(place) => place.link.is_none().then_some(place.pose),
+            None => Some(Pose::IDENTITY),
+        }
     }
 
     /// How high things stand on an instance above the base of all that it is a part of, m.

@@ -96,6 +96,7 @@ impl<'a> Planner<'a, '_> {
                 let (goal, frame) = self.goal(at, scope)?;
                 Some(match manner {
                     Manner::Free | Manner::Straight => return None,
+                    Manner::Driving => Motion::Drive { mover, goal, frame },
                     Manner::Upright(within) => {
                         Motion::Upright { mover, goal, frame, within: self.quantity(within, "Angle", scope)? }
                     }
@@ -115,9 +116,11 @@ impl<'a> Planner<'a, '_> {
             (Goal::Shift(at) | Goal::Joints(at), Manner::Upright(by) | Manner::Tilted(by, _)) => {
                 self.mismatched(by.span.to(at.span))
             }
-            (Goal::Joints(at), Manner::Straight) => self.mismatched(at.span),
+            (Goal::Joints(at), Manner::Straight | Manner::Driving) | (Goal::Shift(at), Manner::Driving) => {
+                self.mismatched(at.span)
+            }
             (Goal::Home, Manner::Upright(by) | Manner::Tilted(by, _)) => self.mismatched(by.span),
-            (Goal::Home, Manner::Straight) => {
+            (Goal::Home, Manner::Straight | Manner::Driving) => {
                 let at = self.lab.instances[mover.0 as usize].span;
                 self.mismatched(at)
             }
@@ -130,7 +133,7 @@ impl<'a> Planner<'a, '_> {
             codes::MISPLACED,
             at,
             "joints go to positions as they can",
-            "only a way to a frame is straight, upright or tilted, or one by a shift straight",
+            "only a way to a frame is straight, driven, upright or tilted, or one by a shift straight",
         ));
         None
     }

@@ -15,7 +15,7 @@ use crate::names::{DeclId, Names, near};
 use crate::units::Units;
 
 const GROUP: &[&str] = &["title", "smarts", "unless", "members", "above", "source"];
-const MATERIAL: &[&str] = &["title", "source"];
+const MATERIAL: &[&str] = &["title", "source", "friction"];
 const PAIR: &[&str] = &["consequence", "above", "phase", "source"];
 
 /// What reading needs.

@@ -805,6 +805,8 @@ pub enum Manner {
     Free,
     /// `straight`.
     Straight,
+    /// `driving`: the robot itself, on the floor.
+    Driving,
     /// `upright within 20 deg`: what it holds.
     Upright(Expr),
     /// `tilted 75 deg about source.lip`: what it holds, about a point of it.

@@ -57,6 +57,8 @@ pub(crate) struct Robot {
     pub(crate) bodies: Vec<Option<Body>>,
     pub(crate) samples: Vec<Sample>,
     pub(crate) grips: Vec<Grip>,
+    /// Things by index that it takes along beside that, whenever these change.
+    pub(crate) loads: Vec<(f64, Vec<usize>)>,
 }
 
 /// A robot at one moment, as recorded.
@@ -94,16 +96,12 @@ impl Film {
         let things: Vec<Thing> = bodies
             .things
             .iter()
-            .map(|thing| {
-                let main = thing.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-                let more = thing.solids.iter().map(|solid| (&solid.shape, solid.pose));
-                Thing {
-                    name: thing.name.clone(),
-                    whole: thing.whole.clone(),
-                    body: Body::of_shapes(main.chain(more)),
-                    points: points.get(&thing.name).cloned().unwrap_or_default(),
-                    way: ways.get(&thing.name).cloned().unwrap_or_default(),
-                }
+            .map(|thing| Thing {
+                name: thing.name.clone(),
+                whole: thing.whole.clone(),
+                body: Body::of_shapes(thing.hull()),
+                points: points.get(&thing.name).cloned().unwrap_or_default(),
+                way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
             .collect();
         let mut robots = Vec::new();
@@ -161,7 +159,7 @@ fn pose(position: &Value, rotation: &Value) -> Pose {
 }
 
 fn meshes(bodies: &Bodies) -> impl Iterator<Item = &Mesh> {
-    let shapes = bodies.things.iter().flat_map(|t| t.shape.iter().chain(t.solids.iter().map(|s| &s.shape)));
+    let shapes = bodies.things.iter().flat_map(|t| t.hull().map(|(shape, _)| shape));
     let of_things = shapes.filter_map(|shape| match shape {
         Shape::Mesh(mesh) => Some(&**mesh),
         _ => None,
@@ -217,17 +215,30 @@ fn robot(machine: Machine, recording: &Recording, ways: &Ways, things: &[Thing])
         });
     }
     let bodies = Body::of_links(&machine.robot);
-    let mut robot = Robot { name, machine, variables, bodies, samples, grips: Vec::new() };
+    let mut robot = Robot { name, machine, variables, bodies, samples, grips: Vec::new(), loads: Vec::new() };
     for (time, message) in topic(recording, "/grips").iter().flat_map(|t| &t.messages) {
         if text(message, "robot") == robot.name {
             let items = robot.gripped(*time, list(message, "items"), ways, things);
             robot.grips.push(Grip { time: *time, items });
         }
     }
+    for (time, message) in topic(recording, "/loads").iter().flat_map(|t| &t.messages) {
+        if text(message, "robot") == robot.name {
+            let index = |name: &Value| things.iter().position(|t| Some(t.name.as_str()) == name.as_str());
+            robot.loads.push((*time, list(message, "items").iter().filter_map(index).collect()));
+        }
+    }
     Ok(robot)
 }
 
 impl Robot {
+    /// Whether it took a thing along beside what it grips, shortly before a time, then, or shortly after.
+    pub(crate) fn took(&self, thing: usize, time: f64) -> bool {
+        let after = self.loads.partition_point(|(t, _)| *t <= time);
+        let near = &self.loads[after.saturating_sub(2)..(after + 1).min(self.loads.len())];
+        near.iter().any(|(_, items)| items.contains(&thing))
+    }
+
     /// Things by name, each where it is relative to the tip.
     fn gripped(&self, time: f64, names: &[Value], ways: &Ways, things: &[Thing]) -> Vec<(usize, Isometry)> {
         let Some(tip) = self.sample(time).and_then(|s| s.links.get(self.machine.tip as usize)) else {

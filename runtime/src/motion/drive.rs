@@ -9,7 +9,7 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Checker;
 
-use super::perform::{Part, Refused, Way};
+use super::perform::{Part, Performed, Refused, Way};
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 
@@ -58,6 +58,41 @@ impl Stage<'_> {
             true => Err(refused),
             false => self.visit(robot, to, way, goal).ok_or(refused),
         }
+    }
+
+    /// Drives a robot to a frame, its arm folded if its hand is empty; with something in hand the arm stays as it is.
+    pub(super) fn drive(&mut self, robot: InstanceId, goal: InstanceId, frame: &str) -> Result<Performed, Refused> {
+        let to = self.frame(goal, frame).ok_or(Refused::NoFrame)?;
+        let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let (drive, arm) = (actor.drive.clone(), actor.arm.clone());
+        let [x, y, turn] = drive[..] else { return Err(Refused::Fixed) };
+        let there = self.pose(robot).inverse().then(to);
+        let ahead = there.point([1.0, 0.0, 0.0]);
+        let heading = math::atan2(ahead[1] - there.position[1], ahead[0] - there.position[0]);
+        let now = actor.positions(&drive);
+        let nearest = now[2] + wrapped(heading - now[2]);
+        let mut joints = actor.joints.clone();
+        (joints[x], joints[y], joints[turn]) = (0.0, 0.0, nearest);
+        // What the last joint of the base carries comes there.
+        let variables = actor.tree.variables();
+        let last = variables.get(turn).and_then(|v| actor.assembly.robot.joints.get(v.joint as usize));
+        let links = actor.tree.poses(&joints);
+        let base = last.and_then(|j| links.get(j.child as usize)).map(matterix_motion::placement).unwrap_or_default();
+        let q = vec![there.position[0] - base.position[0], there.position[1] - base.position[1], nearest];
+        for (variable, value) in drive.iter().zip(&q) {
+            let Some(v) = variables.get(*variable) else { continue };
+            if *value < v.limits.lower || *value > v.limits.upper {
+                let name = actor.assembly.robot.joints.get(v.joint as usize).map(|j| j.name.clone());
+                return Err(Refused::Beyond(name.unwrap_or_default()));
+            }
+        }
+        let home: Vec<f64> = arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+        let mut parts = self.depart(robot, None)?;
+        if self.held(robot).is_none() {
+            parts.extend(self.way(robot, &arm, &home, None).ok());
+        }
+        parts.push(self.way(robot, &drive, &q, None)?);
+        Ok(Performed::new(robot, parts))
     }
 
     /// Whether a robot stands for good, or so that its tip gets on from one of these poses.

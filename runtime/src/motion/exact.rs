@@ -4,8 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-use matterix_ir::pose::Pose;
-use matterix_ir::scene::{Instance, InstanceId, Scene, Shape};
+use matterix_ir::scene::{InstanceId, Scene};
 use matterix_motion::placement;
 use matterix_motion::spheres::{Contact, Figure, Other, Referee};
 use matterix_solids::{Body, Isometry, Touch, isometry};
@@ -71,7 +70,7 @@ impl<'s> Exact<'s> {
                     }
                 }
                 None if self.surroundings.bodiless.contains(id) => {
-                    let body = Body::of_shapes(solids(stage.scene.get(*id)));
+                    let body = Body::of_shapes(stage.scene.get(*id).more());
                     around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
                 }
                 None => {
@@ -149,14 +148,5 @@ impl Referee for Exact<'_> {
 
 /// The true shapes of all instances.
 pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
-    let body = |instance: &Instance| {
-        let main = instance.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-        Body::of_shapes(main.chain(solids(instance)))
-    };
-    scene.instances.iter().map(body).collect()
-}
-
-/// More of the body of an instance than its main shape.
-fn solids(instance: &Instance) -> impl Iterator<Item = (&Shape, Pose)> {
-    instance.solids.iter().map(|solid| (&solid.shape, solid.pose))
+    scene.instances.iter().map(|instance| Body::of_shapes(instance.hull().chain(instance.more()))).collect()
 }

@@ -189,13 +189,17 @@ pub enum Refused {
     Joints(usize, usize),
     /// This joint does not get to its position.
     Beyond(String),
+    /// It is to drive, and has no base that does.
+    Fixed,
 }
 
 impl Refused {
     /// The failure it raises in a run.
     pub fn failure(&self) -> &'static str {
         match self {
-            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn => "unmovable",
+            Refused::NoRobot | Refused::NoFrame | Refused::Bound(..) | Refused::StandsOn | Refused::Fixed => {
+                "unmovable"
+            }
             Refused::OutOfReach(..) => "unreachable",
             Refused::Collides(_) => "collision",
             Refused::NoWay => "no_way",
@@ -222,6 +226,7 @@ impl Refused {
                 format!("`{name}` and `{other}` both hold `{item}`")
             }
             Refused::StandsOn => format!("`{name}` stands on what it is to grip"),
+            Refused::Fixed => format!("`{name}` has no base that drives"),
             Refused::NotHeld => format!("`{name}` holds nothing like that"),
             Refused::TooWide(width, opening) => {
                 format!("`{name}` opens {:.0} mm and no wider, not {:.0} mm", opening * 1e3, width * 1e3)
@@ -302,6 +307,10 @@ impl Stage<'_> {
                 let parts = self.depart(robot, None)?;
                 let angle = values.first().copied().unwrap_or_default();
                 self.tilt(robot, (*item, point), (*goal, frame), angle, parts).map(Some)
+            }
+            Motion::Drive { mover, goal, frame } => {
+                let robot = self.actor_of(*mover).ok_or(Refused::NoRobot)?;
+                self.drive(robot, *goal, frame).map(Some)
             }
             Motion::Joints { mover, .. } => self.turn(*mover, values.to_vec()).map(Some),
             Motion::Home { mover } => {

@@ -120,8 +120,7 @@ fn pieces(stage: &Stage<'_>, id: InstanceId) -> Vec<Outline> {
         });
         return balls.collect();
     }
-    let main = instance.shape.iter().map(|shape| Outline::of(shape, &at));
-    main.chain(instance.solids.iter().map(|s| Outline::of(&s.shape, &at.then(s.pose)))).collect()
+    instance.hull().chain(instance.more()).map(|(shape, inner)| Outline::of(shape, &at.then(inner))).collect()
 }
 
 /// A thing with what is on it, parts inside a shape left out.

@@ -96,7 +96,6 @@ impl<'p> Stage<'p> {
     /// The lab when the run begins. Robots whose description cannot be moved are named.
     pub fn new(program: &'p Program) -> Result<Self, String> {
         let scene = &program.scene;
-        let carried = scene.stands().into_iter().map(Carried::Stands).collect();
         let (mut actors, mut fixtures) = (BTreeMap::new(), BTreeMap::new());
         for (index, instance) in scene.instances.iter().enumerate() {
             let id = InstanceId(index as u32);
@@ -113,12 +112,19 @@ impl<'p> Stage<'p> {
             let Some(assembly) = assemble(scene, id) else { continue };
             actors.insert(id, Actor::new(assembly).map_err(wrong)?);
         }
-        let mut stage = Stage {
+        let mut stage = Stage { actors, fixtures, ..Stage::still(scene) };
+        stage.follow_joints(|node| Some(initial(program, node)));
+        Ok(stage)
+    }
+
+    /// A lab in which nothing moves by itself.
+    pub fn still(scene: &'p Scene) -> Self {
+        Stage {
             scene,
-            carried,
+            carried: scene.stands().into_iter().map(Carried::Stands).collect(),
             before: BTreeMap::new(),
-            actors,
-            fixtures,
+            actors: BTreeMap::new(),
+            fixtures: BTreeMap::new(),
             freed: BTreeMap::new(),
             led: BTreeSet::new(),
             shared: BTreeMap::new(),
@@ -128,9 +134,7 @@ impl<'p> Stage<'p> {
             changes: 0,
             unknown: Unknown::default(),
             bodies: Arc::default(),
-        };
-        stage.follow_joints(|node| Some(initial(program, node)));
-        Ok(stage)
+        }
     }
 
     /// The true shapes of all instances, made when they are first asked for.

@@ -67,11 +67,9 @@ impl Surroundings {
     fn add_shapes(&mut self, stage: &Stage<'_>, id: InstanceId, body: bool) {
         let instance = stage.scene.get(id);
         let at = stage.pose(id);
-        let main = instance.shape.iter().filter(|_| body).map(|shape| (shape, at));
-        let more = instance.solids.iter().map(|s| (&s.shape, at.then(s.pose)));
-        for (shape, at) in main.chain(more) {
+        for (shape, inner) in instance.hull().filter(|_| body).chain(instance.more()) {
             let (solid, middle) = solid(shape);
-            self.push(id, &instance.name, at.then(Pose::up(middle)), solid);
+            self.push(id, &instance.name, at.then(inner).then(Pose::up(middle)), solid);
         }
         let Some(fixture) = stage.fixtures.get(&id) else { return };
         let links = following(stage.scene, id).into_iter().flat_map(|a| &a.robot.links).zip(fixture.links());
@@ -125,9 +123,8 @@ pub fn held(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Vec<Held> {
     let Some(id) = stage.held(robot) else { return Vec::new() };
     let instance = stage.scene.get(id);
     let inner = stage.tip(robot).inverse().then(stage.pose(id));
-    let main = instance.shape.iter().map(|shape| (shape, inner));
-    let more = instance.solids.iter().map(|s| (&s.shape, inner.then(s.pose)));
-    let balls = main.chain(more).flat_map(|(shape, at)| balls(shape, at)).collect();
+    let shapes = instance.hull().chain(instance.more());
+    let balls = shapes.flat_map(|(shape, at)| balls(shape, inner.then(at))).collect();
     // The whole tool may touch what it holds.
     let touching = (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
     vec![Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching }]

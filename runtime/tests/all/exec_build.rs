@@ -55,6 +55,10 @@ impl Lab {
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),
+            collision: Vec::new(),
+            visual: None,
+            inertial: None,
+            friction: None,
             articulation: None,
             span: Span::default(),
         });

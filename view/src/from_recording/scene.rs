@@ -43,6 +43,7 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
             kind: kind.unwrap_or_default().to_owned(),
             // The links of a robot are given in their own frames.
             shapes: shapes(entity, if text(entity, "frame_id") == name { Placement::default() } else { at }),
+            visual: None,
             at,
             frames: points.get(name).cloned().unwrap_or_default(),
             holds: held.contains(name),
@@ -50,7 +51,8 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
         });
     }
     for thing in things.iter_mut().filter(|thing| !thing.link) {
-        if let Some(true_shapes) = forms.get(&thing.name) {
+        if let Some((true_shapes, visual)) = forms.get(&thing.name) {
+            thing.visual.clone_from(visual);
             let color = thing.shapes.first().and_then(|(.., color)| *color);
             thing.shapes = true_shapes.iter().map(|(at, shape)| (*at, shape.clone(), color)).collect();
         }
@@ -72,14 +74,17 @@ pub(super) fn read(topics: &[Topic], document: &mut Document) -> Owners {
     owners
 }
 
+/// Shapes of a thing, and what is seen instead of them.
+type Form = (Vec<(Placement, Shape)>, Option<Shape>);
+
 /// The true shapes of things, where the recording has them: primitives say nothing of insides and of what is turned.
-fn forms(topics: &[Topic]) -> BTreeMap<String, Vec<(Placement, Shape)>> {
+fn forms(topics: &[Topic]) -> BTreeMap<String, Form> {
     let told = topics.iter().filter(|t| t.name == "/bodies").flat_map(|t| &t.messages).next();
     let bodies = told.and_then(|(_, message)| Bodies::deserialize(message).ok()).unwrap_or_default();
     let form = |thing: matterix_ir::bodies::Thing| {
         let main = thing.shape.map(|shape| (Placement::default(), shape));
         let more = thing.solids.into_iter().map(|solid| (solid.pose, solid.shape));
-        (thing.name, main.into_iter().chain(more).collect())
+        (thing.name, (main.into_iter().chain(more).collect(), thing.visual))
     };
     bodies.things.into_iter().map(form).collect()
 }

@@ -241,6 +241,7 @@ fn clause(clause: &Clause) -> Sexp {
             let moves = match manner {
                 Manner::Free => node("moves").with([expr(mover)]),
                 Manner::Straight => node("moves straight").with([expr(mover)]),
+                Manner::Driving => node("moves driving").with([expr(mover)]),
                 Manner::Upright(within) => node("moves upright").with([expr(mover), expr(within)]),
                 Manner::Tilted(angle, about) => node("moves tilted").with([expr(mover), expr(angle), expr(about)]),
             };

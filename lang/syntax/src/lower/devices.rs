@@ -187,6 +187,9 @@ impl Lower<'_> {
 
     fn manner(&mut self, node: Node) -> Manner {
         let kids = &mut Kids::of(node);
+        if kids.has(Rule::kw_driving) {
+            return Manner::Driving;
+        }
         if kids.has(Rule::kw_upright) {
             return Manner::Upright(self.expr_in(kids));
         }

@@ -85,6 +85,7 @@ impl<'s> Memory<'s> {
             }
             Motion::Joints { mover, .. } => write(8, &[*mover], ""),
             Motion::Home { mover } => write(9, &[*mover], ""),
+            Motion::Drive { mover, goal, frame } => write(15, &[*mover, *goal], frame),
             Motion::Lead { item, frame, by } => write(14, &[*by, *item], frame),
             Motion::Fingers { by, open } => write(10 + u8::from(*open), &[*by], ""),
         }
@@ -141,7 +142,17 @@ fn digest_of(scene: &Scene) -> String {
     let mut feed = Feed(SipHasher13::new());
     feed.0.write(MADE_BY.as_bytes());
     for i in &scene.instances {
-        let what = (&i.name, i.owner, i.support, i.pose, i.placed, &i.frames, &i.shape, &i.solids, &i.articulation);
+        let what = (
+            &i.name,
+            i.owner,
+            i.support,
+            i.pose,
+            i.placed,
+            &i.frames,
+            &i.shape,
+            &i.solids,
+            (&i.collision, &i.articulation),
+        );
         // A hash takes whatever it is given.
         let _ = serde_json::to_writer(&mut feed, &what);
     }

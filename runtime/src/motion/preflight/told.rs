@@ -70,6 +70,11 @@ pub fn finding(
             let headline = format!("`{joint}` of `{}` does not get to this position", name(robot));
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, "outside of its limits")
         }
+        Refused::Fixed => {
+            let headline = format!("`{}` does not drive", name(robot));
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, "it stands for good")
+                .help("take a robot whose description has joints before its field `base`")
+        }
         Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
         Refused::StandsOn | Refused::TooWide(..) => return None,
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use matterix_ir::mesh::Mesh;
-use matterix_ir::scene::{Instance, InstanceId, Pose, Shape, Stand};
+use matterix_ir::scene::{Instance, InstanceId, Pose, Shape};
 use mcap::McapResult;
 
 use super::Sink;
@@ -13,8 +13,8 @@ use super::foxglove::{
     self, Color, Cube, Cylinder, Entity, FrameTransform, FrameTransforms, KeyValue, SceneUpdate, Text, Time, Triangles,
     pose, quaternion, vector,
 };
+use super::replay::Replay;
 use super::robots::Robots;
-use crate::motion::supported;
 use crate::record::column::Column;
 use crate::record::run::Run;
 
@@ -30,39 +30,19 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let entities = sink.channel("/scene", "foxglove.SceneUpdate", &foxglove::scene_schema(), &units)?;
     let frames = sink.channel("/tf", "foxglove.FrameTransforms", &foxglove::transforms_schema(), &units)?;
     let tints = tints(run);
-    let mut stands = scene.stands();
     let mut shown: Vec<Option<(Pose, Tint)>> = vec![None; scene.instances.len()];
-    let supports = supports(run);
-    let mut supported: Vec<f64> = supports.iter().map(|&(id, _)| initial_support(run, id)).collect();
-    bodies::write(run, sink)?;
-    let mut robots = Robots::begin(run, sink, entities, frames)?;
+    let mut replay = Replay::new(run);
+    bodies::write(&replay.stage, sink)?;
+    let mut robots = Robots::begin(&replay.stage, sink, entities, frames)?;
     let samples = run.recording.times.len().max(1);
     for sample in 0..samples {
         let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
-        let carried = robots.until(run, time, sink, frames, &stands)?;
-        let mut moved = sample == 0;
-        for (&(id, values), current) in supports.iter().zip(&mut supported) {
-            let Some(&value) = values.get(sample) else { continue };
-            if value != *current {
-                *current = value;
-                moved = true;
-                // Nothing below: it is held, and stays where it was until it is put down. What a robot carried stays
-                // where it was let go.
-                match robots.left.remove(&id) {
-                    Some(at) => stands[id] = Stand::Lab(at),
-                    None if value >= 0.0 => stands[id] = Stand::On(InstanceId(value as u32), Pose::IDENTITY),
-                    None => {}
-                }
-            }
-        }
-        if !moved && !carried && tints.is_empty() {
+        let travelled = robots.until(run, time, sink, frames, &mut replay)?;
+        let moved = replay.sample(run, sample) || sample == 0;
+        if !moved && !travelled && tints.is_empty() {
             continue;
         }
-        let stand = |id: InstanceId| match robots.held.get(&(id.0 as usize)) {
-            Some(at) => Some(Stand::Lab(*at)),
-            None => stands.get(id.0 as usize).copied(),
-        };
-        let poses: Vec<Pose> = (0..stands.len() as u32).map(|i| scene.in_lab(InstanceId(i), stand)).collect();
+        let poses: Vec<Pose> = (0..scene.instances.len() as u32).map(|i| replay.stage.pose(InstanceId(i))).collect();
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
             let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));
@@ -89,21 +69,6 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
         }
     }
     Ok(())
-}
-
-/// The samples of each instance's `support`.
-fn supports<'a>(run: &Run<'a>) -> Vec<(usize, &'a [f64])> {
-    let model = &run.program.model;
-    let of = |(i, state): (usize, &matterix_ir::model::State)| {
-        let id = supported(&run.program.scene, &state.name, &state.domain)?;
-        Some((id.0 as usize, run.recording.states.get(i)?.as_slice()))
-    };
-    model.states.iter().enumerate().filter_map(of).collect()
-}
-
-fn initial_support(run: &Run<'_>, instance: usize) -> f64 {
-    let support = run.program.scene.instances.get(instance).and_then(|i| i.support);
-    support.map_or(-1.0, |id| f64::from(id.0))
 }
 
 /// A vessel has the colour of what is in it: the first property of a mixture that can be a colour.
@@ -181,11 +146,9 @@ impl Pieces {
 fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) -> Option<Entity<'a>> {
     let instance = run.program.scene.instances.get(index)?;
     let (frame_id, at) = if has_mesh(instance) { (instance.name.as_str(), Pose::IDENTITY) } else { (LAB, at) };
-    let shape = instance.shape.iter().map(|shape| (shape, at));
-    let solids = instance.solids.iter().map(|solid| (&solid.shape, at.then(solid.pose)));
     let [r, g, b] = tint.map(|v| f64::from(v) / SHADES);
     let mut pieces = Pieces { color: Color { r, g, b, a: 0.85 }, ..Pieces::default() };
-    shape.chain(solids).for_each(|(shape, at)| pieces.add(shape, at));
+    instance.seen().for_each(|(shape, inner)| pieces.add(shape, at.then(inner)));
     let Pieces { cubes, spheres, cylinders, triangles, top, .. } = pieces;
     if cubes.is_empty() && spheres.is_empty() && cylinders.is_empty() && triangles.is_empty() {
         return None;
@@ -218,8 +181,7 @@ fn entity<'a>(run: &Run<'a>, index: usize, time: f64, (at, tint): (Pose, Tint)) 
 
 /// Whether there are triangles in it: it is written in its own frame, so that it need not be written again where it moves.
 fn has_mesh(instance: &Instance) -> bool {
-    let mut shapes = instance.shape.iter().chain(instance.solids.iter().map(|solid| &solid.shape));
-    shapes.any(|shape| matches!(shape, Shape::Mesh(_)))
+    instance.seen().any(|(shape, _)| matches!(shape, Shape::Mesh(_)))
 }
 
 /// The instance in the lab, and its named points in the instance.

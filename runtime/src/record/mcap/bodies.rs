@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use matterix_ir::Program;
 use matterix_ir::bodies::{Bodies, Machine, Thing};
-use matterix_ir::scene::{InstanceId, Scene, Stand};
+use matterix_ir::scene::InstanceId;
 use mcap::McapResult;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -13,7 +12,6 @@ use serde_json::{Value, json};
 use super::Sink;
 use super::schema::{list, object, text};
 use crate::motion::Stage;
-use crate::record::run::Run;
 
 /// What a robot holds from now on.
 #[derive(Serialize)]
@@ -29,9 +27,15 @@ pub(super) fn grip_schema() -> Value {
     object("matterix.Grip", [("robot", text("Name of the robot")), ("items", items)])
 }
 
+/// Schema of a [`Grip`] that says what a robot takes along beside what it grips.
+pub(super) fn load_schema() -> Value {
+    let items = list(text("What goes along: tips of pipettes"));
+    object("matterix.Load", [("robot", text("Name of the robot")), ("items", items)])
+}
+
 /// Writes the bodies of a lab, if there are any.
-pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
-    let bodies = bodies(run.program);
+pub(super) fn write<W: Write + Seek>(stage: &Stage<'_>, sink: &mut Sink<W>) -> McapResult<()> {
+    let bodies = bodies(stage);
     if bodies == Bodies::default() {
         return Ok(());
     }
@@ -43,6 +47,16 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
             ("whole", text("What it is a part of, or its own name")),
             ("shape", json!({ "description": "Its main shape, m" })),
             ("solids", json!({ "description": "More of its body, each with a pose" })),
+            (
+                "collision",
+                json!({ "description": "What others run into instead, each with a pose; empty for the body" }),
+            ),
+            ("visual", json!({ "description": "What is seen instead; null for the body" })),
+            (
+                "inertial",
+                json!({ "description": "Mass in kg, centre of mass, xx xy xz yy yz zz in kg m2; null if unknown" }),
+            ),
+            ("friction", json!({ "description": "Coefficient of friction; null if unknown" })),
         ],
     );
     let machine = object(
@@ -59,10 +73,10 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     sink.push(channel, 0.0, &bodies)
 }
 
-fn bodies(program: &Program) -> Bodies {
-    let scene = &program.scene;
+fn bodies(stage: &Stage<'_>) -> Bodies {
+    let scene = stage.scene;
     let mut out = Bodies::default();
-    for instance in scene.instances.iter().filter(|i| i.shape.is_some() || !i.solids.is_empty()) {
+    for instance in scene.instances.iter().filter(|i| i.seen().chain(i.hull()).next().is_some()) {
         let mut whole = instance;
         while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
             whole = owner;
@@ -72,10 +86,12 @@ fn bodies(program: &Program) -> Bodies {
             whole: whole.name.clone(),
             shape: instance.shape.clone(),
             solids: instance.solids.clone(),
+            collision: instance.collision.clone(),
+            visual: instance.visual.clone(),
+            inertial: instance.inertial,
+            friction: instance.friction,
         });
     }
-    // A robot that cannot be moved is no machine here; who moves it says why.
-    let Ok(stage) = Stage::new(program) else { return out };
     for (id, robot, _) in stage.movers() {
         let assembly = stage.actors.get(&id).map(|actor| &actor.assembly);
         out.machines.push(Machine {
@@ -89,17 +105,16 @@ fn bodies(program: &Program) -> Bodies {
 }
 
 /// A thing, its parts and what stands on any of these, by name.
-pub(super) fn along<'a>(scene: &'a Scene, id: InstanceId, stands: &[Stand]) -> Vec<&'a str> {
+pub(super) fn along<'a>(stage: &Stage<'a>, id: InstanceId) -> Vec<&'a str> {
     let mut going = vec![id];
     let mut next = 0;
     while let Some(&carrier) = going.get(next) {
         next += 1;
-        for (index, stand) in stands.iter().enumerate() {
-            let other = InstanceId(index as u32);
-            if stand.below() == Some(carrier) && !going.contains(&other) {
+        for other in (0..stage.scene.instances.len() as u32).map(InstanceId) {
+            if stage.stand_of(other) == Some(carrier) && !going.contains(&other) {
                 going.push(other);
             }
         }
     }
-    going.into_iter().map(|id| scene.get(id).name.as_str()).collect()
+    going.into_iter().map(|id| stage.scene.get(id).name.as_str()).collect()
 }

@@ -6,6 +6,7 @@
 mod bench;
 mod bodies;
 mod foxglove;
+mod replay;
 mod robots;
 mod schema;
 mod story;

@@ -6,7 +6,7 @@ use std::io::{Seek, Write};
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{Piece, Robot, Solid};
-use matterix_ir::scene::{InstanceId, Stand};
+use matterix_ir::scene::InstanceId;
 use mcap::McapResult;
 
 use super::Sink;
@@ -16,6 +16,7 @@ use super::foxglove::{
     self, Color, Entity, FrameTransform, FrameTransforms, JointState, JointStates, KeyValue, SceneUpdate, Time, pose,
     quaternion, vector,
 };
+use super::replay::Replay;
 use crate::motion::{Moment, Stage};
 use crate::record::run::Run;
 
@@ -28,46 +29,37 @@ pub(super) struct Robots {
     names: BTreeMap<InstanceId, (Vec<String>, Vec<String>)>,
     joints: u16,
     grips: u16,
+    loads: u16,
     /// By robot, what it last held.
     hands: BTreeMap<InstanceId, InstanceId>,
     /// The first moment that has not been written.
     next: usize,
-    /// What is in hand, by instance, in the lab.
-    pub(super) held: BTreeMap<usize, Pose>,
-    /// Where things were when they were last in hand.
-    pub(super) left: BTreeMap<usize, Pose>,
 }
 
 impl Robots {
     /// Writes all robots as they stand at the beginning.
     pub(super) fn begin<W: Write + Seek>(
-        run: &Run<'_>,
+        stage: &Stage<'_>,
         sink: &mut Sink<W>,
         entities: u16,
         frames: u16,
     ) -> McapResult<Self> {
         let units = BTreeMap::new();
-        let mut out = Robots {
-            names: BTreeMap::new(),
-            joints: 0,
-            grips: 0,
-            hands: BTreeMap::new(),
-            next: 0,
-            held: BTreeMap::new(),
-            left: BTreeMap::new(),
-        };
-        let Ok(stage) = Stage::new(run.program) else { return Ok(out) };
+        let mut out = Robots { names: BTreeMap::new(), joints: 0, grips: 0, loads: 0, hands: BTreeMap::new(), next: 0 };
         if stage.movers().next().is_none() {
             return Ok(out);
         }
         out.joints = sink.channel("/joints", "foxglove.JointStates", &foxglove::joints_schema(), &units)?;
         out.grips = sink.channel("/grips", "matterix.Grip", &bodies::grip_schema(), &units)?;
+        if !stage.scene.carriers.is_empty() {
+            out.loads = sink.channel("/loads", "matterix.Load", &bodies::load_schema(), &units)?;
+        }
         for (id, robot, tree) in stage.movers() {
-            let name = &run.program.scene.get(id).name;
+            let name = &stage.scene.get(id).name;
             let links: Vec<String> = robot.links.iter().map(|l| format!("{name}.{}", l.name)).collect();
             let moving = tree.variables().iter().filter_map(|v| robot.joints.get(v.joint as usize));
             let joints = moving.map(|j| format!("{name}.{}", j.name)).collect();
-            let kind = &run.program.scene.get(id).kind;
+            let kind = &stage.scene.get(id).kind;
             let drawn: Vec<Entity<'_>> =
                 robot.links.iter().zip(&links).filter_map(|(link, id)| entity(robot, &link.visual, id, kind)).collect();
             sink.push(entities, 0.0, &SceneUpdate { deletions: [], entities: drawn })?;
@@ -79,45 +71,40 @@ impl Robots {
         Ok(out)
     }
 
-    /// Writes what moved up to a time, s; whether something is or was in hand.
+    /// Writes what moved up to a time, s, with all that goes along; whether anything did.
     pub(super) fn until<W: Write + Seek>(
         &mut self,
         run: &Run<'_>,
         time: f64,
         sink: &mut Sink<W>,
         frames: u16,
-        stands: &[Stand],
+        replay: &mut Replay<'_>,
     ) -> McapResult<bool> {
-        let mut carried = false;
+        let mut travelled = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
-            if let Some(item) = self.hands.get(&moment.robot) {
-                self.held.remove(&(item.0 as usize));
-            }
-            self.grip(run, moment, sink, stands)?;
+            replay.moment(moment);
+            self.grip(&replay.stage, moment, sink)?;
             self.write(moment, sink, frames)?;
-            if let Some((id, at)) = moment.held {
-                let index = id.0 as usize;
-                self.held.insert(index, at);
-                self.left.insert(index, at);
-                carried = true;
-                if let Some(instance) = run.program.scene.instances.get(index) {
-                    let transforms = vec![transform(moment.time, &instance.name, at)];
-                    sink.push(frames, moment.time, &FrameTransforms { transforms })?;
-                }
+            travelled = true;
+            for (robot, items) in replay.loads() {
+                let name = |id: &InstanceId| run.program.scene.get(*id).name.as_str();
+                let load = bodies::Grip { robot: name(&robot), items: items.iter().map(name).collect() };
+                sink.push(self.loads, moment.time, &load)?;
+            }
+            let scene = &run.program.scene;
+            let going = replay.along(moment.robot);
+            let transforms: Vec<FrameTransform> =
+                going.into_iter().map(|(id, at)| transform(moment.time, &scene.get(id).name, at)).collect();
+            if !transforms.is_empty() {
+                sink.push(frames, moment.time, &FrameTransforms { transforms })?;
             }
         }
-        Ok(carried)
+        Ok(travelled)
     }
 
     /// Writes what is in a hand where that is something else than before, with all that goes along.
-    fn grip<W: Write + Seek>(
-        &mut self,
-        run: &Run<'_>,
-        moment: &Moment,
-        sink: &mut Sink<W>,
-        stands: &[Stand],
-    ) -> McapResult<()> {
+    fn grip<W: Write + Seek>(&mut self, stage: &Stage<'_>, moment: &Moment, sink: &mut Sink<W>) -> McapResult<()> {
         let now = moment.held.map(|(id, _)| id);
         if self.hands.get(&moment.robot).copied() == now {
             return Ok(());
@@ -126,9 +113,8 @@ impl Robots {
             Some(id) => self.hands.insert(moment.robot, id),
             None => self.hands.remove(&moment.robot),
         };
-        let scene = &run.program.scene;
-        let items = now.map(|id| bodies::along(scene, id, stands)).unwrap_or_default();
-        let robot = &scene.get(moment.robot).name;
+        let items = now.map(|id| bodies::along(stage, id)).unwrap_or_default();
+        let robot = &stage.scene.get(moment.robot).name;
         sink.push(self.grips, moment.time, &bodies::Grip { robot, items })
     }
 

@@ -49,6 +49,10 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         frames: vec![],
         shape,
         solids: Vec::new(),
+        collision: Vec::new(),
+        visual: None,
+        inertial: None,
+        friction: None,
         articulation: None,
         span: line(2),
     }
@@ -67,7 +71,7 @@ fn scene() -> Scene {
         contents,
         instance("panda", "FrankaPanda", Some(0), [0.0; 3], Some(Shape::Cylinder([0.15, 0.6]))),
     ];
-    Scene { lab: "bench".into(), instances }
+    Scene { lab: "bench".into(), instances, ..Scene::default() }
 }
 
 fn state(name: &str, domain: Domain, initial: matterix_ir::NodeId) -> State {
