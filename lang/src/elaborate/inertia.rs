@@ -113,7 +113,7 @@ impl<'a> Elaborator<'a> {
 
     /// The value of a parameter of a body, if it has that and it is known before the run.
     fn plain(&mut self, id: InstanceId, (name, dimension): (&str, &str)) -> Option<f64> {
-        let member = self.members_of(id, name).into_iter().next()?;
+        let member = self.members_of(id, name).first().copied()?;
         let at = self.instances[id.0 as usize].span;
         let value = self.member_value(id, member, at);
         let wanted = self.tables.units.named(dimension);

@@ -54,10 +54,12 @@ pub struct Names<'a> {
 
 /// Parses the root file and everything it imports; the library comes first.
 pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Module>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics) = library(sources);
+    let (mut modules, mut diagnostics, first) = library(sources, root);
     let mut queue = vec![(String::new(), root)];
+    let mut parsed = Some(first);
     while let Some((name, file)) = queue.pop() {
-        let (tree, found) = crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text));
+        let parse = || crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text));
+        let (tree, found) = parsed.take().unwrap_or_else(parse);
         diagnostics.extend(found);
         for item in &tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
@@ -116,17 +118,24 @@ fn used(modules: &[Module]) -> Vec<bool> {
     used
 }
 
-/// The library's modules and their findings.
-fn library(sources: &mut Sources) -> (Vec<Module>, Vec<Diagnostic>) {
+/// The library's modules and their findings, and the tree of the root file, which is parsed meanwhile.
+fn library(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
+    let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
+    let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
+    let parse = || crate::syntax::parse(root, sources.get(root).map_or("", |s| &s.text));
+    let (trees, first) = std::thread::scope(|scope| {
+        let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
+        let first = parse();
+        // Where there is no thread to be had, this one does the work.
+        (reading.ok().and_then(|reading| reading.join().ok()).unwrap_or_else(read), first)
+    });
     let mut diagnostics = Vec::new();
-    let read = |(index, module): (usize, &library::Module)| {
-        let file = sources.add(module.name, module.text);
-        let (tree, found) = library::read(index, file);
+    let module = |((module, file), (tree, found)): ((&library::Module, FileId), _)| {
         diagnostics.extend(found);
         Module { name: module.name.to_string(), file, tree }
     };
-    let modules = library::MODULES.iter().enumerate().map(read).collect();
-    (modules, diagnostics)
+    let modules = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
+    (modules, diagnostics, first)
 }
 
 /// Bytes of stack of a thread: what the main one has.
