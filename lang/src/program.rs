@@ -573,7 +573,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             Some(frame) => (frame.pose.then(pose), frame.link),
             None => (pose, None),
         };
-        let Geometry { frames, shape, solids, moving } = lab.geometry(id);
+        let Geometry { frames, shape, solids, room, moving } = lab.geometry(id);
         instances.push(SceneInstance {
             name,
             kind: lab.kind_names(id),
@@ -586,6 +586,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             frames,
             shape,
             solids,
+            room,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });

@@ -20,6 +20,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         placed: true,
         frames: Vec::new(),
         solids: Vec::new(),
+        room: None,
         articulation: None,
         shape,
         span: Span::default(),

@@ -25,6 +25,12 @@ pub struct Thing {
     pub shape: Option<Shape>,
     /// More of it.
     pub solids: Vec<Solid>,
+    /// What its parts take out of it.
+    #[serde(default)]
+    pub rooms: Vec<Solid>,
+    /// Whether its shape is only what it takes out of what it is a part of.
+    #[serde(default)]
+    pub hollow: bool,
 }
 
 /// A robot with the tools mounted on it; where its links are, the recording tells as `NAME.LINK`.

@@ -155,6 +155,9 @@ pub struct Instance {
     pub shape: Option<Shape>,
     /// More of its body.
     pub solids: Vec<Solid>,
+    /// What it takes out of what it is a part of: a hole in a rack, a well in a plate.
+    #[serde(default)]
+    pub room: Option<Shape>,
     /// Its links and joints.
     pub articulation: Option<Box<Articulation>>,
     /// Its declaration.
@@ -165,6 +168,11 @@ impl Instance {
     /// What it is made of, for its measures.
     pub fn body(&self) -> Body<'_> {
         Body { frames: &self.frames, shape: self.shape.as_ref(), solids: &self.solids }
+    }
+
+    /// Its main shape as something to run into; none where that is only the room it takes out of another thing.
+    pub fn solid(&self) -> Option<&Shape> {
+        self.shape.as_ref().filter(|_| self.shape != self.room)
     }
 }
 
@@ -217,6 +225,20 @@ impl Scene {
             (None, None) => Stand::Lab(i.pose),
         };
         self.instances.iter().map(stand).collect()
+    }
+
+    /// What the parts of an instance take out of it, each with its place in the frame of that instance.
+    pub fn rooms(&self, id: InstanceId) -> Vec<Solid> {
+        let mut out = Vec::new();
+        let mut inside = vec![(id, Pose::IDENTITY)];
+        // Parts come after what they are a part of.
+        for (index, part) in self.instances.iter().enumerate().skip(id.0 as usize + 1) {
+            let Some((_, above)) = inside.iter().find(|(i, _)| Some(*i) == part.owner) else { continue };
+            let pose = above.then(part.pose);
+            out.extend(part.room.iter().map(|room| Solid { shape: room.clone(), pose }));
+            inside.push((InstanceId(index as u32), pose));
+        }
+        out
     }
 
     /// The surface things stand on, in the frame of its instance.

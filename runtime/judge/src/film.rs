@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use matterix_ir::bodies::{Bodies, Machine};
+use matterix_ir::bodies::{self, Bodies, Machine};
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::Shape;
@@ -91,16 +91,25 @@ impl Film {
         if !meshes(&bodies).all(Mesh::is_sound) {
             return Err(Unreadable("`/bodies` is damaged: a mesh lacks corners".to_owned()));
         }
+        let mut known: Vec<(&bodies::Thing, Option<Body>)> = Vec::new();
+        let mut body = |thing| {
+            // Tips and vials come by the dozen.
+            if let Some(same) = known.iter().find(|(other, _)| are_alike(thing, other)) {
+                return same.1.clone();
+            }
+            let main = thing.shape.as_ref().filter(|_| !thing.hollow);
+            let made = Body::with_rooms(main, &thing.solids, &thing.rooms);
+            known.push((thing, made.clone()));
+            made
+        };
         let things: Vec<Thing> = bodies
             .things
             .iter()
-            .map(|thing| {
-                let main = thing.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-                let more = thing.solids.iter().map(|solid| (&solid.shape, solid.pose));
+            .map(|thing: &bodies::Thing| {
                 Thing {
                     name: thing.name.clone(),
                     whole: thing.whole.clone(),
-                    body: Body::of_shapes(main.chain(more)),
+                    body: body(thing),
                     points: points.get(&thing.name).cloned().unwrap_or_default(),
                     way: ways.get(&thing.name).cloned().unwrap_or_default(),
                 }
@@ -113,6 +122,11 @@ impl Film {
         }
         Ok(Film { things, robots })
     }
+}
+
+/// Whether two things have one body.
+fn are_alike(a: &bodies::Thing, b: &bodies::Thing) -> bool {
+    a.hollow == b.hollow && a.shape == b.shape && a.solids == b.solids && a.rooms == b.rooms
 }
 
 impl Thing {

@@ -69,6 +69,7 @@ impl<'f> Sweep<'f> {
         let apart = (0..links)
             .flat_map(|a| (a + 1..links).map(move |b| (a, b)))
             .filter(|&(a, b)| by[a] != by[b] && !touching.contains(&[a as u32, b as u32]))
+            .filter(|&(a, b)| !kinematics::are_joined(description, &by, a, b))
             .collect();
         let tools = robot.machine.tools as usize;
         // A finger is moved by a joint of a tool.

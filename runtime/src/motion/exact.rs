@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use matterix_ir::pose::Pose;
-use matterix_ir::scene::{Instance, InstanceId, Scene, Shape};
+use matterix_ir::scene::{Instance, InstanceId, Scene, Shape, Solid};
 use matterix_motion::placement;
 use matterix_motion::spheres::{Contact, Figure, Other, Referee};
 use matterix_solids::{Body, Isometry, Touch, isometry};
@@ -62,31 +62,41 @@ impl<'s> Exact<'s> {
         let mut seen = BTreeSet::new();
         for (index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
             let at = stage.pose(*id);
-            match stage.actors.get(id) {
-                Some(actor) => {
-                    let links = actor.tree.poses(&actor.joints);
-                    for (link, body) in links.iter().zip(actor.bodies()) {
-                        let at = isometry(&at.then(placement(link)));
-                        around.extend(body.iter().map(|body| (index, at, Cow::Borrowed(body))));
-                    }
-                }
-                None if self.surroundings.bodiless.contains(id) => {
-                    let body = Body::of_shapes(solids(stage.scene.get(*id)));
-                    around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
-                }
-                None => {
-                    if let (Some(fixture), Some(own)) = (stage.fixtures.get(id), following(stage.scene, *id)) {
-                        for (link, body) in fixture.links().iter().zip(Body::of_links(&own.robot)) {
-                            let at = isometry(&at.then(*link));
-                            around.extend(body.map(|body| (index, at, Cow::Owned(body))));
-                        }
-                    }
-                    let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
-                    around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
+            if let Some(actor) = stage.actors.get(id).filter(|_| !stage.unknown.postures.contains(id)) {
+                let links = actor.tree.poses(&actor.joints);
+                for (link, body) in links.iter().zip(actor.bodies()) {
+                    let at = isometry(&at.then(placement(link)));
+                    around.extend(body.iter().map(|body| (index, at, Cow::Borrowed(body))));
                 }
             }
+            if self.surroundings.bodiless.contains(id) {
+                let body = Body::of_shapes(solids(stage.scene.get(*id)));
+                around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
+                continue;
+            }
+            if let (Some(fixture), Some(own)) = (stage.fixtures.get(id), following(stage.scene, *id)) {
+                for (link, body) in fixture.links().iter().zip(Body::of_links(&own.robot)) {
+                    let at = isometry(&at.then(*link));
+                    around.extend(body.map(|body| (index, at, Cow::Owned(body))));
+                }
+            }
+            let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
+            around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
         }
         Some(Parts { mine, around })
+    }
+
+    /// Every touch that counts but for those that are spared, deepest first.
+    pub fn touches(&self, q: &[f64], spared: &dyn Fn(u32, &Other) -> bool) -> Vec<Contact> {
+        let mut out = Vec::new();
+        self.look(q, |link, other, touch| {
+            if !spared(link, &other) {
+                out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
+            }
+            false
+        });
+        out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        out
     }
 
     /// Every touch that counts, until `tell` says that it is enough.
@@ -101,7 +111,11 @@ impl<'s> Exact<'s> {
         let counts = |touch: Option<Touch>| touch.filter(|t| t.distance < -TOUCH);
         for (link, mine) in placed.iter().enumerate() {
             let Some((at, body)) = mine else { continue };
+            let stands = self.figure.is_still(link as u32);
             for (index, other_at, other) in &parts.around {
+                if stands && self.surroundings.world.beneath.contains(index) {
+                    continue;
+                }
                 let found = counts(body.touch(at, other, other_at, 0.0));
                 if found.is_some_and(|touch| tell(link as u32, Other::Body(*index), touch)) {
                     return;
@@ -124,13 +138,7 @@ impl<'s> Exact<'s> {
 
 impl Referee for Exact<'_> {
     fn contacts(&self, q: &[f64]) -> Vec<Contact> {
-        let mut out = Vec::new();
-        self.look(q, |link, other, touch| {
-            out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
-            false
-        });
-        out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-        out
+        self.touches(q, &|_, _| false)
     }
 
     fn is_free(&self, q: &[f64]) -> bool {
@@ -149,11 +157,23 @@ impl Referee for Exact<'_> {
 
 /// The true shapes of all instances.
 pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
-    let body = |instance: &Instance| {
-        let main = instance.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-        Body::of_shapes(main.chain(solids(instance)))
-    };
-    scene.instances.iter().map(body).collect()
+    let each = scene.instances.iter().enumerate();
+    let mut known: Vec<(Option<&Shape>, &[Solid], Vec<Solid>, Option<Body>)> = Vec::new();
+    let bodies = each.map(|(index, instance)| {
+        let (main, more) = (instance.solid(), instance.solids.as_slice());
+        if main.is_none() && more.is_empty() {
+            return None;
+        }
+        // Tips and vials come by the dozen.
+        let rooms = scene.rooms(InstanceId(index as u32));
+        if let Some(same) = known.iter().find(|k| k.0 == main && k.1 == more && k.2 == rooms) {
+            return same.3.clone();
+        }
+        let body = Body::with_rooms(main, more, &rooms);
+        known.push((main, more, rooms, body.clone()));
+        body
+    });
+    bodies.collect()
 }
 
 /// More of the body of an instance than its main shape.

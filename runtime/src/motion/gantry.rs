@@ -118,7 +118,7 @@ impl Stage<'_> {
         there: &[f64],
         hanging: f64,
     ) -> Result<f64, Refused> {
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let around = Surroundings::of(self, robot);
         let along = (0..=(hanging / HANGING) as u32).map(|k| [0.0, 0.0, f64::from(k) * HANGING]);
         let tool = Held {
             name: "its tool".to_string(),

@@ -1,6 +1,7 @@
 //! Robots that move: what they are made of, where everything is meanwhile, where they are to go and how they get there.
 
-pub mod assembly;
+mod approach;
+mod assembly;
 mod drive;
 pub mod exact;
 pub mod fingers;

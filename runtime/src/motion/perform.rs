@@ -629,13 +629,7 @@ impl Stage<'_> {
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
     fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
-        let mut without = self.carriers(robot);
-        for id in near {
-            without.push(*id);
-            // No hand that holds it.
-            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
-        }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
+        let without = self.left_out(robot, near);
         let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
         Surroundings::of_but(self, robot, &without, &bodiless)
     }
@@ -649,7 +643,7 @@ impl Stage<'_> {
         q: &[f64],
         within: Option<f64>,
     ) -> Result<Part, Refused> {
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let around = Surroundings::of(self, robot);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let figure = self.figure(robot, actor, variables)?;
         let exact = Exact::of(self, robot, &figure, &around);
@@ -679,8 +673,19 @@ impl Stage<'_> {
         Ok(part)
     }
 
-    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    /// Straight lines of the tip from pose to pose; fingers may touch what it comes up to or leaves.
     pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
+        self.lines(robot, to, near, true)
+    }
+
+    /// As [`Stage::line`]; where it does not look at what it comes up to, that goes along with it.
+    pub(super) fn lines(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        near: &[InstanceId],
+        looks: bool,
+    ) -> Result<Part, Refused> {
         let around = self.beside_line(robot, near);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (base, arm) = (self.foot(robot).inverse(), actor.arm.clone());
@@ -699,6 +704,9 @@ impl Stage<'_> {
                 Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
             })?;
             points.extend(followed.into_iter().skip(1));
+        }
+        if let Some(refused) = looks.then(|| self.bump(robot, &figure, near, &points)).flatten() {
+            return Err(refused);
         }
         let part = timed(actor, &arm, &points, Some(&mut checker))?;
         let end = points.pop().unwrap_or_default();
@@ -742,9 +750,11 @@ impl Stage<'_> {
         let (other, part, with) = match contact.other {
             Other::Body(index) => {
                 let with = around.owners.get(index).copied();
+                let name = with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default();
+                // Of a robot, which link it is; of what that is built into, nothing more.
                 let robot = with.is_some_and(|w| self.actors.contains_key(&w));
-                let part = around.world.bodies.get(index).filter(|_| robot).map(|b| b.name.clone());
-                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), part, with)
+                let part = around.world.bodies.get(index).filter(|b| robot && b.name != name).map(|b| b.name.clone());
+                (name, part, with)
             }
             Other::Link(link) => (figure.name(link).to_string(), None, None),
         };

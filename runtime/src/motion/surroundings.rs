@@ -28,32 +28,53 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Everything but the robot, what carries it, what it holds and the things left out.
-    pub fn of(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId]) -> Self {
-        Self::of_but(stage, robot, without, &[])
+    /// Everything but the robot and what it holds. What carries it may touch what of it does not move.
+    pub fn of(stage: &Stage<'_>, robot: InstanceId) -> Self {
+        Self::of_but(stage, robot, &[], &[])
     }
 
-    /// As [`Surroundings::of`], without the main body of some things: what stands in one of their places stands in it.
+    /// As [`Surroundings::of`], without some things, and without the main body of others: what stands in one of their places
+    /// stands in it.
     pub fn of_but(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId], bodiless: &[InstanceId]) -> Self {
-        let mut out = Surroundings { bodiless: bodiless.to_vec(), ..Surroundings::default() };
-        for index in 0..stage.scene.instances.len() {
-            let id = InstanceId(index as u32);
-            let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
-            if mine || stage.is_in_any(id, without) || stage.is_unknown(id) {
-                continue;
-            }
-            if stage.actors.contains_key(&id) {
-                if stage.unknown.postures.contains(&id) {
-                    continue;
-                }
-                out.add_robot(stage, id);
-            } else if !stage.is_inside_a_shape(id) {
-                out.add_shapes(stage, id, !bodiless.contains(&id));
-            }
-        }
+        let mut out = Self::of_which(stage, robot, bodiless, |id| !stage.is_in_any(id, without));
         if stage.around_sweeps {
             for (id, link, at, radius) in stage.sweeps(robot) {
                 out.push(id, &link, at, Solid::Sphere(radius));
+            }
+        }
+        out
+    }
+
+    /// Only some things, and what is part of them or of which they are part.
+    pub fn of_only(stage: &Stage<'_>, robot: InstanceId, these: &[InstanceId]) -> Self {
+        let wholes: Vec<InstanceId> = these.iter().map(|id| stage.whole(*id)).collect();
+        Self::of_which(stage, robot, &[], |id| stage.is_in_any(id, &wholes))
+    }
+
+    fn of_which(
+        stage: &Stage<'_>,
+        robot: InstanceId,
+        bodiless: &[InstanceId],
+        wanted: impl Fn(InstanceId) -> bool,
+    ) -> Self {
+        let mut out = Surroundings { bodiless: bodiless.to_vec(), ..Surroundings::default() };
+        let carriers = stage.carriers(robot);
+        for index in 0..stage.scene.instances.len() {
+            let id = InstanceId(index as u32);
+            let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
+            if mine || !wanted(id) || stage.is_unknown(id) {
+                continue;
+            }
+            let first = out.world.bodies.len();
+            if stage.actors.contains_key(&id) && !stage.unknown.postures.contains(&id) {
+                out.add_robot(stage, id);
+            }
+            // What a gantry runs in stands there whatever moves.
+            if stage.actors.contains_key(&id) || !stage.is_inside_a_shape(id) {
+                out.add_shapes(stage, id, !bodiless.contains(&id));
+            }
+            if stage.is_in_any(id, &carriers) {
+                out.world.beneath.extend(first..out.world.bodies.len());
             }
         }
         out
@@ -67,7 +88,7 @@ impl Surroundings {
     fn add_shapes(&mut self, stage: &Stage<'_>, id: InstanceId, body: bool) {
         let instance = stage.scene.get(id);
         let at = stage.pose(id);
-        let main = instance.shape.iter().filter(|_| body).map(|shape| (shape, at));
+        let main = instance.solid().into_iter().filter(|_| body).map(|shape| (shape, at));
         let more = instance.solids.iter().map(|s| (&s.shape, at.then(s.pose)));
         for (shape, at) in main.chain(more) {
             let (solid, middle) = solid(shape);

@@ -55,6 +55,7 @@ impl Lab {
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),
+        room: None,
             articulation: None,
             span: Span::default(),
         });

@@ -39,7 +39,7 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let samples = run.recording.times.len().max(1);
     for sample in 0..samples {
         let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
-        let carried = robots.until(run, time, sink, frames, &stands)?;
+        let carried = robots.until(run, time, sink, frames, &mut stands)?;
         let mut moved = sample == 0;
         for (&(id, values), current) in supports.iter().zip(&mut supported) {
             let Some(&value) = values.get(sample) else { continue };
@@ -47,8 +47,13 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
                 *current = value;
                 moved = true;
                 // Nothing below: it is held, and stays where it was until it is put down. What a robot carried stays
-                // where it was let go.
+                // where it was let go on what it stands on now, and goes along with that.
                 match robots.left.remove(&id) {
+                    Some(at) if value >= 0.0 => {
+                        let below = InstanceId(value as u32);
+                        let top = scene.in_lab(below, |i| stands.get(i.0 as usize).copied()).then(scene.surface(below));
+                        stands[id] = Stand::On(below, top.inverse().then(at));
+                    }
                     Some(at) => stands[id] = Stand::Lab(at),
                     None if value >= 0.0 => stands[id] = Stand::On(InstanceId(value as u32), Pose::IDENTITY),
                     None => {}

@@ -43,6 +43,8 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
             ("whole", text("What it is a part of, or its own name")),
             ("shape", json!({ "description": "Its main shape, m" })),
             ("solids", json!({ "description": "More of its body, each with a pose" })),
+            ("rooms", json!({ "description": "What its parts take out of it, each with a pose" })),
+            ("hollow", json!({ "description": "Whether its shape is only what it takes out of another thing", "type": "boolean" })),
         ],
     );
     let machine = object(
@@ -62,7 +64,8 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
 fn bodies(program: &Program) -> Bodies {
     let scene = &program.scene;
     let mut out = Bodies::default();
-    for instance in scene.instances.iter().filter(|i| i.shape.is_some() || !i.solids.is_empty()) {
+    let told = scene.instances.iter().enumerate().filter(|(_, i)| i.shape.is_some() || !i.solids.is_empty());
+    for (index, instance) in told {
         let mut whole = instance;
         while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
             whole = owner;
@@ -72,6 +75,8 @@ fn bodies(program: &Program) -> Bodies {
             whole: whole.name.clone(),
             shape: instance.shape.clone(),
             solids: instance.solids.clone(),
+            rooms: scene.rooms(InstanceId(index as u32)),
+            hollow: instance.shape.is_some() && instance.solid().is_none(),
         });
     }
     // A robot that cannot be moved is no machine here; who moves it says why.

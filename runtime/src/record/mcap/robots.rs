@@ -86,13 +86,17 @@ impl Robots {
         time: f64,
         sink: &mut Sink<W>,
         frames: u16,
-        stands: &[Stand],
+        stands: &mut [Stand],
     ) -> McapResult<bool> {
         let mut carried = false;
         while let Some(moment) = run.recording.moments.get(self.next).filter(|m| m.time <= time) {
             self.next += 1;
-            if let Some(item) = self.hands.get(&moment.robot) {
-                self.held.remove(&(item.0 as usize));
+            if let Some(item) = self.hands.get(&moment.robot).map(|item| item.0 as usize) {
+                let at = self.held.remove(&item);
+                // What is let go is where it was let go, before the model says on what.
+                if let (Some(at), Some(stand)) = (at, stands.get_mut(item)) {
+                    *stand = Stand::Lab(at);
+                }
             }
             self.grip(run, moment, sink, stands)?;
             self.write(moment, sink, frames)?;

@@ -49,6 +49,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         frames: vec![],
         shape,
         solids: Vec::new(),
+        room: None,
         articulation: None,
         span: line(2),
     }

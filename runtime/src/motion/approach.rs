@@ -1,0 +1,92 @@
+//! What straight lines lead to: a robot may touch there what it grips, with its fingers, and what it puts down may stand on
+//! its place; nothing may reach into anything.
+
+use matterix_ir::scene::InstanceId;
+use matterix_motion::spheres::{Figure, Other};
+
+use super::exact::Exact;
+use super::perform::Refused;
+use super::stage::{Actor, Stage};
+use super::surroundings::Surroundings;
+
+/// Greatest change of any joint between two configurations that are looked at, rad or m: 5 mm of a point at a metre's reach.
+const FINE: f64 = 0.005;
+
+impl Actor {
+    /// Whether a link is a finger: moved by what opens and closes the gripper.
+    pub fn is_finger(&self, link: u32) -> bool {
+        let robot = &self.assembly.robot;
+        let mut next = link;
+        while link >= self.assembly.tools {
+            let Some(joint) = robot.joints.iter().position(|j| j.child == next) else { return false };
+            let (own, follows) = (joint as u32, robot.joints[joint].mimic.map(|m| m.joint));
+            let moves = |variable: &usize| {
+                let of = self.tree.variables().get(*variable).map(|v| v.joint);
+                of == Some(own) || of.is_some() && of == follows
+            };
+            if self.fingers.as_ref().is_some_and(|f| f.joints.iter().any(moves)) {
+                return true;
+            }
+            next = robot.joints[joint].parent;
+        }
+        false
+    }
+}
+
+impl Stage<'_> {
+    /// What straight motions leave out of what they look at on their way: what they come up to or leave, and what that stands
+    /// on.
+    pub(super) fn left_out(&self, robot: InstanceId, near: &[InstanceId]) -> Vec<InstanceId> {
+        let mut out = Vec::new();
+        for id in near {
+            out.push(*id);
+            // No hand that holds it.
+            out.extend(self.stand_of(*id).map(|below| self.whole(below)));
+        }
+        out.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
+        out
+    }
+
+    /// What a robot runs into, along configurations on a straight line, of what that leaves out; none where it only comes as
+    /// near to it as it must.
+    pub(super) fn bump(
+        &self,
+        robot: InstanceId,
+        figure: &Figure,
+        near: &[InstanceId],
+        points: &[Vec<f64>],
+    ) -> Option<Refused> {
+        let actor = self.actors.get(&robot)?;
+        let left_out = self.left_out(robot, near);
+        if left_out.is_empty() {
+            return None;
+        }
+        let around = Surroundings::of_only(self, robot, &left_out);
+        let exact = Exact::of(self, robot, figure, &around);
+        let empty = self.held(robot).is_none();
+        let spared = |link: u32, other: &Other| match other {
+            Other::Body(index) => {
+                let owner = around.owners.get(*index);
+                empty && actor.is_finger(link) && owner.is_some_and(|owner| self.is_in_any(*owner, near))
+            }
+            // How the robot stands to itself has been looked at.
+            Other::Link(_) => true,
+        };
+        let mut last: Option<&Vec<f64>> = None;
+        for point in points {
+            let from = last.unwrap_or(point);
+            let far = from.iter().zip(point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let steps = (far / FINE).ceil().max(1.0) as u32;
+            for step in 1..=steps {
+                let share = f64::from(step) / f64::from(steps);
+                let q: Vec<f64> = from.iter().zip(point).map(|(a, b)| a + share * (b - a)).collect();
+                let met = exact.touches(&q, &spared);
+                if !met.is_empty() {
+                    return Some(self.meeting(figure, &around, &met, false));
+                }
+            }
+            last = Some(point);
+        }
+        None
+    }
+}
