@@ -34,7 +34,7 @@ pub struct Exact<'s> {
 struct Parts<'s> {
     /// By link, then what is held: the link it is on, where, and its body.
     mine: Vec<Option<(usize, Isometry, &'s Body)>>,
-    /// Each with the index of the first solid of the surroundings that is of the same thing.
+    /// Each with the index of the first solid of the surroundings that is of the same thing, or of the same link of it.
     around: Vec<(usize, Isometry, Cow<'s, Body>)>,
 }
 
@@ -60,14 +60,20 @@ impl<'s> Exact<'s> {
         }
         let mut around = Vec::new();
         let mut seen = BTreeSet::new();
-        for (index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
+        for (mut index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
             let at = stage.pose(*id);
             if let Some(actor) = stage.actors.get(id).filter(|_| !stage.unknown.postures.contains(id)) {
                 let links = actor.tree.poses(&actor.joints);
-                for (link, body) in links.iter().zip(actor.bodies()) {
-                    let at = isometry(&at.then(placement(link)));
-                    around.extend(body.iter().map(|body| (index, at, Cow::Borrowed(body))));
+                let named = |name: &str| {
+                    let mut all = self.surroundings.world.bodies.iter().zip(&self.surroundings.owners).skip(index);
+                    all.position(|(body, owner)| owner == id && body.name == name).map_or(index, |k| index + k)
+                };
+                let robot = &actor.assembly.robot;
+                for ((link, pose), body) in robot.links.iter().zip(&links).zip(actor.bodies()) {
+                    let at = isometry(&at.then(placement(pose)));
+                    around.extend(body.iter().map(|body| (named(&link.name), at, Cow::Borrowed(body))));
                 }
+                index = named(&stage.scene.get(*id).name);
             }
             if self.surroundings.bodiless.contains(id) {
                 let body = Body::of_shapes(solids(stage.scene.get(*id)));

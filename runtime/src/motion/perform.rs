@@ -453,6 +453,7 @@ impl Stage<'_> {
             self.line(robot, &[to], &[item])
         };
         let beyond = |why: &Refused| matches!(why, Refused::OutOfReach(..));
+        if std::env::var("DBG").is_ok() { eprintln!("retreat {tip:?} {:?}", [1.0,0.5,0.25,0.1].map(|s| back(s*RETREAT).map(|_| ()))); }
         match back(RETREAT) {
             Err(why) if beyond(&why) => [0.5, 0.25].iter().find_map(|share| back(share * RETREAT).ok()).ok_or(why),
             whole => whole,
@@ -589,8 +590,9 @@ impl Stage<'_> {
                 return Ok(turned.into());
             }
         }
-        // A line that ends beyond what a posture reaches may be within what another one does.
-        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..)) {
+        // A line that ends beyond what a posture reaches, or on which that meets something, may be within what another one
+        // does.
+        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..) | Refused::Collides(_)) {
             for (_, target, _) in &found {
                 if let Ok(parts) = self.line_from_elsewhere(robot, target, goal.as_slice()) {
                     return Ok(parts.into());
