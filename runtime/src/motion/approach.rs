@@ -2,12 +2,16 @@
 //! its place; nothing may reach into anything.
 
 use matterix_ir::scene::InstanceId;
-use matterix_motion::spheres::{Figure, Other};
+use matterix_motion::placement;
+use matterix_motion::spheres::{Checker, Figure, Other};
 
 use super::exact::Exact;
-use super::perform::Refused;
+use super::perform::{Part, Refused, timed};
 use super::stage::{Actor, Stage};
 use super::surroundings::Surroundings;
+
+/// How much less far than asked for is far enough, m.
+const LOOSE: f64 = 1e-3;
 
 /// Greatest change of any joint between two configurations that are looked at, rad or m: 5 mm of a point at a metre's reach.
 const FINE: f64 = 0.005;
@@ -45,6 +49,44 @@ impl Stage<'_> {
         }
         out.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
         out
+    }
+
+    /// Leads a robot back along the straight line on which it came, until its tip is so far from where it is, m; none where it
+    /// did not come on one, or something is in the way of its open gripper.
+    pub(super) fn reversed(
+        &mut self,
+        robot: InstanceId,
+        came: &[Vec<f64>],
+        far: f64,
+        near: InstanceId,
+    ) -> Option<Part> {
+        let actor = self.actors.get(&robot)?;
+        if came.last() != Some(&actor.configuration()) {
+            return None;
+        }
+        let tip = |q: &[f64]| placement(&actor.chain.tip(q)).position;
+        let from = tip(came.last()?);
+        let gone = |q: &Vec<f64>| {
+            let at = tip(q);
+            (0..3).map(|k| (at[k] - from[k]) * (at[k] - from[k])).sum::<f64>().sqrt()
+        };
+        let back = came.iter().rev();
+        let count = back.clone().position(|q| gone(q) >= far - LOOSE).map_or(came.len(), |k| k + 1);
+        let points: Vec<Vec<f64>> = back.take(count).cloned().collect();
+        let around = self.beside_line(robot, &[near]);
+        let figure = self.figure(robot, actor, &actor.arm).ok()?;
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
+        let free = |checker: &mut Checker<'_>| points.windows(2).all(|way| is_clear(checker, &way[0], &way[1]));
+        let passes = points.len() > 1 && (free(&mut checker) || checker.ask(true) && free(&mut checker));
+        if !passes || self.bump(robot, &figure, &[near], &points).is_some() {
+            return None;
+        }
+        let arm = actor.arm.clone();
+        let part = timed(actor, &arm, &points, Some(&mut checker)).ok()?;
+        let end = points.last()?.clone();
+        self.settle(robot, &arm, &end);
+        Some(part)
     }
 
     /// What a robot runs into, along configurations on a straight line, of what that leaves out; none where it only comes as
@@ -89,4 +131,12 @@ impl Stage<'_> {
         }
         None
     }
+}
+
+/// Whether a robot is free all along the line between two configurations.
+fn is_clear(checker: &mut Checker<'_>, from: &[f64], to: &[f64]) -> bool {
+    let from: Vec<f32> = from.iter().map(|v| *v as f32).collect();
+    let vector: Vec<f32> = from.iter().zip(to).map(|(a, b)| *b as f32 - a).collect();
+    let length = vector.iter().map(|v| v * v).sum::<f32>().sqrt();
+    checker.is_clear(&from, &vector, length)
 }

@@ -445,19 +445,26 @@ impl Stage<'_> {
         Ok(parts)
     }
 
-    /// Draws a gripper back from what it has let go; where that leads beyond reach, less far.
+    /// Draws a gripper back from what it has let go; where that leads beyond reach, the way it came, or less far.
     fn retreat(&mut self, robot: InstanceId, item: InstanceId) -> Result<Part, Refused> {
         let tip = self.tip(robot);
+        let came = self.came.get(&robot).cloned().unwrap_or_default();
         let mut back = |far: f64| {
             let to = Pose { position: tip.point([0.0, 0.0, -far]), ..tip };
             self.line(robot, &[to], &[item])
         };
-        let beyond = |why: &Refused| matches!(why, Refused::OutOfReach(..));
-        if std::env::var("DBG").is_ok() { eprintln!("retreat {tip:?} {:?}", [1.0,0.5,0.25,0.1].map(|s| back(s*RETREAT).map(|_| ()))); }
-        match back(RETREAT) {
-            Err(why) if beyond(&why) => [0.5, 0.25].iter().find_map(|share| back(share * RETREAT).ok()).ok_or(why),
-            whole => whole,
+        let why = match back(RETREAT) {
+            Err(why) if matches!(why, Refused::OutOfReach(..) | Refused::NoWay) => why,
+            whole => return whole,
+        };
+        if let Some(part) = self.reversed(robot, &came, RETREAT, item) {
+            return Ok(part);
         }
+        let mut back = |far: f64| {
+            let to = Pose { position: tip.point([0.0, 0.0, -far]), ..tip };
+            self.line(robot, &[to], &[item]).ok()
+        };
+        [0.5, 0.25].iter().find_map(|share| back(share * RETREAT)).ok_or(why)
     }
 
     /// Brings a robot to a frame, or so far from it, m; what it holds to the nearest spot about it that is free and within
@@ -630,7 +637,7 @@ impl Stage<'_> {
     }
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
-    fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
+    pub(super) fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
         let without = self.left_out(robot, near);
         let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
         Surroundings::of_but(self, robot, &without, &bodiless)
@@ -711,13 +718,14 @@ impl Stage<'_> {
             return Err(refused);
         }
         let part = timed(actor, &arm, &points, Some(&mut checker))?;
-        let end = points.pop().unwrap_or_default();
+        let end = points.last().cloned().unwrap_or_default();
         self.settle(robot, &arm, &end);
+        self.came.insert(robot, points);
         Ok(part)
     }
 
     /// Says what collides. What others sweep are balls, and a way around them is not worth asking true shapes.
-    fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
+    pub(super) fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
         let checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
         if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }
@@ -730,6 +738,7 @@ impl Stage<'_> {
 
     /// Joints of a robot stand like this from now on.
     pub(super) fn settle(&mut self, robot: InstanceId, variables: &[usize], q: &[f64]) {
+        self.came.remove(&robot);
         if let Some(actor) = self.actors.get_mut(&robot) {
             actor.set_some(variables, q);
         }

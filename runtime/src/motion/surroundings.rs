@@ -161,10 +161,34 @@ const EDGE: (f64, f64) = (0.003, 0.02);
 /// As [`SLACK`], of these, m: what they cut off a rim stays below 2 mm.
 const EDGE_SLACK: f64 = 5e-4;
 
+/// Radius of balls along the edges of what is not round, and how far they are apart, m: corners stand out of them by less
+/// than 2 mm.
+const RIM: f64 = 2e-3;
+const ALONG: f64 = 8e-3;
+
+/// Points along the edges of a block, in from them by [`RIM`].
+fn edges(size: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
+    let half = size.map(|s| (s / 2.0 - RIM).max(0.0));
+    (0..3usize).flat_map(move |axis| {
+        let steps = (2.0 * half[axis] / ALONG).ceil().max(1.0) as u32;
+        (0..4u8).flat_map(move |side| {
+            (0..=steps).map(move |step| {
+                let mut place = [0.0; 3];
+                place[axis] = half[axis] * (2.0 * f64::from(step) / f64::from(steps) - 1.0);
+                for (bit, other) in [(1, (axis + 1) % 3), (2, (axis + 2) % 3)] {
+                    place[other] = if side & bit == 0 { -half[other] } else { half[other] };
+                }
+                place[2] += size[2] / 2.0;
+                place
+            })
+        })
+    })
+}
+
 /// Balls that fill a shape, no larger than it: a row of them along each of its edges and through its middle; of what is
 /// round, small ones along its wall.
 fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
-    let [x, y, z] = shape.size();
+    let size @ [x, y, z] = shape.size();
     let radius = (x.min(y).min(z) / 2.0).max(1e-3);
     let along = |length: f64| -> Vec<f64> {
         let free = length - 2.0 * radius;
@@ -185,6 +209,9 @@ fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
                 out.push((at.point([px, py, z / 2.0 + pz]), radius - SLACK.min(radius / 2.0)));
             }
         }
+    }
+    if !shape.is_round() {
+        out.extend(edges(size).map(|place| (at.point(place), RIM - EDGE_SLACK)));
     }
     let (small, apart) = EDGE;
     if shape.is_round() && !matches!(shape, Shape::Sphere(_)) && radius > small {

@@ -24,7 +24,7 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) ->
     let mut stage = stage;
     let ids = (0..program.scene.instances.len() as u32).map(InstanceId);
     stage.unknown.places = ids.filter(|id| !program.scene.get(*id).placed).collect();
-    let values = Values::at_start(&program.model);
+    let values = Values::at_start(program);
     let looker = Looker::new(program, &stage, memory);
     let mut walk = Walk {
         program,

@@ -26,7 +26,7 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
     if !program.plan.steps.iter().any(|s| is_beside(&s.step)) {
         return Vec::new();
     }
-    let (times, values) = (Times::of(program), Values::at_start(&program.model));
+    let (times, values) = (Times::of(program), Values::at_start(program));
     let mut walk = Walk {
         program,
         times: &times,
