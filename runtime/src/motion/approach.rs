@@ -134,7 +134,7 @@ impl Stage<'_> {
 }
 
 /// Whether a robot is free all along the line between two configurations.
-fn is_clear(checker: &mut Checker<'_>, from: &[f64], to: &[f64]) -> bool {
+pub(super) fn is_clear(checker: &mut Checker<'_>, from: &[f64], to: &[f64]) -> bool {
     let from: Vec<f32> = from.iter().map(|v| *v as f32).collect();
     let vector: Vec<f32> = from.iter().zip(to).map(|(a, b)| *b as f32 - a).collect();
     let length = vector.iter().map(|v| v * v).sum::<f32>().sqrt();

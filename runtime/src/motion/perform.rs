@@ -285,7 +285,7 @@ impl Stage<'_> {
                     match to.is_empty() {
                         true if within.is_some() => return Ok(None),
                         true => return Err(Refused::NoFrame),
-                        false if gantry => return self.cross(robot, &to, shift[2].max(0.0)).map(Some),
+                        false if gantry => return self.cross(robot, &to, *goal, shift[2].max(0.0)).map(Some),
                         false => {}
                     }
                 }
