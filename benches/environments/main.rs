@@ -31,7 +31,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         args.drain(at..=at + 1);
     }
     let files = environments(&args)?;
-    let tasks: Vec<(usize, u32)> = (0..files.len()).flat_map(|file| (1..=seeds).map(move |seed| (file, seed))).collect();
+    let tasks: Vec<(usize, u32)> =
+        (0..files.len()).flat_map(|file| (1..=seeds).map(move |seed| (file, seed))).collect();
     let (next, done) = (AtomicUsize::new(0), Mutex::new(vec![Vec::new(); files.len()]));
     let lanes = available_parallelism().map_or(1, |n| n.get());
     scope(|threads| {
@@ -56,8 +57,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn environments(words: &[String]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
     let examples = std::env::var_os("MATTERIX_EXAMPLES")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), PathBuf::from);
-    let folder = std::fs::read_dir(examples.join("environments"))
-        .map_err(|why| format!("no examples in `{}`: {why}; MATTERIX_EXAMPLES says where they are", examples.display()))?;
+    let folder = std::fs::read_dir(examples.join("environments")).map_err(|why| {
+        format!("no examples in `{}`: {why}; MATTERIX_EXAMPLES says where they are", examples.display())
+    })?;
     let mut files: Vec<PathBuf> = folder.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>()?;
     files.retain(|f| f.extension().is_some_and(|e| e == "mtx"));
     files.extend(BESIDE.map(|name| examples.join(name)));

@@ -13,7 +13,8 @@ use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
 
 /// Fields every asset may have beside the members of its capabilities: geometry, of which only the shape is used yet.
-const GEOMETRY: &[&str] = &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia", "friction"];
+const GEOMETRY: &[&str] =
+    &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia", "friction"];
 
 /// Those of them that nothing uses yet.
 const UNUSED: &[&str] = &["mesh", "collision", "inertia", "friction"];

@@ -105,14 +105,12 @@ impl Film {
         let things: Vec<Thing> = bodies
             .things
             .iter()
-            .map(|thing: &bodies::Thing| {
-                Thing {
-                    name: thing.name.clone(),
-                    whole: thing.whole.clone(),
-                    body: body(thing),
-                    points: points.get(&thing.name).cloned().unwrap_or_default(),
-                    way: ways.get(&thing.name).cloned().unwrap_or_default(),
-                }
+            .map(|thing: &bodies::Thing| Thing {
+                name: thing.name.clone(),
+                whole: thing.whole.clone(),
+                body: body(thing),
+                points: points.get(&thing.name).cloned().unwrap_or_default(),
+                way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
             .collect();
         let mut robots = Vec::new();

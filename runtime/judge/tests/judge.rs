@@ -32,7 +32,14 @@ fn slide() -> Robot {
 }
 
 fn thing(name: &str, shape: Shape) -> Thing {
-    Thing { name: name.into(), whole: name.into(), shape: Some(shape), solids: Vec::new(), rooms: Vec::new(), hollow: false }
+    Thing {
+        name: name.into(),
+        whole: name.into(),
+        shape: Some(shape),
+        solids: Vec::new(),
+        rooms: Vec::new(),
+        hollow: false,
+    }
 }
 
 /// A run of the slide from 0 along x in steps of 40 ms.

@@ -322,7 +322,10 @@ fn a_held_vessel_stays_upright() {
     goal.translation.vector = Vector3::new(0.1, 0.5, 0.4);
     let goal = solver.solve(&Request::new(goal, &READY)).unwrap().q;
     let pose = Pose::from_parts(Translation3::new(0.4, 0.3, 0.3), Default::default());
-    let world = World { bodies: vec![Body { name: "post".into(), pose, shape: Shape::Capsule(0.05, 0.3) }], ..World::default() };
+    let world = World {
+        bodies: vec![Body { name: "post".into(), pose, shape: Shape::Capsule(0.05, 0.3) }],
+        ..World::default()
+    };
     let mut checker = Checker::new(&figure, &world, 32.0);
     let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
     let settings = Settings { iterations: 2000, ..Settings::default() };

@@ -71,7 +71,12 @@ fn hole(room: &Solid, size: [f64; 3]) -> Option<Hole> {
     let half = [wide / 2.0, deep / 2.0];
     let inside = (0..2).all(|k| [px, py][k].abs() + half[k] <= size[k] / 2.0 + THIN);
     let is_box = matches!(room.shape, Shape::Box(_));
-    (inside && (round || is_box) && height[1] > height[0] + THIN).then_some(Hole { middle: [px, py], half, round, height })
+    (inside && (round || is_box) && height[1] > height[0] + THIN).then_some(Hole {
+        middle: [px, py],
+        half,
+        round,
+        height,
+    })
 }
 
 /// Cuts between holes until each has a rectangle of its own.

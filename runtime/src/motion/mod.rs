@@ -17,6 +17,7 @@ mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod swing;
 mod tilt;
 mod together;
 mod turn;

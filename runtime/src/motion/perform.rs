@@ -652,8 +652,11 @@ impl Stage<'_> {
         q: &[f64],
         within: Option<f64>,
     ) -> Result<Part, Refused> {
-        let around = Surroundings::of(self, robot);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let around = match variables == actor.drive {
+            true => Surroundings::of_driving(self, robot),
+            false => Surroundings::of(self, robot),
+        };
         let figure = self.figure(robot, actor, variables)?;
         let exact = Exact::of(self, robot, &figure, &around);
         let mut checker = self.checker(&figure, &around, &exact);
@@ -725,7 +728,12 @@ impl Stage<'_> {
     }
 
     /// Says what collides. What others sweep are balls, and a way around them is not worth asking true shapes.
-    pub(super) fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
+    pub(super) fn checker<'a>(
+        &self,
+        figure: &'a Figure,
+        around: &'a Surroundings,
+        exact: &'a Exact<'_>,
+    ) -> Checker<'a> {
         let checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
         if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }

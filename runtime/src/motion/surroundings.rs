@@ -33,6 +33,11 @@ impl Surroundings {
         Self::of_but(stage, robot, &[], &[])
     }
 
+    /// As [`Surroundings::of`] for a robot that drives: on what carries it.
+    pub fn of_driving(stage: &Stage<'_>, robot: InstanceId) -> Self {
+        Self::of_but(stage, robot, &stage.carriers(robot), &[])
+    }
+
     /// As [`Surroundings::of`], without some things, and without the main body of others: what stands in one of their places
     /// stands in it.
     pub fn of_but(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId], bodiless: &[InstanceId]) -> Self {

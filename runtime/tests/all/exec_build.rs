@@ -55,7 +55,7 @@ impl Lab {
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),
-        room: None,
+            room: None,
             articulation: None,
             span: Span::default(),
         });

@@ -183,7 +183,8 @@ fn digest_of(scene: &Scene) -> String {
     let mut feed = Feed(SipHasher13::new());
     feed.0.write(MADE_BY.as_bytes());
     for i in &scene.instances {
-        let what = (&i.name, i.owner, i.support, i.pose, i.placed, &i.frames, &i.shape, &i.solids, &i.room, &i.articulation);
+        let what =
+            (&i.name, i.owner, i.support, i.pose, i.placed, &i.frames, &i.shape, &i.solids, &i.room, &i.articulation);
         // A hash takes whatever it is given.
         let _ = serde_json::to_writer(&mut feed, &what);
     }

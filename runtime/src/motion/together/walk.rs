@@ -131,11 +131,12 @@ impl<'p> Walk<'p, '_> {
     }
 
     fn operation(&mut self, id: StepId, operation: &Operation) {
-        self.act(&operation.at_start);
+        // As in a run, what a motion depends on is what was before its operation began.
         if let Some(motion) = operation.motion.as_ref().filter(|_| self.left > 0) {
             self.left -= 1;
             self.motion(id, motion, operation);
         }
+        self.act(&operation.at_start);
         self.act(&operation.at_end);
         self.stage.let_go(operation.motion.as_ref());
         let (values, model) = (&self.values, &self.program.model);

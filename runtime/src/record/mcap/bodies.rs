@@ -44,7 +44,10 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
             ("shape", json!({ "description": "Its main shape, m" })),
             ("solids", json!({ "description": "More of its body, each with a pose" })),
             ("rooms", json!({ "description": "What its parts take out of it, each with a pose" })),
-            ("hollow", json!({ "description": "Whether its shape is only what it takes out of another thing", "type": "boolean" })),
+            (
+                "hollow",
+                json!({ "description": "Whether its shape is only what it takes out of another thing", "type": "boolean" }),
+            ),
         ],
     );
     let machine = object(
