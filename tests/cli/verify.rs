@@ -33,7 +33,8 @@ fn every_example_with_a_robot_is_judged() {
     let here = |folder: &str| -> Vec<String> {
         let names = crate::harness::names(&root().join(folder));
         let text = |n: &String| std::fs::read_to_string(root().join(folder).join(n)).expect("text");
-        let robot = |n: &String| n.ends_with(".mtx") && ["std::robots", "OT2", "use sn1"].iter().any(|w| text(n).contains(w));
+        let robot =
+            |n: &String| n.ends_with(".mtx") && ["std::robots", "OT2", "use sn1"].iter().any(|w| text(n).contains(w));
         names.into_iter().filter(robot).map(|n| n.trim_end_matches(".mtx").to_string()).collect()
     };
     let mut all = here("examples");

@@ -74,8 +74,10 @@ impl<'f> Sweep<'f> {
             .filter(|&(a, b)| !kinematics::are_joined(description, &by, a, b))
             .collect();
         let tools = robot.machine.tools as usize;
-        // A finger is moved by a joint of a tool.
-        let of_tool = |joint: &u32| description.joints[*joint as usize].child as usize >= tools;
+        // A finger is moved by a joint of a tool that does not move the tip.
+        let wrist = kinematics::above(description, robot.machine.tip);
+        let of_tool =
+            |joint: &u32| description.joints[*joint as usize].child as usize >= tools && !wrist.contains(joint);
         let fingers = by.iter().enumerate().map(|(l, j)| l >= tools && j.as_ref().is_some_and(of_tool)).collect();
         let stands = robot.samples.windows(2).all(|p| p[0].links.first() == p[1].links.first());
         let moves = by.iter().map(|j| j.is_some() || !stands).collect();
@@ -105,13 +107,13 @@ impl<'f> Sweep<'f> {
         let others = self.others(time, &carried, &names);
         let near = robot.near_grips(time);
         for other in &others {
-            for l in 0..links.len() {
+            for (l, name) in own.iter().enumerate() {
                 let gripped = |g: &Grip| g.items.iter().any(|(item, _)| Some(*item) == other.thing);
                 if !self.moves[l] || self.fingers[l] && near.iter().any(gripped) {
                     continue;
                 }
                 if let Some((mine, at)) = link(l) {
-                    self.compare(time, (&own[l], mine, at), (other.name, other.body, other.at));
+                    self.compare(time, (name, mine, at), (other.name, other.body, other.at));
                 }
             }
             for (item, at) in &carried {
@@ -124,9 +126,9 @@ impl<'f> Sweep<'f> {
         for (item, item_at) in &carried {
             let thing = &film.things[*item];
             let Some(body) = thing.body.as_ref() else { continue };
-            for l in 0..links.len() {
+            for (l, name) in own.iter().enumerate() {
                 if let (Some((mine, at)), false) = (link(l), self.fingers[l]) {
-                    self.compare(time, (&own[l], mine, at), (&thing.name, body, *item_at));
+                    self.compare(time, (name, mine, at), (&thing.name, body, *item_at));
                 }
             }
         }

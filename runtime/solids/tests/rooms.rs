@@ -37,7 +37,7 @@ fn what_fits_stands_in_its_hole() {
 fn a_trough_is_a_hole_with_four_sides() {
     let trough = [Solid {
         shape: Shape::Box([0.06, 0.02, 0.04]),
-        pose: Pose::turned([0.0, 0.0, 0.01], [0.0, 0.0, 1.570796326794897]),
+        pose: Pose::turned([0.0, 0.0, 0.01], [0.0, 0.0, std::f64::consts::FRAC_PI_2]),
     }];
     assert!(depth(&trough, 0.012, [0.0, 0.022, 0.011]).is_none_or(|d| d < 1e-6));
     assert!(depth(&trough, 0.012, [0.022, 0.0, 0.011]).is_some_and(|d| d > 1e-3), "it is turned");

@@ -21,7 +21,7 @@ impl Actor {
     pub fn is_finger(&self, link: u32) -> bool {
         let robot = &self.assembly.robot;
         let mut next = link;
-        while link >= self.assembly.tools {
+        while next >= self.assembly.tools {
             let Some(joint) = robot.joints.iter().position(|j| j.child == next) else { return false };
             let (own, follows) = (joint as u32, robot.joints[joint].mimic.map(|m| m.joint));
             let moves = |variable: &usize| {

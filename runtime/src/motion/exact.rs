@@ -161,10 +161,18 @@ impl Referee for Exact<'_> {
     }
 }
 
+/// What a body is made of.
+#[derive(PartialEq)]
+struct Made<'s> {
+    main: Option<&'s Shape>,
+    more: &'s [Solid],
+    rooms: Vec<Solid>,
+}
+
 /// The true shapes of all instances.
 pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
     let each = scene.instances.iter().enumerate();
-    let mut known: Vec<(Option<&Shape>, &[Solid], Vec<Solid>, Option<Body>)> = Vec::new();
+    let mut known: Vec<(Made<'_>, Option<Body>)> = Vec::new();
     let bodies = each.map(|(index, instance)| {
         let (main, more) = (instance.solid(), instance.solids.as_slice());
         if main.is_none() && more.is_empty() {
@@ -172,11 +180,12 @@ pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
         }
         // Tips and vials come by the dozen.
         let rooms = scene.rooms(InstanceId(index as u32));
-        if let Some(same) = known.iter().find(|k| k.0 == main && k.1 == more && k.2 == rooms) {
-            return same.3.clone();
+        let made = Made { main, more, rooms };
+        if let Some((_, same)) = known.iter().find(|(other, _)| *other == made) {
+            return same.clone();
         }
-        let body = Body::with_rooms(main, more, &rooms);
-        known.push((main, more, rooms, body.clone()));
+        let body = Body::with_rooms(main, more, &made.rooms);
+        known.push((made, body.clone()));
         body
     });
     bodies.collect()
