@@ -1,14 +1,26 @@
-//! How often workflows end as expected where things stand a little away from their places.
+//! How often workflows end as expected where things stand a little away from their places, and whether what robots then did
+//! stands up to the judge.
 //!
-//! `cargo bench --bench environments` runs every file of `examples/environments` from 100 labs, each with its things moved
-//! by up to 20 mm and turned by up to 10 degrees, at motion fidelity, and prints the share that passed, what the others
-//! failed with and at which seeds. `-- funnel` takes the files whose name holds this, `-- --seeds 10` other numbers of labs.
+//! `cargo bench --bench environments` runs the ten environments from 100 labs each, with their things moved by up to 20 mm and
+//! turned by up to 10 degrees, at motion fidelity, on all cores, and judges every recording. It prints how many of them
+//! completed, how many recordings the judge found nothing wrong in, and by what faults the others ended.
+//!
+//! `-- --seeds 10` takes another number of labs, `-- funnel pour` the environments whose names hold one of these. What is built
+//! needs no Cargo: `MATTERIX_BIN` names the command to run, `MATTERIX_EXAMPLES` the folder of the examples, where they are
+//! not where they were when it was built.
+
+mod trial;
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{available_parallelism, scope};
-use std::time::Instant;
+
+use trial::{Trial, trial};
+
+/// Environments beside those in the folder `environments`.
+const BESIDE: [&str; 2] = ["fume_hood.mtx", "kuka_transport.mtx"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     // Cargo adds `--bench`.
@@ -18,60 +30,77 @@ fn main() -> Result<(), Box<dyn Error>> {
         seeds = args.get(at + 1).ok_or("--seeds takes a number")?.parse()?;
         args.drain(at..=at + 1);
     }
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/environments");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)?.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>()?;
-    files.retain(|f| f.extension().is_some_and(|e| e == "mtx"));
-    files.retain(|f| args.is_empty() || args.iter().any(|a| name(f).contains(a)));
-    files.sort();
-    println!("| environment | passed | of | a run, s | failures |");
-    println!("| --- | --- | --- | --- | --- |");
-    let (mut passed, mut ran) = (0, 0);
-    for file in &files {
-        #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
-        let start = Instant::now();
-        let ended = all(file, seeds);
-        let each = start.elapsed().as_secs_f64() * lanes() as f64 / f64::from(seeds.max(1));
-        let failures: Vec<String> =
-            ended.iter().filter_map(|(seed, why)| Some(format!("{seed}: {}", why.as_ref()?))).collect();
-        let good = ended.len() - failures.len();
-        println!("| {} | {good} | {} | {each:.2} | {} |", name(file), ended.len(), failures.join("; "));
-        passed += good;
-        ran += ended.len();
-    }
-    println!("| all | {passed} | {ran} | | {:.2} % |", 100.0 * passed as f64 / ran.max(1) as f64);
+    let files = environments(&args)?;
+    let tasks: Vec<(usize, u32)> =
+        (0..files.len()).flat_map(|file| (1..=seeds).map(move |seed| (file, seed))).collect();
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(vec![Vec::new(); files.len()]));
+    let lanes = available_parallelism().map_or(1, |n| n.get());
+    scope(|threads| {
+        for _ in 0..lanes {
+            threads.spawn(|| {
+                while let Some(&(file, seed)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let ended = trial(&files[file], seed);
+                    if let Ok(mut done) = done.lock() {
+                        done[file].push(ended);
+                    }
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().map_err(|_| "a run was lost")?;
+    done.iter_mut().for_each(|trials| trials.sort_by_key(|t| t.seed));
+    table(&files, &done);
     Ok(())
+}
+
+/// The environments whose name holds one of these words; all where there are none.
+fn environments(words: &[String]) -> Result<Vec<PathBuf>, Box<dyn Error>> {
+    let examples = std::env::var_os("MATTERIX_EXAMPLES")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), PathBuf::from);
+    let folder = std::fs::read_dir(examples.join("environments")).map_err(|why| {
+        format!("no examples in `{}`: {why}; MATTERIX_EXAMPLES says where they are", examples.display())
+    })?;
+    let mut files: Vec<PathBuf> = folder.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>()?;
+    files.retain(|f| f.extension().is_some_and(|e| e == "mtx"));
+    files.extend(BESIDE.map(|name| examples.join(name)));
+    files.retain(|f| words.is_empty() || words.iter().any(|w| name(f).contains(w)));
+    files.sort();
+    Ok(files)
 }
 
 fn name(file: &Path) -> String {
     file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-fn lanes() -> usize {
-    available_parallelism().map_or(1, |n| n.get())
+/// One line for each environment, one for all, then what the judge found.
+fn table(files: &[PathBuf], done: &[Vec<Trial>]) {
+    println!("| environment | completed | judged clean | a run, s | faults by code, with seeds |");
+    println!("| --- | --- | --- | --- | --- |");
+    for (file, trials) in files.iter().zip(done) {
+        println!("| {} |{}", name(file), row(trials));
+    }
+    println!("| all |{}", row(&done.concat()));
+    for (file, trials) in files.iter().zip(done) {
+        for trial in trials {
+            trial.wrong.iter().for_each(|wrong| println!("{} from {}: {wrong}", name(file), trial.seed));
+        }
+    }
 }
 
-/// Each seed with why its run failed, if it did.
-fn all(file: &Path, seeds: u32) -> Vec<(u32, Option<String>)> {
-    let lanes = lanes() as u32;
-    let share =
-        |lane: u32| (1..=seeds).filter(move |s| s % lanes == lane).map(|s| (s, one(file, s))).collect::<Vec<_>>();
-    let mut out: Vec<_> = scope(|threads| {
-        let running: Vec<_> = (0..lanes).map(|lane| threads.spawn(move || share(lane))).collect();
-        running.into_iter().flat_map(|r| r.join().unwrap_or_default()).collect()
+fn row(trials: &[Trial]) -> String {
+    let of = trials.len();
+    let completed = trials.iter().filter(|t| t.fault.is_none()).count();
+    let judged = trials.iter().filter(|t| t.judged).count();
+    let clean = trials.iter().filter(|t| t.judged && t.wrong.is_empty()).count();
+    let seconds = trials.iter().map(|t| t.seconds).sum::<f64>() / of.max(1) as f64;
+    let mut codes: Vec<&str> = trials.iter().filter_map(|t| t.fault.as_deref()).collect();
+    codes.sort_unstable();
+    codes.dedup();
+    let each = codes.into_iter().map(|code| {
+        let seeds: Vec<String> =
+            trials.iter().filter(|t| t.fault.as_deref() == Some(code)).map(|t| t.seed.to_string()).collect();
+        format!("{} `{code}` ({})", seeds.len(), seeds.join(", "))
     });
-    out.sort();
-    out
-}
-
-/// Why a run failed: the first error it reports.
-fn one(file: &Path, seed: u32) -> Option<String> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_matterixc"));
-    command.arg("run").arg(file).args(["--fidelity", "motion", "--perturb", "20mm,10deg"]);
-    let ended = match command.args(["--seed", &seed.to_string()]).output() {
-        Ok(ended) if ended.status.success() => return None,
-        Ok(ended) => ended,
-        Err(why) => return Some(why.to_string()),
-    };
-    let text = String::from_utf8_lossy(&ended.stderr).into_owned();
-    Some(text.lines().find(|l| l.starts_with("error")).unwrap_or("ended without an error").to_string())
+    let faults: Vec<String> = each.collect();
+    format!(" {completed} of {of} | {clean} of {judged} | {seconds:.2} | {} |", faults.join("; "))
 }

@@ -581,7 +581,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let geometry = lab.geometry(id);
         let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
-        let Geometry { frames, shape, solids, moving, collision, visual } = geometry;
+        let Geometry { frames, shape, solids, room, moving, collision, visual } = geometry;
         instances.push(SceneInstance {
             name,
             kind: lab.kind_names(id),
@@ -598,6 +598,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             visual,
             inertial,
             friction,
+            room,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,
         });

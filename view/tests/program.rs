@@ -24,6 +24,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         visual: None,
         inertial: None,
         friction: None,
+        room: None,
         articulation: None,
         shape,
         span: Span::default(),

@@ -38,6 +38,12 @@ pub struct Thing {
     /// Coefficient of friction of its surface, if that is known.
     #[serde(default)]
     pub friction: Option<f64>,
+    /// What its parts take out of it.
+    #[serde(default)]
+    pub rooms: Vec<Solid>,
+    /// Whether its shape is only what it takes out of what it is a part of.
+    #[serde(default)]
+    pub hollow: bool,
 }
 
 impl Thing {

@@ -276,6 +276,14 @@ impl Motion {
         Some(motion)
     }
 
+    /// The node that tells which thing it goes to, where only that does.
+    pub fn choice(&self) -> Option<NodeId> {
+        match self {
+            Motion::To { choice, .. } => *choice,
+            _ => None,
+        }
+    }
+
     /// The quantities it depends on, in their order.
     pub fn values(&self) -> Vec<NodeId> {
         match self {

@@ -170,6 +170,9 @@ pub struct Instance {
     /// Coefficient of friction of its surface, if that is known.
     #[serde(default)]
     pub friction: Option<f64>,
+    /// What it takes out of what it is a part of: a hole in a rack, a well in a plate.
+    #[serde(default)]
+    pub room: Option<Shape>,
     /// Its links and joints.
     pub articulation: Option<Box<Articulation>>,
     /// Its declaration.
@@ -182,9 +185,14 @@ impl Instance {
         Body { frames: &self.frames, shape: self.shape.as_ref(), solids: &self.solids }
     }
 
+    /// Its main shape as something to run into; none where that is only the room it takes out of another thing.
+    pub fn solid(&self) -> Option<&Shape> {
+        self.shape.as_ref().filter(|_| self.shape != self.room)
+    }
+
     /// What others run into of its main body: its shape, or what is given in its place.
     pub fn hull(&self) -> impl Iterator<Item = (&Shape, Pose)> {
-        let shape = self.shape.iter().filter(|_| self.collision.is_empty()).map(|shape| (shape, Pose::IDENTITY));
+        let shape = self.solid().into_iter().filter(|_| self.collision.is_empty()).map(|shape| (shape, Pose::IDENTITY));
         shape.chain(self.collision.iter().map(|solid| (&solid.shape, solid.pose)))
     }
 
@@ -263,6 +271,20 @@ impl Scene {
             (None, None) => Stand::Lab(i.pose),
         };
         self.instances.iter().map(stand).collect()
+    }
+
+    /// What the parts of an instance take out of it, each with its place in the frame of that instance.
+    pub fn rooms(&self, id: InstanceId) -> Vec<Solid> {
+        let mut out = Vec::new();
+        let mut inside = vec![(id, Pose::IDENTITY)];
+        // Parts come after what they are a part of.
+        for (index, part) in self.instances.iter().enumerate().skip(id.0 as usize + 1) {
+            let Some((_, above)) = inside.iter().find(|(i, _)| Some(*i) == part.owner) else { continue };
+            let pose = above.then(part.pose);
+            out.extend(part.room.iter().map(|room| Solid { shape: room.clone(), pose }));
+            inside.push((InstanceId(index as u32), pose));
+        }
+        out
     }
 
     /// The surface things stand on, in the frame of its instance.

@@ -37,6 +37,8 @@ pub struct Geometry {
     pub shape: Option<Shape>,
     /// More of it.
     pub solids: Vec<Solid>,
+    /// What it takes out of what it is a part of.
+    pub room: Option<Shape>,
     /// More of it on links that move, by index.
     pub moving: Vec<(u32, Solid)>,
     /// What others run into instead of shape and solids.
@@ -49,11 +51,9 @@ impl<'a> Elaborator<'a> {
     /// Frames and shapes of an instance.
     pub fn geometry(&mut self, id: InstanceId) -> Geometry {
         let mut out = Geometry::default();
-        if let Some(setting) = self.instances[id.0 as usize].setting("shape")
-            && let FieldValue::Expr(e) = setting.value()
-        {
-            out.shape = self.shape(id, e, &mut setting.scope());
-        }
+        out.room = self.given_shape(id, "room");
+        // What is nothing but room has its points where that is.
+        out.shape = self.given_shape(id, "shape").or_else(|| out.room.clone());
         self.coverings(id, &mut out);
         out.frames = self.frames(id, out.shape.as_ref());
         for (module, line) in self.lines(id) {
@@ -71,6 +71,13 @@ impl<'a> Elaborator<'a> {
             }
         }
         out
+    }
+
+    /// The shape that a field gives.
+    fn given_shape(&mut self, id: InstanceId, field: &str) -> Option<Shape> {
+        let setting = self.instances[id.0 as usize].setting(field)?;
+        let FieldValue::Expr(e) = setting.value() else { return None };
+        self.shape(id, e, &mut setting.scope())
     }
 
     /// The lines of an asset and of those it builds on.

@@ -11,13 +11,18 @@ use crate::elaborate::grids::Place;
 /// Unevenness below which places are evenly spaced, mm: definitions are rounded to hundredths.
 const EVEN: f64 = 0.02;
 
+/// Walls of tips and the free room about them in their racks, mm, and how wide the end of a tip is of its top: estimates.
+const TIP_WALL: f64 = 0.6;
+const TIP_PLAY: f64 = 0.2;
+const TIP_END: f64 = 0.2;
+
 /// The lines a definition stands for; all of them point to where its file is named.
 pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
     let write = Writer { definition, at };
     let mut lines: Vec<AssetLine> = definition
         .size()
         .filter(|size| size.iter().all(|s| *s > 0.0))
-        .map(|size| AssetLine::Field(write.shape("box", &size)))
+        .map(|size| AssetLine::Field(write.shape("shape", "box", &size)))
         .into_iter()
         .collect();
     lines.extend(write.grids().into_iter().map(AssetLine::Grid));
@@ -84,7 +89,11 @@ impl<'d> Writer<'d> {
             Opening::Rectangular { x_dimension, y_dimension } => ("box", vec![x_dimension, y_dimension, well.depth]),
         };
         // A bin's definition gives its one place no depth.
-        let shape = sizes.iter().all(|s| *s > 0.0).then(|| self.shape(kind_of_shape, &sizes));
+        let sized = sizes.iter().all(|s| *s > 0.0);
+        let mut shape: Vec<Field> = sized.then(|| self.shape("room", kind_of_shape, &sizes)).into_iter().collect();
+        if let (true, Opening::Circular { diameter }) = (self.definition.is_tip_rack(), well.opening) {
+            shape = if sized { self.tip(diameter, well.depth) } else { Vec::new() };
+        }
         let volume = self.quantity(well.total_liquid_volume, "uL");
         let mut fields: Vec<Field> = std::iter::once(self.field("max_volume", volume)).chain(shape).collect();
         if self.definition.is_tip_rack() {
@@ -133,10 +142,27 @@ impl<'d> Writer<'d> {
     }
 
     /// `shape: box(x, y, z)`.
-    fn shape(&self, kind: &str, sizes: &[f64]) -> Field {
-        let args = sizes.iter().map(|s| Arg { name: None, value: self.quantity(*s, "mm") }).collect();
+    fn shape(&self, field: &str, kind: &str, sizes: &[f64]) -> Field {
+        let args = sizes.iter().map(|s| self.quantity(*s, "mm")).collect();
+        self.call(field, kind, args)
+    }
+
+    fn call(&self, field: &str, kind: &str, args: Vec<Expr>) -> Field {
+        let args = args.into_iter().map(|value| Arg { name: None, value }).collect();
         let callee = self.expr(ExprKind::Name(self.name(kind)));
-        self.field("shape", self.expr(ExprKind::Call(callee, args)))
+        self.field(field, self.expr(ExprKind::Call(callee, args)))
+    }
+
+    /// A tip and the hole it stands in: a cone with a wall, open at both ends, as wide inside at its top as its definition
+    /// says.
+    fn tip(&self, diameter: f64, depth: f64) -> Vec<Field> {
+        let (bore, end) = (diameter / 2.0, diameter / 2.0 * TIP_END);
+        let outline = |wall: f64| {
+            let points = [(end + wall, 0.0), (bore + wall, depth)];
+            self.expr(ExprKind::List(points.iter().map(|(r, z)| self.lengths(&[*r, *z])).collect()))
+        };
+        let hole = self.shape("room", "cylinder", &[diameter + 2.0 * (TIP_WALL + TIP_PLAY), depth]);
+        vec![self.call("shape", "turned", vec![outline(TIP_WALL), outline(0.0)]), hole]
     }
 }
 

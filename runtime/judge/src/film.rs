@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use matterix_ir::bodies::{Bodies, Machine};
+use matterix_ir::bodies::{self, Bodies, Machine};
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::Shape;
@@ -93,13 +93,27 @@ impl Film {
         if !meshes(&bodies).all(Mesh::is_sound) {
             return Err(Unreadable("`/bodies` is damaged: a mesh lacks corners".to_owned()));
         }
+        let mut known: Vec<(&bodies::Thing, Option<Body>)> = Vec::new();
+        let mut body = |thing| {
+            // Tips and vials come by the dozen.
+            if let Some(same) = known.iter().find(|(other, _)| are_alike(thing, other)) {
+                return same.1.clone();
+            }
+            let main = thing.shape.as_ref().filter(|_| !thing.hollow);
+            let made = match thing.collision.is_empty() {
+                true => Body::with_rooms(main, &thing.solids, &thing.rooms),
+                false => Body::of_shapes(thing.hull()),
+            };
+            known.push((thing, made.clone()));
+            made
+        };
         let things: Vec<Thing> = bodies
             .things
             .iter()
-            .map(|thing| Thing {
+            .map(|thing: &bodies::Thing| Thing {
                 name: thing.name.clone(),
                 whole: thing.whole.clone(),
-                body: Body::of_shapes(thing.hull()),
+                body: body(thing),
                 points: points.get(&thing.name).cloned().unwrap_or_default(),
                 way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
@@ -111,6 +125,16 @@ impl Film {
         }
         Ok(Film { things, robots })
     }
+}
+
+/// Whether two things have one body.
+fn are_alike(a: &bodies::Thing, b: &bodies::Thing) -> bool {
+    let places = |t: &bodies::Thing| t.solids.len() + t.collision.len() + t.rooms.len();
+    (a.hollow, places(a)) == (b.hollow, places(b))
+        && a.shape == b.shape
+        && a.solids == b.solids
+        && a.collision == b.collision
+        && a.rooms == b.rooms
 }
 
 impl Thing {

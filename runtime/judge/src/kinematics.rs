@@ -9,6 +9,23 @@ pub(crate) fn variables(robot: &Robot) -> Vec<usize> {
     (0..robot.joints.len()).filter(own).collect()
 }
 
+/// The joints between a link and the root.
+pub(crate) fn above(robot: &Robot, link: u32) -> Vec<u32> {
+    let before = |link: u32| robot.joints.iter().position(|j| j.child == link).map(|j| j as u32);
+    let next = |joint: &u32| before(robot.joints[*joint as usize].parent);
+    std::iter::successors(before(link), next).collect()
+}
+
+/// Whether one joint is all that is between two links, or between what is rigidly fixed to either: how they fit together there
+/// is no matter of motion.
+pub(crate) fn are_joined(robot: &Robot, moved: &[Option<u32>], a: usize, b: usize) -> bool {
+    let above = |link: usize| {
+        let joint = robot.joints.get(moved.get(link).copied().flatten()? as usize)?;
+        Some(moved.get(joint.parent as usize).copied().flatten())
+    };
+    above(a) == Some(moved[b]) || above(b) == Some(moved[a])
+}
+
 /// All links, given where the root is and the positions of the joints that move by themselves.
 pub(crate) fn links(robot: &Robot, root: &Isometry, variables: &[usize], q: &[f64]) -> Vec<Isometry> {
     let value =

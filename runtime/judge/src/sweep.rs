@@ -55,6 +55,8 @@ struct Sweep<'f> {
     moves: Vec<bool>,
     /// By link: whether it is a finger.
     fingers: Vec<bool>,
+    /// By robot, then by link.
+    names: Vec<Vec<String>>,
     configurations: usize,
     met: BTreeMap<(String, String), Wrong>,
 }
@@ -69,83 +71,90 @@ impl<'f> Sweep<'f> {
         let apart = (0..links)
             .flat_map(|a| (a + 1..links).map(move |b| (a, b)))
             .filter(|&(a, b)| by[a] != by[b] && !touching.contains(&[a as u32, b as u32]))
+            .filter(|&(a, b)| !kinematics::are_joined(description, &by, a, b))
             .collect();
         let tools = robot.machine.tools as usize;
-        // A finger is moved by a joint of a tool.
-        let of_tool = |joint: &u32| description.joints[*joint as usize].child as usize >= tools;
+        // A finger is moved by a joint of a tool that does not move the tip.
+        let wrist = kinematics::above(description, robot.machine.tip);
+        let of_tool =
+            |joint: &u32| description.joints[*joint as usize].child as usize >= tools && !wrist.contains(joint);
         let fingers = by.iter().enumerate().map(|(l, j)| l >= tools && j.as_ref().is_some_and(of_tool)).collect();
         let stands = robot.samples.windows(2).all(|p| p[0].links.first() == p[1].links.first());
         let moves = by.iter().map(|j| j.is_some() || !stands).collect();
-        Sweep { film, index, apart, moves, fingers, configurations: 0, met: BTreeMap::new() }
+        let named = |robot: &Robot| {
+            robot.machine.robot.links.iter().map(|link| format!("{}.{}", robot.name, link.name)).collect()
+        };
+        let names = film.robots.iter().map(named).collect();
+        Sweep { film, index, apart, moves, fingers, names, configurations: 0, met: BTreeMap::new() }
     }
 
     fn look(&mut self, time: f64) {
         self.configurations += 1;
         let (film, robot) = (self.film, &self.film.robots[self.index]);
+        let names = std::mem::take(&mut self.names);
+        let own = &names[self.index];
         let links = robot.links(time);
         let link = |l: usize| Some((robot.bodies.get(l)?.as_ref()?, *links.get(l)?));
-        let named = |l: usize| format!("{}.{}", robot.name, robot.machine.robot.links[l].name);
         for pair in 0..self.apart.len() {
             let (a, b) = self.apart[pair];
             if let (Some((mine, at)), Some((other, other_at))) = (link(a), link(b)) {
-                self.compare(time, (&|| named(a), mine, at), (&|| named(b), other, other_at));
+                self.compare(time, (&own[a], mine, at), (&own[b], other, other_at));
             }
         }
         let tip = links.get(robot.machine.tip as usize).copied();
         let carried: Vec<(usize, Isometry)> =
             robot.held(time).iter().filter_map(|(item, inner)| Some((*item, tip? * *inner))).collect();
-        let others = self.others(time, &carried);
+        let others = self.others(time, &carried, &names);
         let near = robot.near_grips(time);
         for other in others.iter().filter(|o| !o.thing.is_some_and(|thing| robot.took(thing, time))) {
-            for l in 0..links.len() {
+            for (l, name) in own.iter().enumerate() {
                 let gripped = |g: &Grip| g.items.iter().any(|(item, _)| Some(*item) == other.thing);
                 if !self.moves[l] || self.fingers[l] && near.iter().any(gripped) {
                     continue;
                 }
                 if let Some((mine, at)) = link(l) {
-                    self.compare(time, (&|| named(l), mine, at), (&|| other.name.clone(), other.body, other.at));
+                    self.compare(time, (name, mine, at), (other.name, other.body, other.at));
                 }
             }
             for (item, at) in &carried {
                 let thing = &film.things[*item];
                 if let Some(mine) = thing.body.as_ref() {
-                    self.compare(
-                        time,
-                        (&|| thing.name.clone(), mine, *at),
-                        (&|| other.name.clone(), other.body, other.at),
-                    );
+                    self.compare(time, (&thing.name, mine, *at), (other.name, other.body, other.at));
                 }
             }
         }
         for (item, item_at) in &carried {
             let thing = &film.things[*item];
             let Some(body) = thing.body.as_ref() else { continue };
-            for l in 0..links.len() {
+            for (l, name) in own.iter().enumerate() {
                 if let (Some((mine, at)), false) = (link(l), self.fingers[l]) {
-                    self.compare(time, (&|| named(l), mine, at), (&|| thing.name.clone(), body, *item_at));
+                    self.compare(time, (name, mine, at), (&thing.name, body, *item_at));
                 }
             }
         }
+        self.names = names;
     }
 
     /// All bodies that are not of this robot and not carried by it.
-    fn others(&self, time: f64, carried: &[(usize, Isometry)]) -> Vec<Other<'f>> {
+    fn others<'n>(&self, time: f64, carried: &[(usize, Isometry)], names: &'n [Vec<String>]) -> Vec<Other<'n>>
+    where
+        'f: 'n,
+    {
         let film = self.film;
         let mut taken: BTreeSet<usize> = carried.iter().map(|(item, _)| *item).collect();
         let mut out = Vec::new();
-        for (_, robot) in film.robots.iter().enumerate().filter(|(i, _)| *i != self.index) {
+        for (which, robot) in film.robots.iter().enumerate().filter(|(i, _)| *i != self.index) {
             let links = robot.links(time);
             let tip = links.get(robot.machine.tip as usize);
             for (item, inner) in robot.held(time) {
                 if let (Some(tip), Some(body), true) = (tip, film.things[*item].body.as_ref(), taken.insert(*item)) {
-                    let name = film.things[*item].name.clone();
+                    let name = film.things[*item].name.as_str();
                     out.push(Other { name, thing: Some(*item), body, at: *tip * *inner });
                 }
             }
             for (l, at) in links.into_iter().enumerate() {
                 let Some(body) = robot.bodies[l].as_ref() else { continue };
-                let name = format!("{}.{}", robot.name, robot.machine.robot.links[l].name);
-                out.push(Other { name, thing: None, body, at });
+                out.push(Other { name: &names[which][l], thing: None, body, at });
             }
         }
         let own = &film.robots[self.index].name;
@@ -154,7 +163,7 @@ impl<'f> Sweep<'f> {
                 continue;
             }
             if let (Some(body), Some(at)) = (thing.body.as_ref(), thing.at(time)) {
-                out.push(Other { name: thing.name.clone(), thing: Some(index), body, at });
+                out.push(Other { name: &thing.name, thing: Some(index), body, at });
             }
         }
         out
@@ -166,7 +175,7 @@ impl<'f> Sweep<'f> {
         if depth <= NOMINAL {
             return;
         }
-        let (one, two) = ((mine.0)(), (other.0)());
+        let (one, two) = (mine.0.to_owned(), other.0.to_owned());
         let key = if one < two { (one.clone(), two.clone()) } else { (two.clone(), one.clone()) };
         let new = Wrong::Meets { mine: one, other: two, depth, at: point, time };
         let deeper = match self.met.get(&key) {
@@ -180,11 +189,11 @@ impl<'f> Sweep<'f> {
 }
 
 /// A name, a body and where it is.
-type Side<'a> = (&'a dyn Fn() -> String, &'a Body, Isometry);
+type Side<'a> = (&'a str, &'a Body, Isometry);
 
 /// What a robot could run into.
 struct Other<'f> {
-    name: String,
+    name: &'f str,
     thing: Option<usize>,
     body: &'f Body,
     at: Isometry,

@@ -101,7 +101,7 @@ const READY: [f64; 7] = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785];
 
 fn ball(at: [f64; 3], radius: f64) -> World {
     let pose = Pose::from_parts(Translation3::from(at), Default::default());
-    World { bodies: vec![Body { name: "ball".into(), pose, shape: Shape::Sphere(radius) }] }
+    World { bodies: vec![Body { name: "ball".into(), pose, shape: Shape::Sphere(radius) }], ..World::default() }
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn frames_may_branch_slide_and_turn_without_end() {
     for shape in
         [Shape::Cuboid([0.2, 0.1, 0.3]), Shape::Cylinder(0.15, 0.2), Shape::Capsule(0.1, 0.2), Shape::Sphere(0.2)]
     {
-        let world = World { bodies: vec![Body { name: "thing".into(), pose, shape }] };
+        let world = World { bodies: vec![Body { name: "thing".into(), pose, shape }], ..World::default() };
         let mut checker = Checker::new(&figure, &world, 32.0);
         let mut seen = [0, 0];
         for k in 0..400 {
@@ -297,7 +297,7 @@ fn straight_moves_stay_on_their_line_or_say_where_they_end() {
     }
     let table = Shape::Cuboid([0.5, 0.5, 0.01]);
     let pose = Pose::from_parts(Translation3::new(0.6, 0.0, down.translation.vector.z), Default::default());
-    let world = World { bodies: vec![Body { name: "table".into(), pose, shape: table }] };
+    let world = World { bodies: vec![Body { name: "table".into(), pose, shape: table }], ..World::default() };
     let mut checker = Checker::new(&figure, &world, 32.0);
     match straight(&mut solver, &mut checker, &READY, &down, &Stride::default()) {
         Err(Blocked::Collision(share, contacts)) => {
@@ -322,7 +322,10 @@ fn a_held_vessel_stays_upright() {
     goal.translation.vector = Vector3::new(0.1, 0.5, 0.4);
     let goal = solver.solve(&Request::new(goal, &READY)).unwrap().q;
     let pose = Pose::from_parts(Translation3::new(0.4, 0.3, 0.3), Default::default());
-    let world = World { bodies: vec![Body { name: "post".into(), pose, shape: Shape::Capsule(0.05, 0.3) }] };
+    let world = World {
+        bodies: vec![Body { name: "post".into(), pose, shape: Shape::Capsule(0.05, 0.3) }],
+        ..World::default()
+    };
     let mut checker = Checker::new(&figure, &world, 32.0);
     let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
     let settings = Settings { iterations: 2000, ..Settings::default() };

@@ -51,12 +51,13 @@ fn world(radius: f64) -> World {
             pose: Pose::translation(at.x, at.y, at.z),
             shape: Shape::Sphere(radius),
         }],
+        ..World::default()
     }
 }
 
 #[test]
 fn where_balls_find_a_way_no_referee_is_asked() {
-    let (figure, world, referee) = (figure(), World { bodies: Vec::new() }, Fixed { free: false, asked: Cell::new(0) });
+    let (figure, world, referee) = (figure(), World::default(), Fixed { free: false, asked: Cell::new(0) });
     let mut checker = Checker::new(&figure, &world, 32.0).overruled_by(&referee);
     plan(&mut checker, &START, &GOAL, &Settings::default()).expect("a way");
     assert_eq!(referee.asked.get(), 0);

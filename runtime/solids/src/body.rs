@@ -6,12 +6,13 @@ use std::fmt;
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{Link, Robot, Solid};
-use matterix_ir::scene::Shape;
+use matterix_ir::scene::{Shape, Solid as Placed};
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose as Isometry, Vector};
 use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
 
+use crate::bored::{self, Piece};
 use crate::mesh::{self, hull};
 use crate::place::isometry;
 use crate::turned;
@@ -51,6 +52,20 @@ impl Body {
     pub fn of_shapes<'a>(shapes: impl IntoIterator<Item = (&'a Shape, Pose)>) -> Option<Body> {
         let mut pieces = Vec::new();
         shapes.into_iter().for_each(|(shape, at)| add_shape(shape, &at, &mut pieces));
+        Body::of(pieces)
+    }
+
+    /// As [`Body::of_shapes`], with rooms taken out of a main shape that is a block: holes of a rack, wells of a plate.
+    pub fn with_rooms(main: Option<&Shape>, more: &[Placed], rooms: &[Placed]) -> Option<Body> {
+        let mut pieces = Vec::new();
+        match main {
+            Some(Shape::Box(size)) if !rooms.is_empty() => {
+                bored::pieces(*size, rooms).into_iter().for_each(|piece| add_piece(piece, &mut pieces));
+            }
+            Some(shape) => add_shape(shape, &Pose::IDENTITY, &mut pieces),
+            None => {}
+        }
+        more.iter().for_each(|solid| add_shape(&solid.shape, &solid.pose, &mut pieces));
         Body::of(pieces)
     }
 
@@ -121,6 +136,19 @@ fn contact(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, within: f64) ->
 fn push(at: Isometry, shape: SharedShape, pieces: &mut Vec<Convex>) {
     let around = shape.compute_aabb(&at);
     pieces.push(Convex { at, shape, around });
+}
+
+fn add_piece(piece: Piece, pieces: &mut Vec<Convex>) {
+    match piece {
+        Piece::Box(low, high) => {
+            let (low, high) = (Vector::from(low), Vector::from(high));
+            let half = (high - low) / 2.0;
+            push(Isometry::from_translation(low + half), SharedShape::cuboid(half.x, half.y, half.z), pieces);
+        }
+        Piece::Corners(corners) => {
+            hull(&corners).into_iter().for_each(|hull| push(Isometry::identity(), hull, pieces));
+        }
+    }
 }
 
 /// A shape of a scene has its origin at the middle of its base.

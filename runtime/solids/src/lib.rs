@@ -5,6 +5,7 @@
 //! EPA on convex pieces). Round walls are prisms of [`turned::SIDES`] sides around the true circle.
 
 mod body;
+mod bored;
 mod mesh;
 mod place;
 pub mod turned;

@@ -91,13 +91,18 @@ impl<'m> Sim<'m> {
     }
 
     /// Joints stand where the model says; how they get there in so many seconds is told.
-    fn follow_joints(&mut self, lasts: f64, out: &mut dyn Listener) {
-        let Some(stage) = self.stage.as_mut().filter(|stage| !stage.fixtures.is_empty()) else { return };
+    /// What one of them runs into on its way is said.
+    fn follow_joints(&mut self, lasts: f64, out: &mut dyn Listener) -> Option<String> {
+        let stage = self.stage.as_mut().filter(|stage| !stage.fixtures.is_empty())?;
         let engine = &self.engine;
         let moved = stage.follow_joints(|node| Some(engine.eval(node)));
-        if !moved.is_empty() {
-            out.travels(&stage.swings(&moved, engine.time(), lasts, FRAME));
+        if moved.is_empty() {
+            return None;
         }
+        out.travels(&stage.swings(&moved, engine.time(), lasts, FRAME));
+        let (id, met) = self.moves.robots.then(|| stage.swing_meets(&moved)).flatten()?;
+        let name = &stage.scene.get(id).name;
+        Some(format!("`{}` of `{name}` runs into {} at {}", met.mine, met.whom(), met.place()))
     }
 
     /// The value of a node when an operation has ended.
@@ -308,7 +313,10 @@ impl Backend for Sim<'_> {
             Ends::At(end) => end - self.engine.time(),
             _ => 0.0,
         };
-        self.follow_joints(lasts, out);
+        let ends = match self.follow_joints(lasts, out) {
+            Some(text) => Ends::Failed("collision".to_string(), text),
+            None => ends,
+        };
         let ticket = Ticket(self.started);
         self.started += 1;
         self.running
@@ -330,7 +338,9 @@ impl Backend for Sim<'_> {
             }
             self.engine.apply(&running.at_end, out)?;
             self.follow_supports(&running.at_end);
-            self.follow_joints(0.0, out);
+            if let Some(text) = self.follow_joints(0.0, out) {
+                return Ok(Status::Failed { name: "collision".to_string(), text });
+            }
         }
         Ok(Status::Done)
     }

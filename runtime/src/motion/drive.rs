@@ -136,7 +136,7 @@ impl Stage<'_> {
     /// Places where the robot is free to stand and from which its arm gets to one of some poses and on; the nearest first.
     fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
         let (Some(actor), [x, y, turn]) = (self.actors.get(&robot), drive) else { return Vec::new() };
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let around = Surroundings::of_driving(self, robot);
         let Ok(figure) = self.figure(robot, actor, drive) else { return Vec::new() };
         let mut checker = Checker::new(&figure, &around.world, 1.0);
         let mut solver = actor.solver();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::scene::{InstanceId, Scene, Shape, Solid};
 use matterix_motion::placement;
 use matterix_motion::spheres::{Contact, Figure, Other, Referee};
 use matterix_solids::{Body, Isometry, Touch, isometry};
@@ -33,7 +33,7 @@ pub struct Exact<'s> {
 struct Parts<'s> {
     /// By link, then what is held: the link it is on, where, and its body.
     mine: Vec<Option<(usize, Isometry, &'s Body)>>,
-    /// Each with the index of the first solid of the surroundings that is of the same thing.
+    /// Each with the index of the first solid of the surroundings that is of the same thing, or of the same link of it.
     around: Vec<(usize, Isometry, Cow<'s, Body>)>,
 }
 
@@ -59,33 +59,49 @@ impl<'s> Exact<'s> {
         }
         let mut around = Vec::new();
         let mut seen = BTreeSet::new();
-        for (index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
+        for (mut index, id) in self.surroundings.owners.iter().enumerate().filter(|(_, id)| seen.insert(**id)) {
             let at = stage.pose(*id);
-            match stage.actors.get(id) {
-                Some(actor) => {
-                    let links = actor.tree.poses(&actor.joints);
-                    for (link, body) in links.iter().zip(actor.bodies()) {
-                        let at = isometry(&at.then(placement(link)));
-                        around.extend(body.iter().map(|body| (index, at, Cow::Borrowed(body))));
-                    }
+            if let Some(actor) = stage.actors.get(id).filter(|_| !stage.unknown.postures.contains(id)) {
+                let links = actor.tree.poses(&actor.joints);
+                let named = |name: &str| {
+                    let mut all = self.surroundings.world.bodies.iter().zip(&self.surroundings.owners).skip(index);
+                    all.position(|(body, owner)| owner == id && body.name == name).map_or(index, |k| index + k)
+                };
+                let robot = &actor.assembly.robot;
+                for ((link, pose), body) in robot.links.iter().zip(&links).zip(actor.bodies()) {
+                    let at = isometry(&at.then(placement(pose)));
+                    around.extend(body.iter().map(|body| (named(&link.name), at, Cow::Borrowed(body))));
                 }
-                None if self.surroundings.bodiless.contains(id) => {
-                    let body = Body::of_shapes(stage.scene.get(*id).more());
-                    around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
-                }
-                None => {
-                    if let (Some(fixture), Some(own)) = (stage.fixtures.get(id), following(stage.scene, *id)) {
-                        for (link, body) in fixture.links().iter().zip(Body::of_links(&own.robot)) {
-                            let at = isometry(&at.then(*link));
-                            around.extend(body.map(|body| (index, at, Cow::Owned(body))));
-                        }
-                    }
-                    let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
-                    around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
+                index = named(&stage.scene.get(*id).name);
+            }
+            if self.surroundings.bodiless.contains(id) {
+                let body = Body::of_shapes(stage.scene.get(*id).more());
+                around.extend(body.map(|body| (index, isometry(&at), Cow::Owned(body))));
+                continue;
+            }
+            if let (Some(fixture), Some(own)) = (stage.fixtures.get(id), following(stage.scene, *id)) {
+                for (link, body) in fixture.links().iter().zip(Body::of_links(&own.robot)) {
+                    let at = isometry(&at.then(*link));
+                    around.extend(body.map(|body| (index, at, Cow::Owned(body))));
                 }
             }
+            let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
+            around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
         }
         Some(Parts { mine, around })
+    }
+
+    /// Every touch that counts but for those that are spared, deepest first.
+    pub fn touches(&self, q: &[f64], spared: &dyn Fn(u32, &Other) -> bool) -> Vec<Contact> {
+        let mut out = Vec::new();
+        self.look(q, |link, other, touch| {
+            if !spared(link, &other) {
+                out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
+            }
+            false
+        });
+        out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
+        out
     }
 
     /// Every touch that counts, until `tell` says that it is enough.
@@ -100,7 +116,11 @@ impl<'s> Exact<'s> {
         let counts = |touch: Option<Touch>| touch.filter(|t| t.distance < -TOUCH);
         for (link, mine) in placed.iter().enumerate() {
             let Some((at, body)) = mine else { continue };
+            let stands = self.figure.is_still(link as u32);
             for (index, other_at, other) in &parts.around {
+                if stands && self.surroundings.world.beneath.contains(index) {
+                    continue;
+                }
                 let found = counts(body.touch(at, other, other_at, 0.0));
                 if found.is_some_and(|touch| tell(link as u32, Other::Body(*index), touch)) {
                     return;
@@ -123,13 +143,7 @@ impl<'s> Exact<'s> {
 
 impl Referee for Exact<'_> {
     fn contacts(&self, q: &[f64]) -> Vec<Contact> {
-        let mut out = Vec::new();
-        self.look(q, |link, other, touch| {
-            out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
-            false
-        });
-        out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
-        out
+        self.touches(q, &|_, _| false)
     }
 
     fn is_free(&self, q: &[f64]) -> bool {
@@ -146,7 +160,35 @@ impl Referee for Exact<'_> {
     }
 }
 
+/// What a body is made of.
+#[derive(PartialEq)]
+struct Made<'s> {
+    main: Option<&'s Shape>,
+    more: &'s [Solid],
+    rooms: Vec<Solid>,
+}
+
 /// The true shapes of all instances.
 pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
-    scene.instances.iter().map(|instance| Body::of_shapes(instance.hull().chain(instance.more()))).collect()
+    let each = scene.instances.iter().enumerate();
+    let mut known: Vec<(Made<'_>, Option<Body>)> = Vec::new();
+    let bodies = each.map(|(index, instance)| {
+        if !instance.collision.is_empty() {
+            return Body::of_shapes(instance.hull());
+        }
+        let (main, more) = (instance.solid(), instance.solids.as_slice());
+        if main.is_none() && more.is_empty() {
+            return None;
+        }
+        // Tips and vials come by the dozen.
+        let rooms = scene.rooms(InstanceId(index as u32));
+        let made = Made { main, more, rooms };
+        if let Some((_, same)) = known.iter().find(|(other, _)| *other == made) {
+            return same.clone();
+        }
+        let body = Body::with_rooms(main, more, &made.rooms);
+        known.push((made, body.clone()));
+        body
+    });
+    bodies.collect()
 }

@@ -95,7 +95,7 @@ impl Fingers {
             let at = placement(links.get(*link as usize)?).then(*at);
             Some(Body { name: String::new(), pose: pose(&at), shape: shape.clone() })
         });
-        let world = World { bodies: bodies.collect() };
+        let world = World { bodies: bodies.collect(), ..World::default() };
         Some(free(&world, tip, 1.0)? + free(&world, tip, -1.0)?)
     }
 

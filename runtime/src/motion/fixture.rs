@@ -171,7 +171,7 @@ impl Stage<'_> {
                 stage.pose(item).then(stage.link(item, link)).then(inner)
             })
             .collect();
-        let part = self.line(robot, &way, &[item])?;
+        let part = self.lines(robot, &way, &[item], false)?;
         self.set_joint(item, variable, to);
         self.led.insert(item);
         Ok(Performed { robot, parts: vec![part], led: Some(led) })

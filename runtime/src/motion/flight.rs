@@ -114,7 +114,7 @@ impl Stage<'_> {
 
     /// Whether it is another robot that is in the way of a motion: it may go away.
     pub fn is_by_a_robot(&self, refused: &Refused) -> bool {
-        matches!(refused, Refused::Collides(m) if m.with.is_some_and(|w| self.robot_with(w).is_some()))
+        matches!(refused, Refused::Collides(m) if m.part.is_some() || m.with.is_some_and(|w| self.held_by(w).is_some()))
     }
 
     /// The robot that an instance is, is part of or is held by.
@@ -208,7 +208,7 @@ impl Stage<'_> {
         let actor = self.actors.get(&robot)?;
         let joints = performed.moved(actor);
         let figure = self.figure(robot, actor, &joints).ok()?;
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let around = Surroundings::of(self, robot);
         let others: Vec<bool> = around.owners.iter().map(|owner| self.robot_with(*owner).is_some()).collect();
         let steps = (performed.duration() / STEP * 10.0).ceil().max(1.0) as u32;
         (0..=steps).find_map(|step| {

@@ -9,6 +9,8 @@ use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Held};
 use matterix_motion::{Chain, Variable};
 
+use super::approach::is_clear;
+use super::exact::Exact;
 use super::perform::{Performed, Refused, TOLERANCE, timed};
 use super::stage::{Actor, Stage};
 use super::surroundings::{SLACK, Surroundings};
@@ -49,8 +51,14 @@ impl Stage<'_> {
     }
 
     /// Brings the tip to one of some poses: up by its last joint to the least height at which the way is free, across, and
-    /// down. `hanging` is how far something hangs below the tip, m. What else slides goes to where it is at home first.
-    pub(super) fn cross(&mut self, robot: InstanceId, to: &[Pose], hanging: f64) -> Result<Performed, Refused> {
+    /// down to `goal`. `hanging` is how far something hangs below the tip, m. What else slides goes to where it is at home first.
+    pub(super) fn cross(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        goal: InstanceId,
+        hanging: f64,
+    ) -> Result<Performed, Refused> {
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let now = actor.configuration();
         let there = self.settled(robot, actor, &now, to)?;
@@ -68,6 +76,7 @@ impl Stage<'_> {
             }
         }
         stops.push(there.clone());
+        self.lowers_freely(robot, actor, goal, &stops)?;
         let mut parts = Vec::new();
         let away = actor.positions(&others);
         if away.iter().zip(&home).any(|(a, b)| (a - b).abs() > 1e-6) {
@@ -118,7 +127,7 @@ impl Stage<'_> {
         there: &[f64],
         hanging: f64,
     ) -> Result<f64, Refused> {
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
+        let around = Surroundings::of(self, robot);
         let along = (0..=(hanging / HANGING) as u32).map(|k| [0.0, 0.0, f64::from(k) * HANGING]);
         let tool = Held {
             name: "its tool".to_string(),
@@ -155,6 +164,26 @@ impl Stage<'_> {
             }
             height = lift(height + up * STEP);
         }
+    }
+
+    /// Whether nothing is in the way where a gantry comes down on a thing, but for that thing and what it stands in.
+    fn lowers_freely(
+        &self,
+        robot: InstanceId,
+        actor: &Actor,
+        goal: InstanceId,
+        stops: &[Vec<f64>],
+    ) -> Result<(), Refused> {
+        let [.., from, to] = stops else { return Ok(()) };
+        let left_out = [self.whole(goal)];
+        let around = Surroundings::of_but(self, robot, &left_out, &[]);
+        let figure = self.figure(robot, actor, &actor.arm)?;
+        let exact = Exact::of(self, robot, &figure, &around);
+        let mut checker = self.checker(&figure, &around, &exact);
+        if is_clear(&mut checker, from, to) || checker.ask(true) && is_clear(&mut checker, from, to) {
+            return Ok(());
+        }
+        Err(self.meeting(&figure, &around, &checker.contacts(to), false))
     }
 
     /// The direction in which the last joint of a gantry raises its tip, and how far that goes.

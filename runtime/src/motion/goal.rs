@@ -69,23 +69,26 @@ pub fn spots(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Vec<Po
         return vec![Pose::IDENTITY];
     };
     let place = scene.surface(surface).position;
-    let others: Vec<([f64; 3], [f64; 3])> = stage
+    let others: Vec<Extent> = stage
         .carried
         .iter()
         .enumerate()
         .filter_map(|(index, carried)| match carried {
             Carried::Stands(Stand::On(on, at)) if *on == surface && index != item.0 as usize => {
                 let id = InstanceId(index as u32);
-                Some((at.position, footprint(stage, id).filter(|_| !stage.unknown.places.contains(&id))?))
+                footprint(stage, id, at).filter(|_| !stage.unknown.places.contains(&id))
             }
             _ => None,
         })
         .collect();
     let (own, top) = (own.size(), top.size());
     let free = |x: f64, y: f64| {
-        let apart = |(at, size): &([f64; 3], [f64; 3])| {
-            (at[0] - x).abs() >= (size[0] + own[0]) / 2.0 + RASTER
-                || (at[1] - y).abs() >= (size[1] + own[1]) / 2.0 + RASTER
+        let apart = |[low, high]: &Extent| {
+            let beside = |k: usize, p: f64| {
+                let room = own[k] / 2.0 + RASTER;
+                p + room <= low[k] || p - room >= high[k]
+            };
+            beside(0, x) || beside(1, y)
         };
         others.iter().all(apart)
     };
@@ -116,15 +119,32 @@ pub fn spots(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Vec<Po
     }
 }
 
-/// Room a thing takes where it stands, x, y, z in metres: that of its shape, or of the foot of a robot.
-fn footprint(stage: &Stage<'_>, id: InstanceId) -> Option<[f64; 3]> {
-    if let Some(shape) = &stage.scene.get(id).shape {
-        return Some(shape.size());
+/// The least and the greatest corner of what something takes of a surface, m.
+type Extent = [[f64; 2]; 2];
+
+/// What a thing takes of the surface it stands on: all of its body, or the foot of a robot.
+fn footprint(stage: &Stage<'_>, id: InstanceId, at: &Pose) -> Option<Extent> {
+    let instance = stage.scene.get(id);
+    let main = instance.shape.iter().map(|shape| (shape, *at));
+    let more = instance.solids.iter().map(|solid| (&solid.shape, at.then(solid.pose)));
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for (shape, at) in main.chain(more) {
+        let [x, y, z] = shape.size();
+        for corner in 0..8u8 {
+            let side = |bit: u8, half: f64| if corner & bit == 0 { -half } else { half };
+            let [x, y, _] = at.point([side(1, x / 2.0), side(2, y / 2.0), if corner & 4 == 0 { 0.0 } else { z }]);
+            points.push([x, y]);
+        }
     }
-    let robot = &stage.actors.get(&id)?.assembly.robot;
-    let foot = robot.balls.iter().filter(|b| robot.fixed_to(0).contains(&b.link));
-    let reach = foot.map(|b| b.center[0].hypot(b.center[1]) + b.radius).fold(0.0, f64::max);
-    Some([2.0 * reach; 3])
+    if let Some(actor) = stage.actors.get(&id) {
+        let robot = &actor.assembly.robot;
+        let foot = robot.balls.iter().filter(|b| robot.fixed_to(0).contains(&b.link));
+        let reach = foot.map(|b| b.center[0].hypot(b.center[1]) + b.radius).fold(0.0, f64::max);
+        points.extend([-reach, reach].map(|by| [at.position[0] + by, at.position[1] + by]));
+    }
+    let least = |k: usize| points.iter().map(|p| p[k]).reduce(f64::min);
+    let most = |k: usize| points.iter().map(|p| p[k]).reduce(f64::max);
+    Some([[least(0)?, least(1)?], [most(0)?, most(1)?]])
 }
 
 /// Turns about a thing's own axis that change nothing: of a round one eight, of another one so many.

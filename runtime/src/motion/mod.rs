@@ -1,6 +1,7 @@
 //! Robots that move: what they are made of, where everything is meanwhile, where they are to go and how they get there.
 
-pub mod assembly;
+mod approach;
+mod assembly;
 mod drive;
 pub mod exact;
 pub mod fingers;
@@ -16,6 +17,7 @@ mod postures;
 mod preflight;
 pub mod stage;
 pub mod surroundings;
+mod swing;
 mod tilt;
 mod together;
 mod turn;

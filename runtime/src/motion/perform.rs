@@ -290,7 +290,7 @@ impl Stage<'_> {
                     match to.is_empty() {
                         true if within.is_some() => return Ok(None),
                         true => return Err(Refused::NoFrame),
-                        false if gantry => return self.cross(robot, &to, shift[2].max(0.0)).map(Some),
+                        false if gantry => return self.cross(robot, &to, *goal, shift[2].max(0.0)).map(Some),
                         false => {}
                     }
                 }
@@ -454,18 +454,26 @@ impl Stage<'_> {
         Ok(parts)
     }
 
-    /// Draws a gripper back from what it has let go; where that leads beyond reach, less far.
+    /// Draws a gripper back from what it has let go; where that leads beyond reach, the way it came, or less far.
     fn retreat(&mut self, robot: InstanceId, item: InstanceId) -> Result<Part, Refused> {
         let tip = self.tip(robot);
+        let came = self.came.get(&robot).cloned().unwrap_or_default();
         let mut back = |far: f64| {
             let to = Pose { position: tip.point([0.0, 0.0, -far]), ..tip };
             self.line(robot, &[to], &[item])
         };
-        let beyond = |why: &Refused| matches!(why, Refused::OutOfReach(..));
-        match back(RETREAT) {
-            Err(why) if beyond(&why) => [0.5, 0.25].iter().find_map(|share| back(share * RETREAT).ok()).ok_or(why),
-            whole => whole,
+        let why = match back(RETREAT) {
+            Err(why) if matches!(why, Refused::OutOfReach(..) | Refused::NoWay) => why,
+            whole => return whole,
+        };
+        if let Some(part) = self.reversed(robot, &came, RETREAT, item) {
+            return Ok(part);
         }
+        let mut back = |far: f64| {
+            let to = Pose { position: tip.point([0.0, 0.0, -far]), ..tip };
+            self.line(robot, &[to], &[item]).ok()
+        };
+        [0.5, 0.25].iter().find_map(|share| back(share * RETREAT)).ok_or(why)
     }
 
     /// Brings a robot to a frame, or so far from it, m; what it holds to the nearest spot about it that is free and within
@@ -598,8 +606,9 @@ impl Stage<'_> {
                 return Ok(turned.into());
             }
         }
-        // A line that ends beyond what a posture reaches may be within what another one does.
-        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..)) {
+        // A line that ends beyond what a posture reaches, or on which that meets something, may be within what another one
+        // does.
+        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..) | Refused::Collides(_)) {
             for (_, target, _) in &found {
                 if let Ok(parts) = self.line_from_elsewhere(robot, target, goal.as_slice()) {
                     return Ok(parts.into());
@@ -637,14 +646,8 @@ impl Stage<'_> {
     }
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
-    fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
-        let mut without = self.carriers(robot);
-        for id in near {
-            without.push(*id);
-            // No hand that holds it.
-            without.extend(self.stand_of(*id).map(|below| self.whole(below)));
-        }
-        without.extend(self.held(robot).and_then(|held| self.stood_on(held)).map(|on| self.whole(on)));
+    pub(super) fn beside_line(&self, robot: InstanceId, near: &[InstanceId]) -> Surroundings {
+        let without = self.left_out(robot, near);
         let bodiless: Vec<InstanceId> = without.iter().flat_map(|id| self.owners(*id)).collect();
         Surroundings::of_but(self, robot, &without, &bodiless)
     }
@@ -658,8 +661,11 @@ impl Stage<'_> {
         q: &[f64],
         within: Option<f64>,
     ) -> Result<Part, Refused> {
-        let around = Surroundings::of(self, robot, &self.carriers(robot));
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
+        let around = match variables == actor.drive {
+            true => Surroundings::of_driving(self, robot),
+            false => Surroundings::of(self, robot),
+        };
         let figure = self.figure(robot, actor, variables)?;
         let exact = Exact::of(self, robot, &figure, &around);
         let mut checker = self.checker(&figure, &around, &exact);
@@ -688,8 +694,19 @@ impl Stage<'_> {
         Ok(part)
     }
 
-    /// Straight lines of the tip from pose to pose; things it comes up to or leaves may be touched.
+    /// Straight lines of the tip from pose to pose; fingers may touch what it comes up to or leaves.
     pub(super) fn line(&mut self, robot: InstanceId, to: &[Pose], near: &[InstanceId]) -> Result<Part, Refused> {
+        self.lines(robot, to, near, true)
+    }
+
+    /// As [`Stage::line`]; where it does not look at what it comes up to, that goes along with it.
+    pub(super) fn lines(
+        &mut self,
+        robot: InstanceId,
+        to: &[Pose],
+        near: &[InstanceId],
+        looks: bool,
+    ) -> Result<Part, Refused> {
         let around = self.beside_line(robot, near);
         let actor = self.actors.get(&robot).ok_or(Refused::NoRobot)?;
         let (base, arm) = (self.foot(robot).inverse(), actor.arm.clone());
@@ -709,14 +726,23 @@ impl Stage<'_> {
             })?;
             points.extend(followed.into_iter().skip(1));
         }
+        if let Some(refused) = looks.then(|| self.bump(robot, &figure, near, &points)).flatten() {
+            return Err(refused);
+        }
         let part = timed(actor, &arm, &points, Some(&mut checker))?;
-        let end = points.pop().unwrap_or_default();
+        let end = points.last().cloned().unwrap_or_default();
         self.settle(robot, &arm, &end);
+        self.came.insert(robot, points);
         Ok(part)
     }
 
     /// Says what collides. What others sweep are balls, and a way around them is not worth asking true shapes.
-    fn checker<'a>(&self, figure: &'a Figure, around: &'a Surroundings, exact: &'a Exact<'_>) -> Checker<'a> {
+    pub(super) fn checker<'a>(
+        &self,
+        figure: &'a Figure,
+        around: &'a Surroundings,
+        exact: &'a Exact<'_>,
+    ) -> Checker<'a> {
         let checker = Checker::new(figure, &around.world, 1.0 / FINENESS);
         if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }
@@ -729,6 +755,7 @@ impl Stage<'_> {
 
     /// Joints of a robot stand like this from now on.
     pub(super) fn settle(&mut self, robot: InstanceId, variables: &[usize], q: &[f64]) {
+        self.came.remove(&robot);
         if let Some(actor) = self.actors.get_mut(&robot) {
             actor.set_some(variables, q);
         }
@@ -751,9 +778,11 @@ impl Stage<'_> {
         let (other, part, with) = match contact.other {
             Other::Body(index) => {
                 let with = around.owners.get(index).copied();
+                let name = with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default();
+                // Of a robot, which link it is; of what that is built into, nothing more.
                 let robot = with.is_some_and(|w| self.actors.contains_key(&w));
-                let part = around.world.bodies.get(index).filter(|_| robot).map(|b| b.name.clone());
-                (with.map(|w| self.scene.get(w).name.clone()).unwrap_or_default(), part, with)
+                let part = around.world.bodies.get(index).filter(|b| robot && b.name != name).map(|b| b.name.clone());
+                (name, part, with)
             }
             Other::Link(link) => (figure.name(link).to_string(), None, None),
         };

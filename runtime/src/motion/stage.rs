@@ -65,6 +65,8 @@ pub struct Stage<'p> {
     pub fixtures: BTreeMap<InstanceId, Fixture>,
     /// What each robot has let go and not yet drawn back from.
     freed: BTreeMap<InstanceId, InstanceId>,
+    /// Configurations along the straight line on which a robot came to where it is.
+    pub(super) came: BTreeMap<InstanceId, Vec<Vec<f64>>>,
     /// Things whose parts hands are moving.
     pub(super) led: BTreeSet<InstanceId>,
     /// What a second robot grips as well, with that robot.
@@ -126,6 +128,7 @@ impl<'p> Stage<'p> {
             actors: BTreeMap::new(),
             fixtures: BTreeMap::new(),
             freed: BTreeMap::new(),
+            came: BTreeMap::new(),
             led: BTreeSet::new(),
             shared: BTreeMap::new(),
             now: 0.0,
@@ -409,6 +412,7 @@ pub struct Change {
     led: Vec<(InstanceId, bool)>,
     tools: Vec<(InstanceId, u32)>,
     freed: Vec<(InstanceId, Option<InstanceId>)>,
+    came: Vec<(InstanceId, Option<Vec<Vec<f64>>>)>,
 }
 
 impl Stage<'_> {
@@ -417,6 +421,7 @@ impl Stage<'_> {
         let things = self.carried.iter().zip(&before.carried).enumerate();
         let moved = self.actors.iter().filter(|(id, a)| before.actors.get(id).is_none_or(|b| a.joints != b.joints));
         let freed = |id: &&InstanceId| self.freed.get(id) != before.freed.get(id);
+        let came = |id: &&InstanceId| self.came.get(id) != before.came.get(id);
         let swung = self.fixtures.iter().filter(|(id, a)| before.fixtures.get(id).is_none_or(|b| a.joints != b.joints));
         let tool =
             |(id, a): &(&InstanceId, &Actor)| before.actors.get(id).is_none_or(|b| a.assembly.tip != b.assembly.tip);
@@ -426,6 +431,7 @@ impl Stage<'_> {
             tools: self.actors.iter().filter(tool).map(|(id, a)| (*id, a.assembly.tip)).collect(),
             carried: things.filter(|(_, (a, b))| a != b).map(|(i, (a, _))| (InstanceId(i as u32), *a)).collect(),
             joints: moved.map(|(id, a)| (*id, a.joints.clone())).collect(),
+            came: self.actors.keys().filter(came).map(|id| (*id, self.came.get(id).cloned())).collect(),
             freed: self.actors.keys().filter(freed).map(|id| (*id, self.freed.get(id).copied())).collect(),
         }
     }
@@ -452,6 +458,12 @@ impl Stage<'_> {
             let actor = self.actors.get_mut(id).filter(|a| a.joints.len() == joints.len())?;
             actor.joints.clone_from(joints);
         }
+        for (robot, came) in &change.came {
+            match came {
+                Some(came) => self.came.insert(*robot, came.clone()),
+                None => self.came.remove(robot),
+            };
+        }
         for (robot, item) in &change.freed {
             match item {
                 Some(item) => self.freed.insert(*robot, *item),
@@ -464,7 +476,7 @@ impl Stage<'_> {
     /// Feeds all that tells this moment from others of the same lab to a hash; with `coarse`, figures that differ by
     /// less than that (m, rad) mostly count as the same.
     pub fn digest(&self, coarse: Option<f64>, hash: &mut impl Hasher) {
-        let Stage { carried, before, actors, fixtures, freed, led, shared, unknown, .. } = self;
+        let Stage { carried, before, actors, fixtures, freed, came, led, shared, unknown, .. } = self;
         for one in carried {
             match one {
                 Carried::Stands(s) => write_stand(hash, s, coarse),
@@ -489,6 +501,11 @@ impl Stage<'_> {
         }
         for (a, b) in freed.iter().chain([(&InstanceId(u32::MAX), &InstanceId(u32::MAX))]).chain(shared) {
             hash.write_u64(u64::from(a.0) << 32 | u64::from(b.0));
+        }
+        // Courses that end alike count as one whichever way they came.
+        for (id, points) in came.iter().filter(|_| coarse.is_none()) {
+            hash.write_u64(u64::from(id.0) | 5 << 32);
+            points.iter().flatten().for_each(|v| write_number(hash, *v, None));
         }
         hash.write_u64(u64::MAX);
         unknown.places.iter().for_each(|id| hash.write_u32(id.0));

@@ -28,32 +28,58 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Everything but the robot, what carries it, what it holds and the things left out.
-    pub fn of(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId]) -> Self {
-        Self::of_but(stage, robot, without, &[])
+    /// Everything but the robot and what it holds. What carries it may touch what of it does not move.
+    pub fn of(stage: &Stage<'_>, robot: InstanceId) -> Self {
+        Self::of_but(stage, robot, &[], &[])
     }
 
-    /// As [`Surroundings::of`], without the main body of some things: what stands in one of their places stands in it.
+    /// As [`Surroundings::of`] for a robot that drives: on what carries it.
+    pub fn of_driving(stage: &Stage<'_>, robot: InstanceId) -> Self {
+        Self::of_but(stage, robot, &stage.carriers(robot), &[])
+    }
+
+    /// As [`Surroundings::of`], without some things, and without the main body of others: what stands in one of their places
+    /// stands in it.
     pub fn of_but(stage: &Stage<'_>, robot: InstanceId, without: &[InstanceId], bodiless: &[InstanceId]) -> Self {
-        let mut out = Surroundings { bodiless: bodiless.to_vec(), ..Surroundings::default() };
-        for index in 0..stage.scene.instances.len() {
-            let id = InstanceId(index as u32);
-            let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
-            if mine || stage.is_in_any(id, without) || stage.is_unknown(id) {
-                continue;
-            }
-            if stage.actors.contains_key(&id) {
-                if stage.unknown.postures.contains(&id) {
-                    continue;
-                }
-                out.add_robot(stage, id);
-            } else if !stage.is_inside_a_shape(id) {
-                out.add_shapes(stage, id, !bodiless.contains(&id));
-            }
-        }
+        let mut out = Self::of_which(stage, robot, bodiless, |id| !stage.is_in_any(id, without));
         if stage.around_sweeps {
             for (id, link, at, radius) in stage.sweeps(robot) {
                 out.push(id, &link, at, Solid::Sphere(radius));
+            }
+        }
+        out
+    }
+
+    /// Only some things, and what is part of them or of which they are part.
+    pub fn of_only(stage: &Stage<'_>, robot: InstanceId, these: &[InstanceId]) -> Self {
+        let wholes: Vec<InstanceId> = these.iter().map(|id| stage.whole(*id)).collect();
+        Self::of_which(stage, robot, &[], |id| stage.is_in_any(id, &wholes))
+    }
+
+    fn of_which(
+        stage: &Stage<'_>,
+        robot: InstanceId,
+        bodiless: &[InstanceId],
+        wanted: impl Fn(InstanceId) -> bool,
+    ) -> Self {
+        let mut out = Surroundings { bodiless: bodiless.to_vec(), ..Surroundings::default() };
+        let carriers = stage.carriers(robot);
+        for index in 0..stage.scene.instances.len() {
+            let id = InstanceId(index as u32);
+            let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
+            if mine || !wanted(id) || stage.is_unknown(id) {
+                continue;
+            }
+            let first = out.world.bodies.len();
+            if stage.actors.contains_key(&id) && !stage.unknown.postures.contains(&id) {
+                out.add_robot(stage, id);
+            }
+            // What a gantry runs in stands there whatever moves.
+            if stage.actors.contains_key(&id) || !stage.is_inside_a_shape(id) {
+                out.add_shapes(stage, id, !bodiless.contains(&id));
+            }
+            if stage.is_in_any(id, &carriers) {
+                out.world.beneath.extend(first..out.world.bodies.len());
             }
         }
         out
@@ -137,10 +163,34 @@ const EDGE: (f64, f64) = (0.003, 0.02);
 /// As [`SLACK`], of these, m: what they cut off a rim stays below 2 mm.
 const EDGE_SLACK: f64 = 5e-4;
 
+/// Radius of balls along the edges of what is not round, and how far they are apart, m: corners stand out of them by less
+/// than 2 mm.
+const RIM: f64 = 2e-3;
+const ALONG: f64 = 8e-3;
+
+/// Points along the edges of a block, in from them by [`RIM`].
+fn edges(size: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
+    let half = size.map(|s| (s / 2.0 - RIM).max(0.0));
+    (0..3usize).flat_map(move |axis| {
+        let steps = (2.0 * half[axis] / ALONG).ceil().max(1.0) as u32;
+        (0..4u8).flat_map(move |side| {
+            (0..=steps).map(move |step| {
+                let mut place = [0.0; 3];
+                place[axis] = half[axis] * (2.0 * f64::from(step) / f64::from(steps) - 1.0);
+                for (bit, other) in [(1, (axis + 1) % 3), (2, (axis + 2) % 3)] {
+                    place[other] = if side & bit == 0 { -half[other] } else { half[other] };
+                }
+                place[2] += size[2] / 2.0;
+                place
+            })
+        })
+    })
+}
+
 /// Balls that fill a shape, no larger than it: a row of them along each of its edges and through its middle; of what is
 /// round, small ones along its wall.
 fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
-    let [x, y, z] = shape.size();
+    let size @ [x, y, z] = shape.size();
     let radius = (x.min(y).min(z) / 2.0).max(1e-3);
     let along = |length: f64| -> Vec<f64> {
         let free = length - 2.0 * radius;
@@ -161,6 +211,9 @@ fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
                 out.push((at.point([px, py, z / 2.0 + pz]), radius - SLACK.min(radius / 2.0)));
             }
         }
+    }
+    if !shape.is_round() {
+        out.extend(edges(size).map(|place| (at.point(place), RIM - EDGE_SLACK)));
     }
     let (small, apart) = EDGE;
     if shape.is_round() && !matches!(shape, Shape::Sphere(_)) && radius > small {

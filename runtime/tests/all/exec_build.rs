@@ -59,6 +59,7 @@ impl Lab {
             visual: None,
             inertial: None,
             friction: None,
+            room: None,
             articulation: None,
             span: Span::default(),
         });

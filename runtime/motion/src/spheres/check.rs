@@ -51,7 +51,10 @@ impl<'a> Checker<'a> {
                     near.sort_by_key(Obstacle::kind);
                     near
                 }
-                None => world.bodies.iter().map(Obstacle::new).collect(),
+                None => {
+                    let beneath = |(index, _): &(usize, &crate::world::Body)| !world.beneath.contains(index);
+                    world.bodies.iter().enumerate().filter(beneath).map(|(_, body)| Obstacle::new(body)).collect()
+                }
             });
         }
         let rows = figure.frames.len();

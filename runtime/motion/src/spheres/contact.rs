@@ -43,7 +43,11 @@ impl Figure {
             }
         };
         for &(link, center, radius) in &placed {
+            let still = self.is_still(link);
             for (index, body) in world.bodies.iter().enumerate() {
+                if still && world.beneath.contains(&index) {
+                    continue;
+                }
                 let nearest = body.nearest(&center);
                 let depth = radius - nearest.distance;
                 note(Contact { link, other: Other::Body(index), point: nearest.point, depth });

@@ -85,6 +85,8 @@ pub struct Figure {
     parts: Vec<Part>,
     balls: Vec<[f32; 4]>,
     pairs: Vec<Pair>,
+    /// By link, then by held thing: whether nothing that is planned for moves it.
+    still: Vec<bool>,
 }
 
 impl Figure {
@@ -129,6 +131,7 @@ impl Figure {
             samples: Samples::new(&sampled),
             limits,
             frames,
+            still: seats.iter().map(|seat| seat.frame.is_none()).collect(),
             groups: Vec::new(),
             parts: Vec::new(),
             balls: Vec::new(),
@@ -162,6 +165,11 @@ impl Figure {
     /// The name of a link, or of a held thing by the index that follows the links'.
     pub fn name(&self, link: u32) -> &str {
         self.names.get(link as usize).map_or("", String::as_str)
+    }
+
+    /// Whether nothing that is planned for moves a link, or a held thing by the index that follows the links'.
+    pub fn is_still(&self, link: u32) -> bool {
+        self.still.get(link as usize).copied().unwrap_or(false)
     }
 
     /// The link itself, or the one that holds the thing with this index.

@@ -6,6 +6,8 @@ mod obstacle;
 pub use distance::Nearest;
 pub(crate) use obstacle::Obstacle;
 
+use std::collections::BTreeSet;
+
 use crate::pose::Pose;
 
 /// A solid about its own origin; metres.
@@ -37,4 +39,6 @@ pub struct Body {
 pub struct World {
     /// In any order.
     pub bodies: Vec<Body>,
+    /// Those that the robot stands on, by index: what of it does not move may touch them.
+    pub beneath: BTreeSet<usize>,
 }

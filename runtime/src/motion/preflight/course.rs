@@ -54,12 +54,13 @@ impl Course<'_> {
         }
     }
 
-    /// Parts that move stand where the states say, as far as those are known.
-    pub fn follow_joints(&mut self, model: &Model) {
-        if !self.stage.fixtures.is_empty() {
-            let values = &self.values;
-            self.stage.follow_joints(|node| values.value(model, node));
+    /// Parts that move stand where the states say, as far as those are known. Gives what moved, and how it stood.
+    pub fn follow_joints(&mut self, model: &Model) -> Vec<(InstanceId, Vec<f64>)> {
+        if self.stage.fixtures.is_empty() {
+            return Vec::new();
         }
+        let values = &self.values;
+        self.stage.follow_joints(|node| values.value(model, node))
     }
 
     /// A thing is carried by something else from now on, nobody says how: where it is then is known only where there is

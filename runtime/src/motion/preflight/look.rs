@@ -75,7 +75,10 @@ impl<'p, 's> Looker<'p, 's> {
         let stage = &course.stage;
         let adrift = stage.unknown.postures.contains(&robot);
         let held = stage.held(robot).is_some_and(|h| stage.unknown.places.contains(&h));
-        let somewhere = motion.goal().is_some_and(|(goal, frame)| stage.is_frame_unknown(goal, frame));
+        let somewhere = motion.goal().is_some_and(|(goal, frame)| {
+            // Where a thing stood is gone to with the thing; with anything else it is another motion.
+            stage.is_frame_unknown(goal, frame) || stage.is_stand(goal, frame) && stage.held(robot) != Some(goal)
+        });
         let goes_on = match motion {
             Motion::To { straight, .. } => *straight,
             Motion::By { .. } | Motion::Tilted { .. } | Motion::Fingers { .. } | Motion::Lead { .. } => true,

@@ -151,7 +151,7 @@ fn digest_of(scene: &Scene) -> String {
             &i.frames,
             &i.shape,
             &i.solids,
-            (&i.collision, &i.articulation),
+            (&i.collision, &i.room, &i.articulation),
         );
         // A hash takes whatever it is given.
         let _ = serde_json::to_writer(&mut feed, &what);

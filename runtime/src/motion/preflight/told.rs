@@ -8,7 +8,7 @@ use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
 
 use crate::motion::goal::targets;
-use crate::motion::perform::Refused;
+use crate::motion::perform::{Meeting, Refused};
 use crate::motion::stage::{Carried, Stage};
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
@@ -98,6 +98,23 @@ pub fn finding(
         found = found.help(within_reach(stage, goal, [x, y]));
     }
     Some(found)
+}
+
+/// The finding for a part of a thing that runs into something as it moves by itself.
+pub fn swing(stage: &Stage<'_>, id: InstanceId, meeting: &Meeting, span: Span) -> Diagnostic {
+    let thing = stage.scene.get(id);
+    let headline = format!("a part of `{}` runs into `{}`", thing.name, meeting.other);
+    let met = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
+    let depth = (meeting.depth * 1e3).max(1.0);
+    let label = format!("`{}` meets {met} at {}, {depth:.0} mm deep", meeting.mine, meeting.place());
+    let found = Diagnostic::error(codes::COLLISION, span, headline, label);
+    match meeting.with.filter(|with| stage.is_where_it_was(*with)) {
+        Some(with) if stage.scene.get(with).span != span => {
+            let name = &stage.scene.get(with).name;
+            found.because(stage.scene.get(with).span, format!("`{name}` stands here"))
+        }
+        _ => found,
+    }
 }
 
 /// Where a goal could be reached, if it is shifted by x and y, m: as its line says it, or from where it is.

@@ -1,32 +1,37 @@
 //! What is known of a lab's states while a plan is followed without being run.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use matterix_ir::graph::{BinaryOp, apply};
 use matterix_ir::model::{Action, Domain, Model};
-use matterix_ir::plan::{Motion, Operation};
-use matterix_ir::{NodeId, Op};
+use matterix_ir::plan::{Motion, Operation, Step};
+use matterix_ir::{NodeId, Op, Program};
 
 use crate::motion::stage::Stage;
 
-/// Values of states that are words, truths or instances, as far as they are known; quantities never are.
+/// Values of states that are words, truths or instances, as far as they are known; quantities only where motions depend on
+/// them and nothing but operations changes them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values {
     by_state: BTreeMap<u32, f64>,
+    /// The quantities among them.
+    followed: Arc<BTreeSet<u32>>,
 }
 
 impl Values {
     /// When the run begins. What an event changes is not known, as nobody says when.
-    pub fn at_start(model: &Model) -> Self {
+    pub fn at_start(program: &Program) -> Self {
+        let model = &program.model;
         let changes = model.events.iter().flat_map(|e| &e.actions).filter_map(|a| match a {
             Action::Assign { state, .. } => Some(*state),
             Action::Move { .. } => None,
         });
         let changes: BTreeSet<u32> = changes.collect();
-        let mut out = Values::default();
+        let mut out = Values { followed: Arc::new(followed(program, &changes)), ..Values::default() };
         for (index, state) in model.states.iter().enumerate() {
             let index = index as u32;
-            if matches!(state.domain, Domain::Quantity(_)) || changes.contains(&index) {
+            if !out.follows(model, index) || changes.contains(&index) {
                 continue;
             }
             if let Some(value) = out.value(model, state.initial) {
@@ -36,10 +41,16 @@ impl Values {
         out
     }
 
+    /// Whether what becomes of a state is followed.
+    fn follows(&self, model: &Model, state: u32) -> bool {
+        let quantity = model.states.get(state as usize).is_none_or(|s| matches!(s.domain, Domain::Quantity(_)));
+        !quantity || self.followed.contains(&state)
+    }
+
     /// An assignment: the new value, if it is known.
     pub fn assign(&mut self, model: &Model, state: u32, value: NodeId) -> Option<f64> {
         let value = self.value(model, value);
-        if model.states.get(state as usize).is_some_and(|s| !matches!(s.domain, Domain::Quantity(_))) {
+        if self.follows(model, state) {
             match value {
                 Some(value) => self.by_state.insert(state, value),
                 None => self.by_state.remove(&state),
@@ -116,4 +127,45 @@ impl Values {
     pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
         self.by_state.iter().map(|(state, value)| (*state, *value))
     }
+}
+
+/// Quantities that motions depend on, such as how far a tip hangs below its nozzle, as far as no law and no event changes them.
+/// To follow the others would be to tell courses apart that are the same in space.
+fn followed(program: &Program, by_events: &BTreeSet<u32>) -> BTreeSet<u32> {
+    let model = &program.model;
+    let operations = || {
+        program.plan.steps.iter().filter_map(|step| match &step.step {
+            Step::Operation(operation) => Some(operation),
+            _ => None,
+        })
+    };
+    let mut assigned: BTreeMap<u32, Vec<NodeId>> = BTreeMap::new();
+    let mut open: Vec<NodeId> = Vec::new();
+    for operation in operations() {
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            if let Action::Assign { state, value, .. } = action {
+                assigned.entry(*state).or_default().push(*value);
+            }
+        }
+        if let Some(motion) = &operation.motion {
+            open.extend(motion.values());
+            open.extend(motion.choice());
+        }
+    }
+    let by_laws = model.derivatives.iter().map(|d| d.state);
+    let in_mixtures = model.mixtures.iter().flat_map(|m| m.extensive.iter().map(|(_, state)| *state));
+    let moving: BTreeSet<u32> = by_laws.chain(in_mixtures).chain(by_events.iter().copied()).collect();
+    let (mut seen, mut found) = (BTreeSet::new(), BTreeSet::new());
+    while let Some(node) = open.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        for node in model.graph.schedule([node]) {
+            let Op::State(state) = model.graph.op(node) else { continue };
+            if !moving.contains(&state) && found.insert(state) {
+                open.extend(assigned.get(&state).into_iter().flatten());
+            }
+        }
+    }
+    found
 }

@@ -8,9 +8,10 @@ use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span};
 
 use super::beside::{Job, Moved};
-use super::course::Course;
+use super::course::{Course, Refusal};
 use super::look::{Looker, on_step};
 use super::memory::Memory;
+use super::told;
 use super::values::Values;
 use crate::motion::stage::{Carried, Stage};
 
@@ -24,7 +25,7 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) ->
     let mut stage = stage;
     let ids = (0..program.scene.instances.len() as u32).map(InstanceId);
     stage.unknown.places = ids.filter(|id| !program.scene.get(*id).placed).collect();
-    let values = Values::at_start(&program.model);
+    let values = Values::at_start(program);
     let looker = Looker::new(program, &stage, memory);
     let mut walk = Walk {
         program,
@@ -202,7 +203,7 @@ impl<'p> Walk<'p, '_> {
                 self.raise(failure, &course);
             }
         }
-        course.act(self.program, &operation.at_start);
+        // As in a run, what a motion depends on is what was before its operation began.
         if operation.motion.is_some() && course.lost.is_none() {
             let site = self.sites.last().copied().unwrap_or(span);
             let beside = std::mem::take(&mut self.beside);
@@ -212,9 +213,22 @@ impl<'p> Walk<'p, '_> {
                 lost.finding = on_step(lost.finding.clone(), span);
             }
         }
+        course.act(self.program, &operation.at_start);
         course.act(self.program, &operation.at_end);
         course.stage.let_go(operation.motion.as_ref());
-        course.follow_joints(&self.program.model);
+        let moved = course.follow_joints(&self.program.model);
+        if course.lost.is_none()
+            && self.beside.is_empty()
+            && let Some((id, meeting)) = course.stage.swing_meets(&moved)
+        {
+            let site = self.sites.last().copied().unwrap_or(span);
+            let finding = on_step(told::swing(&course.stage, id, &meeting, site), span);
+            course.lost = Some(Box::new(Refusal { failure: "collision", finding }));
+            // Where it has been pushed to nobody knows.
+            if let Some(robot) = meeting.with.filter(|with| course.stage.actors.contains_key(with)) {
+                course.drifts(robot);
+            }
+        }
         course
     }
 
@@ -410,6 +424,8 @@ impl<'p> Walk<'p, '_> {
 fn recover<'p>(course: &mut Course<'p>, before: &Stage<'p>) {
     let after = std::mem::replace(&mut course.stage, before.clone());
     course.stage.unknown.places.extend(&after.unknown.places);
+    // Parts stand where the states say as well: they do not move there once more.
+    course.stage.fixtures.clone_from(&after.fixtures);
     for (index, carried) in after.carried.iter().enumerate() {
         let (Carried::Stands(Stand::On(below, _)) | Carried::Held(below, _)) = carried else { continue };
         course.follow(InstanceId(index as u32), Some(*below));

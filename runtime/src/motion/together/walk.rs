@@ -26,7 +26,7 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
     if !program.plan.steps.iter().any(|s| is_beside(&s.step)) {
         return Vec::new();
     }
-    let (times, values) = (Times::of(program), Values::at_start(&program.model));
+    let (times, values) = (Times::of(program), Values::at_start(program));
     let mut walk = Walk {
         program,
         times: &times,
@@ -131,11 +131,12 @@ impl<'p> Walk<'p, '_> {
     }
 
     fn operation(&mut self, id: StepId, operation: &Operation) {
-        self.act(&operation.at_start);
+        // As in a run, what a motion depends on is what was before its operation began.
         if let Some(motion) = operation.motion.as_ref().filter(|_| self.left > 0) {
             self.left -= 1;
             self.motion(id, motion, operation);
         }
+        self.act(&operation.at_start);
         self.act(&operation.at_end);
         self.stage.let_go(operation.motion.as_ref());
         let (values, model) = (&self.values, &self.program.model);

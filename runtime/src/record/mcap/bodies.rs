@@ -57,6 +57,11 @@ pub(super) fn write<W: Write + Seek>(stage: &Stage<'_>, sink: &mut Sink<W>) -> M
                 json!({ "description": "Mass in kg, centre of mass, xx xy xz yy yz zz in kg m2; null if unknown" }),
             ),
             ("friction", json!({ "description": "Coefficient of friction; null if unknown" })),
+            ("rooms", json!({ "description": "What its parts take out of it, each with a pose" })),
+            (
+                "hollow",
+                json!({ "description": "Whether its shape is only what it takes out of another thing", "type": "boolean" }),
+            ),
         ],
     );
     let machine = object(
@@ -76,7 +81,8 @@ pub(super) fn write<W: Write + Seek>(stage: &Stage<'_>, sink: &mut Sink<W>) -> M
 fn bodies(stage: &Stage<'_>) -> Bodies {
     let scene = stage.scene;
     let mut out = Bodies::default();
-    for instance in scene.instances.iter().filter(|i| i.seen().chain(i.hull()).next().is_some()) {
+    let told = scene.instances.iter().enumerate().filter(|(_, i)| i.seen().chain(i.hull()).next().is_some());
+    for (index, instance) in told {
         let mut whole = instance;
         while let Some(owner) = whole.owner.and_then(|o| scene.instances.get(o.0 as usize)) {
             whole = owner;
@@ -90,6 +96,8 @@ fn bodies(stage: &Stage<'_>) -> Bodies {
             visual: instance.visual.clone(),
             inertial: instance.inertial,
             friction: instance.friction,
+            rooms: scene.rooms(InstanceId(index as u32)),
+            hollow: instance.shape.is_some() && instance.solid().is_none(),
         });
     }
     for (id, robot, _) in stage.movers() {

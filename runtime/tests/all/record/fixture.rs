@@ -53,6 +53,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         visual: None,
         inertial: None,
         friction: None,
+        room: None,
         articulation: None,
         span: line(2),
     }
