@@ -1,6 +1,7 @@
 //! The functions the library declares with `extern fn`, bound by name in one table.
 
 use matterix_ir::scene::InstanceId;
+use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
 use super::{Num, Type, Value};
@@ -49,6 +50,8 @@ enum Bound {
     Placed,
     /// Whether one mixture has touched something that another has not.
     Soils,
+    /// What is kept of a quantity over a whole run.
+    OverTime(Keep),
 }
 
 const TABLE: &[(&str, Bound)] = &[
@@ -75,6 +78,9 @@ const TABLE: &[(&str, Bound)] = &[
     ("position", Bound::Position),
     ("placed", Bound::Placed),
     ("soils", Bound::Soils),
+    ("max_over_time", Bound::OverTime(Keep::Largest)),
+    ("min_over_time", Bound::OverTime(Keep::Smallest)),
+    ("mean_over_time", Bound::OverTime(Keep::Mean)),
     ("wholes", Bound::Wholes),
 ];
 
@@ -158,6 +164,11 @@ impl Elaborator<'_> {
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
+            (Bound::OverTime(keep), [Value::Num(n)]) => self.over_time(*keep, n, name, at),
+            (Bound::OverTime(_), [Value::Concentration(..)]) => {
+                self.kindless(at);
+                Value::Error
+            }
             (_, values) if values.contains(&Value::Error) => Value::Error,
             _ => self.wrong_arguments(name, at),
         };

@@ -121,6 +121,7 @@ impl<'a, 'e> Planner<'a, 'e> {
                 }
                 self.add(format!("test {}", name.text), name.span, Step::Sequence(steps))
             }
+            ItemKind::Study { .. } | ItemKind::Fit { .. } => self.many(task, &mut scope, &mut arguments),
             _ => self.workflow(task.item, &task.given, &mut scope, &mut arguments),
         };
         self.lab.readings_live = false;
@@ -134,8 +135,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
     }
 
-    /// The steps of a workflow; what its parameters are bound to goes into `shown`.
-    fn workflow(
+    /// The steps of a workflow; what its parameters are bound to goes into `shown`. Its parameters that a study or a fit
+    /// leaves open have no value.
+    pub fn workflow(
         &mut self,
         id: DeclId,
         given: &[Given<'a>],
