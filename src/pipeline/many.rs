@@ -57,7 +57,12 @@ impl Done {
 }
 
 /// Makes the runs of a study. `done` is told how many of how many have ended; `Err` says what is wrong with the usage.
-pub fn study(program: &Program, study: &Study, asked: &Asked<'_>, done: &mut dyn FnMut(u64, u64)) -> Result<Done, String> {
+pub fn study(
+    program: &Program,
+    study: &Study,
+    asked: &Asked<'_>,
+    done: &mut dyn FnMut(u64, u64),
+) -> Result<Done, String> {
     let points = Design::grid(study);
     let runs = asked.runs.or(study.runs).or(points).unwrap_or(1);
     if let Some(points) = points.filter(|points| runs % points != 0) {

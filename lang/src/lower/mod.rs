@@ -125,7 +125,12 @@ impl<'a, 'e> Planner<'a, 'e> {
             _ => self.workflow(task.item, &task.given, &mut scope, &mut arguments),
         };
         self.lab.readings_live = false;
-        let name = crate::names::item_name(decl.item).map(|n| n.0).unwrap_or_default();
+        let item = match &decl.item.kind {
+            ItemKind::Study { .. } | ItemKind::Fit { .. } => task::workflow_of(self.lab.tables, task.item).ok(),
+            _ => None,
+        };
+        let item = item.map_or(decl.item, |workflow| self.lab.tables.names.decl(workflow).item);
+        let name = crate::names::item_name(item).map(|n| n.0).unwrap_or_default();
         let limits = self.limits(false);
         if !self.draft {
             self.note_limits(&limits);

@@ -9,7 +9,12 @@ use crate::loader::Loader;
 use crate::names::near;
 
 /// Reads the data of a fit into it.
-pub fn read(fit: &mut Fit, tables: &Tables<'_>, sources: &mut Sources, loader: &dyn Loader) -> Result<(), Box<Diagnostic>> {
+pub fn read(
+    fit: &mut Fit,
+    tables: &Tables<'_>,
+    sources: &mut Sources,
+    loader: &dyn Loader,
+) -> Result<(), Box<Diagnostic>> {
     let about = |headline: String, label: &str| Diagnostic::error(codes::DATA_FILE, fit.data_span, headline, label);
     let text = loader.file(fit.data_span.file, &fit.data).map_err(|reason| {
         let d = about(format!("cannot read `{}`: {reason}", fit.data), "named here");
@@ -57,8 +62,8 @@ pub fn read(fit: &mut Fit, tables: &Tables<'_>, sources: &mut Sources, loader: &
     // Where the noise is learnt from what is left over, something must be left over.
     let least = fit.estimates.len() + usize::from(fit.matches.iter().any(|m| m.noise.is_none()));
     if values < least {
-        let headline = format!("{values} values cannot say {} parameters", fit.estimates.len());
-        let d = about(headline, "holds too few values").help(format!("{least} are needed at least"));
+        let headline = format!("too few values: {values} for parameters in the number of {}", fit.estimates.len());
+        let d = about(headline, "holds too few").help(format!("{least} are needed at least"));
         return Err(Box::new(d));
     }
     fit.rows = rows;
@@ -99,13 +104,20 @@ impl Table<'_> {
             Ok(value) if value.is_finite() => Ok(Some(value)),
             _ => {
                 let d = self.at(record, column, &format!("`{cell}` is not a number"), "not a number");
-                Err(Box::new(d.help("numbers have a point, no unit and no thousands: `0.913`; a value that is missing, nothing")))
+                Err(Box::new(
+                    d.help("numbers have a point, no unit and no thousands: `0.913`; a value that is missing, nothing"),
+                ))
             }
         }
     }
 
     /// The column of times and its unit.
-    fn time(&self, columns: &[Header<'_>], header: &csv::StringRecord, tables: &Tables<'_>) -> Result<(usize, Unit), Box<Diagnostic>> {
+    fn time(
+        &self,
+        columns: &[Header<'_>],
+        header: &csv::StringRecord,
+        tables: &Tables<'_>,
+    ) -> Result<(usize, Unit), Box<Diagnostic>> {
         let Some(index) = columns.iter().position(|c| c.name == "time") else {
             let d = self.at(header, 0, "this table has no column `time`", "the first row names the columns");
             return Err(Box::new(d.help("call it `time`, in seconds, or `time [min]`")));
@@ -122,7 +134,14 @@ impl Table<'_> {
     }
 
     /// The column of a match.
-    fn column(&self, columns: &[Header<'_>], header: &csv::StringRecord, wanted: &str, asked: Span, unit: &Unit) -> Result<usize, Box<Diagnostic>> {
+    fn column(
+        &self,
+        columns: &[Header<'_>],
+        header: &csv::StringRecord,
+        wanted: &str,
+        asked: Span,
+        unit: &Unit,
+    ) -> Result<usize, Box<Diagnostic>> {
         let exact: Vec<usize> = (0..columns.len()).filter(|i| columns[*i].whole == wanted).collect();
         let by_name = || (0..columns.len()).filter(|i| columns[*i].name == wanted).collect();
         let found: Vec<usize> = if exact.is_empty() { by_name() } else { exact };
@@ -131,7 +150,7 @@ impl Table<'_> {
                 Some(symbol) if symbol != unit.symbol => {
                     let headline = format!("the column `{wanted}` is in `{symbol}`, and read as `{}`", unit.symbol);
                     let d = self.at(header, *one, &headline, "says its unit here");
-                    Err(Box::new(d.because(asked, "read here").help(format!("write `as {symbol}`"))))
+                    Err(Box::new(d.because(asked, "read here").help("the header and `as` must say the same unit")))
                 }
                 _ => Ok(*one),
             },

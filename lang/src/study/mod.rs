@@ -1,8 +1,9 @@
 //! Studies and fits: many runs of one workflow, compiled once. What varies is a parameter of the model; what is reported
 //! or matched is looked at where the workflow's own names mean what they mean in it.
 
-pub mod data;
 mod choose;
+pub mod data;
+mod draws;
 mod lines;
 mod open;
 mod paths;

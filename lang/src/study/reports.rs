@@ -21,8 +21,9 @@ impl<'a> Planner<'a, '_> {
                 return self.add("nothing", decl.item.span, matterix_ir::plan::Step::Sequence(Vec::new()));
             }
         };
-        for path in super::lines::paths(&decl.item.kind) {
-            if let Some(name) = super::paths::written(path) {
+        if let ItemKind::Workflow { params, .. } = &self.lab.tables.names.decl(workflow).item.kind {
+            let left = super::lines::paths(&decl.item.kind).into_iter().filter_map(super::paths::written);
+            for name in left.filter(|name| params.iter().any(|p| p.name.text == *name)) {
                 self.lab.open.leave(&name);
             }
         }

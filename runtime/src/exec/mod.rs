@@ -78,7 +78,13 @@ pub struct Looks<'c> {
 impl Default for Limits<'_> {
     /// 30 days, a million steps.
     fn default() -> Self {
-        Limits { horizon: 30.0 * 86_400.0, steps_per_instant: 100_000, cancel: None, turns: &[], looks: Looks::default() }
+        Limits {
+            horizon: 30.0 * 86_400.0,
+            steps_per_instant: 100_000,
+            cancel: None,
+            turns: &[],
+            looks: Looks::default(),
+        }
     }
 }
 

@@ -20,10 +20,7 @@ pub fn human(o: &Outcome) -> String {
     out.push('\n');
     for row in &rows {
         let [name, value, error, interval] = row;
-        let line = format!(
-            "  {name:<0$}  {value:>1$}  {error:>2$}  {interval}",
-            widths[0], widths[1], widths[2]
-        );
+        let line = format!("  {name:<0$}  {value:>1$}  {error:>2$}  {interval}", widths[0], widths[1], widths[2]);
         let _ = writeln!(out, "{}", line.trim_end());
     }
     out.push('\n');
@@ -42,7 +39,7 @@ pub fn human(o: &Outcome) -> String {
     for (i, row) in o.correlation.iter().enumerate() {
         for (j, r) in row.iter().enumerate().skip(i + 1) {
             if let (Some(r), Some(a), Some(b)) = (r, o.estimates.get(i), o.estimates.get(j)) {
-                let _ = writeln!(out, "  correlation of {} and {}: {r:.3}", a.name, b.name);
+                let _ = writeln!(out, "  correlation of {} and {}: {r:.4}", a.name, b.name);
             }
         }
     }

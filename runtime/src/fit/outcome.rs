@@ -96,13 +96,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// The figures of a solution; `predicted` is what the model says by row and match, SI.
-    pub fn new(
-        program: &Program,
-        fit: &Fit,
-        scales: &[Scale],
-        solution: &Solution,
-        predicted: Vec<Vec<f64>>,
-    ) -> Self {
+    pub fn new(program: &Program, fit: &Fit, scales: &[Scale], solution: &Solution, predicted: Vec<Vec<f64>>) -> Self {
         let values = solution.residuals.len();
         let freedom = values as i64 - scales.len() as i64;
         let squares: f64 = solution.residuals.iter().map(|r| r * r).sum();
@@ -124,7 +118,10 @@ impl Outcome {
         if let (false, Some(v)) = (learns, per_degree)
             && v > 1.0 + 4.0 * (2.0 / freedom as f64).sqrt()
         {
-            notes.push("the residuals are larger than the noise says: the model lacks something, or the noise is larger".into());
+            notes.push(
+                "the residuals are larger than the noise says: the model lacks something, or the noise is larger"
+                    .into(),
+            );
         }
         if solution.agreed < solution.starts {
             let (agreed, starts) = (solution.agreed, solution.starts);
@@ -218,7 +215,10 @@ fn notes(estimates: &[Estimate], undetermined: &[Vec<String>], spread: &Spread) 
         if let Some(end) = e.at_bound {
             let (which, value) = if end == "low" { ("lower", e.low) } else { ("upper", e.high) };
             let value = crate::study::short(value);
-            out.push(format!("`{}` lies at the {which} end of its range, {value} {}: its error means little", e.name, e.unit));
+            out.push(format!(
+                "`{}` lies at the {which} end of its range, {value} {}: its error means little",
+                e.name, e.unit
+            ));
         }
     }
     for (i, row) in spread.correlation.iter().enumerate() {

@@ -90,11 +90,25 @@ mod tests {
 
     fn study(draws: &[Draw]) -> Study {
         let varied = draws.iter().enumerate().map(|(i, draw)| Varied {
-            free: Free { name: format!("x{i}"), param: i as u32, low: 2.0, high: 6.0, unit: Unit::one(), span: Span::default() },
+            free: Free {
+                name: format!("x{i}"),
+                param: i as u32,
+                low: 2.0,
+                high: 6.0,
+                unit: Unit::one(),
+                span: Span::default(),
+            },
             draw: *draw,
         });
         let varied = varied.collect();
-        Study { name: "s".into(), span: Span::default(), varied, runs: None, reports: Vec::new(), over_time: Vec::new() }
+        Study {
+            name: "s".into(),
+            span: Span::default(),
+            varied,
+            runs: None,
+            reports: Vec::new(),
+            over_time: Vec::new(),
+        }
     }
 
     /// Mean and standard deviation of a coordinate over many points.

@@ -16,7 +16,8 @@ pub fn human(summary: &Summary) -> String {
         let (low, high) = (show_number(v.low), show_number(v.high));
         let _ = writeln!(out, "  vary {} in {low}{unit} .. {high}{unit} by {}", v.name, v.by);
     }
-    let mut rows: Vec<[String; 8]> = vec![["", "mean", "std", "min", "5 %", "median", "95 %", "max"].map(str::to_string)];
+    let mut rows: Vec<[String; 8]> =
+        vec![["", "mean", "std", "min", "5 %", "median", "95 %", "max"].map(str::to_string)];
     for c in &summary.reports {
         let show = |v: Option<f64>| v.map_or_else(|| "-".to_string(), short);
         let name = if c.unit.is_empty() { c.name.clone() } else { format!("{} [{}]", c.name, c.unit) };

@@ -48,3 +48,26 @@ pub fn shared<T: Send>(
     results.sort_by_key(|r| r.0);
     results.into_iter().map(|r| r.1).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_whatever_the_threads() {
+        let never = AtomicBool::new(false);
+        for jobs in [1, 2, 7] {
+            let mut last = 0;
+            let squares = shared(100, jobs, &never, |n| n * n, &mut |done| last = done);
+            assert_eq!(squares, (0..100).map(|n| n * n).collect::<Vec<_>>());
+            assert_eq!(last, 100);
+        }
+    }
+
+    #[test]
+    fn what_is_done_is_kept_when_it_is_stopped() {
+        let stop = AtomicBool::new(false);
+        let some = shared(1000, 2, &stop, |n| n, &mut |done| stop.store(done >= 10, Ordering::Relaxed));
+        assert!((10..1000).contains(&some.len()), "{}", some.len());
+    }
+}

@@ -92,7 +92,9 @@ impl Summary {
                 Draw::Sobol => "sobol".to_string(),
                 Draw::Grid(n) => format!("grid({n})"),
                 Draw::Normal(mean, sd) => {
-                    format!("normal({}, {})", unit.show(mean), matterix_ir::quantity::show_number(sd / unit.factor))
+                    // A difference on a scale has another unit than its points.
+                    let symbol = if unit.offset == 0.0 { unit.symbol.as_str() } else { "" };
+                    format!("normal({}, {})", unit.show(mean), Unit::scaled(symbol, unit.factor).show(sd))
                 }
             };
             let (low, high) = (unit.of_si(v.free.low), unit.of_si(v.free.high));
