@@ -48,6 +48,10 @@ pub enum Command {
     Test(TestArgs),
     /// Say what a run uses up and occupies: reagents, tips, vessels, waste, device time.
     Bill(BillArgs),
+    /// Run a workflow many times, with what a study varies, and report what becomes of it.
+    Study(StudyArgs),
+    /// Estimate parameters of a workflow's model from data.
+    Fit(FitArgs),
     /// Write a workflow as a protocol that a person can follow by hand.
     Doc(DocArgs),
     /// Schedule a workflow: who has which instance when, so that the whole ends early.
@@ -252,6 +256,65 @@ pub enum BillFormat {
     Json,
     /// One row per number.
     Csv,
+}
+
+/// Many runs of a workflow of a file.
+#[derive(Debug, Args)]
+pub struct Many {
+    /// The file.
+    pub file: PathBuf,
+    /// Which study or fit, where the file has several.
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// A parameter of the workflow that is not left open, as written in the language: `--set "target=40 degC"`.
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    pub set: Vec<(String, String)>,
+    /// The lab, for a workflow that runs in any.
+    #[arg(long, value_name = "NAME")]
+    pub lab: Option<String>,
+    /// Where all randomness starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Where to write tables and figures; nothing is written without it.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// On how many threads; on all processors without it. Results do not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub jobs: Option<u16>,
+    /// Form of the figures.
+    #[arg(long, value_enum, default_value_t = RunFormat::Human)]
+    pub format: RunFormat,
+}
+
+impl Many {
+    /// The same, as the compiler takes it.
+    pub fn options(&self) -> Options {
+        Options { workflow: self.name.clone(), set: self.set.clone(), lab: self.lab.clone() }
+    }
+
+    /// How many threads.
+    pub fn threads(&self) -> usize {
+        self.jobs.map_or_else(|| std::thread::available_parallelism().map_or(1, usize::from), usize::from)
+    }
+}
+
+/// `matterixc study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// What is run.
+    #[command(flatten)]
+    pub many: Many,
+    /// How many runs, in place of what the study says.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=matterix_ir::study::MOST_RUNS))]
+    pub runs: Option<u64>,
+}
+
+/// `matterixc fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// What is run.
+    #[command(flatten)]
+    pub many: Many,
 }
 
 /// `matterixc doc`.

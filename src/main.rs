@@ -68,6 +68,8 @@ fn obey(cli: Cli) -> Exit {
         Command::Run(args) => command::run(&args, cli.color),
         Command::Test(args) => command::test(&args, cli.color),
         Command::Bill(args) => command::bill(&args, cli.color),
+        Command::Study(args) => command::study(&args, cli.color),
+        Command::Fit(args) => command::fit(&args, cli.color),
         Command::Doc(args) => command::doc(&args, cli.color),
         Command::Plan(args) => command::plan(&args, cli.color),
         Command::Verify(args) => command::verify(&args),

@@ -75,6 +75,37 @@ impl<'a> Progress<'a> {
     }
 }
 
+/// How many runs have ended, as one live line on a terminal.
+pub struct Count {
+    is_live: bool,
+    drawn: Option<Instant>,
+}
+
+impl Count {
+    /// Of runs that have not begun; nothing is shown where nobody is to read it.
+    pub fn new(wanted: bool) -> Self {
+        Count { is_live: wanted && terminal::is_terminal(Stream::Err), drawn: None }
+    }
+
+    /// So many have ended, of so many where that is known.
+    #[allow(clippy::disallowed_methods, reason = "the live line follows the wall clock; nothing recorded does")]
+    pub fn reached(&mut self, ended: u64, all: Option<u64>) {
+        if !self.is_live || self.drawn.is_some_and(|d| d.elapsed() < FRAME) {
+            return;
+        }
+        self.drawn = Some(Instant::now());
+        let of = all.map_or_else(String::new, |all| format!(" of {all}"));
+        print(Stream::Err, &format!("\r\x1b[2K{ended}{of} runs"));
+    }
+
+    /// Takes the live line away.
+    pub fn finish(&mut self) {
+        if self.drawn.take().is_some() {
+            print(Stream::Err, "\r\x1b[2K");
+        }
+    }
+}
+
 /// Whether a step is more than a grouping of others.
 fn is_shown(step: &Step) -> bool {
     !matches!(step, Step::Sequence(_) | Step::Guarded { .. } | Step::Let { .. })

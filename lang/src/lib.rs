@@ -19,10 +19,12 @@ pub mod program;
 pub mod prose;
 pub mod screen;
 pub mod stock;
+mod study;
 pub mod task;
 pub mod units;
 
 pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
-pub use program::{Options, Test, check, check_and, compile, contents, document, tests};
+pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, tests};
+pub use study::Many;

@@ -17,6 +17,7 @@ use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::names::{self, DeclId, Names, near};
 use crate::points::Questions;
+use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
 /// What a compilation is asked for.
@@ -79,7 +80,7 @@ fn examine(
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
     diagnostics.extend(checks::declarations(&tables, sources, root));
-    let items = runnable(&names, root);
+    let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
     for item in items.iter().copied() {
@@ -95,13 +96,21 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
-        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
+        let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+        // What robots do is looked at for the workflow itself.
+        fine &= !many(&names.decl(task.item).item.kind);
+        if let Some(Many::Fit(fit)) = &mut built.many
+            && let Err(d) = study::data::read(fit, &tables, sources, loader)
+        {
+            diagnostics.push(*d);
+        }
         diagnostics.extend(built.findings);
         diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
         starts.extend(built.starts);
-        // The statements of a test of a workflow are the workflow's.
-        let tests = matches!(names.decl(task.item).item.kind, ItemKind::Test { lab: None, .. });
+        // The statements of a test, a study or a fit of a workflow are the workflow's.
+        let kind = &names.decl(task.item).item.kind;
+        let tests = matches!(kind, ItemKind::Test { lab: None, .. }) || many(kind);
         points.extend(built.points.filter(|_| !tests));
         uses.extend(built.uses);
     }
@@ -191,6 +200,61 @@ fn compile_and<T>(
     (more, diagnostics)
 }
 
+/// A study or a fit of a file with the program that all its runs execute.
+pub struct Compiled {
+    /// The workflow in its lab.
+    pub program: Program,
+    /// What is asked of it.
+    pub many: Many,
+}
+
+/// Compiles a study of a file, or a fit where `fits`; `options.workflow` names it and may be left out where the file has
+/// one. Nothing where there is an error.
+pub fn many_runs(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+    fits: bool,
+) -> (Option<Compiled>, Vec<Diagnostic>) {
+    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
+    let set = typed_values(sources, options, &mut diagnostics);
+    let (names, found) = Names::new(&modules);
+    diagnostics.extend(found);
+    let (tables, found) = Tables::new(&names);
+    diagnostics.extend(found);
+    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let choice = study::choose(&names, root, file, options.workflow.as_deref(), fits);
+    let item = match choice {
+        Ok(item) => item,
+        Err(d) => {
+            diagnostics.push(*d);
+            return (None, finish(diagnostics, sources));
+        }
+    };
+    let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
+    diagnostics.extend(task::check_given(&tables, item, &given));
+    let lab = match task::lab(&tables, sources, root, item, &given, options.lab.as_deref()) {
+        Ok(lab) => lab,
+        Err(d) => {
+            diagnostics.push(*d);
+            return (None, finish(diagnostics, sources));
+        }
+    };
+    let mut built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program);
+    diagnostics.extend(built.findings);
+    if let Some(Many::Fit(fit)) = &mut built.many
+        && let Err(d) = study::data::read(fit, &tables, sources, loader)
+    {
+        diagnostics.push(*d);
+    }
+    let diagnostics = finish(diagnostics, sources);
+    let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let compiled = built.program.zip(built.many).filter(|_| !failed);
+    (compiled.map(|(program, many)| Compiled { program, many }), diagnostics)
+}
+
 /// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
 /// them is returned apart.
 pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
@@ -232,6 +296,20 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
 fn runnable(names: &Names<'_>, module: usize) -> Vec<DeclId> {
     let is_run = |id: &DeclId| matches!(names.decl(*id).item.kind, ItemKind::Workflow { .. } | ItemKind::Test { .. });
     names.declared_by(module).filter(is_run).collect()
+}
+
+/// What is judged of a module: what can be run, once or many times.
+fn judged(names: &Names<'_>, module: usize) -> Vec<DeclId> {
+    let is_judged = |id: &DeclId| {
+        let kind = &names.decl(*id).item.kind;
+        matches!(kind, ItemKind::Workflow { .. } | ItemKind::Test { .. }) || many(kind)
+    };
+    names.declared_by(module).filter(is_judged).collect()
+}
+
+/// Whether an item is many runs of a workflow.
+fn many(kind: &ItemKind) -> bool {
+    matches!(kind, ItemKind::Study { .. } | ItemKind::Fit { .. })
 }
 
 /// Each finding once, in the order of the text, without those that only follow from others.
@@ -338,6 +416,7 @@ struct Built {
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
+    many: Option<Many>,
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
@@ -403,6 +482,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         starts.windows = windows;
         let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
+        let many = study::resolve(&mut elaborator, task);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -411,7 +491,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !elaborator.has_robots() {
-                return Built { program: None, points, findings: elaborator.diagnostics, starts, uses };
+                return Built { program: None, points, findings: elaborator.diagnostics, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -438,7 +518,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
-        return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses };
+        return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses, many };
     }
 }
 

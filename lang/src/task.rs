@@ -102,8 +102,12 @@ pub fn given<'a>(tables: &Tables<'a>, item: DeclId, outside: &[Given<'a>]) -> Ve
     }
 }
 
-/// The workflow behind a task: itself, or the one a test runs.
+/// The workflow behind a task: itself, or the one that a test, a study or a fit runs.
 pub fn workflow_of(tables: &Tables<'_>, item: DeclId) -> Result<DeclId, Box<Diagnostic>> {
+    let decl = tables.names.decl(item);
+    if let ItemKind::Study { of, .. } | ItemKind::Fit { of, .. } = &decl.item.kind {
+        return find(tables, decl.module, of, "workflow", |k| matches!(k, ItemKind::Workflow { .. }));
+    }
     Ok(tested(tables, item)?.map_or(item, |t| t.workflow))
 }
 

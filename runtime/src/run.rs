@@ -75,7 +75,7 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
         Err(fault) => return refused(program, fault),
     };
     match options.fidelity {
-        Fidelity::Process | Fidelity::Motion => simulate(program, options, params, out),
+        Fidelity::Process | Fidelity::Motion => run_ready(program, &Prepared::new(program), params, options, out),
         Fidelity::Dry => {
             let mut dry = Dry::new(&program.model, &program.plan, params.clone());
             let execution = exec::execute(&program.plan, &program.scene, &mut dry, options.limits, out);
@@ -84,15 +84,22 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
     }
 }
 
-fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: &mut dyn Listener) -> Outcome {
-    let prepared = Prepared::new(program);
+/// Runs a program that was made ready before, for one run of many: `params` are all of its parameters by index, SI. The
+/// fidelity is `process`, or `motion` where the options say so.
+pub fn run_ready(
+    program: &Program,
+    prepared: &Prepared,
+    params: Vec<f64>,
+    options: &RunOptions<'_>,
+    out: &mut dyn Listener,
+) -> Outcome {
     let engine = Engine::new(&prepared.model, params.clone(), program.plan.locals.len(), options.process);
     let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
     let engine = match started {
         Ok(engine) => engine,
         Err(fault) => return refused(program, fault),
     };
-    let mut sim = Sim::new(engine, &prepared, options.seed);
+    let mut sim = Sim::new(engine, prepared, options.seed);
     let moves = options.fidelity == Fidelity::Motion;
     sim = match Stage::new(program) {
         Ok(stage) if moves || !stage.fixtures.is_empty() => {
@@ -104,6 +111,7 @@ fn simulate(program: &Program, options: &RunOptions<'_>, params: Vec<f64>, out: 
     let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
     let engine = sim.engine();
     let finished = engine.finish(out);
+    out.ended(engine);
     let mut outcome = outcome(execution, params, engine.states().iter().copied().map(Some).collect());
     outcome.balances = engine.balances();
     if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
@@ -124,13 +132,13 @@ fn runs_beside(plan: &Plan) -> bool {
 fn params(program: &Program, changed: &[(String, f64)]) -> Result<Vec<f64>, Fault> {
     let mut values: Vec<f64> = program.model.params.iter().map(|p| p.value).collect();
     for (name, value) in changed {
-        let index = program.model.params.iter().position(|p| p.name == *name);
-        match index.and_then(|i| values.get_mut(i)) {
-            Some(slot) => *slot = *value,
-            None => {
-                let message = format!("the program has no parameter `{name}`");
-                return Err(Fault::new(codes::UNKNOWN_PARAMETER, 0.0, message));
-            }
+        let mut found = false;
+        for (_, slot) in program.model.params.iter().zip(&mut values).filter(|(p, _)| p.name == *name) {
+            (*slot, found) = (*value, true);
+        }
+        if !found {
+            let message = format!("the program has no parameter `{name}`");
+            return Err(Fault::new(codes::UNKNOWN_PARAMETER, 0.0, message));
         }
     }
     Ok(values)

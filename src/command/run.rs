@@ -124,7 +124,7 @@ fn kind(format: RunFormat) -> Kind {
     }
 }
 
-fn create(dir: &Path) -> Result<(), String> {
+pub(super) fn create(dir: &Path) -> Result<(), String> {
     if dir.exists() && !dir.is_dir() {
         return Err(format!("`{}` is a file, not a directory", dir.display()));
     }

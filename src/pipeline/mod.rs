@@ -1,6 +1,7 @@
 //! Every call into the compiler and the runtime.
 
 mod bill;
+mod many;
 mod neighbours;
 mod plan;
 mod run;
@@ -16,6 +17,7 @@ use matterix_runtime::motion::{Store, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
+pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};

@@ -30,6 +30,7 @@ mod science;
 mod screening;
 mod slips;
 mod strict;
+mod studies;
 mod time;
 mod together;
 mod types;

@@ -68,6 +68,8 @@ codes! {
     WRONG_ARGUMENTS "wrong-arguments" "N0" "the arguments do not fit what is called";
     WRONG_DEVICE "wrong-device" "N0" "a command for something that cannot do it";
     TYPE_MISMATCH "type-mismatch" "N0" "a value of another type than is expected";
+    CANNOT_VARY "cannot-vary" "N0" "a study or a fit leaves open what is fixed";
+    DATA_FILE "data-file" "N0" "the data of a fit cannot be read";
     UNBOUND_ROLE "unbound-role" "N0" "it is not decided which instance, or which lab, takes a role";
     MISPLACED "misplaced" "N0" "a statement that has no meaning at its place";
     EMPTY_RANGE "empty-range" "N0" "the lower end of a range is above its upper end";

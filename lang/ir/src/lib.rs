@@ -7,6 +7,7 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+//! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
@@ -28,6 +29,7 @@ pub mod robot;
 pub mod scene;
 pub mod span;
 pub mod stock;
+pub mod study;
 pub mod text;
 
 pub use codes::Code;

@@ -107,8 +107,6 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             planner.check_skill(id);
         }
         ItemKind::Driver { .. } => later(lab, "drivers"),
-        ItemKind::Study { .. } => later(lab, "studies"),
-        ItemKind::Fit { .. } => later(lab, "fits"),
         _ => {}
     }
 }

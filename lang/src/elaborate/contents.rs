@@ -74,6 +74,7 @@ impl<'a> Elaborator<'a> {
                     return;
                 }
                 let n = self.name_param(&format!("{owner}.initial[{}]", name.text), n, quantity.span);
+                self.open.bound(self.graph.op(n.node), 0.0, false);
                 let amounts = self.amounts_of(&substance, n.clone(), quantity.span, name);
                 self.held.push(Held {
                     mixture: None,

@@ -266,7 +266,7 @@ impl<'a> Elaborator<'a> {
     /// A setting that another lab has given too must be the same.
     pub fn same_setting(&mut self, name: &Name, first: &Value, second: &Value) {
         let known = |this: &Self, v: &Value| match v {
-            Value::Num(n) => this.known(n.node),
+            Value::Num(n) => this.glance(n.node),
             _ => None,
         };
         let (a, b) = (known(self, first), known(self, second));

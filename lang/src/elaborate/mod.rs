@@ -173,6 +173,8 @@ pub struct Elaborator<'a> {
     pub pairs: Vec<Pair<'a>>,
     /// Parameters of the model.
     pub params: Vec<model::Param>,
+    /// What studies and fits may vary.
+    pub open: crate::study::Open,
     /// States of the model.
     pub states: Vec<model::State>,
     /// For states that hold an instance: what they may hold, copied states included.
@@ -274,6 +276,7 @@ impl<'a> Elaborator<'a> {
             defaulted: BTreeSet::new(),
             pairs: Vec::new(),
             params: Vec::new(),
+            open: crate::study::Open::default(),
             states: Vec::new(),
             holds: BTreeMap::new(),
             copies: BTreeSet::new(),
@@ -369,8 +372,15 @@ impl<'a> Elaborator<'a> {
         None
     }
 
-    /// The value of a node that depends on nothing but parameters.
+    /// The value of a node that depends on nothing but parameters, for a decision: it stays as it is, whatever the
+    /// parameters are in a run.
     pub fn known(&self, node: NodeId) -> Option<f64> {
+        self.open.fix(&self.graph, node);
+        self.glance(node)
+    }
+
+    /// The same for what is only said or judged.
+    pub fn glance(&self, node: NodeId) -> Option<f64> {
         let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
         if self.graph.depends(node, live) {
             return None;

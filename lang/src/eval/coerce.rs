@@ -91,7 +91,7 @@ impl Elaborator<'_> {
     fn coerce_whole(&mut self, n: Num, span: Span, what: &str) -> Value {
         let value = self.coerce_quantity(n, &Type::ratio(), span, what);
         if let Value::Num(n) = &value
-            && let Some(v) = self.known(n.node).filter(|v| v.is_finite() && v.fract() != 0.0)
+            && let Some(v) = self.glance(n.node).filter(|v| v.is_finite() && v.fract() != 0.0)
         {
             let found = matterix_ir::quantity::show_number(v);
             self.report(Diagnostic::error(

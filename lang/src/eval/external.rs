@@ -1,6 +1,7 @@
 //! The functions the library declares with `extern fn`, bound by name in one table.
 
 use matterix_ir::scene::InstanceId;
+use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Type, Value};
@@ -52,6 +53,8 @@ enum Bound {
     Placed,
     /// Whether one mixture has touched something that another has not.
     Soils,
+    /// What is kept of a quantity over a whole run.
+    OverTime(Keep),
 }
 
 const TABLE: &[(&str, Bound)] = &[
@@ -79,6 +82,9 @@ const TABLE: &[(&str, Bound)] = &[
     ("placed", Bound::Placed),
     ("soils", Bound::Soils),
     ("stated", Bound::Stated),
+    ("max_over_time", Bound::OverTime(Keep::Largest)),
+    ("min_over_time", Bound::OverTime(Keep::Smallest)),
+    ("mean_over_time", Bound::OverTime(Keep::Mean)),
     ("wholes", Bound::Wholes),
 ];
 
@@ -164,6 +170,11 @@ impl Elaborator<'_> {
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
             (Bound::Stated, [Value::Material(id), Value::Text(what)]) => self.stated(*id, what),
             (Bound::Stated, [Value::Nothing, Value::Text(_)]) => Value::Unlimited,
+            (Bound::OverTime(keep), [Value::Num(n)]) => self.over_time(*keep, n, name, at),
+            (Bound::OverTime(_), [Value::Concentration(..)]) => {
+                self.kindless(at);
+                Value::Error
+            }
             (_, values) if values.contains(&Value::Error) => Value::Error,
             _ => self.wrong_arguments(name, at),
         };

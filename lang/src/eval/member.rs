@@ -391,12 +391,13 @@ impl<'a> Elaborator<'a> {
         module: usize,
     ) {
         let Value::Num(n) = value else { return };
-        let Some(given) = self.known(n.node) else { return };
+        let Some(given) = self.glance(n.node) else { return };
         for o in options.iter().filter(|o| matches!(o.name.text.as_str(), "above" | "at_least")) {
             let v = self.expr(&o.value, &mut Scope::module(module));
             let Value::Num(limit) = self.coerce(v, ty, o.value.span, &o.name.text) else { continue };
-            let Some(least) = self.known(limit.node) else { continue };
+            let Some(least) = self.glance(limit.node) else { continue };
             let strict = o.name.text == "above";
+            self.open.bound(self.graph.op(n.node), least, strict);
             if given > least || (!strict && given >= least) {
                 continue;
             }
@@ -435,7 +436,7 @@ impl<'a> Elaborator<'a> {
             FieldValue::Expr(e) => {
                 let within = self.within_of(id, setting.lab);
                 let v = self.within_lab(&within, |this| this.typed(e, ty, &mut setting.scope(), name));
-                self.as_param(id, name, v, e.span)
+                self.as_param(id, name, ty, v, e.span)
             }
             FieldValue::Fields(_) | FieldValue::Literal(_) | FieldValue::Species(_) => Value::Error,
         }
@@ -443,14 +444,20 @@ impl<'a> Elaborator<'a> {
 
     fn param_default(&mut self, id: InstanceId, name: &str, ty: &Type, e: &'a Expr, module: usize) -> Value {
         let v = self.typed(e, ty, &mut Scope::of(id, module), name);
-        self.as_param(id, name, v, e.span)
+        self.as_param(id, name, ty, v, e.span)
     }
 
     /// Constants become parameters of the model, so that a study can vary them.
-    fn as_param(&mut self, id: InstanceId, name: &str, value: Value, span: Span) -> Value {
+    fn as_param(&mut self, id: InstanceId, name: &str, ty: &Type, value: Value, span: Span) -> Value {
         let full = format!("{}.{name}", self.instances[id.0 as usize].name);
         match value {
-            Value::Num(n) => Value::Num(self.name_param(&full, n, span)),
+            Value::Num(n) => {
+                let n = self.name_param(&full, n, span);
+                if *ty == Type::Int {
+                    self.open.whole(self.graph.op(n.node));
+                }
+                Value::Num(n)
+            }
             Value::Range(a, b) => {
                 let low = self.name_param(&format!("{full}.min"), *a, span);
                 let high = self.name_param(&format!("{full}.max"), *b, span);
@@ -466,9 +473,17 @@ impl<'a> Elaborator<'a> {
         if self.prototype {
             return n;
         }
-        let unit = n.unit.clone().unwrap_or_else(|| self.shown(&n));
-        let index = self.params.len() as u32;
-        self.params.push(matterix_ir::model::Param { name: name.to_string(), value, unit, span });
+        let again = self.open.named(name).find(|o| o.span == span && self.params[o.param as usize].value == value);
+        let index = match again {
+            Some(known) => known.param,
+            None => {
+                let unit = n.unit.clone().unwrap_or_else(|| self.shown(&n));
+                let index = self.params.len() as u32;
+                self.params.push(matterix_ir::model::Param { name: name.to_string(), value, unit, span });
+                self.open.add(name, index, &n, span);
+                index
+            }
+        };
         Num { node: self.graph.add(Op::Param(index)), literal: false, ..n }
     }
 

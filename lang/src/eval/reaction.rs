@@ -292,7 +292,7 @@ impl<'a> Elaborator<'a> {
         {
             return;
         }
-        if self.known(k.node).is_some_and(|v| v < 0.0) {
+        if self.glance(k.node).is_some_and(|v| v < 0.0) {
             self.report(
                 Diagnostic::error(codes::RATE_UNIT, e.span, "a rate constant cannot be negative", "negative")
                     .help("write the reaction the other way round, or with `<->` and `reverse`"),

@@ -121,10 +121,16 @@ impl<'a, 'e> Planner<'a, 'e> {
                 }
                 self.add(format!("test {}", name.text), name.span, Step::Sequence(steps))
             }
+            ItemKind::Study { .. } | ItemKind::Fit { .. } => self.many(task, &mut scope, &mut arguments),
             _ => self.workflow(task.item, &task.given, &mut scope, &mut arguments),
         };
         self.lab.readings_live = false;
-        let name = crate::names::item_name(decl.item).map(|n| n.0).unwrap_or_default();
+        let item = match &decl.item.kind {
+            ItemKind::Study { .. } | ItemKind::Fit { .. } => task::workflow_of(self.lab.tables, task.item).ok(),
+            _ => None,
+        };
+        let item = item.map_or(decl.item, |workflow| self.lab.tables.names.decl(workflow).item);
+        let name = crate::names::item_name(item).map(|n| n.0).unwrap_or_default();
         let limits = self.limits(false);
         if !self.draft {
             self.note_limits(&limits);
@@ -134,8 +140,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
     }
 
-    /// The steps of a workflow; what its parameters are bound to goes into `shown`.
-    fn workflow(
+    /// The steps of a workflow; what its parameters are bound to goes into `shown`. Its parameters that a study or a fit
+    /// leaves open have no value.
+    pub fn workflow(
         &mut self,
         id: DeclId,
         given: &[Given<'a>],

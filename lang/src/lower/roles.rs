@@ -117,7 +117,7 @@ impl<'a> Planner<'a, '_> {
             }
             Some(holds) if holds != 0.0 => None,
             Some(_) => {
-                let measured = found.compared.first().and_then(|c| Some(c.unit.show(self.lab.known(c.value)?)));
+                let measured = found.compared.first().and_then(|c| Some(c.unit.show(self.lab.glance(c.value)?)));
                 let measured = measured.map_or_else(String::new, |m| format!(" (it is {m})"));
                 Some(format!("`{}` does not hold{measured}", found.text))
             }

@@ -485,7 +485,11 @@ impl<'a> Planner<'a, '_> {
             let ty = p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, scope.module));
             let given = given.iter().find(|g| g.name.text == p.name.text);
             let role = matches!(ty, Type::Instance { .. });
+            let is_open = given.is_none()
+                && matches!(ty, Type::Quantity { .. } | Type::Int)
+                && self.lab.open.leaves(&p.name.text);
             let (value, span) = match (given, &p.default) {
+                _ if is_open => (self.unknown_value(&ty, &p.name.text), p.name.span),
                 (Some(g), _) => {
                     let mut scope = Scope { lab: true, ..Scope::module(g.module) };
                     (self.lab.hinted(g.value, &ty, &mut scope), g.value.span)
@@ -516,6 +520,12 @@ impl<'a> Planner<'a, '_> {
                         shown.push((p.name.text.clone(), matterix_ir::quantity::show_number(si)));
                     }
                     let named = self.lab.name_param(&p.name.text, n, span);
+                    if let (true, Op::Param(i)) = (is_open, self.lab.graph.op(named.node)) {
+                        self.lab.open.add(&p.name.text, i, &named, span);
+                    }
+                    if ty == Type::Int {
+                        self.lab.open.whole(self.lab.graph.op(named.node));
+                    }
                     if let (None, Op::Param(i)) = (given, self.lab.graph.op(named.node)) {
                         self.lab.defaulted.insert(i);
                     }

@@ -74,7 +74,7 @@ impl<'a> Planner<'a, '_> {
             match value {
                 Value::Num(n) => {
                     let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
-                    Some(unit.show(self.lab.known(n.node)?))
+                    Some(unit.show(self.lab.glance(n.node)?))
                 }
                 Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
                 Value::Frame(id, frame) => Some(format!("{}.{frame}", self.lab.spoken(&Value::Instance(*id))?)),

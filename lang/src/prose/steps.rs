@@ -204,7 +204,7 @@ impl<'a> Prose<'a, '_> {
         match value {
             Value::Num(n) => {
                 let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
-                Some(words::quantity(&unit.show(self.lab.known(n.node)?)))
+                Some(words::quantity(&unit.show(self.lab.glance(n.node)?)))
             }
             Value::Tuple(items) => {
                 let items: Option<Vec<String>> = items.iter().map(|i| self.member_of_set(i)).collect();

@@ -10,7 +10,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::stock::{Count, Holding, Stock, Tally};
 use matterix_ir::{BinaryOp, NodeId, Sources, Span};
 
-use crate::ast::{ExprKind, ItemKind, MemberKind, NamedExpr, StudyLine};
+use crate::ast::{ExprKind, ItemKind, MemberKind, NamedExpr};
 use crate::elaborate::{Elaborator, SpeciesId};
 use crate::eval::{Num, Value};
 use crate::names::DeclId;
@@ -105,23 +105,15 @@ fn tallies(lab: &mut Elaborator<'_>) -> Vec<Tally> {
 }
 
 /// The studies of a workflow and their numbers of runs.
-fn studies(lab: &Elaborator<'_>, workflow: DeclId) -> Vec<(String, u64)> {
+fn studies(lab: &mut Elaborator<'_>, workflow: DeclId) -> Vec<(String, u64)> {
     let names = lab.tables.names;
     let mut out = Vec::new();
     for decl in &names.decls {
         let ItemKind::Study { name, of, lines } = &decl.item.kind else { continue };
         let of = of.segments.last().and_then(|word| names.lookup(decl.module, &word.text));
-        if of != Some(workflow) {
-            continue;
+        if of == Some(workflow) {
+            out.extend(crate::study::count_of(lab, lines, decl.module).map(|runs| (name.text.clone(), runs)));
         }
-        let runs = lines.iter().find_map(|line| match line {
-            StudyLine::Runs(e) => match &*e.kind {
-                ExprKind::Number(runs) if *runs >= 1.0 && runs.fract() == 0.0 => Some(*runs as u64),
-                _ => None,
-            },
-            _ => None,
-        });
-        out.extend(runs.map(|runs| (name.text.clone(), runs)));
     }
     out
 }

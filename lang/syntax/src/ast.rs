@@ -1000,7 +1000,7 @@ pub enum FitLine {
     /// Could not be read.
     Error(Span),
     /// `data "run.csv"`.
-    Data(String),
+    Data(Name),
     /// `estimate r.rate.A in 1e7 .. 1e10 log`.
     Estimate {
         /// What.
@@ -1015,7 +1015,7 @@ pub enum FitLine {
         /// The model's value.
         value: Expr,
         /// The data's column.
-        column: String,
+        column: Name,
         /// The column's unit.
         unit: Option<UnitText>,
         /// Standard deviation.

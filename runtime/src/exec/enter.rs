@@ -240,6 +240,16 @@ impl<'p> Executor<'p, '_> {
                 recording.turn += 1;
             }
         }
+        while let Some(time) = self.limits.looks.times.get(self.looked)
+            && *time <= now
+        {
+            let mut values = Vec::with_capacity(self.limits.looks.nodes.len());
+            for &node in self.limits.looks.nodes {
+                values.push(self.backend.value(node, self.out)?.unwrap_or(f64::NAN));
+            }
+            self.out.looked(self.looked, &values);
+            self.looked += 1;
+        }
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::motion::Moment;
 
 use super::failure::{FailureTrace, Measured};
-use crate::process::Observer;
+use crate::process::{Engine, Observer};
 
 /// Where a node of the plan stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -98,6 +98,10 @@ pub trait Listener: Observer {
     fn assumed(&mut self, time: f64, step: StepId, condition: &Condition) {}
     /// A sample of a `record`, one value or the parts of a tuple, SI.
     fn record(&mut self, time: f64, step: StepId, name: &str, values: &[f64], unit: &Unit) {}
+    /// What was asked for is looked at, for the time with this number: SI.
+    fn looked(&mut self, number: usize, values: &[f64]) {}
+    /// The run has ended, and this is how the model stands.
+    fn ended(&mut self, engine: &Engine<'_>) {}
     /// What a device reported when it was looked at: the reading's index in the model, SI.
     fn reading(&mut self, time: f64, reading: usize, value: f64) {}
     /// A robot begins to move: where it is from moment to moment until it stands still again.

@@ -62,12 +62,29 @@ pub struct Limits<'c> {
     pub cancel: Option<&'c AtomicBool>,
     /// The turns that claiming blocks take, in order; without one, a block takes its turn as it asks.
     pub turns: &'c [Turn],
+    /// What is looked at when.
+    pub looks: Looks<'c>,
+}
+
+/// Quantities that are looked at, at some times.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Looks<'c> {
+    /// s, ascending; those after the end of the run are left out.
+    pub times: &'c [f64],
+    /// The quantities.
+    pub nodes: &'c [NodeId],
 }
 
 impl Default for Limits<'_> {
     /// 30 days, a million steps.
     fn default() -> Self {
-        Limits { horizon: 30.0 * 86_400.0, steps_per_instant: 100_000, cancel: None, turns: &[] }
+        Limits {
+            horizon: 30.0 * 86_400.0,
+            steps_per_instant: 100_000,
+            cancel: None,
+            turns: &[],
+            looks: Looks::default(),
+        }
     }
 }
 
@@ -176,6 +193,8 @@ struct Executor<'p, 'b> {
     tasks: Vec<Task>,
     claims: Claims,
     recordings: BTreeMap<StepId, Recording<'p>>,
+    /// How many of the times have come at which something is looked at.
+    looked: usize,
     job_names: BTreeSet<&'p str>,
     steps: Vec<StepRecord>,
     now: f64,
@@ -212,6 +231,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             tasks: Vec::new(),
             claims: Claims::with_turns(limits.turns),
             recordings: BTreeMap::new(),
+            looked: 0,
             job_names: BTreeSet::new(),
             steps: vec![StepRecord::default(); plan.steps.len()],
             now,

@@ -39,6 +39,8 @@ impl Listener for Tee<'_> {
         assumed(time: f64, step: StepId, condition: &Condition);
         record(time: f64, step: StepId, name: &str, values: &[f64], unit: &Unit);
         reading(time: f64, reading: usize, value: f64);
+        looked(number: usize, values: &[f64]);
+        ended(engine: &Engine<'_>);
         note(time: f64, step: StepId, text: &str);
         ask(time: f64, step: StepId, text: &str);
     }

@@ -106,7 +106,8 @@ impl Executor<'_, '_> {
             return Err(self.run_fault(codes::ENDLESS_INSTANT, message));
         }
         let recordings = self.recordings.values().map(super::Recording::due).fold(f64::INFINITY, f64::min);
-        let until = agenda.next.min(recordings).min(self.horizon).max(self.now);
+        let look = self.limits.looks.times.get(self.looked).copied().unwrap_or(f64::INFINITY);
+        let until = agenda.next.min(recordings).min(look).min(self.horizon).max(self.now);
         let before = self.now;
         let advance = self.backend.advance(until, &agenda.watches, self.out);
         self.now = self.backend.now().max(before);

@@ -208,6 +208,11 @@ impl<'m> Engine<'m> {
         self.model.graph.eval(node, Env { states, ..self.env() })
     }
 
+    /// The value of `node` now if the values of the plan were these.
+    pub fn eval_kept(&self, node: NodeId, locals: &[f64]) -> f64 {
+        self.model.graph.eval(node, Env { locals, ..self.env() })
+    }
+
     /// Whether `node` is not 0 now.
     pub fn truth(&self, node: NodeId) -> bool {
         self.eval(node) != 0.0

@@ -115,7 +115,7 @@ pub(super) fn repeats(run: &Run<'_>, observable: usize) -> bool {
 }
 
 /// The shortest text that reads back as the same number; empty if it is none.
-pub(super) fn exact(value: f64) -> String {
+pub(crate) fn exact(value: f64) -> String {
     if value.is_nan() {
         return String::new();
     }

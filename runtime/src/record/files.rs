@@ -30,7 +30,7 @@ impl fmt::Display for RecordError {
 impl std::error::Error for RecordError {}
 
 /// Writes beside the target, then renames, so that a reader never sees half a file.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let partial = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
     let written: io::Result<()> = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));

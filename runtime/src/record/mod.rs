@@ -3,7 +3,7 @@
 //! [`Recording`] takes what the engine and the executor report; the writers read a finished [`Run`]. All output is a
 //! function of the run alone: no clock, no order of hash maps.
 
-mod column;
+pub(crate) mod column;
 mod files;
 mod history;
 mod recording;
@@ -19,7 +19,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-pub use files::RecordError;
+pub use files::{RecordError, write_whole};
 pub use recording::{
     EventMark, Expectation, Level, LogLine, Measured, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
     StepState,

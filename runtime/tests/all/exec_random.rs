@@ -240,7 +240,7 @@ impl Listener for CancelAt<'_> {
 
 fn go(lab: &Lab, fidelity: Fidelity, cancel_at: usize) -> (Outcome, CancelAt<'static>) {
     let cancel: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
-    let limits = Limits { horizon: 500.0, steps_per_instant: 5_000, cancel: Some(cancel), turns: &[] };
+    let limits = Limits { horizon: 500.0, steps_per_instant: 5_000, cancel: Some(cancel), ..Limits::default() };
     let options = RunOptions { seed: 3, fidelity, limits, ..RunOptions::default() };
     let mut listener =
         CancelAt { cancel, left: AtomicUsize::new(cancel_at), trace: Vec::new(), used: Vec::new(), overlap: false };

@@ -14,6 +14,7 @@ mod exec_flow;
 mod exec_random;
 mod exec_readings;
 mod exec_stop;
+mod fit;
 mod ledger;
 
 mod record;

@@ -356,12 +356,12 @@ fn study_line(line: &StudyLine) -> Sexp {
 fn fit_line(line: &FitLine) -> Sexp {
     match line {
         FitLine::Error(_) => leaf("error"),
-        FitLine::Data(file) => node("data").with([quoted(file)]),
+        FitLine::Data(file) => node("data").with([quoted(&file.text)]),
         FitLine::Estimate { path: of, range, log } => {
             node("estimate").with([expr(of), expr(range)]).with(flag(*log, "log"))
         }
         FitLine::Match { value, column, unit: of, noise } => node("match")
-            .with([expr(value), quoted(column)])
+            .with([expr(value), quoted(&column.text)])
             .with(of.as_ref().map(|u| node("as").with([unit(u)])))
             .with(maybe("noise", noise.as_ref())),
     }

@@ -178,14 +178,14 @@ impl Lower<'_> {
         let (rule, span) = (node.as_rule(), self.span(&node));
         let kids = &mut Kids::of(node);
         match rule {
-            Rule::fit_data => FitLine::Data(self.text_in(kids)),
+            Rule::fit_data => FitLine::Data(self.quoted_in(kids)),
             Rule::estimate => {
                 let (path, range) = self.path_and_range(kids);
                 FitLine::Estimate { path, range, log: kids.has(Rule::kw_log) }
             }
             Rule::match_ => {
                 let value = self.expr_in(kids);
-                let column = self.text_in(kids);
+                let column = self.quoted_in(kids);
                 let unit = kids.eat(Rule::as_unit).and_then(|n| Kids::of(n).eat(Rule::unit)).map(|u| self.unit(&u));
                 let noise = kids.eat(Rule::operand).map(|n| self.expr(n));
                 FitLine::Match { value, column, unit, noise }

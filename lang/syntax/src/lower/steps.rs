@@ -1,5 +1,7 @@
 //! Blocks and the steps in them.
 
+use matterix_ir::Span;
+
 use super::{
     super::{
         cursor::{Kids, Node},
@@ -220,6 +222,12 @@ impl Lower<'_> {
     /// The text that stands next.
     pub(super) fn text_in(&mut self, kids: &mut Kids) -> String {
         kids.eat(Rule::string).map_or_else(String::new, |node| self.text(&node))
+    }
+
+    /// The same with its place.
+    pub(super) fn quoted_in(&mut self, kids: &mut Kids) -> Name {
+        let Some(node) = kids.eat(Rule::string) else { return Name { text: String::new(), span: Span::default() } };
+        Name { text: self.text(&node), span: self.span(&node) }
     }
 }
 
