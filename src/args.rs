@@ -123,7 +123,7 @@ pub struct Subject {
 impl Subject {
     /// The same, as the compiler takes it.
     pub fn options(&self) -> Options {
-        Options { workflow: self.workflow.clone(), set: self.set.clone(), lab: self.lab.clone() }
+        Options { workflow: self.workflow.clone(), set: self.set.clone(), lab: self.lab.clone(), ..Options::default() }
     }
 }
 

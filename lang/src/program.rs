@@ -14,6 +14,7 @@ use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
+use crate::lower::wires::Wires;
 use crate::names::{self, DeclId, Names, near};
 use crate::points::Questions;
 use crate::task::{self, Given, Task};
@@ -27,6 +28,8 @@ pub struct Options {
     pub set: Vec<(String, String)>,
     /// Which lab, for a workflow that runs in any.
     pub lab: Option<String>,
+    /// What is asked of drivers.
+    pub wires: Wires,
 }
 
 /// A test, ready to run.
@@ -174,7 +177,7 @@ fn compile_and<T>(
         }
     };
     let task = Task { item, lab, given };
-    let built = build(&tables, sources, &task, Wanted::Program);
+    let built = build(&tables, sources, &task, Wanted::Program(options.wires));
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -210,7 +213,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let mut program = None;
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
-                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program);
+                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program(Wires::Off));
                 found.extend(built.findings);
                 program = built.program;
             }
@@ -323,7 +326,7 @@ enum Wanted {
     /// Nothing more.
     Findings,
     /// To be run.
-    Program,
+    Program(Wires),
     /// What is known at every statement.
     Contents,
     /// A program too, where robots with joints are in the lab.
@@ -365,7 +368,10 @@ fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], 
 /// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
 /// of it only where it is wanted.
 fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
-    let to_run = wanted == Wanted::Program;
+    let (to_run, wires) = match wanted {
+        Wanted::Program(wires) => (true, wires),
+        _ => (false, Wires::Off),
+    };
     let lab = task.lab;
     let mut reach = Reach::default();
     let mut draft = true;
@@ -375,6 +381,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
         planner.draft = draft;
+        planner.wires = wires;
         let plan = planner.task(task);
         elaborator.initialise();
         elaborator.close_holds();
@@ -431,7 +438,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             graph: elaborator.graph,
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
+        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers: elaborator.drivers };
         return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses };
     }
 }

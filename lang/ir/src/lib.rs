@@ -7,6 +7,7 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
+//! - [`wire`]: how devices are spoken to.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
@@ -28,6 +29,7 @@ pub mod scene;
 pub mod span;
 pub mod stock;
 pub mod text;
+pub mod wire;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};

@@ -173,7 +173,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_over
             | kw_where
             | kw_pitch
-            | kw_open
+            | kw_alive
             | kw_reply
             | kw_reading
             | kw_include
