@@ -2,7 +2,9 @@
 
 mod bill;
 mod check;
+mod deploy;
 mod doc;
+mod emulate;
 mod explain;
 mod fmt;
 mod new;
@@ -14,7 +16,9 @@ mod view;
 
 pub use bill::bill;
 pub use check::check;
+pub use deploy::deploy;
 pub use doc::doc;
+pub use emulate::emulate;
 pub use explain::explain;
 pub use fmt::fmt;
 pub use new::new;

@@ -111,8 +111,8 @@ pub struct Told {
     pub state: Option<u32>,
     /// As shown.
     pub unit: Unit,
-    /// Whether two values have no sum: a difference of two is shown without the zero of the unit.
-    pub point: bool,
+    /// The unit that a difference of two values is given in.
+    pub difference: Unit,
     /// It is what the device tells only while this is not 0.
     pub condition: Option<NodeId>,
     /// What goes out.

@@ -3,6 +3,7 @@
 // A fault ends the run: how many bytes it is returned in is of no account.
 #![allow(clippy::result_large_err)]
 
+pub mod binding;
 pub mod codec;
 pub mod deploy;
 pub mod emulate;

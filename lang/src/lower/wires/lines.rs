@@ -121,13 +121,14 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         };
         let unit = self.unit_of(member, &expects, n.node);
+        let difference = if n.point { self.lab.tables.si(&n.dimension) } else { unit.clone() };
         let (reading, state) = match self.lab.graph.op(n.node) {
             Op::Reading(r) => (Some(r), None),
             Op::State(s) => (None, Some(s)),
             _ => (None, None),
         };
         let name = format!("{}.{}", self.lab.instances[id.0 as usize].name, super::words(path));
-        Some(Told { name, value: n.node, reading, state, unit, point: n.point, condition: None, asks, expects, span })
+        Some(Told { name, value: n.node, reading, state, unit, difference, condition: None, asks, expects, span })
     }
 
     /// The unit a told quantity is shown in: its own, else that of the reply.

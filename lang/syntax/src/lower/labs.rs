@@ -218,6 +218,7 @@ impl Lower<'_> {
                 WireKind::Fixed { when: when.unwrap_or_else(|| nameless(span)), exchange: self.exchange(kids) }
             }
             Rule::wire_alive => {
+                kids.has(Rule::kw_while);
                 let (condition, every) = self.path_and_range(kids);
                 let by = self.verb_in(kids);
                 WireKind::Alive { condition, every, by, otherwise: self.verb_in(kids) }
@@ -225,7 +226,11 @@ impl Lower<'_> {
             Rule::wire_reply => WireKind::Reply { text: self.text_in(kids), fails: self.name_in(kids) },
             Rule::wire_reading => WireKind::Reading {
                 path: self.path_in(kids),
-                condition: kids.eat(Rule::wire_while).map(|n| self.expr_in(&mut Kids::of(n))),
+                condition: kids.eat(Rule::wire_while).map(|n| {
+                    let kids = &mut Kids::of(n);
+                    kids.has(Rule::kw_while);
+                    self.expr_in(kids)
+                }),
                 asks: self.said(kids, span),
                 expects: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
             },
