@@ -251,6 +251,7 @@ impl Lower<'_> {
         let until = kids.eat(Rule::wire_until).map(|node| {
             let span = self.span(&node);
             let kids = &mut Kids::of(node);
+            kids.has(Rule::kw_until);
             let (asks, expects) = (self.said(kids, span), self.answer(kids));
             Box::new(Until { asks, expects, timeout: self.expr_in(kids) })
         });

@@ -1,10 +1,11 @@
 //! The backend that talks to devices. A twin goes along: it keeps what was commanded, checks what steps need, and supposes what
 //! no device tells. Time is the clock's; in a dry run it is the twin's, and nothing is sent.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::wire::{Exchange, Pattern, Template};
 use matterix_ir::{Code, NodeId, Op, Program, Sources, Span, codes};
@@ -81,6 +82,8 @@ pub struct Hardware<'m, 't> {
     pub(super) resuming: bool,
     /// When it was cut off, s since 1970.
     pub(super) left_at: f64,
+    /// States that devices were told.
+    pub(super) commanded: BTreeSet<u32>,
     running: BTreeMap<Ticket, Running<'m>>,
     tickets: u64,
     /// What was told at this instant.
@@ -125,6 +128,7 @@ impl<'m, 't> Hardware<'m, 't> {
             replay: VecDeque::new(),
             resuming: false,
             left_at: 0.0,
+            commanded: BTreeSet::new(),
             origin: (0.0, Instant::now()),
             running: BTreeMap::new(),
             tickets: 0,
@@ -231,7 +235,7 @@ impl<'m, 't> Hardware<'m, 't> {
                 let frame = codec.ask(&text);
                 (self.trace)(time, device.name, true, &frame);
             }
-            return Ok(self.twin.engine().eval(told.value));
+            return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
         let asked = match device.link.as_mut() {
             Some(link) => {
@@ -421,16 +425,17 @@ impl<'m, 't> Hardware<'m, 't> {
     /// Whether saying it twice does what saying it once does: it only sets what does not depend on itself, at once.
     fn is_repeatable(&self, operation: &Operation, step: StepId) -> bool {
         let lasts = self.devices.iter().filter_map(|d| d.driver?.call(step)).any(|e| e.until.is_some());
-        let moves = |a: &matterix_ir::model::Action| matches!(a, matterix_ir::model::Action::Move { .. });
+        let moves = |a: &Action| matches!(a, Action::Move { .. });
         !lasts && operation.until.is_none() && !operation.at_start.iter().chain(&operation.at_end).any(moves)
     }
 
-    /// Reads back what an operation has set, where its device tells it.
-    fn read_back(&mut self, device: usize) -> Result<(), Fault> {
+    /// Reads back what an operation has set, or what has come of what it moved, where its device tells it.
+    fn read_back(&mut self, device: usize, set: &[u32], moved: bool) -> Result<(), Fault> {
         let Some(driver) = self.devices[device].driver.filter(|_| !self.is_dry()) else { return Ok(()) };
         for (line, told) in driver.told.iter().enumerate() {
             let applies = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
-            if told.reading.is_some() || !applies || !self.observed.is_settled(&self.program.model, told.value) {
+            let concerned = told.state.map_or(moved, |s| set.contains(&s));
+            if told.reading.is_some() || !applies || !concerned || !self.observed.is_settled(&self.program.model, told.value) {
                 continue;
             }
             let value = self.tell(device, line)?;
@@ -527,8 +532,19 @@ impl Backend for Hardware<'_, '_> {
         let deadline = self.twin.now() + until.map_or(0.0, |u| self.twin.engine().eval(u.timeout));
         let ready = until.is_none() || self.is_dry();
         let changed = exchange.is_some();
+        let set: Vec<u32> = operation
+            .at_start
+            .iter()
+            .filter_map(|a| match a {
+                Action::Assign { state, .. } => Some(*state),
+                Action::Move { .. } => None,
+            })
+            .collect();
         if changed && failed.is_none() && ready && self.replay.is_empty() {
-            self.read_back(device)?;
+            self.read_back(device, &set, false)?;
+        }
+        if changed {
+            self.commanded.extend(set);
         }
         let running = Running { device, twin, exchange, deadline, ready, failed, changed };
         self.running.insert(ticket, running);
@@ -598,7 +614,7 @@ impl Backend for Hardware<'_, '_> {
                 if running.is_some_and(|r| r.changed && r.exchange.is_some_and(|e| e.until.is_some()))
                     && self.replay.is_empty()
                 {
-                    self.read_back(device)?;
+                    self.read_back(device, &[], true)?;
                 }
                 Ok(ended)
             }

@@ -119,6 +119,9 @@ impl Hardware<'_, '_> {
                     continue;
                 }
                 let value = self.tell(device, line)?;
+                if told.state.is_some_and(|s| !self.commanded.contains(&s)) {
+                    continue;
+                }
                 if told.reading.is_none() && self.observed.is_settled(&self.program.model, told.value) && !self.is_busy(device) {
                     self.settled(device, line, value)?;
                 } else {

@@ -199,8 +199,10 @@ impl<'m> Emulator<'m> {
             return Ok(None);
         }
         if complete.is_empty() {
-            // The first part of something, or part of what cannot be told apart yet.
-            return Ok(Some(None));
+            // The first part of something.
+            let part = driver.served.iter().find(|s| s.exchange.sends.iter().any(|t| template::found(t, word).is_some()));
+            let expects = part.and_then(|s| s.exchange.expects.as_ref());
+            return Ok(Some(expects.map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned())))));
         }
         let mut why = NOT_UNDERSTOOD;
         for (served, all) in complete {
