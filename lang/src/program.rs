@@ -438,7 +438,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             graph: elaborator.graph,
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers: elaborator.drivers };
+        let program =
+            Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers: elaborator.drivers };
         return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses };
     }
 }

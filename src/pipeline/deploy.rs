@@ -74,7 +74,10 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let shows = plan.trace || plan.mode == Mode::Dry;
     let trace = move |time: f64, device: &str, out: bool, bytes: &[u8]| {
         if shows {
-            print(Stream::Out, &format!("{time:10.3} s  {device} {} {}\n", if out { "<-" } else { "->" }, shown(bytes)));
+            print(
+                Stream::Out,
+                &format!("{time:10.3} s  {device} {} {}\n", if out { "<-" } else { "->" }, shown(bytes)),
+            );
         }
     };
     let settings = Settings { mode: plan.mode, speed: plan.speed, cancel: plan.cancel, person: plan.person };
@@ -110,11 +113,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let status = if well { "ended" } else { "failed" };
     found.extend(hardware.end_journal(status).err().map(of_fault));
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
-    let counts = [
-        execution.expectations.len(),
-        count(&[Verdict::Passed]),
-        count(&[Verdict::NotObserved]),
-    ];
+    let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| d.severity != Severity::Error);
     Ok(Deployed { diagnostics: found, passed, end: Some(execution.end_time), counts })
 }

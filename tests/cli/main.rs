@@ -3,6 +3,7 @@
 mod beforehand;
 mod bill;
 mod contents;
+mod deploy;
 mod determinism;
 mod devices;
 mod doc;

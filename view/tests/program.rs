@@ -93,7 +93,10 @@ fn program() -> (Program, Sources) {
     };
     let scene = Scene { lab: "l".into(), instances };
     let files = vec!["lab.mtx".into()];
-    (Program { version: PROGRAM_VERSION, files, scene, model, plan, stock: Default::default(), drivers: Vec::new() }, sources)
+    (
+        Program { version: PROGRAM_VERSION, files, scene, model, plan, stock: Default::default(), drivers: Vec::new() },
+        sources,
+    )
 }
 
 #[test]

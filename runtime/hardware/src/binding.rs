@@ -51,13 +51,19 @@ impl Reader<'_> {
         let key = name.get_ref().as_ref();
         let Some(instance) = self.program.scene.find(key) else {
             let lab = &self.program.scene.lab;
-            let top = self.program.scene.instances.iter().filter(|i| i.owner.is_none()).map(|i| format!("`{}`", i.name));
+            let top =
+                self.program.scene.instances.iter().filter(|i| i.owner.is_none()).map(|i| format!("`{}`", i.name));
             let help = format!("it has {}", top.take(12).collect::<Vec<_>>().join(", "));
             self.wrong(name.span(), &format!("the lab `{lab}` has no `{key}`"), "no such device", Some(help));
             return None;
         };
         let DeValue::Table(table) = value.get_ref() else {
-            self.wrong(value.span(), &format!("`{key}` is bound with a table"), "no table", Some(format!("write `[{key}]`, then a key a line")));
+            self.wrong(
+                value.span(),
+                &format!("`{key}` is bound with a table"),
+                "no table",
+                Some(format!("write `[{key}]`, then a key a line")),
+            );
             return None;
         };
         for (k, _) in table.iter().filter(|(k, _)| !KEYS.contains(&k.get_ref().as_ref())) {
@@ -70,7 +76,12 @@ impl Reader<'_> {
             match value.get_ref() {
                 DeValue::String(text) => Some((text.to_string(), value.span())),
                 _ => {
-                    this.wrong(value.span(), &format!("`{wanted}` is a text"), "no text", Some("write it in quotes".into()));
+                    this.wrong(
+                        value.span(),
+                        &format!("`{wanted}` is a text"),
+                        "no text",
+                        Some("write it in quotes".into()),
+                    );
                     None
                 }
             }
@@ -79,10 +90,20 @@ impl Reader<'_> {
         let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
         if let Some((by, at)) = &by {
             if by != HAND {
-                self.wrong(at.clone(), "only a person's hands need no line", "not understood", Some("write `by = \"hand\"`".into()));
+                self.wrong(
+                    at.clone(),
+                    "only a person's hands need no line",
+                    "not understood",
+                    Some("write `by = \"hand\"`".into()),
+                );
             }
             if port.is_some() || address.is_some() || driver.is_some() {
-                self.wrong(at.clone(), &format!("`{key}` is done by hand and bound to a line"), "one or the other", None);
+                self.wrong(
+                    at.clone(),
+                    &format!("`{key}` is done by hand and bound to a line"),
+                    "one or the other",
+                    None,
+                );
             }
             let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
             return (self.found.len() == before).then_some(binding);
@@ -132,7 +153,8 @@ impl Reader<'_> {
             }
             (None, [(only, _)]) => Some(*only),
             (None, []) => {
-                let help = "declare one: `driver NAME for ASSET over serial(...) { }`, or let a person do it: `by = \"hand\"`";
+                let help =
+                    "declare one: `driver NAME for ASSET over serial(...) { }`, or let a person do it: `by = \"hand\"`";
                 self.wrong(at, &format!("no driver says how `{key}` is spoken to"), "no driver", Some(help.into()));
                 None
             }
@@ -160,7 +182,12 @@ impl Reader<'_> {
                 let names: Vec<String> =
                     program.drivers[driver].told.iter().map(|t| format!("`{}`", &t.name[key.len() + 1..])).collect();
                 let help = format!("it tells {}", names.join(", "));
-                self.wrong(member.span(), &format!("`{key}` does not tell `{}`", member.get_ref()), "not told", Some(help));
+                self.wrong(
+                    member.span(),
+                    &format!("`{key}` does not tell `{}`", member.get_ref()),
+                    "not told",
+                    Some(help),
+                );
                 continue;
             };
             let unit = &told.difference;

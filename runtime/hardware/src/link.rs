@@ -53,7 +53,8 @@ impl Link {
     /// A line in use by a driver.
     pub fn new(port: Box<dyn Port>, driver: &Driver, address: Option<&str>) -> Result<Self, String> {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
-        let timeout = Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
+        let timeout =
+            Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
         Ok(Link { port, codec, timeout, buffer: Vec::new() })
     }
 

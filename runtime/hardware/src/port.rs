@@ -121,7 +121,9 @@ fn some(mut read: impl FnMut(&mut [u8]) -> io::Result<usize>) -> io::Result<Vec<
     match read(&mut buffer) {
         Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the line was closed")),
         Ok(n) => Ok(buffer[..n].to_vec()),
-        Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(Vec::new()),
+        Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+            Ok(Vec::new())
+        }
         Err(e) => Err(e),
     }
 }

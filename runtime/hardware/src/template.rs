@@ -61,7 +61,8 @@ pub fn found(template: &Template, message: &str) -> Option<Vec<Found>> {
         match piece {
             Piece::Plain(text) => rest = rest.strip_prefix(text.as_str())?,
             Piece::Number { value, unit, .. } => {
-                let end = rest.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | '-' | '+')).unwrap_or(rest.len());
+                let end =
+                    rest.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | '-' | '+')).unwrap_or(rest.len());
                 let number: f64 = rest[..end].parse().ok().filter(|n: &f64| n.is_finite())?;
                 let digits = rest[..end].split_once('.').map_or(0, |(_, d)| d.len());
                 let precision = 0.5 * 10f64.powi(-(digits.min(15) as i32)) * unit.factor.abs();

@@ -9,12 +9,7 @@ use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 
 impl<'a> Planner<'a, '_> {
-    pub(super) fn exchange(
-        &mut self,
-        of: &'a ast::Exchange,
-        span: Span,
-        scope: &mut Scope,
-    ) -> Option<Exchange> {
+    pub(super) fn exchange(&mut self, of: &'a ast::Exchange, span: Span, scope: &mut Scope) -> Option<Exchange> {
         let mut sends = Vec::with_capacity(of.sends.len());
         for text in &of.sends {
             sends.push(self.template(text, scope)?);
@@ -106,7 +101,8 @@ impl<'a> Planner<'a, '_> {
         };
         let [dimension] = dimensions.as_slice() else {
             let headline = format!("the reply must say once what `{}` is", name.text);
-            let d = Diagnostic::error(codes::DRIVER_LINE, expects.span, headline, format!("{} values", dimensions.len()));
+            let d =
+                Diagnostic::error(codes::DRIVER_LINE, expects.span, headline, format!("{} values", dimensions.len()));
             self.lab.report(d.help("write the unit in braces where the number stands, as in `\"{degC} 2\"`"));
             return None;
         };

@@ -98,7 +98,9 @@ impl<'a> Planner<'a, '_> {
                 return None;
             }
             let is_it = match self_of(sig) {
-                Some(at) => matches!(bound.values.get(at)?.1, Value::Instance(i) | Value::Qualified(i, _) if i == instance),
+                Some(at) => {
+                    matches!(bound.values.get(at)?.1, Value::Instance(i) | Value::Qualified(i, _) if i == instance)
+                }
                 None => device == Some(instance),
             };
             is_it.then_some(((exchange, w.span), sig))
@@ -194,7 +196,8 @@ impl<'a> Planner<'a, '_> {
             return found;
         }
         let commands = self.lab.tables.commands(&verb).to_vec();
-        let own: Vec<MemberRef<'a>> = commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner)).collect();
+        let own: Vec<MemberRef<'a>> =
+            commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner)).collect();
         let found = own.iter().find(|m| command_sig(m).is_some_and(|of| same_form(sig, of)));
         if found.is_none() {
             let forms: Vec<String> = own.iter().filter_map(|m| command_sig(m)).map(|of| self.form(of)).collect();

@@ -68,7 +68,9 @@ impl<'a> Planner<'a, '_> {
         for (values, arguments) in arrangements {
             let mut scope = Scope::of(instance, module);
             bind(line, &values, &mut scope);
-            let Some(operation) = self.operation_of(mapped, sig, clauses, Bound { values }, instance, of) else { continue };
+            let Some(operation) = self.operation_of(mapped, sig, clauses, Bound { values }, instance, of) else {
+                continue;
+            };
             // What can never begin in this lab is not served.
             if !self.lab.prototype && operation.needs.iter().any(|n| self.lab.graph.constant(n.node) == Some(0.0)) {
                 continue;
@@ -176,7 +178,9 @@ impl<'a> Planner<'a, '_> {
             .decls
             .iter()
             .find_map(|d| match &d.item.kind {
-                ItemKind::Driver { wires, .. } if d.item.span.file == at.file && (d.item.span.start..d.item.span.end).contains(&at.start) => {
+                ItemKind::Driver { wires, .. }
+                    if d.item.span.file == at.file && (d.item.span.start..d.item.span.end).contains(&at.start) =>
+                {
                     Some(wires.as_slice())
                 }
                 _ => None,
@@ -184,4 +188,3 @@ impl<'a> Planner<'a, '_> {
             .unwrap_or_default()
     }
 }
-

@@ -33,13 +33,23 @@ impl<'a> Planner<'a, '_> {
         };
         for (i, arg) in args.iter().enumerate() {
             let Some(word) = &arg.name else {
-                self.wrong(arg.value.span, "what a line has is named", "which one?", &format!("one of {}", list(known)));
+                self.wrong(
+                    arg.value.span,
+                    "what a line has is named",
+                    "which one?",
+                    &format!("one of {}", list(known)),
+                );
                 return None;
             };
             let again = args[..i].iter().any(|a| a.name.as_ref().is_some_and(|n| n.text == word.text));
             if again || !known.contains(&word.text.as_str()) {
                 let what = if again { "is given twice" } else { "is nothing that this line has" };
-                self.wrong(word.span, &format!("`{}` {what}", word.text), "not expected", &format!("it has {}", list(known)));
+                self.wrong(
+                    word.span,
+                    &format!("`{}` {what}", word.text),
+                    "not expected",
+                    &format!("it has {}", list(known)),
+                );
                 return None;
             }
         }

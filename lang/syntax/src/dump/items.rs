@@ -7,9 +7,9 @@ use super::{
     steps::{block, filled, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Exchange, Expr, Field, FieldValue, FitLine, Goal,
-    Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind, Name, Pattern, Process,
-    Role, StudyLine, Term, Wire, WireKind,
+    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Exchange, Expr, Field, FieldValue,
+    FitLine, Goal, Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind,
+    Name, Pattern, Process, Role, StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {

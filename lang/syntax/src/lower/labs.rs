@@ -10,8 +10,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Exchange, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, Pattern, StudyLine,
-    Text, Until, Wire, WireKind,
+    AssetLiteral, Exchange, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, Pattern,
+    StudyLine, Text, Until, Wire, WireKind,
 };
 
 impl Lower<'_> {

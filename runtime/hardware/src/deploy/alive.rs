@@ -11,7 +11,9 @@ impl Hardware<'_, '_> {
     /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.
     pub(super) fn beat(&mut self, over: bool, out: &mut dyn Listener) -> Result<(), Fault> {
         for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else { continue };
+            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else {
+                continue;
+            };
             for (index, alive) in driver.alive.iter().enumerate() {
                 let now = self.twin.now();
                 let holds = self.twin.engine().eval(alive.condition) != 0.0;
@@ -40,7 +42,9 @@ impl Hardware<'_, '_> {
     pub(super) fn next_beat(&mut self) -> f64 {
         let mut next = f64::INFINITY;
         for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else { continue };
+            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else {
+                continue;
+            };
             for (index, alive) in driver.alive.iter().enumerate() {
                 if let Some(last) = self.devices[device].beats[index] {
                     next = next.min(last + self.twin.engine().eval(alive.every));

@@ -245,7 +245,10 @@ impl<'m, 't> Hardware<'m, 't> {
             None => Err(Trouble::Lost("its line is not open".to_owned())),
         };
         let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
-        numbers.first().copied().ok_or_else(|| self.fault(codes::DEVICE_GARBLED, told.span, "no number was told".into()))
+        numbers
+            .first()
+            .copied()
+            .ok_or_else(|| self.fault(codes::DEVICE_GARBLED, told.span, "no number was told".into()))
     }
 
     /// What is told of a node now, asked once an instant.
@@ -264,7 +267,8 @@ impl<'m, 't> Hardware<'m, 't> {
             }
             Some(other) => return Err(self.mismatch(&format!("`{name}` is asked for"), &other)),
             None => {
-                let value = self.tell(device, line)?;
+                self.go_live(out)?;
+                let (now, value) = (self.twin.now(), self.tell(device, line)?);
                 self.journal.note(&Entry::Told { t: now, name: name.clone(), value });
                 self.compared(device, line, value)?;
                 value
@@ -313,7 +317,12 @@ impl<'m, 't> Hardware<'m, 't> {
     pub(super) fn next_entry(&mut self) -> Option<Entry> {
         while let Some(entry) = self.replay.front() {
             match entry {
-                Entry::Out { .. } | Entry::Back { .. } | Entry::Begin { .. } | Entry::Resumed { .. } | Entry::End { .. } => {
+                Entry::Resumed { t, .. } => {
+                    let t = *t;
+                    while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
+                    self.replay.pop_front();
+                }
+                Entry::Out { .. } | Entry::Back { .. } | Entry::Begin { .. } | Entry::End { .. } => {
                     self.replay.pop_front();
                 }
                 other => return Some(other.clone()),
@@ -382,7 +391,12 @@ impl<'m, 't> Hardware<'m, 't> {
     }
 
     /// What an operation's device did, as the earlier process has it.
-    fn replayed_start(&mut self, ticket: u64, step: StepId, label: &str) -> Result<Option<Option<(String, String)>>, Fault> {
+    fn replayed_start(
+        &mut self,
+        ticket: u64,
+        step: StepId,
+        label: &str,
+    ) -> Result<Option<Option<(String, String)>>, Fault> {
         let Some(entry) = self.next_entry() else { return Ok(None) };
         let Entry::Starting { ticket: before, step: at, sends, device, .. } = &entry else {
             return Err(self.mismatch(&format!("`{label}` begins"), &entry));
@@ -435,7 +449,11 @@ impl<'m, 't> Hardware<'m, 't> {
         for (line, told) in driver.told.iter().enumerate() {
             let applies = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
             let concerned = told.state.map_or(moved, |s| set.contains(&s));
-            if told.reading.is_some() || !applies || !concerned || !self.observed.is_settled(&self.program.model, told.value) {
+            if told.reading.is_some()
+                || !applies
+                || !concerned
+                || !self.observed.is_settled(&self.program.model, told.value)
+            {
                 continue;
             }
             let value = self.tell(device, line)?;
@@ -490,7 +508,8 @@ impl Backend for Hardware<'_, '_> {
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         let step = self.steps.get(&address(operation)).copied();
-        let step = step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;
+        let step =
+            step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;
         let program = self.program;
         let label = &program.plan.get(step).label;
         let found = carrier(step, operation, &self.devices);
@@ -560,7 +579,8 @@ impl Backend for Hardware<'_, '_> {
             self.twin.halt(twin);
             return Ok(Status::Failed { name, text });
         }
-        if let (false, Some(exchange), Some(until)) = (running.ready, exchange, exchange.and_then(|e| e.until.as_ref())) {
+        if let (false, Some(exchange), Some(until)) = (running.ready, exchange, exchange.and_then(|e| e.until.as_ref()))
+        {
             let deadline = running.deadline;
             match self.next_entry() {
                 Some(Entry::Ended { ticket: before, failed, .. }) if before == ticket.0 => {
@@ -578,7 +598,8 @@ impl Backend for Hardware<'_, '_> {
                     let asked = {
                         let d = &mut self.devices[device];
                         let name = d.name;
-                        let mut ear = Ear { time: now, device: name, journal: &mut self.journal, trace: &mut *self.trace };
+                        let mut ear =
+                            Ear { time: now, device: name, journal: &mut self.journal, trace: &mut *self.trace };
                         match (d.link.as_mut(), d.driver) {
                             (Some(link), Some(driver)) => link.is_ready(&text, until, driver, &mut ear),
                             _ => Err(Trouble::Lost("its line is not open".to_owned())),

@@ -161,7 +161,8 @@ impl Journal {
     pub fn note(&mut self, entry: &Entry) {
         let Some(file) = self.file.as_mut().filter(|_| self.broken.is_none()) else { return };
         let line = serde_json::to_string(entry).map(|line| line + "\n");
-        let written = line.map_err(|e| e.to_string()).and_then(|l| file.write_all(l.as_bytes()).map_err(|e| e.to_string()));
+        let written =
+            line.map_err(|e| e.to_string()).and_then(|l| file.write_all(l.as_bytes()).map_err(|e| e.to_string()));
         self.broken = written.err();
     }
 

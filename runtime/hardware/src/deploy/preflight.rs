@@ -23,9 +23,9 @@ pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed)
             Step::If { condition, .. } | Step::RepeatWhile { condition, .. } => {
                 found.extend(unobserved(program, observed, condition.node, condition.span, &condition.text));
             }
-            Step::During { invariants, .. } => found.extend(
-                invariants.iter().filter_map(|c| unobserved(program, observed, c.node, c.span, &c.text)),
-            ),
+            Step::During { invariants, .. } => {
+                found.extend(invariants.iter().filter_map(|c| unobserved(program, observed, c.node, c.span, &c.text)))
+            }
             Step::Let { value, .. } => found.extend(unobserved(program, observed, *value, node.span, &node.label)),
             _ => {}
         }
@@ -66,7 +66,10 @@ fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, d
     let bound = devices.iter().find(|d| Some(d.binding.instance) == operation.device);
     let headline = match (name, bound.and_then(|d| d.driver)) {
         (Some(name), Some(driver)) => {
-            format!("`{label}` cannot be told to `{name}`: the driver `{}` has no line for `{}`", driver.name, operation.verb)
+            format!(
+                "`{label}` cannot be told to `{name}`: the driver `{}` has no line for `{}`",
+                driver.name, operation.verb
+            )
         }
         (Some(name), None) => format!("nothing carries out `{label}`: `{name}` is bound to no line"),
         (None, _) => format!("nothing carries out `{label}`"),

@@ -110,7 +110,6 @@ impl Hardware<'_, '_> {
         self.open(true)?;
         let (t, wall) = (self.twin.now(), wall());
         self.keep(&Entry::Resumed { t, wall })?;
-        self.keep(&Entry::Time { t, fired: Vec::new(), wall })?;
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
             for (line, told) in driver.told.iter().enumerate() {
@@ -122,7 +121,10 @@ impl Hardware<'_, '_> {
                 if told.state.is_some_and(|s| !self.commanded.contains(&s)) {
                     continue;
                 }
-                if told.reading.is_none() && self.observed.is_settled(&self.program.model, told.value) && !self.is_busy(device) {
+                if told.reading.is_none()
+                    && self.observed.is_settled(&self.program.model, told.value)
+                    && !self.is_busy(device)
+                {
                     self.settled(device, line, value)?;
                 } else {
                     self.held_against(device, line, value)?;
@@ -210,7 +212,9 @@ impl Hardware<'_, '_> {
     pub fn close(&mut self) -> Result<(), Fault> {
         let mut first = Ok(());
         for index in 0..self.devices.len() {
-            let Some(driver) = self.devices[index].driver.filter(|_| self.devices[index].lost.is_none()) else { continue };
+            let Some(driver) = self.devices[index].driver.filter(|_| self.devices[index].lost.is_none()) else {
+                continue;
+            };
             for exchange in &driver.close {
                 let texts = self.texts(&exchange.sends);
                 let said = self.say(index, &texts, exchange.expects.as_ref(), exchange.span);

@@ -59,10 +59,11 @@ impl<'m> Emulator<'m> {
             if now >= until {
                 return Ok(());
             }
-            let ends = self.running.clone().into_iter().filter_map(|(ticket, _)| match self.sim.poll(ticket, &mut ()) {
-                Ok(Status::Running { until, watch }) => Some((until, watch)),
-                _ => None,
-            });
+            let ends =
+                self.running.clone().into_iter().filter_map(|(ticket, _)| match self.sim.poll(ticket, &mut ()) {
+                    Ok(Status::Running { until, watch }) => Some((until, watch)),
+                    _ => None,
+                });
             let (mut next, mut watches) = (until, Vec::new());
             for (end, watch) in ends.collect::<Vec<_>>() {
                 next = end.unwrap_or(f64::INFINITY).clamp(now, next);
@@ -200,7 +201,8 @@ impl<'m> Emulator<'m> {
         }
         if complete.is_empty() {
             // The first part of something.
-            let part = driver.served.iter().find(|s| s.exchange.sends.iter().any(|t| template::found(t, word).is_some()));
+            let part =
+                driver.served.iter().find(|s| s.exchange.sends.iter().any(|t| template::found(t, word).is_some()));
             let expects = part.and_then(|s| s.exchange.expects.as_ref());
             return Ok(Some(expects.map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned())))));
         }
@@ -247,7 +249,8 @@ impl<'m> Emulator<'m> {
             .collect();
         let mut texts = BTreeMap::new();
         for unit in numbers {
-            let told = driver.told.iter().find(|t| t.expects.slots.contains(&matterix_ir::wire::Slot::Number(unit.clone())));
+            let told =
+                driver.told.iter().find(|t| t.expects.slots.contains(&matterix_ir::wire::Slot::Number(unit.clone())));
             let text = match (found.first(), told) {
                 (Some(sent), _) => number(unit, sent.value, None),
                 (None, Some(told)) => {

@@ -137,7 +137,9 @@ pub fn serve_tcp(
             let came = match stream.read(&mut buffer) {
                 Ok(0) => break,
                 Ok(n) => &buffer[..n],
-                Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => &[],
+                Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                    &[]
+                }
                 Err(_) => break,
             };
             let out = turn(emulator, &clock, came)?;
