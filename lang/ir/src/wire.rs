@@ -183,6 +183,8 @@ pub struct Driver {
     pub alive: Vec<Alive>,
     /// What it tells.
     pub told: Vec<Told>,
+    /// What else an emulator answers.
+    pub answers: Vec<(Pattern, Template)>,
     /// Replies that mean failures.
     pub refusals: Vec<Refusal>,
     /// The operations of the plan that it knows.

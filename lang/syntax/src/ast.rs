@@ -886,6 +886,13 @@ pub enum WireKind {
         /// The failure it means.
         fails: Name,
     },
+    /// `answers "I4" with "I4 A \"1\""`: what else an emulator answers.
+    Answers {
+        /// What comes in.
+        asked: Pattern,
+        /// What goes out.
+        with: Text,
+    },
     /// `open sends "1@1"`.
     Fixed {
         /// `open`, `close`, `halt` or `safe`.

@@ -174,6 +174,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_where
             | kw_pitch
             | kw_alive
+            | kw_answers
             | kw_reply
             | kw_reading
             | kw_include

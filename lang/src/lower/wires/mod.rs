@@ -126,6 +126,7 @@ impl<'a> Planner<'a, '_> {
             safe: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),
+            answers: Vec::new(),
             refusals: Vec::new(),
             calls: Vec::new(),
             served: Vec::new(),
@@ -156,6 +157,10 @@ impl<'a> Planner<'a, '_> {
                 if let Some((reply, _)) = self.pattern(&pattern) {
                     driver.refusals.push(wire::Refusal { reply, failure: fails.text.clone() });
                 }
+            }
+            WireKind::Answers { asked, with } => {
+                let (asked, with) = (self.pattern(asked), self.template(with, &mut scope));
+                driver.answers.extend(asked.zip(with).map(|((asked, _), with)| (asked, with)));
             }
             WireKind::Reading { path, condition, asks, expects } => {
                 let told = self.told(path, asks, expects, w.span, &mut scope);

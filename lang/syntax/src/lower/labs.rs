@@ -224,6 +224,10 @@ impl Lower<'_> {
                 WireKind::Alive { condition, every, by, otherwise: self.verb_in(kids) }
             }
             Rule::wire_reply => WireKind::Reply { text: self.text_in(kids), fails: self.name_in(kids) },
+            Rule::wire_answers => WireKind::Answers {
+                asked: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
+                with: self.said(kids, span),
+            },
             Rule::wire_reading => WireKind::Reading {
                 path: self.path_in(kids),
                 condition: kids.eat(Rule::wire_while).map(|n| {

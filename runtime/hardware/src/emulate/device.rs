@@ -136,6 +136,11 @@ impl<'m> Emulator<'m> {
                 return Ok(Some(Reply::of(text)));
             }
         }
+        if let Some((_, with)) = driver.answers.iter().find(|(asked, _)| pattern::matched(asked, word).is_some()) {
+            let engine = self.sim.engine();
+            let text = template::filled(with, |n| Some(engine.eval(n)));
+            return Ok(text.filter(|t| !t.is_empty()).map(Reply::of));
+        }
         if let Some(reply) = self.command(word)? {
             return Ok(reply);
         }
