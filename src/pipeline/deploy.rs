@@ -1,6 +1,6 @@
 //! A program on devices: bindings, checks before anything moves, execution, what is left safe.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
@@ -102,11 +102,11 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
         return Ok(Deployed::not_begun(found));
     }
     let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
-    let mut told = Told { person: plan.person };
+    let mut told = Told { person: plan.person, cancel: plan.cancel };
     let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
     let mut found = findings(&execution, sources);
-    if !well && execution.failure.as_ref().is_none_or(|f| f.code != codes::JOURNAL_MISMATCH) {
+    if !well {
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
@@ -157,6 +157,7 @@ fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
 /// Says what is noted, and asks what is asked.
 struct Told<'p> {
     person: &'p dyn Fn(&str) -> bool,
+    cancel: &'p AtomicBool,
 }
 
 impl Observer for Told<'_> {
@@ -171,6 +172,9 @@ impl Listener for Told<'_> {
     }
 
     fn ask(&mut self, _: f64, _: matterix_ir::plan::StepId, text: &str) {
-        (self.person)(text);
+        // Who does not agree wants it to end.
+        if !(self.person)(text) {
+            self.cancel.store(true, Ordering::Relaxed);
+        }
     }
 }

@@ -135,7 +135,7 @@ pub struct Refusal {
 /// A command of a device for which an emulator or a repetition needs no plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Served {
-    /// Its arguments: the local of the plan that stands for each, and a value that is good for it.
+    /// Its arguments: the name of each and the local of the plan that stands for it.
     pub arguments: Vec<(String, u32)>,
     /// What it does in the model.
     pub operation: Operation,

@@ -112,11 +112,6 @@ impl Link {
         })
     }
 
-    /// What a text looks like on the line, for a dry run. Frames are numbered as if they were sent.
-    pub fn frames(codec: &mut Codec, texts: &[String]) -> Vec<Vec<u8>> {
-        codec.say(texts)
-    }
-
     fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
         // What is still there answers nothing that will be asked.
         loop {

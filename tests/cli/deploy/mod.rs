@@ -42,8 +42,13 @@ pub struct Emulated {
 
 impl Emulated {
     pub fn start(dir: &Path, args: &[&str]) -> Emulated {
+        Emulated::at(SPEED, dir, args)
+    }
+
+    /// With a speed of its own.
+    pub fn at(speed: &str, dir: &Path, args: &[&str]) -> Emulated {
         let mut child = command();
-        child.current_dir(dir).arg("emulate").args(args).args(["--tcp", "0", "--speed", SPEED]);
+        child.current_dir(dir).arg("emulate").args(args).args(["--tcp", "0", "--speed", speed]);
         let mut child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the emulator starts");
         let mut address = String::new();
         BufReader::new(child.stdout.take().expect("piped")).read_line(&mut address).expect("an address");
@@ -132,6 +137,11 @@ pub fn bench(name: &str, text: &str, device: &str, address: &str) -> PathBuf {
 
 /// Deploys it on devices.
 pub fn deploy(dir: &Path, more: &[&str]) -> Ended {
-    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--journal", "journal", "--speed", SPEED];
+    deploy_at(SPEED, dir, more)
+}
+
+/// With a speed of its own.
+pub fn deploy_at(speed: &str, dir: &Path, more: &[&str]) -> Ended {
+    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--journal", "journal", "--speed", speed];
     matterixc_in(dir, &[&given, more].concat())
 }

@@ -3,7 +3,7 @@
 use std::process::Stdio;
 use std::time::Duration;
 
-use super::{Emulated, HEAT, SPEED, bench, deploy};
+use super::{Emulated, HEAT, bench, deploy, deploy_at};
 use crate::harness::{command, folder, matterixc_in, write};
 
 #[test]
@@ -111,14 +111,17 @@ fn a_simulation_that_does_not_pass_sends_nothing() {
     assert!(!dir.join("journal").exists());
 }
 
+/// A plate must hear something every 15 s of lab time: slow enough for a process to end and another to begin.
+const SLOW: &str = "4";
+
 #[test]
 fn a_deployment_that_was_killed_goes_on_from_its_journal() {
     let dir = bench("resume", HEAT, "plate", "");
-    let emulated = Emulated::start(&dir, &["plate", "--file", "lab.mtx"]);
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
     write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
     let mut killed = command();
     killed.current_dir(&dir).args(["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real"]);
-    killed.args(["--journal", "journal", "--speed", SPEED]).stdout(Stdio::null()).stderr(Stdio::null());
+    killed.args(["--journal", "journal", "--speed", SLOW]).stdout(Stdio::null()).stderr(Stdio::null());
     let mut killed = killed.spawn().expect("the command starts");
     for _ in 0..2000 {
         let journal = std::fs::read_to_string(dir.join("journal")).unwrap_or_default();
@@ -130,13 +133,13 @@ fn a_deployment_that_was_killed_goes_on_from_its_journal() {
     killed.kill().expect("it can be killed");
     killed.wait().expect("it ends");
     let before = std::fs::read_to_string(dir.join("journal")).expect("a journal");
-    let ended = deploy(&dir, &["--mode", "real", "--resume"]);
+    let ended = deploy_at(SLOW, &dir, &["--mode", "real", "--resume"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
     let after = std::fs::read_to_string(dir.join("journal")).expect("a journal");
     assert!(after.starts_with(&before[..before.rfind('\n').map_or(0, |n| n + 1)]), "nothing is rewritten");
     assert_eq!(after.matches("START_1\\\\r").count(), 1, "told once: {after}");
     // What has come to its end is not gone on with.
-    let again = deploy(&dir, &["--mode", "real", "--resume"]);
+    let again = deploy_at(SLOW, &dir, &["--mode", "real", "--resume"]);
     assert_eq!(again.code, 1);
     assert!(again.err.contains("journal-mismatch") && again.err.contains("come to its end"), "{}", again.err);
 }

@@ -152,9 +152,14 @@ impl<'m, 't> Hardware<'m, 't> {
         &mut self.journal
     }
 
-    /// Whether an operation goes on that its device has not ended.
+    /// Whether an operation of a device goes on, on it or in the twin.
     pub(super) fn is_busy(&self, device: usize) -> bool {
-        self.running.values().any(|r| r.device == device && !r.ready)
+        self.running.values().any(|r| r.device == device)
+    }
+
+    /// Whether what an earlier process wrote has been gone through, and devices have been asked since.
+    fn is_live(&self) -> bool {
+        self.replay.is_empty() && !self.resuming
     }
 
     pub(super) fn is_dry(&self) -> bool {
@@ -335,7 +340,7 @@ impl<'m, 't> Hardware<'m, 't> {
         let before = serde_json::to_string(before).unwrap_or_default();
         let message = format!("the journal does not fit the plan: {now}, but it says `{before}`");
         let mut fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), message);
-        fault.help.push("nothing was sent; begin anew, with a journal of its own".to_owned());
+        fault.help.push("begin anew, with a journal of its own".to_owned());
         fault
     }
 
@@ -559,7 +564,7 @@ impl Backend for Hardware<'_, '_> {
                 Action::Move { .. } => None,
             })
             .collect();
-        if changed && failed.is_none() && ready && self.replay.is_empty() {
+        if changed && failed.is_none() && ready && self.is_live() {
             self.read_back(device, &set, false)?;
         }
         if changed {
@@ -632,8 +637,7 @@ impl Backend for Hardware<'_, '_> {
             Status::Running { until, watch } => Ok(Status::Running { until, watch }),
             ended => {
                 let running = self.running.remove(&ticket);
-                if running.is_some_and(|r| r.changed && r.exchange.is_some_and(|e| e.until.is_some()))
-                    && self.replay.is_empty()
+                if running.is_some_and(|r| r.changed && r.exchange.is_some_and(|e| e.until.is_some())) && self.is_live()
                 {
                     self.read_back(device, &[], true)?;
                 }
@@ -646,7 +650,7 @@ impl Backend for Hardware<'_, '_> {
         let Some(running) = self.running.remove(&ticket) else { return };
         self.twin.halt(running.twin);
         let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
-        if running.ready || !self.replay.is_empty() {
+        if running.ready || !self.is_live() {
             return;
         }
         for exchange in &driver.halt {

@@ -143,8 +143,7 @@ impl Hardware<'_, '_> {
             _ => None,
         });
         let Some(unit) = unit else { return Ok(()) };
-        // As many digits as the number that came, at most one less than it was sent with.
-        let step = if unit.symbol.is_empty() || (unit.of_si(value)).fract() == 0.0 { 1.0 } else { 0.1 };
+        let step = 10f64.powi(-i32::from(self.digits_sent(device, unit)));
         if (unit.of_si(value) - unit.of_si(wanted)).abs() <= ROUNDING * step {
             return Ok(());
         }
@@ -152,6 +151,17 @@ impl Hardware<'_, '_> {
         let message = format!("`{name}` is {is} on the device, not {was} as it was told");
         let span = told.span;
         Err(self.fault(codes::DIVERGED, span, message))
+    }
+
+    /// Digits after the point with which a device is sent numbers in this unit.
+    fn digits_sent(&self, device: usize, unit: &matterix_ir::Unit) -> u8 {
+        let calls = self.devices[device].driver.into_iter().flat_map(|d| &d.calls);
+        let pieces = calls.flat_map(|(_, e)| &e.sends).flat_map(|t| &t.pieces);
+        let digits = pieces.filter_map(|p| match p {
+            matterix_ir::wire::Piece::Number { unit: sent, digits, .. } if sent.symbol == unit.symbol => *digits,
+            _ => None,
+        });
+        digits.max().unwrap_or(0)
     }
 
     /// Where devices are shadowed, what is told may not be far from what the twin supposes.
