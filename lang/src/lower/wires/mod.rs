@@ -251,7 +251,7 @@ fn command_sig<'a>(m: &MemberRef<'a>) -> Option<&'a Sig> {
 }
 
 /// All parameters of a call form, in order.
-fn params<'a>(sig: &'a Sig) -> impl Iterator<Item = &'a crate::ast::Param> {
+fn params(sig: &Sig) -> impl Iterator<Item = &crate::ast::Param> {
     std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten()
 }
 

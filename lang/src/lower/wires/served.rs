@@ -12,6 +12,9 @@ use crate::lower::Planner;
 use crate::lower::call::Bound;
 use crate::names::verb_text;
 
+/// Values of parameters, and the locals among them.
+type Arrangement = (Vec<(String, Value)>, Vec<(String, u32)>);
+
 /// More arrangements of things than a lab has.
 const MOST: usize = 10_000;
 
@@ -36,7 +39,7 @@ impl<'a> Planner<'a, '_> {
                 _ => return Vec::new(),
             },
         };
-        let mut arrangements: Vec<(Vec<(String, Value)>, Vec<(String, u32)>)> = vec![(Vec::new(), Vec::new())];
+        let mut arrangements: Vec<Arrangement> = vec![(Vec::new(), Vec::new())];
         for p in params(sig) {
             let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, of));
             let name = p.name.text.clone();
