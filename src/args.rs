@@ -56,6 +56,10 @@ pub enum Command {
     Doc(DocArgs),
     /// Schedule a workflow: who has which instance when, so that the whole ends early.
     Plan(PlanArgs),
+    /// Carry a workflow out on devices, or say what would be sent to them.
+    Deploy(DeployArgs),
+    /// Stand in for a device: answer on a line as it would.
+    Emulate(EmulateArgs),
     /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
@@ -127,7 +131,7 @@ pub struct Subject {
 impl Subject {
     /// The same, as the compiler takes it.
     pub fn options(&self) -> Options {
-        Options { workflow: self.workflow.clone(), set: self.set.clone(), lab: self.lab.clone() }
+        Options { workflow: self.workflow.clone(), set: self.set.clone(), lab: self.lab.clone(), ..Options::default() }
     }
 }
 
@@ -289,7 +293,7 @@ pub struct Many {
 impl Many {
     /// The same, as the compiler takes it.
     pub fn options(&self) -> Options {
-        Options { workflow: self.name.clone(), set: self.set.clone(), lab: self.lab.clone() }
+        Options { workflow: self.name.clone(), set: self.set.clone(), lab: self.lab.clone(), ..Options::default() }
     }
 
     /// How many threads.
@@ -326,6 +330,83 @@ pub struct DocArgs {
     /// Where to write it; to standard output without it.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+/// `matterixc deploy`.
+#[derive(Debug, Args)]
+pub struct DeployArgs {
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Where the devices of the lab are.
+    #[arg(long, value_name = "FILE")]
+    pub bind: PathBuf,
+    /// What is done with them.
+    #[arg(long, value_enum, default_value_t = DeployMode::Dry)]
+    pub mode: DeployMode,
+    /// Where to keep the journal; needed unless nothing is sent.
+    #[arg(long, value_name = "FILE")]
+    pub journal: Option<PathBuf>,
+    /// Go on with a deployment that was cut off, from its journal.
+    #[arg(long, requires = "journal")]
+    pub resume: bool,
+    /// Show all bytes that go out and come in.
+    #[arg(long)]
+    pub trace: bool,
+    /// Take every question and every step by hand for confirmed.
+    #[arg(long)]
+    pub yes: bool,
+    /// Let lab time pass so many times as fast: only where all devices are emulators that do the same.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f64,
+    /// Where all randomness of the simulation starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// What a deployment does with devices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DeployMode {
+    /// Send nothing, and print every byte that would be sent.
+    Dry,
+    /// Run on the digital twin first, and on devices only where that passes.
+    SimFirst,
+    /// Run on devices, and stop where they are not where the twin is.
+    Shadow,
+    /// Run on devices.
+    Real,
+}
+
+/// `matterixc emulate`.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("line").required(true).args(["pty", "tcp"]))]
+pub struct EmulateArgs {
+    /// An asset of the library with a driver, or with `--file` an instance of its lab.
+    pub device: String,
+    /// The lab the device stands in, with what is around it.
+    #[arg(long, value_name = "FILE")]
+    pub file: Option<PathBuf>,
+    /// The workflow of the file, where it has several.
+    #[arg(long, value_name = "NAME", requires = "file")]
+    pub workflow: Option<String>,
+    /// The driver, where the device has several.
+    #[arg(long, value_name = "NAME")]
+    pub driver: Option<String>,
+    /// Answer at a pseudo-terminal; its path is printed.
+    #[arg(long)]
+    pub pty: bool,
+    /// Where to put a link to the pseudo-terminal.
+    #[arg(long, value_name = "PATH", requires = "pty")]
+    pub link: Option<PathBuf>,
+    /// Answer at a port of this machine; 0 takes any that is free.
+    #[arg(long, value_name = "PORT")]
+    pub tcp: Option<u16>,
+    /// Let lab time pass so many times as fast.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f64,
+    /// Where the noise of readings starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
 }
 
 /// `matterixc verify`.
@@ -368,6 +449,11 @@ pub struct ExplainArgs {
 pub struct NewArgs {
     /// The folder to create; if it exists, it must be empty.
     pub dir: PathBuf,
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed: f64 = text.parse().map_err(|_| "write a number, as in 20".to_string())?;
+    if (1e-3..=1e4).contains(&speed) { Ok(speed) } else { Err("write a number from 0.001 to 10000".to_string()) }
 }
 
 fn setting(text: &str) -> Result<(String, String), String> {

@@ -72,6 +72,8 @@ fn obey(cli: Cli) -> Exit {
         Command::Fit(args) => command::fit(&args, cli.color),
         Command::Doc(args) => command::doc(&args, cli.color),
         Command::Plan(args) => command::plan(&args, cli.color),
+        Command::Deploy(args) => command::deploy(&args, cli.color),
+        Command::Emulate(args) => command::emulate(&args, cli.color),
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),
         Command::Explain(args) => command::explain(&args),

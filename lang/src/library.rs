@@ -55,6 +55,15 @@ files! {
     "robots/xm540_w150/" => "xm540_w150.urdf"
 }
 
+/// The module that declares an asset type.
+pub fn home_of(asset: &str) -> Option<&'static str> {
+    let declares = |line: &str| {
+        let rest = line.strip_prefix("asset ").and_then(|l| l.strip_prefix(asset));
+        rest.is_some_and(|r| !r.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
+    };
+    MODULES.iter().find(|m| m.text.lines().any(declares)).map(|m| m.name)
+}
+
 /// A data file of the library.
 pub fn file(name: &str) -> Option<&'static str> {
     FILES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)

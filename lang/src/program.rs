@@ -15,6 +15,7 @@ use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
+use crate::lower::wires::Wires;
 use crate::names::{self, DeclId, Names, near};
 use crate::points::Questions;
 use crate::study::{self, Many};
@@ -29,6 +30,8 @@ pub struct Options {
     pub set: Vec<(String, String)>,
     /// Which lab, for a workflow that runs in any.
     pub lab: Option<String>,
+    /// What is asked of drivers.
+    pub wires: Wires,
 }
 
 /// A test, ready to run.
@@ -184,7 +187,7 @@ fn compile_and<T>(
         }
     };
     let task = Task { item, lab, given };
-    let built = build(&tables, sources, &task, Wanted::Program);
+    let built = build(&tables, sources, &task, Wanted::Program(options.wires));
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -242,7 +245,7 @@ pub fn many_runs(
             return (None, finish(diagnostics, sources));
         }
     };
-    let mut built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program);
+    let mut built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program(Wires::default()));
     diagnostics.extend(built.findings);
     if let Some(Many::Fit(fit)) = &mut built.many
         && let Err(d) = study::data::read(fit, &tables, sources, loader)
@@ -275,7 +278,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let mut program = None;
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
-                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program);
+                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program(Wires::Off));
                 found.extend(built.findings);
                 program = built.program;
             }
@@ -402,7 +405,7 @@ enum Wanted {
     /// Nothing more.
     Findings,
     /// To be run.
-    Program,
+    Program(Wires),
     /// What is known at every statement.
     Contents,
     /// A program too, where robots with joints are in the lab.
@@ -445,7 +448,10 @@ fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], 
 /// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
 /// of it only where it is wanted.
 fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
-    let to_run = wanted == Wanted::Program;
+    let (to_run, wires) = match wanted {
+        Wanted::Program(wires) => (true, wires),
+        _ => (false, Wires::Off),
+    };
     let lab = task.lab;
     let mut reach = Reach::default();
     let mut draft = true;
@@ -455,6 +461,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
         planner.draft = draft;
+        planner.wires = wires;
         let plan = planner.task(task);
         if !draft {
             elaborator.initialise();
@@ -471,7 +478,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         }
         let (derivatives, balances) = elaborator.close();
         // A look at motions asks for neither what is recorded nor what is used up.
-        let told = matches!(wanted, Wanted::Program | Wanted::Contents);
+        let told = matches!(wanted, Wanted::Program(_) | Wanted::Contents);
         let observables = if told { observables(&mut elaborator) } else { Vec::new() };
         let mut starts = checks::starts(&elaborator, lab);
         checks::model(&mut elaborator);
@@ -517,7 +524,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             graph: elaborator.graph,
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
+        let drivers = elaborator.drivers;
+        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers };
         return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses, many };
     }
 }

@@ -2,7 +2,9 @@
 
 mod bill;
 mod check;
+mod deploy;
 mod doc;
+mod emulate;
 mod explain;
 mod fit;
 mod fmt;
@@ -16,7 +18,9 @@ mod view;
 
 pub use bill::bill;
 pub use check::check;
+pub use deploy::deploy;
 pub use doc::doc;
+pub use emulate::emulate;
 pub use explain::explain;
 pub use fit::fit;
 pub use fmt::fmt;

@@ -1,6 +1,8 @@
 //! Every call into the compiler and the runtime.
 
 mod bill;
+mod deploy;
+mod emulate;
 mod many;
 mod neighbours;
 mod plan;
@@ -17,8 +19,10 @@ use matterix_runtime::motion::{Store, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
+pub use deploy::{Plan as DeployPlan, deploy};
+pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
-pub use matterix_lang::{Options, Test};
+pub use matterix_lang::{Options, Test, Wires};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 pub use view::still;

@@ -238,7 +238,7 @@ pub(super) fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> 
 }
 
 /// A fault inside the library is shown at the user's own line first, then where the library stands.
-fn led_by_the_user(mut d: Diagnostic, sources: &Sources) -> Diagnostic {
+pub(super) fn led_by_the_user(mut d: Diagnostic, sources: &Sources) -> Diagnostic {
     let library = |l: &Label| sources.get(l.span.file).is_some_and(|f| f.name.contains("::"));
     if !d.labels.iter().any(|l| l.primary && library(l)) {
         return d;

@@ -4,6 +4,7 @@ mod along;
 mod beforehand;
 mod bill;
 mod contents;
+mod deploy;
 mod determinism;
 mod devices;
 mod doc;

@@ -105,6 +105,7 @@ codes! {
     UNUSED "unused" "F4" "a thing or a reagent is declared and never used";
     NOT_REACHED "not-reached" "D2" "a device cannot bring about what is waited for";
     WRONG_REAGENT "wrong-reagent" "C2" "a call says of what it takes something, and the source holds none of it";
+    DRIVER_LINE "driver-line" "N0" "a line of a driver fits neither its device nor its transport";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a pipette is asked for less than its smallest volume";
     TIP_OVERFLOW "tip-overflow" "V3" "a tip takes up more than it holds";
@@ -146,6 +147,14 @@ codes! {
     TAKES_CONTRADICTED "takes-contradicted" "D3" "a command or skill cannot take as long as its bounds say";
     FLOW_UNBALANCED "flow-unbalanced" "E1" "what one body loses the other does not gain";
     NOT_LUMPED "not-lumped" "E2" "a body gives off heat faster than it can have one temperature";
+    BINDING "binding" "W1" "the bindings of a lab do not say where its devices are";
+    UNDRIVEN "undriven" "W1" "nothing carries out a step on real devices";
+    UNOBSERVED "unobserved" "W1" "a decision depends on what no device tells";
+    DEVICE_LOST "device-lost" "W2" "a device no longer answers";
+    DEVICE_GARBLED "device-garbled" "W2" "a device answers what makes no sense";
+    DEVICE_REFUSED "device-refused" "W2" "a device refuses what it is told or asked";
+    DIVERGED "diverged" "W2" "a device tells something else than it was told, or than its twin";
+    JOURNAL_MISMATCH "journal-mismatch" "W2" "a deployment cannot go on from its journal";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";

@@ -8,6 +8,7 @@
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
+//! - [`wire`]: how devices are spoken to.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
@@ -31,6 +32,7 @@ pub mod span;
 pub mod stock;
 pub mod study;
 pub mod text;
+pub mod wire;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};

@@ -6,6 +6,7 @@ use crate::model::Model;
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::stock::Stock;
+use crate::wire::Driver;
 
 /// Version of the serialised form; a reader refuses any other.
 pub const PROGRAM_VERSION: u32 = 1;
@@ -26,4 +27,7 @@ pub struct Program {
     /// What was brought in, and how to count what becomes of it.
     #[serde(default)]
     pub stock: Stock,
+    /// How devices are spoken to, where that was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub drivers: Vec<Driver>,
 }

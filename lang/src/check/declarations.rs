@@ -106,7 +106,15 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }
-        ItemKind::Driver { .. } => later(lab, "drivers"),
+        ItemKind::Driver { device, .. } => {
+            if let Some(kind) = lab.kind_named(device, module) {
+                let this = lab.prototype_of(vec![kind], lab.tables.kind_name(kind));
+                lab.use_lines(this);
+                Planner::new(lab, sources).driver(id, this);
+            }
+        }
+        ItemKind::Study { .. } => later(lab, "studies"),
+        ItemKind::Fit { .. } => later(lab, "fits"),
         _ => {}
     }
 }

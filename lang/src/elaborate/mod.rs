@@ -183,6 +183,8 @@ pub struct Elaborator<'a> {
     pub copies: BTreeSet<(u32, u32)>,
     /// Extensive quantities by place.
     pub extensive: BTreeMap<ExtensiveKey, u32>,
+    /// How devices are spoken to, where that was asked for.
+    pub drivers: Vec<matterix_ir::wire::Driver>,
     /// Readings taken by the plan.
     pub readings: Vec<model::Reading>,
     /// Species that can get into each mixture.
@@ -281,6 +283,7 @@ impl<'a> Elaborator<'a> {
             holds: BTreeMap::new(),
             copies: BTreeSet::new(),
             extensive: BTreeMap::new(),
+            drivers: Vec::new(),
             readings: Vec::new(),
             reach,
             moves: BTreeSet::new(),

@@ -9,6 +9,7 @@ mod operation;
 pub mod roles;
 mod stmt;
 mod text;
+pub mod wires;
 
 pub use call::Verb;
 
@@ -50,6 +51,10 @@ pub struct Planner<'a, 'e> {
     pub said: Vec<Condition>,
     /// Only what the plan moves where is asked for, not how it reads or what it needs.
     pub draft: bool,
+    /// What is asked of drivers.
+    pub wires: wires::Wires,
+    /// Drivers of the lab, with their declarations.
+    drivers: Vec<(DeclId, matterix_ir::wire::Driver)>,
     clauses: Clauses,
     /// Clauses and limits that a draft has looked at.
     drafted: BTreeSet<Span>,
@@ -89,6 +94,8 @@ impl<'a, 'e> Planner<'a, 'e> {
             jobs: BTreeSet::new(),
             said: Vec::new(),
             draft: false,
+            wires: wires::Wires::Off,
+            drivers: Vec::new(),
             clauses: Clauses::default(),
             drafted: BTreeSet::new(),
         }
@@ -98,6 +105,7 @@ impl<'a, 'e> Planner<'a, 'e> {
     pub fn task(mut self, task: &Task<'a>) -> Plan {
         let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
+        self.begin_wires();
         let mut arguments = Vec::new();
         let root = match &decl.item.kind {
             ItemKind::Test { name, lab: Some(_), body, handlers } => {
@@ -137,6 +145,7 @@ impl<'a, 'e> Planner<'a, 'e> {
         }
         // A test may leave things as it likes.
         let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
+        self.lab.drivers = self.drivers.into_iter().map(|(_, driver)| driver).collect();
         Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
     }
 

@@ -43,12 +43,21 @@ impl<'a> Planner<'a, '_> {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        Some(self.during(label, span, operation, invariants))
+        Some(self.during(label, span, operation, invariants, &bound))
     }
 
     /// An operation with what must hold while it lasts.
-    fn during(&mut self, label: String, span: Span, operation: Operation, invariants: Vec<Condition>) -> StepId {
+    fn during(
+        &mut self,
+        label: String,
+        span: Span,
+        operation: Operation,
+        invariants: Vec<Condition>,
+        bound: &Bound,
+    ) -> StepId {
+        let (verb, device) = (operation.verb.clone(), operation.device);
         let body = self.add(label.clone(), span, Step::Operation(Box::new(operation)));
+        self.call_wires(body, &verb, bound, device);
         if invariants.is_empty() { body } else { self.add(label, span, Step::During { invariants, body }) }
     }
 
@@ -67,10 +76,10 @@ impl<'a> Planner<'a, '_> {
             Value::Instance(i) => Some(*i),
             _ => None,
         });
-        Some(self.during(label.to_string(), span, operation, invariants))
+        Some(self.during(label.to_string(), span, operation, invariants, bound))
     }
 
-    fn operation(
+    pub(super) fn operation(
         &mut self,
         sig: &'a Sig,
         clauses: &'a [Clause],

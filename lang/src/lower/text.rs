@@ -30,6 +30,10 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
     };
     for decl in &names.decls {
         match &decl.item.kind {
+            ItemKind::Driver { wires, .. } => out.extend(wires.iter().filter_map(|w| match &w.kind {
+                ast::WireKind::Reply { fails, .. } => Some(fails.text.clone()),
+                _ => None,
+            })),
             ItemKind::Skill { clauses, .. } => add(clauses, &mut out),
             ItemKind::Capability { members, .. } => {
                 for m in members {

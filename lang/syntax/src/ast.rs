@@ -867,19 +867,19 @@ pub enum WireKind {
     Command {
         /// The command's call form.
         sig: Sig,
-        /// What goes out.
-        sends: Vec<String>,
-        /// What must come back.
-        expects: Option<String>,
+        /// What is said.
+        exchange: Exchange,
     },
     /// `reading temperature asks "IN_PV_2" expects "{degC} 2"`.
     Reading {
         /// The reading.
         path: Path,
+        /// It is what the device tells only while this holds.
+        condition: Option<Expr>,
         /// What goes out.
-        asks: String,
+        asks: Text,
         /// What comes back.
-        expects: String,
+        expects: Pattern,
     },
     /// `reply "#" fails blocked`.
     Reply {
@@ -888,11 +888,62 @@ pub enum WireKind {
         /// The failure it means.
         fails: Name,
     },
-    /// `open sends "1@1"`.
-    Open {
-        /// What goes out first.
-        sends: Vec<String>,
+    /// `answers "I4" with "I4 A \"1\""`: what else an emulator answers.
+    Answers {
+        /// What comes in.
+        asked: Pattern,
+        /// What goes out.
+        with: Text,
     },
+    /// `open sends "1@1"`.
+    Fixed {
+        /// `open`, `close`, `halt` or `safe`.
+        when: Name,
+        /// What is said then.
+        exchange: Exchange,
+    },
+    /// `alive while active every 20 s by arm watchdog else disarm watchdog`.
+    Alive {
+        /// As long as this holds.
+        condition: Expr,
+        /// So often.
+        every: Expr,
+        /// The command that is repeated.
+        by: Vec<Name>,
+        /// The command for when it no longer holds.
+        otherwise: Vec<Name>,
+    },
+}
+
+/// What is said to a device at one time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Exchange {
+    /// What goes out, in order.
+    pub sends: Vec<Text>,
+    /// What comes back to each.
+    pub expects: Option<Pattern>,
+    /// How its end is known.
+    pub until: Option<Box<Until>>,
+}
+
+/// `until asks "Q" timeout 1 min`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Until {
+    /// What goes out.
+    pub asks: Text,
+    /// What comes back in the end.
+    pub expects: Option<Pattern>,
+    /// At most so long.
+    pub timeout: Expr,
+}
+
+/// What a reply looks like, with units where numbers stand: `"{degC} 2"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pattern {
+    /// Unescaped.
+    pub text: String,
+    /// Where.
+    pub span: Span,
 }
 
 /// A line of a lab.

@@ -173,7 +173,8 @@ fn is_noise(rule: Rule) -> bool {
             | kw_over
             | kw_where
             | kw_pitch
-            | kw_open
+            | kw_alive
+            | kw_answers
             | kw_reply
             | kw_reading
             | kw_include

@@ -64,6 +64,11 @@ pub trait Backend {
     /// The value now, with readings sampled (and told) now; `None` if it cannot be known here.
     fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault>;
 
+    /// The value now, as far as it is seen and not only supposed; `None` if it cannot be known here.
+    fn observe(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        self.value(node, out)
+    }
+
     /// How to follow a condition from now on.
     fn follow(&mut self, condition: NodeId) -> Follow;
 

@@ -117,7 +117,8 @@ impl Executor<'_, '_> {
     /// Judges expectations; none stops the run.
     pub(super) fn expect(&mut self, step: StepId, conditions: &[Condition]) -> Result<(), Fault> {
         for condition in conditions {
-            let verdict = match self.holds(condition)? {
+            let seen = self.backend.observe(condition.node, self.out).map_err(|f| at(f, condition.span))?;
+            let verdict = match seen.map(truth) {
                 Some(true) => Verdict::Passed,
                 Some(false) => Verdict::Failed,
                 None => Verdict::NotObserved,

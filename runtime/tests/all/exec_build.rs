@@ -38,6 +38,7 @@ impl Lab {
             model: Default::default(),
             plan,
             stock: Default::default(),
+            drivers: Vec::new(),
         };
         Lab { program }
     }

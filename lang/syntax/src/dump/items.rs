@@ -4,12 +4,12 @@ use super::{
     Sexp,
     exprs::{args, expr, maybe, named, param, path, sig, ty, unit},
     leaf, name, names, node, quoted,
-    steps::{block, handlers, labelled},
+    steps::{block, filled, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine, Goal,
-    Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind, Name, Process,
-    Role, StudyLine, Term, Wire, WireKind,
+    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Exchange, Expr, Field, FieldValue,
+    FitLine, Goal, Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind,
+    Name, Pattern, Process, Role, StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -301,22 +301,33 @@ fn law(law: &Law) -> Sexp {
     }
 }
 
-fn texts(word: &str, all: &[String]) -> Sexp {
-    node(word).with(all.iter().map(|text| quoted(text)))
-}
-
 fn wire(wire: &Wire) -> Sexp {
+    let verb = |word: &str, names: &[Name]| node(word).with(names.iter().map(name));
     match &wire.kind {
         WireKind::Error => leaf("error"),
-        WireKind::Command { sig: of, sends, expects } => node("command")
-            .with([sig(of), texts("sends", sends)])
-            .with(expects.as_deref().map(|text| node("expects").with([quoted(text)]))),
-        WireKind::Reading { path: of, asks, expects } => {
-            node("reading").with([path(of), quoted(asks), quoted(expects)])
-        }
+        WireKind::Command { sig: of, exchange: said } => node("command").with([sig(of)]).with(exchange(said)),
+        WireKind::Reading { path: of, condition, asks, expects } => node("reading")
+            .with([path(of)])
+            .with(maybe("while", condition.as_ref()))
+            .with([filled(asks), quoted(&expects.text)]),
         WireKind::Reply { text, fails } => node("reply").with([quoted(text), name(fails)]),
-        WireKind::Open { sends } => node("open").with([texts("sends", sends)]),
+        WireKind::Answers { asked, with } => node("answers").with([quoted(&asked.text), filled(with)]),
+        WireKind::Fixed { when, exchange: said } => node(&when.text).with(exchange(said)),
+        WireKind::Alive { condition, every, by, otherwise } => {
+            node("alive").with([expr(condition), expr(every), verb("by", by), verb("else", otherwise)])
+        }
     }
+}
+
+fn exchange(said: &Exchange) -> Vec<Sexp> {
+    let expects = |p: &Pattern| node("expects").with([quoted(&p.text)]);
+    let mut out = vec![node("sends").with(said.sends.iter().map(filled))];
+    out.extend(said.expects.as_ref().map(expects));
+    out.extend(said.until.as_ref().map(|u| {
+        let asks = node("until").with([filled(&u.asks)]);
+        asks.with(u.expects.as_ref().map(expects)).with([expr(&u.timeout)])
+    }));
+    out
 }
 
 fn lab_line(line: &LabLine) -> Sexp {

@@ -10,7 +10,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Wire, WireKind,
+    AssetLiteral, Exchange, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, Pattern,
+    StudyLine, Text, Until, Wire, WireKind,
 };
 
 impl Lower<'_> {
@@ -209,27 +210,78 @@ impl Lower<'_> {
     }
 
     fn wire(&mut self, node: Node) -> WireKind {
-        let rule = node.as_rule();
+        let (rule, span) = (node.as_rule(), self.span(&node));
         let kids = &mut Kids::of(node);
         match rule {
-            Rule::wire_open => WireKind::Open { sends: self.sends_in(kids) },
-            Rule::wire_reply => WireKind::Reply { text: self.text_in(kids), fails: self.name_in(kids) },
-            Rule::wire_reading => {
-                WireKind::Reading { path: self.path_in(kids), asks: self.text_in(kids), expects: self.text_in(kids) }
+            Rule::wire_fixed => {
+                let when = kids.eat(Rule::wire_when).map(|n| self.name(&n));
+                WireKind::Fixed { when: when.unwrap_or_else(|| nameless(span)), exchange: self.exchange(kids) }
             }
-            Rule::wire_command => WireKind::Command {
-                sig: self.sig_in(kids),
-                sends: self.sends_in(kids),
-                expects: kids.eat(Rule::string).map(|s| self.text(&s)),
+            Rule::wire_alive => {
+                kids.has(Rule::kw_while);
+                let (condition, every) = self.path_and_range(kids);
+                let by = self.verb_in(kids);
+                WireKind::Alive { condition, every, by, otherwise: self.verb_in(kids) }
+            }
+            Rule::wire_reply => WireKind::Reply { text: self.text_in(kids), fails: self.name_in(kids) },
+            Rule::wire_answers => WireKind::Answers {
+                asked: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
+                with: self.said(kids, span),
             },
+            Rule::wire_reading => WireKind::Reading {
+                path: self.path_in(kids),
+                condition: kids.eat(Rule::wire_while).map(|n| {
+                    let kids = &mut Kids::of(n);
+                    kids.has(Rule::kw_while);
+                    self.expr_in(kids)
+                }),
+                asks: self.said(kids, span),
+                expects: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
+            },
+            Rule::wire_command => WireKind::Command { sig: self.sig_in(kids), exchange: self.exchange(kids) },
             _ => WireKind::Error,
         }
     }
 
-    fn sends_in(&mut self, kids: &mut Kids) -> Vec<String> {
-        let Some(node) = kids.eat(Rule::sends) else { return Vec::new() };
-        Kids::of(node).all(Rule::string).iter().map(|s| self.text(s)).collect()
+    fn verb_in(&mut self, kids: &mut Kids) -> Vec<Name> {
+        let Some(node) = kids.eat(Rule::verb) else { return Vec::new() };
+        Kids::of(node).all(Rule::ident).iter().map(|n| self.name(n)).collect()
     }
+
+    fn exchange(&mut self, kids: &mut Kids) -> Exchange {
+        let sends = kids.eat(Rule::sends).map(|node| Kids::of(node).all(Rule::string));
+        let sends = sends.unwrap_or_default().iter().map(|s| self.filled(s)).collect();
+        let expects = self.answer(kids);
+        let until = kids.eat(Rule::wire_until).map(|node| {
+            let span = self.span(&node);
+            let kids = &mut Kids::of(node);
+            kids.has(Rule::kw_until);
+            let (asks, expects) = (self.said(kids, span), self.answer(kids));
+            Box::new(Until { asks, expects, timeout: self.expr_in(kids) })
+        });
+        Exchange { sends, expects, until }
+    }
+
+    fn answer(&mut self, kids: &mut Kids) -> Option<Pattern> {
+        let node = kids.eat(Rule::answer)?;
+        Kids::of(node).eat(Rule::string).map(|s| self.pattern(&s))
+    }
+
+    fn pattern(&mut self, node: &Node) -> Pattern {
+        Pattern { text: self.text(node), span: self.span(node) }
+    }
+
+    fn said(&mut self, kids: &mut Kids, span: Span) -> Text {
+        self.filled_in(kids).unwrap_or(Text { parts: Vec::new(), span })
+    }
+}
+
+fn nameless(span: Span) -> Name {
+    Name { text: String::new(), span }
+}
+
+fn silence(span: Span) -> Pattern {
+    Pattern { text: String::new(), span }
 }
 
 fn is_word(text: &str) -> bool {

@@ -272,8 +272,15 @@ fn recording(program: &Program) -> Recording {
 pub(super) fn lab() -> Lab {
     let mut model = model();
     let plan = plan(&mut model);
-    let program =
-        Program { version: 1, files: vec!["sn1.mtx".into()], scene: scene(), model, plan, stock: Default::default() };
+    let program = Program {
+        version: 1,
+        files: vec!["sn1.mtx".into()],
+        scene: scene(),
+        model,
+        plan,
+        stock: Default::default(),
+        drivers: Vec::new(),
+    };
     let mut sources = Sources::default();
     sources.add("sn1.mtx", TEXT);
     let info = RunInfo {

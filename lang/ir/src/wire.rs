@@ -1,0 +1,203 @@
+//! How the devices of a lab are spoken to: what drivers say of lines, words and replies, as data.
+
+use serde::{Deserialize, Serialize};
+
+use crate::plan::{Operation, StepId};
+use crate::scene::InstanceId;
+use crate::{NodeId, Span, Unit};
+
+/// The line a driver speaks over, as it declares it; which port or address that is, a binding says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Transport {
+    /// A serial port.
+    Serial {
+        /// Bits per second.
+        baud: u32,
+        /// 5 to 8.
+        data_bits: u8,
+        /// `N`, `E` or `O`.
+        parity: char,
+        /// 1 or 2.
+        stop_bits: u8,
+    },
+    /// A connection over a network.
+    Tcp,
+}
+
+/// Names of the codecs that put a text on a line and take it off again.
+pub const FRAMINGS: &[&str] = &["line", "cr", "lf", "namur", "sics", "cavro_dt", "cavro_oem"];
+
+/// A piece of what is sent.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Piece {
+    /// As written.
+    Plain(String),
+    /// A number in a unit.
+    Number {
+        /// SI.
+        value: NodeId,
+        /// As sent.
+        unit: Unit,
+        /// Digits after the point; as many as needed where absent.
+        digits: Option<u8>,
+    },
+    /// One of these words, by its index.
+    Word(NodeId, Vec<String>),
+}
+
+/// A text to send, with values that are known when it is sent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Template {
+    /// In order.
+    pub pieces: Vec<Piece>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// A piece of what a reply looks like. A blank stands for any number of blanks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Slot {
+    /// As written.
+    Plain(String),
+    /// A number in this unit.
+    Number(Unit),
+    /// Anything.
+    Any,
+}
+
+/// What a reply looks like.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Pattern {
+    /// In order.
+    pub slots: Vec<Slot>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// What is said to a device at one time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Exchange {
+    /// What goes out, in order.
+    pub sends: Vec<Template>,
+    /// What comes back to each.
+    pub expects: Option<Pattern>,
+    /// How its end is known.
+    pub until: Option<Until>,
+    /// Where it is declared.
+    pub span: Span,
+}
+
+/// How the end of what a device does is known: it is asked again and again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Until {
+    /// What goes out.
+    pub asks: Template,
+    /// What comes back in the end; without it the device is ready when its framing says so.
+    pub expects: Option<Pattern>,
+    /// At most so long, s.
+    pub timeout: NodeId,
+}
+
+/// A quantity that a device tells.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    /// `plate.temperature`.
+    pub name: String,
+    /// What is told, as the model has it.
+    pub value: NodeId,
+    /// The reading it is, by index; absent for a state or what follows from states.
+    pub reading: Option<u32>,
+    /// The state it is, by index; absent for a reading and what follows from states.
+    pub state: Option<u32>,
+    /// As shown.
+    pub unit: Unit,
+    /// The unit that a difference of two values is given in.
+    pub difference: Unit,
+    /// It is what the device tells only while this is not 0.
+    pub condition: Option<NodeId>,
+    /// What goes out.
+    pub asks: Template,
+    /// What comes back.
+    pub expects: Pattern,
+    /// Its line.
+    pub span: Span,
+}
+
+/// A reply that means a failure.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// What the reply looks like.
+    pub reply: Pattern,
+    /// The failure.
+    pub failure: String,
+}
+
+/// A command of a device for which an emulator or a repetition needs no plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Served {
+    /// Its arguments: the name of each and the local of the plan that stands for it.
+    pub arguments: Vec<(String, u32)>,
+    /// What it does in the model.
+    pub operation: Operation,
+    /// What is said.
+    pub exchange: Exchange,
+}
+
+/// What is repeated while something holds, and what is said when it no longer does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alive {
+    /// While this is not 0.
+    pub condition: NodeId,
+    /// So often, s.
+    pub every: NodeId,
+    /// Repeated.
+    pub repeated: Served,
+    /// At its end.
+    pub at_end: Option<Served>,
+}
+
+/// A driver on an instance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Driver {
+    /// `IkaNamur`.
+    pub name: String,
+    /// The device.
+    pub instance: InstanceId,
+    /// What it speaks over.
+    pub transport: Transport,
+    /// One of [`FRAMINGS`].
+    pub framing: String,
+    /// The device's own on a line that several share.
+    pub address: Option<String>,
+    /// Longest time until a reply has come, s.
+    pub timeout: f64,
+    /// When the line is opened.
+    pub open: Vec<Exchange>,
+    /// When it is closed.
+    pub close: Vec<Exchange>,
+    /// To break off what the device does.
+    pub halt: Vec<Exchange>,
+    /// To leave it safe after a run that did not end well.
+    pub safe: Vec<Exchange>,
+    /// What keeps its watchdog quiet.
+    pub alive: Vec<Alive>,
+    /// What it tells.
+    pub told: Vec<Told>,
+    /// What else an emulator answers.
+    pub answers: Vec<(Pattern, Template)>,
+    /// Replies that mean failures.
+    pub refusals: Vec<Refusal>,
+    /// The operations of the plan that it knows.
+    pub calls: Vec<(StepId, Exchange)>,
+    /// All commands that it knows, where an emulator was asked for.
+    pub served: Vec<Served>,
+    /// Its declaration.
+    pub span: Span,
+}
+
+impl Driver {
+    /// What is said for an operation of the plan.
+    pub fn call(&self, step: StepId) -> Option<&Exchange> {
+        self.calls.iter().find(|(s, _)| *s == step).map(|(_, exchange)| exchange)
+    }
+}

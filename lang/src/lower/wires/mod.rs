@@ -1,0 +1,283 @@
+//! Drivers: how the commands and readings of a device go over its line.
+//!
+//! A driver is written out for every device of the lab that it fits, and to check it by itself for a stand-in: what was
+//! checked is what runs. A line maps a command of the device, or a primitive skill of whose parameters one, `self`, is the
+//! device. What is sent is an expression of the command's arguments and the device's members.
+
+mod lines;
+mod pattern;
+mod served;
+mod transport;
+
+use matterix_ir::plan::StepId;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::{self, Driver};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::Planner;
+use super::call::Bound;
+use crate::ast::{ItemKind, Sig, Wire, WireKind};
+use crate::elaborate::tables::MemberRef;
+use crate::eval::{Scope, Value};
+use crate::names::{DeclId, verb_text};
+
+/// What is asked of drivers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Wires {
+    /// Nothing: the program is simulated.
+    #[default]
+    Off,
+    /// What the plan says to its devices.
+    Called,
+    /// Also what their devices may be told by others.
+    Served,
+}
+
+/// What a line of a driver maps.
+#[derive(Clone, Copy)]
+pub(super) enum Mapped<'a> {
+    /// A command of the device.
+    Command(MemberRef<'a>),
+    /// A primitive skill; which of its parameters is the device.
+    Skill(DeclId, &'a Sig, &'a str),
+}
+
+/// The name of the parameter that is the device.
+const SELF: &str = "self";
+
+impl<'a> Planner<'a, '_> {
+    /// Drivers of all devices of the lab, without what the plan says to them.
+    pub(super) fn begin_wires(&mut self) {
+        if self.wires == Wires::Off {
+            return;
+        }
+        let names = self.lab.tables.names;
+        for index in 0..names.decls.len() as u32 {
+            let id = DeclId(index);
+            let ItemKind::Driver { device, .. } = &names.decl(id).item.kind else { continue };
+            let Some(kind) = self.lab.kind_named(device, names.decl(id).module) else { continue };
+            for instance in self.lab.instances_of(kind) {
+                if let Some(driver) = self.driver(id, instance) {
+                    self.drivers.push((id, driver));
+                }
+            }
+        }
+    }
+
+    /// Notes what is said for an operation.
+    pub(super) fn call_wires(&mut self, step: StepId, verb: &str, bound: &Bound, device: Option<InstanceId>) {
+        if self.wires == Wires::Off || self.draft {
+            return;
+        }
+        for at in 0..self.drivers.len() {
+            let (id, instance) = (self.drivers[at].0, self.drivers[at].1.instance);
+            let Some((line, sig)) = self.line_for(id, verb, bound, device, instance) else { continue };
+            let module = self.lab.tables.names.decl(id).module;
+            let mut scope = Scope::of(instance, module);
+            bind(sig, &bound.values, &mut scope);
+            if let Some(exchange) = self.exchange(line.0, line.1, &mut scope) {
+                self.drivers[at].1.calls.push((step, exchange));
+            }
+        }
+    }
+
+    /// The line of a driver that says how an operation is told to an instance, with the call form it gives.
+    #[allow(clippy::type_complexity)]
+    fn line_for(
+        &self,
+        driver: DeclId,
+        verb: &str,
+        bound: &Bound,
+        device: Option<InstanceId>,
+        instance: InstanceId,
+    ) -> Option<((&'a crate::ast::Exchange, Span), &'a Sig)> {
+        let ItemKind::Driver { wires, .. } = &self.lab.tables.names.decl(driver).item.kind else { return None };
+        wires.iter().find_map(|w| {
+            let WireKind::Command { sig, exchange } = &w.kind else { return None };
+            if verb_text(&sig.verb) != verb || count(sig) > bound.values.len() {
+                return None;
+            }
+            let is_it = match self_of(sig) {
+                Some(at) => {
+                    matches!(bound.values.get(at)?.1, Value::Instance(i) | Value::Qualified(i, _) if i == instance)
+                }
+                None => device == Some(instance),
+            };
+            is_it.then_some(((exchange, w.span), sig))
+        })
+    }
+
+    /// A driver on an instance, which may be a stand-in; nothing where its line cannot be understood.
+    pub fn driver(&mut self, id: DeclId, instance: InstanceId) -> Option<Driver> {
+        let decl = self.lab.tables.names.decl(id);
+        let ItemKind::Driver { name, transport, args, wires, .. } = &decl.item.kind else { return None };
+        let module = decl.module;
+        let line = self.transport(transport, args, name.span, module)?;
+        let mut driver = Driver {
+            name: name.text.clone(),
+            instance,
+            transport: line.transport,
+            framing: line.framing,
+            address: line.address,
+            timeout: line.timeout,
+            open: Vec::new(),
+            close: Vec::new(),
+            halt: Vec::new(),
+            safe: Vec::new(),
+            alive: Vec::new(),
+            told: Vec::new(),
+            answers: Vec::new(),
+            refusals: Vec::new(),
+            calls: Vec::new(),
+            served: Vec::new(),
+            span: name.span,
+        };
+        self.repeated(wires);
+        for w in wires {
+            self.line(w, instance, module, &mut driver);
+        }
+        Some(driver)
+    }
+
+    fn line(&mut self, w: &'a Wire, instance: InstanceId, module: usize, driver: &mut Driver) {
+        let mut scope = Scope::of(instance, module);
+        match &w.kind {
+            WireKind::Error => {}
+            WireKind::Fixed { when, exchange } => {
+                let Some(exchange) = self.exchange(exchange, w.span, &mut scope) else { return };
+                match when.text.as_str() {
+                    "open" => driver.open.push(exchange),
+                    "close" => driver.close.push(exchange),
+                    "halt" => driver.halt.push(exchange),
+                    _ => driver.safe.push(exchange),
+                }
+            }
+            WireKind::Reply { text, fails } => {
+                let pattern = crate::ast::Pattern { text: text.clone(), span: w.span };
+                if let Some((reply, _)) = self.pattern(&pattern) {
+                    driver.refusals.push(wire::Refusal { reply, failure: fails.text.clone() });
+                }
+            }
+            WireKind::Answers { asked, with } => {
+                let (asked, with) = (self.pattern(asked), self.template(with, &mut scope));
+                driver.answers.extend(asked.zip(with).map(|((asked, _), with)| (asked, with)));
+            }
+            WireKind::Reading { path, condition, asks, expects } => {
+                let told = self.told(path, asks, expects, w.span, &mut scope);
+                let condition = condition.as_ref().map(|c| self.lab.truth(c, &mut scope));
+                if let (Some(told), true) = (told, condition != Some(None)) {
+                    driver.told.push(wire::Told { condition: condition.flatten(), ..told });
+                }
+            }
+            WireKind::Alive { condition, every, by, otherwise } => {
+                let Some(node) = self.lab.truth(condition, &mut scope) else { return };
+                let Some(every) = self.duration_node(every, &mut scope, "every") else { return };
+                let Some(repeated) = self.by_name(by, instance, module) else { return };
+                let at_end = if otherwise.is_empty() { None } else { self.by_name(otherwise, instance, module) };
+                driver.alive.push(wire::Alive { condition: node, every, repeated, at_end });
+            }
+            WireKind::Command { sig, exchange } => {
+                let Some(mapped) = self.mapped(sig, instance, module) else { return };
+                if self.lab.prototype || self.wires == Wires::Served {
+                    driver.served.extend(self.served(mapped, sig, exchange, w.span, instance, module));
+                }
+            }
+        }
+    }
+
+    /// What a line maps; what is wrong with its form is reported on stand-ins only.
+    fn mapped(&mut self, sig: &'a Sig, instance: InstanceId, module: usize) -> Option<Mapped<'a>> {
+        let verb = verb_text(&sig.verb);
+        if let Some(at) = self_of(sig) {
+            let names = self.lab.tables.names;
+            let skill = names.lookup(module, &verb).and_then(|id| match &names.decl(id).item.kind {
+                ItemKind::Skill { sig: of, external: true, .. } if same_form(sig, of) => Some((id, of)),
+                _ => None,
+            });
+            let found = skill.and_then(|(id, of)| Some(Mapped::Skill(id, of, &params(of).nth(at)?.name.text)));
+            if found.is_none() {
+                self.not_mapped(sig, "primitive skill", &[]);
+            }
+            return found;
+        }
+        let commands = self.lab.tables.commands(&verb).to_vec();
+        let own: Vec<MemberRef<'a>> =
+            commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner)).collect();
+        let found = own.iter().find(|m| command_sig(m).is_some_and(|of| same_form(sig, of)));
+        if found.is_none() {
+            let forms: Vec<String> = own.iter().filter_map(|m| command_sig(m)).map(|of| self.form(of)).collect();
+            self.not_mapped(sig, "command of the device", &forms);
+        }
+        found.copied().map(Mapped::Command)
+    }
+
+    fn not_mapped(&mut self, sig: &Sig, what: &str, forms: &[String]) {
+        let headline = format!("no {what} has the form `{}`", self.form(sig));
+        let mut d = Diagnostic::error(codes::DRIVER_LINE, sig.span, headline, "nothing that is ever said");
+        for form in forms {
+            d = d.help(format!("its form is `{form}`"));
+        }
+        self.lab.report(d);
+    }
+
+    /// A line for what has one already.
+    fn repeated(&mut self, wires: &'a [Wire]) {
+        let key = |w: &Wire| match &w.kind {
+            WireKind::Command { sig, .. } => Some(self.form(sig)),
+            WireKind::Reading { path, .. } => Some(format!("reading {}", words(path))),
+            WireKind::Reply { text, .. } => Some(format!("reply {text}")),
+            _ => None,
+        };
+        let keys: Vec<Option<String>> = wires.iter().map(key).collect();
+        for (i, key) in keys.iter().enumerate().filter_map(|(i, k)| Some((i, k.as_ref()?))) {
+            if let Some(first) = keys[..i].iter().position(|k| k.as_ref() == Some(key)) {
+                let headline = "a driver says twice how this goes over its line";
+                let d = Diagnostic::error(codes::DRIVER_LINE, wires[i].span, headline, "said again here");
+                self.lab.report(d.because(wires[first].span, "said first here"));
+            }
+        }
+    }
+}
+
+fn words(path: &crate::ast::Path) -> String {
+    path.segments.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join(".")
+}
+
+fn command_sig<'a>(m: &MemberRef<'a>) -> Option<&'a Sig> {
+    match &m.member.kind {
+        crate::ast::MemberKind::Command { sig, .. } => Some(sig),
+        _ => None,
+    }
+}
+
+/// All parameters of a call form, in order.
+fn params(sig: &Sig) -> impl Iterator<Item = &crate::ast::Param> {
+    std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten()
+}
+
+fn count(sig: &Sig) -> usize {
+    params(sig).count()
+}
+
+/// Which parameter is the device.
+fn self_of(sig: &Sig) -> Option<usize> {
+    params(sig).position(|p| p.name.text == SELF)
+}
+
+/// Whether two call forms have the same labels in the same order, with as many parameters each.
+fn same_form(a: &Sig, b: &Sig) -> bool {
+    let groups = |s: &Sig| -> Vec<(String, usize)> {
+        let first = (String::new(), s.params.len());
+        std::iter::once(first).chain(s.labelled.iter().map(|(l, p)| (l.text.clone(), p.len()))).collect()
+    };
+    groups(a) == groups(b)
+}
+
+/// The parameters of a driver's line stand for the values of the command's, in their order.
+fn bind(sig: &Sig, values: &[(String, Value)], scope: &mut Scope) {
+    for (p, (_, value)) in params(sig).zip(values) {
+        if p.name.text != SELF {
+            scope.bind(p.name.text.clone(), value.clone());
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Commands of a device apart from any plan: for emulators, for what is repeated, and to check a driver by itself.
+
+use matterix_ir::plan::Operation;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::Served;
+use matterix_ir::{Diagnostic, Op, Span, codes};
+
+use super::{Mapped, bind, command_sig, params};
+use crate::ast::{self, Clause, ItemKind, MemberKind, Name, Sig, WireKind};
+use crate::eval::{Num, Scope, Type, Value};
+use crate::lower::Planner;
+use crate::lower::call::Bound;
+use crate::names::verb_text;
+
+/// Values of parameters, and the locals among them.
+type Arrangement = (Vec<(String, Value)>, Vec<(String, u32)>);
+
+/// More arrangements of things than a lab has.
+const MOST: usize = 10_000;
+
+impl<'a> Planner<'a, '_> {
+    /// The command of a line, for every arrangement of the things it is about; its quantities are locals of the plan.
+    pub(super) fn served(
+        &mut self,
+        mapped: Mapped<'a>,
+        line: &'a Sig,
+        exchange: &'a ast::Exchange,
+        span: Span,
+        instance: InstanceId,
+        module: usize,
+    ) -> Vec<Served> {
+        let (sig, clauses, of, own): (&'a Sig, &'a [Clause], usize, &str) = match mapped {
+            Mapped::Command(m) => match &m.member.kind {
+                MemberKind::Command { sig, clauses } => (sig, clauses, m.module, ""),
+                _ => return Vec::new(),
+            },
+            Mapped::Skill(id, sig, own) => match &self.lab.tables.names.decl(id).item.kind {
+                ItemKind::Skill { clauses, .. } => (sig, clauses, self.lab.tables.names.decl(id).module, own),
+                _ => return Vec::new(),
+            },
+        };
+        let mut arrangements: Vec<Arrangement> = vec![(Vec::new(), Vec::new())];
+        for p in params(sig) {
+            let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, of));
+            let name = p.name.text.clone();
+            let (values, local): (Vec<Value>, Option<u32>) = match ty {
+                _ if name == own => (vec![Value::Instance(instance)], None),
+                Some(Type::Instance { kinds, .. }) if !self.lab.prototype => {
+                    let all = 0..self.lab.instances.len() as u32;
+                    let fits = |i: &InstanceId| kinds.iter().all(|k| self.lab.instance_is(*i, *k));
+                    (all.map(InstanceId).filter(fits).map(Value::Instance).collect(), None)
+                }
+                Some(ty) => self.open_value(&ty, &name),
+                None => (vec![Value::Error], None),
+            };
+            arrangements = arrangements
+                .into_iter()
+                .flat_map(|(bound, locals)| {
+                    let (name, local) = (name.clone(), local);
+                    values.clone().into_iter().map(move |v| {
+                        let mut bound = bound.clone();
+                        bound.push((name.clone(), v));
+                        let locals = locals.iter().cloned().chain(local.map(|l| (name.clone(), l))).collect();
+                        (bound, locals)
+                    })
+                })
+                .take(MOST)
+                .collect();
+        }
+        let mut out = Vec::new();
+        for (values, arguments) in arrangements {
+            let mut scope = Scope::of(instance, module);
+            bind(line, &values, &mut scope);
+            let Some(operation) = self.operation_of(mapped, sig, clauses, Bound { values }, instance, of) else {
+                continue;
+            };
+            // What can never begin in this lab is not served.
+            if !self.lab.prototype && operation.needs.iter().any(|n| self.lab.graph.constant(n.node) == Some(0.0)) {
+                continue;
+            }
+            if let Some(exchange) = self.exchange(exchange, span, &mut scope) {
+                out.push(Served { arguments, operation, exchange });
+            }
+        }
+        out
+    }
+
+    /// A value that is known only when it comes over the line.
+    fn open_value(&mut self, ty: &Type, name: &str) -> (Vec<Value>, Option<u32>) {
+        let (dimension, point, words) = match ty {
+            Type::Quantity { dimension, point, .. } => (dimension.clone(), *point, None),
+            Type::Int => match Type::ratio() {
+                Type::Quantity { dimension, .. } => (dimension, false, None),
+                _ => return (Vec::new(), None),
+            },
+            Type::Enum(words) => match Type::ratio() {
+                Type::Quantity { dimension, .. } => (dimension, false, Some(words.clone())),
+                _ => return (Vec::new(), None),
+            },
+            other => return (vec![self.lab.placeholder(other, name)], None),
+        };
+        let local = self.local(name, self.lab.tables.si(&dimension));
+        let node = self.lab.graph.add(Op::Local(local));
+        let value = match words {
+            Some(words) => Value::Enum(node, words),
+            None => Value::Num(Num { node, dimension, point, unit: None, literal: false }),
+        };
+        (vec![value], Some(local))
+    }
+
+    fn operation_of(
+        &mut self,
+        mapped: Mapped<'a>,
+        sig: &'a Sig,
+        clauses: &'a [Clause],
+        bound: Bound,
+        instance: InstanceId,
+        module: usize,
+    ) -> Option<Operation> {
+        let mut scope = match mapped {
+            Mapped::Command(m) => Scope::of_member(instance, m),
+            Mapped::Skill(..) => Scope::module(module),
+        };
+        let mut bound = bound;
+        // Options of the command have their default: a line says nothing of them.
+        for clause in clauses {
+            let ast::ClauseKind::Option(p) = &clause.kind else { continue };
+            let ty = p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, module));
+            let value = match &p.default {
+                Some(e) => self.lab.typed(e, &ty, &mut Scope::module(module), &p.name.text),
+                None => self.lab.placeholder(&ty, &p.name.text),
+            };
+            bound.values.push((p.name.text.clone(), value));
+        }
+        for (name, v) in &bound.values {
+            scope.bind(name.clone(), v.clone());
+        }
+        let (mut operation, _) = self.operation(sig, clauses, &bound, &mut scope)?;
+        if let Mapped::Command(m) = mapped {
+            operation.capability = Some(self.lab.tables.kind_name(m.owner).to_string());
+            operation.at_start = std::mem::take(&mut operation.at_end);
+        }
+        operation.device = Some(instance);
+        if !operation.claims.contains(&instance) {
+            operation.claims.insert(0, instance);
+        }
+        Some(operation)
+    }
+
+    /// The command without arguments that these words mean, by the line the same driver has for it.
+    pub(super) fn by_name(&mut self, verb: &[Name], instance: InstanceId, module: usize) -> Option<Served> {
+        let text = verb_text(verb);
+        let span = verb.first()?.span.to(verb.last()?.span);
+        let commands = self.lab.tables.commands(&text).to_vec();
+        let own = commands.into_iter().find(|m| {
+            self.lab.instance_is(instance, m.owner) && command_sig(m).is_some_and(|s| params(s).next().is_none())
+        });
+        let Some(m) = own else {
+            let headline = format!("the device has no command `{text}` without arguments");
+            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "cannot be repeated"));
+            return None;
+        };
+        let line = self.lines_beside(span).iter().find_map(|w| match &w.kind {
+            WireKind::Command { sig, exchange } if verb_text(&sig.verb) == text && params(sig).next().is_none() => {
+                Some((sig, exchange, w.span))
+            }
+            _ => None,
+        });
+        let Some((sig, exchange, at)) = line else {
+            let headline = format!("the driver has no line for `{text}`");
+            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "how is it said?"));
+            return None;
+        };
+        self.served(Mapped::Command(m), sig, exchange, at, instance, module).into_iter().next()
+    }
+
+    /// The lines of the driver that a place in the text belongs to.
+    fn lines_beside(&self, at: Span) -> &'a [ast::Wire] {
+        let names = self.lab.tables.names;
+        names
+            .decls
+            .iter()
+            .find_map(|d| match &d.item.kind {
+                ItemKind::Driver { wires, .. }
+                    if d.item.span.file == at.file && (d.item.span.start..d.item.span.end).contains(&at.start) =>
+                {
+                    Some(wires.as_slice())
+                }
+                _ => None,
+            })
+            .unwrap_or_default()
+    }
+}

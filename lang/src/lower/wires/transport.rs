@@ -1,0 +1,143 @@
+//! The line of a driver: `serial(baud: 9600, frame: "7E1", framing: line, timeout: 1 s)`.
+
+use matterix_ir::wire::{FRAMINGS, Transport};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use crate::ast::{Arg, Expr, ExprKind, Name};
+use crate::eval::{Scope, Value};
+use crate::lower::Planner;
+use crate::names::near;
+
+/// A line, understood.
+pub(super) struct Line {
+    pub transport: Transport,
+    pub framing: String,
+    pub address: Option<String>,
+    pub timeout: f64,
+}
+
+const SERIAL: &[&str] = &["baud", "frame", "framing", "address", "timeout"];
+const TCP: &[&str] = &["framing", "address", "timeout"];
+const BAUDS: std::ops::RangeInclusive<f64> = 50.0..=4_000_000.0;
+
+impl<'a> Planner<'a, '_> {
+    pub(super) fn transport(&mut self, name: &'a Name, args: &'a [Arg], at: Span, module: usize) -> Option<Line> {
+        let known = match name.text.as_str() {
+            "serial" => SERIAL,
+            "tcp" => TCP,
+            _ => {
+                let headline = format!("there is no transport `{}`", name.text);
+                self.wrong(name.span, &headline, "not a kind of line", "a driver speaks over `serial` or `tcp`");
+                return None;
+            }
+        };
+        for (i, arg) in args.iter().enumerate() {
+            let Some(word) = &arg.name else {
+                self.wrong(
+                    arg.value.span,
+                    "what a line has is named",
+                    "which one?",
+                    &format!("one of {}", list(known)),
+                );
+                return None;
+            };
+            let again = args[..i].iter().any(|a| a.name.as_ref().is_some_and(|n| n.text == word.text));
+            if again || !known.contains(&word.text.as_str()) {
+                let what = if again { "is given twice" } else { "is nothing that this line has" };
+                self.wrong(
+                    word.span,
+                    &format!("`{}` {what}", word.text),
+                    "not expected",
+                    &format!("it has {}", list(known)),
+                );
+                return None;
+            }
+        }
+        let given = |key: &str| args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == key)).map(|a| &a.value);
+        let missing: Vec<&str> = known.iter().copied().filter(|k| *k != "address" && given(k).is_none()).collect();
+        if !missing.is_empty() {
+            let headline = format!("the line of this driver lacks {}", list(&missing));
+            let help = "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`";
+            self.wrong(at, &headline, "nothing is taken for granted here", help);
+            return None;
+        }
+        let transport = match name.text.as_str() {
+            "serial" => self.serial(given("baud")?, given("frame")?, module)?,
+            _ => Transport::Tcp,
+        };
+        let framing = self.framing(given("framing")?)?;
+        let address = match given("address") {
+            Some(e) => Some(self.address(e, module)?),
+            None => None,
+        };
+        if framing.starts_with("cavro") && address.is_none() {
+            self.wrong(at, "this framing needs the `address` of the device", "no address", "as in `address: 1`");
+            return None;
+        }
+        let timeout = self.duration_node(given("timeout")?, &mut Scope::module(module), "timeout")?;
+        let timeout = self.lab.known(timeout)?;
+        Some(Line { transport, framing, address, timeout })
+    }
+
+    fn serial(&mut self, baud: &'a Expr, frame: &'a Expr, module: usize) -> Option<Transport> {
+        let rate = self.plain_number(baud, module).filter(|b| BAUDS.contains(b) && b.fract() == 0.0);
+        let Some(rate) = rate else {
+            self.wrong(baud.span, "a baud rate is a whole number", "not one", "as in `baud: 9600`");
+            return None;
+        };
+        let bits = match &*frame.kind {
+            ExprKind::Text(text) => match *text.as_bytes() {
+                [data @ b'5'..=b'8', parity @ (b'N' | b'E' | b'O'), stop @ (b'1' | b'2')] => Some((data, parity, stop)),
+                _ => None,
+            },
+            _ => None,
+        };
+        let Some((data, parity, stop)) = bits else {
+            let help = "data bits, parity, stop bits, as in `frame: \"8N1\"` or `frame: \"7E1\"`";
+            self.wrong(frame.span, "this is no form of characters on a serial line", "not understood", help);
+            return None;
+        };
+        let parity = char::from(parity);
+        Some(Transport::Serial { baud: rate as u32, data_bits: data - b'0', parity, stop_bits: stop - b'0' })
+    }
+
+    fn framing(&mut self, e: &'a Expr) -> Option<String> {
+        let word = match &*e.kind {
+            ExprKind::Name(n) => n.text.as_str(),
+            _ => "",
+        };
+        if FRAMINGS.contains(&word) {
+            return Some(word.to_owned());
+        }
+        let mut d = Diagnostic::error(codes::DRIVER_LINE, e.span, "there is no such framing", "not a known one");
+        d.help.extend(near::question(&near::nearest(word, FRAMINGS)));
+        self.lab.report(d.help(format!("it is one of {}", list(FRAMINGS))));
+        None
+    }
+
+    fn address(&mut self, e: &'a Expr, module: usize) -> Option<String> {
+        if let ExprKind::Text(text) = &*e.kind {
+            return Some(text.clone());
+        }
+        let number = self.plain_number(e, module).filter(|n| n.fract() == 0.0 && (0.0..1e6).contains(n));
+        if number.is_none() {
+            self.wrong(e.span, "an address is a whole number or a text", "not one", "as in `address: 1`");
+        }
+        number.map(|n| format!("{n}"))
+    }
+
+    fn plain_number(&mut self, e: &'a Expr, module: usize) -> Option<f64> {
+        match self.lab.expr(e, &mut Scope::module(module)) {
+            Value::Num(n) if n.dimension.is_one() => self.lab.known(n.node),
+            _ => None,
+        }
+    }
+
+    fn wrong(&mut self, span: Span, headline: &str, label: &str, help: &str) {
+        self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, label).help(help));
+    }
+}
+
+fn list(words: &[&str]) -> String {
+    words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", ")
+}

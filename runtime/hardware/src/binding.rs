@@ -1,0 +1,210 @@
+//! Where the devices of a lab are, as a file says: a table of TOML for each.
+//!
+//! ```toml
+//! [plate]
+//! port = "/dev/ttyUSB0"
+//! tolerance = { temperature = "5 K" }
+//! ```
+
+use matterix_ir::{Diagnostic, FileId, Program, Span, codes};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::deploy::{Binding, Carrier};
+use crate::port::Place;
+
+const KEYS: [&str; 6] = ["port", "address", "driver", "unit", "by", "tolerance"];
+const HAND: &str = "hand";
+
+/// The bindings of a file for the lab of a program, with what is wrong with them.
+pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<Diagnostic>) {
+    let mut reader = Reader { program, file, found: Vec::new() };
+    let table = match DeTable::parse(text) {
+        Ok(table) => table,
+        Err(e) => {
+            let at = e.span().map_or(0..0, |s| s);
+            reader.wrong(at, "the file is not TOML", e.message().to_owned(), None);
+            return (Vec::new(), reader.found);
+        }
+    };
+    let bindings = table.get_ref().iter().filter_map(|(name, value)| reader.device(name, value)).collect();
+    (bindings, reader.found)
+}
+
+struct Reader<'p> {
+    program: &'p Program,
+    file: FileId,
+    found: Vec<Diagnostic>,
+}
+
+type Range = std::ops::Range<usize>;
+
+impl Reader<'_> {
+    fn wrong(&mut self, at: Range, headline: &str, label: impl Into<String>, help: Option<String>) {
+        let span = Span::new(self.file, at.start, at.end);
+        let mut d = Diagnostic::error(codes::BINDING, span, headline.to_owned(), label.into());
+        d.help.extend(help);
+        self.found.push(d);
+    }
+
+    fn device(&mut self, name: &Spanned<std::borrow::Cow<'_, str>>, value: &Spanned<DeValue<'_>>) -> Option<Binding> {
+        let key = name.get_ref().as_ref();
+        let Some(instance) = self.program.scene.find(key) else {
+            let lab = &self.program.scene.lab;
+            let top =
+                self.program.scene.instances.iter().filter(|i| i.owner.is_none()).map(|i| format!("`{}`", i.name));
+            let help = format!("it has {}", top.take(12).collect::<Vec<_>>().join(", "));
+            self.wrong(name.span(), &format!("the lab `{lab}` has no `{key}`"), "no such device", Some(help));
+            return None;
+        };
+        let DeValue::Table(table) = value.get_ref() else {
+            self.wrong(
+                value.span(),
+                &format!("`{key}` is bound with a table"),
+                "no table",
+                Some(format!("write `[{key}]`, then a key a line")),
+            );
+            return None;
+        };
+        for (k, _) in table.iter().filter(|(k, _)| !KEYS.contains(&k.get_ref().as_ref())) {
+            let help = format!("a binding has {}", KEYS.map(|k| format!("`{k}`")).join(", "));
+            self.wrong(k.span(), &format!("a binding has no `{}`", k.get_ref()), "not a known key", Some(help));
+        }
+        let before = self.found.len();
+        let text = |this: &mut Self, wanted: &str| -> Option<(String, Range)> {
+            let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
+            match value.get_ref() {
+                DeValue::String(text) => Some((text.to_string(), value.span())),
+                _ => {
+                    this.wrong(
+                        value.span(),
+                        &format!("`{wanted}` is a text"),
+                        "no text",
+                        Some("write it in quotes".into()),
+                    );
+                    None
+                }
+            }
+        };
+        let (port, address) = (text(self, "port"), text(self, "address"));
+        let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
+        if let Some((by, at)) = &by {
+            if by != HAND {
+                self.wrong(
+                    at.clone(),
+                    "only a person's hands need no line",
+                    "not understood",
+                    Some("write `by = \"hand\"`".into()),
+                );
+            }
+            if port.is_some() || address.is_some() || driver.is_some() {
+                self.wrong(
+                    at.clone(),
+                    &format!("`{key}` is done by hand and bound to a line"),
+                    "one or the other",
+                    None,
+                );
+            }
+            let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
+            return (self.found.len() == before).then_some(binding);
+        }
+        let place = match (port, address) {
+            (Some((port, _)), None) => Place::Serial(port),
+            (None, Some((address, _))) => Place::Tcp(address),
+            (Some(_), Some((_, at))) => {
+                self.wrong(at, &format!("`{key}` has two lines"), "a port and an address", None);
+                return None;
+            }
+            (None, None) => {
+                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"` or `by = \"hand\"`";
+                self.wrong(name.span(), &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
+                return None;
+            }
+        };
+        let driver = self.driver(key, instance, driver, name.span())?;
+        if let Some((unit, at)) = &unit
+            && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
+        {
+            self.wrong(at.clone(), &why, "not an address on this line", None);
+        }
+        let tolerances = self.tolerances(key, driver, table);
+        let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
+        (self.found.len() == before).then_some(Binding { instance, carrier, tolerances })
+    }
+
+    fn driver(
+        &mut self,
+        key: &str,
+        instance: matterix_ir::scene::InstanceId,
+        wanted: Option<(String, Range)>,
+        at: Range,
+    ) -> Option<usize> {
+        let drivers = self.program.drivers.iter().enumerate().filter(|(_, d)| d.instance == instance);
+        let all: Vec<(usize, &str)> = drivers.map(|(i, d)| (i, d.name.as_str())).collect();
+        let list = all.iter().map(|(_, n)| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+        match (&wanted, all.as_slice()) {
+            (Some((name, at)), _) => {
+                let found = all.iter().find(|(_, n)| n == name).map(|(i, _)| *i);
+                if found.is_none() {
+                    let help = (!list.is_empty()).then(|| format!("it has {list}"));
+                    self.wrong(at.clone(), &format!("`{key}` has no driver `{name}`"), "no such driver", help);
+                }
+                found
+            }
+            (None, [(only, _)]) => Some(*only),
+            (None, []) => {
+                let help =
+                    "declare one: `driver NAME for ASSET over serial(...) { }`, or let a person do it: `by = \"hand\"`";
+                self.wrong(at, &format!("no driver says how `{key}` is spoken to"), "no driver", Some(help.into()));
+                None
+            }
+            (None, _) => {
+                let help = format!("say which: `driver = ...` with one of {list}");
+                self.wrong(at, &format!("`{key}` has several drivers"), "which one?", Some(help));
+                None
+            }
+        }
+    }
+
+    /// `tolerance = { temperature = "5 K" }`.
+    fn tolerances(&mut self, key: &str, driver: usize, table: &DeTable<'_>) -> Vec<(String, f64)> {
+        let Some((_, value)) = table.iter().find(|(k, _)| k.get_ref() == "tolerance") else { return Vec::new() };
+        let DeValue::Table(all) = value.get_ref() else {
+            let help = "write `tolerance = { temperature = \"5 K\" }`";
+            self.wrong(value.span(), "tolerances are a table", "no table", Some(help.into()));
+            return Vec::new();
+        };
+        let mut out = Vec::new();
+        for (member, value) in all.iter() {
+            let program = self.program;
+            let told = program.drivers[driver].told.iter().find(|t| t.name == format!("{key}.{}", member.get_ref()));
+            let Some(told) = told else {
+                let names: Vec<String> =
+                    program.drivers[driver].told.iter().map(|t| format!("`{}`", &t.name[key.len() + 1..])).collect();
+                let help = format!("it tells {}", names.join(", "));
+                self.wrong(
+                    member.span(),
+                    &format!("`{key}` does not tell `{}`", member.get_ref()),
+                    "not told",
+                    Some(help),
+                );
+                continue;
+            };
+            let unit = &told.difference;
+            let text = match value.get_ref() {
+                DeValue::String(text) => text.as_ref(),
+                _ => "",
+            };
+            let (number, symbol) = text.split_once(' ').unwrap_or((text, ""));
+            match number.parse::<f64>().ok().filter(|n| n.is_finite() && *n >= 0.0 && symbol.trim() == unit.symbol) {
+                Some(number) => out.push((member.get_ref().to_string(), number * unit.factor)),
+                None => {
+                    let help = format!("write it as in `{} = \"2 {}\"`", member.get_ref(), unit.symbol);
+                    let headline = format!("the tolerance of `{}` is a number of {}", member.get_ref(), unit.symbol);
+                    self.wrong(value.span(), &headline, "not one", Some(help));
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,131 @@
+//! Framings: how a text is put on a line and taken off again, from both ends.
+
+mod cavro;
+mod line;
+
+use cavro::Cavro;
+use line::Line;
+
+/// Longest frame that is taken for one, bytes.
+pub const LONGEST: usize = 4096;
+
+/// What a device answers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reply {
+    /// What it says; an error that the framing carries reads `error 9`.
+    pub text: String,
+    /// The framing says that it is still busy.
+    pub busy: bool,
+    /// Whether the text is an error that the framing carries.
+    pub is_error: bool,
+}
+
+impl Reply {
+    /// A plain text.
+    pub fn of(text: impl Into<String>) -> Self {
+        Reply { text: text.into(), ..Reply::default() }
+    }
+}
+
+/// What came in is no frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Garbled {
+    /// In words.
+    pub why: String,
+}
+
+impl Garbled {
+    fn new(why: impl Into<String>) -> Self {
+        Garbled { why: why.into() }
+    }
+}
+
+/// What a device is told or asked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// One or more commands.
+    Says(Vec<String>),
+    /// The frame before, once more: the answer got lost.
+    Again,
+    /// It is for a device with another address.
+    Other,
+}
+
+/// A framing in use at one end of a line.
+#[derive(Clone, Debug)]
+pub enum Codec {
+    /// Texts with a mark at their end.
+    Line(Line),
+    /// Tecan Cavro pumps.
+    Cavro(Cavro),
+}
+
+impl Codec {
+    /// The framing of this name; an error in words where there is none, or where the address is none it can have.
+    pub fn new(framing: &str, address: Option<&str>) -> Result<Codec, String> {
+        Ok(match framing {
+            "line" | "sics" => Codec::Line(Line::new("\r\n", "\r\n")),
+            "namur" => Codec::Line(Line::new("\r\n", " \r\n")),
+            "cr" => Codec::Line(Line::new("\r", "\r")),
+            "lf" => Codec::Line(Line::new("\n", "\n")),
+            "cavro_dt" => Codec::Cavro(Cavro::new(false, address)?),
+            "cavro_oem" => Codec::Cavro(Cavro::new(true, address)?),
+            other => return Err(format!("there is no framing `{other}`")),
+        })
+    }
+
+    /// Whether every frame is answered.
+    pub fn acknowledges(&self) -> bool {
+        matches!(self, Codec::Cavro(_))
+    }
+
+    /// Commands as frames.
+    pub fn say(&mut self, texts: &[String]) -> Vec<Vec<u8>> {
+        match self {
+            Codec::Line(line) => texts.iter().map(|t| line.request(t)).collect(),
+            Codec::Cavro(cavro) => vec![cavro.request(&format!("{}R", texts.concat()))],
+        }
+    }
+
+    /// A question as a frame.
+    pub fn ask(&mut self, text: &str) -> Vec<u8> {
+        match self {
+            Codec::Line(line) => line.request(text),
+            Codec::Cavro(cavro) => cavro.request(text),
+        }
+    }
+
+    /// The first answer in what has come in, which is taken away; nothing while it is not whole.
+    pub fn take_reply(&mut self, buffer: &mut Vec<u8>) -> Option<Result<Reply, Garbled>> {
+        match self {
+            Codec::Line(line) => line.take(buffer, false).map(|text| text.map(Reply::of)),
+            Codec::Cavro(cavro) => cavro.take_reply(buffer),
+        }
+    }
+
+    /// The device's end: the first request in what has come in, which is taken away.
+    pub fn take_request(&mut self, buffer: &mut Vec<u8>) -> Option<Result<Request, Garbled>> {
+        match self {
+            Codec::Line(line) => line.take(buffer, true).map(|text| text.map(|t| Request::Says(vec![t]))),
+            Codec::Cavro(cavro) => cavro.take_request(buffer),
+        }
+    }
+
+    /// The device's end: an answer as a frame.
+    pub fn answer(&mut self, reply: &Reply) -> Vec<u8> {
+        match self {
+            Codec::Line(line) => line.reply(&reply.text),
+            Codec::Cavro(cavro) => cavro.reply(reply),
+        }
+    }
+
+    /// Whether a word that is known without operands means this one, which may have some.
+    pub fn is_word(&self, known: &str, word: &str) -> bool {
+        known == word || matches!(self, Codec::Cavro(_)) && cavro::is_word(known, word)
+    }
+}
+
+/// Bytes as people read them: `OUT_SP_1 60.0\r\n`.
+pub fn shown(bytes: &[u8]) -> String {
+    bytes.escape_ascii().to_string()
+}

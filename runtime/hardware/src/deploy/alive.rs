@@ -1,0 +1,64 @@
+//! Watchdogs: what is repeated so that a device goes on, and what tells it that it need not listen any more.
+
+use matterix_ir::wire::Served;
+use matterix_runtime::backend::Backend;
+use matterix_runtime::exec::Listener;
+use matterix_runtime::fault::Fault;
+
+use super::backend::Hardware;
+
+impl Hardware<'_, '_> {
+    /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.
+    pub(super) fn beat(&mut self, over: bool, out: &mut dyn Listener) -> Result<(), Fault> {
+        for device in 0..self.devices.len() {
+            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else {
+                continue;
+            };
+            for (index, alive) in driver.alive.iter().enumerate() {
+                let now = self.twin.now();
+                let holds = self.twin.engine().eval(alive.condition) != 0.0;
+                let every = self.twin.engine().eval(alive.every);
+                let last = self.devices[device].beats[index];
+                match (holds, last) {
+                    (true, None) => {}
+                    (true, Some(last)) if now >= last + every => {}
+                    (false, Some(_)) if over => {
+                        self.devices[device].beats[index] = None;
+                        if let Some(end) = &alive.at_end {
+                            self.serve(device, end, out)?;
+                        }
+                        continue;
+                    }
+                    _ => continue,
+                }
+                self.devices[device].beats[index] = Some(now);
+                self.serve(device, &alive.repeated, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// When something is due next, s.
+    pub(super) fn next_beat(&mut self) -> f64 {
+        let mut next = f64::INFINITY;
+        for device in 0..self.devices.len() {
+            let Some(driver) = self.devices[device].driver.filter(|_| self.devices[device].lost.is_none()) else {
+                continue;
+            };
+            for (index, alive) in driver.alive.iter().enumerate() {
+                if let Some(last) = self.devices[device].beats[index] {
+                    next = next.min(last + self.twin.engine().eval(alive.every));
+                }
+            }
+        }
+        next
+    }
+
+    /// A command apart from the plan.
+    fn serve(&mut self, device: usize, served: &Served, out: &mut dyn Listener) -> Result<(), Fault> {
+        let ticket = self.twin.start(&served.operation, out)?;
+        self.twin.poll(ticket, out)?;
+        let texts = self.texts(&served.exchange.sends);
+        self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
+    }
+}

@@ -1,0 +1,93 @@
+//! Devices of a lab as they are bound: to a line, or to a person's hands.
+
+use matterix_ir::Program;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::Driver;
+
+use super::Trace;
+use super::journal::{Entry, Journal};
+use crate::codec::{Codec, shown};
+use crate::link::{Link, Overhear};
+use crate::port::Place;
+
+/// What carries out what a device is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Carrier {
+    /// A device behind a line.
+    Line {
+        /// Index of the driver in the program.
+        driver: usize,
+        /// Where the line is.
+        place: Place,
+        /// The device's address on it, where it is another than the driver's.
+        address: Option<String>,
+    },
+    /// A person, who confirms.
+    Hand,
+}
+
+/// An instance of the lab and what carries out what it is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Binding {
+    /// The instance.
+    pub instance: InstanceId,
+    /// What carries it out.
+    pub carrier: Carrier,
+    /// By how much what it tells may differ from the twin: member, SI.
+    pub tolerances: Vec<(String, f64)>,
+}
+
+/// A bound device.
+pub struct Device<'m> {
+    /// Its name in the lab.
+    pub name: &'m str,
+    /// How it is bound.
+    pub binding: Binding,
+    /// How it is spoken to; none where hands do it.
+    pub driver: Option<&'m Driver>,
+    /// The open line.
+    pub link: Option<Link>,
+    /// Frames for a dry run.
+    pub codec: Option<Codec>,
+    /// Why nothing more is said to it.
+    pub lost: Option<String>,
+    /// When what keeps its watchdog quiet was last said, by line of the driver, s.
+    pub beats: Vec<Option<f64>>,
+}
+
+impl<'m> Device<'m> {
+    /// A device whose line is not open yet.
+    pub fn new(program: &'m Program, binding: Binding) -> Result<Self, String> {
+        let (driver, codec) = match &binding.carrier {
+            Carrier::Hand => (None, None),
+            Carrier::Line { driver, address, .. } => {
+                let driver = program.drivers.get(*driver).ok_or("the program has no such driver")?;
+                let address = address.as_deref().or(driver.address.as_deref());
+                (Some(driver), Some(Codec::new(&driver.framing, address)?))
+            }
+        };
+        let name = &program.scene.get(binding.instance).name;
+        let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
+        Ok(Device { name, binding, driver, link: None, codec, lost: None, beats })
+    }
+}
+
+/// Writes down and shows what goes over a line.
+pub(super) struct Ear<'e, 't> {
+    pub time: f64,
+    pub device: &'e str,
+    pub journal: &'e mut Journal,
+    pub trace: &'e mut Trace<'t>,
+}
+
+impl Overhear for Ear<'_, '_> {
+    fn out(&mut self, bytes: &[u8]) {
+        (self.trace)(self.time, self.device, true, bytes);
+        self.journal.note(&Entry::Out { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
+    }
+
+    fn back(&mut self, bytes: &[u8]) {
+        (self.trace)(self.time, self.device, false, bytes);
+        self.journal.note(&Entry::Back { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
+    }
+}

@@ -1,0 +1,292 @@
+//! One emulated device: requests in, answers out, the twin in between.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::Unit;
+use matterix_ir::plan::Operation;
+use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Told};
+use matterix_runtime::backend::{Backend, Sim, Status, Ticket};
+use matterix_runtime::fault::Fault;
+
+use super::solve::solve;
+use crate::codec::{Codec, Reply, Request};
+use crate::pattern;
+use crate::template::{self, Found};
+
+/// The failure that a driver gives to what its device does not understand.
+const NOT_UNDERSTOOD: &str = "not_understood";
+/// The failure that a driver gives to what comes while its device is busy.
+const BUSY: &str = "busy";
+
+/// A device in its lab.
+pub struct Emulator<'m> {
+    sim: Sim<'m>,
+    driver: &'m Driver,
+    codec: Codec,
+    running: Vec<(Ticket, &'m Operation)>,
+    /// The last message of each form, by command and by its place among what that sends.
+    heard: BTreeMap<(usize, usize), Vec<Found>>,
+    /// What was answered last.
+    last: Vec<u8>,
+    input: Vec<u8>,
+}
+
+impl<'m> Emulator<'m> {
+    /// The device of a driver in a lab that has been started.
+    pub fn new(sim: Sim<'m>, driver: &'m Driver, address: Option<&str>) -> Result<Self, String> {
+        let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
+        Ok(Emulator {
+            sim,
+            driver,
+            codec,
+            running: Vec::new(),
+            heard: BTreeMap::new(),
+            last: Vec::new(),
+            input: Vec::new(),
+        })
+    }
+
+    /// The model behind it.
+    pub fn sim(&mut self) -> &mut Sim<'m> {
+        &mut self.sim
+    }
+
+    /// Lets lab time pass until then, s.
+    pub fn pass(&mut self, until: f64) -> Result<(), Fault> {
+        loop {
+            self.sweep()?;
+            let now = self.sim.now();
+            if now >= until {
+                return Ok(());
+            }
+            let ends =
+                self.running.clone().into_iter().filter_map(|(ticket, _)| match self.sim.poll(ticket, &mut ()) {
+                    Ok(Status::Running { until, watch }) => Some((until, watch)),
+                    _ => None,
+                });
+            let (mut next, mut watches) = (until, Vec::new());
+            for (end, watch) in ends.collect::<Vec<_>>() {
+                next = end.unwrap_or(f64::INFINITY).clamp(now, next);
+                watches.extend(watch.map(|node| matterix_runtime::process::Watch { node, value: true }));
+            }
+            self.sim.advance(next, &watches, &mut ())?;
+        }
+    }
+
+    /// What is over is forgotten.
+    fn sweep(&mut self) -> Result<(), Fault> {
+        let mut left = Vec::new();
+        for (ticket, operation) in std::mem::take(&mut self.running) {
+            if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
+                left.push((ticket, operation));
+            }
+        }
+        self.running = left;
+        Ok(())
+    }
+
+    /// Bytes that have come in; the bytes that are answered.
+    pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
+        self.input.extend_from_slice(bytes);
+        let mut out = Vec::new();
+        while let Some(request) = self.codec.take_request(&mut self.input) {
+            let reply = match request {
+                Ok(Request::Says(words)) => self.obey(&words)?,
+                Ok(Request::Again) => {
+                    out.extend_from_slice(&self.last);
+                    continue;
+                }
+                Ok(Request::Other) => continue,
+                Err(_) => self.refuse(NOT_UNDERSTOOD),
+            };
+            if let Some(reply) = reply {
+                let reply = Reply { busy: !self.running.is_empty(), ..reply };
+                self.last = self.codec.answer(&reply);
+                out.extend_from_slice(&self.last);
+            }
+        }
+        Ok(out)
+    }
+
+    /// Does what a string of commands says; what is answered, if something is.
+    fn obey(&mut self, words: &[String]) -> Result<Option<Reply>, Fault> {
+        let mut reply = None;
+        for word in words {
+            reply = self.word(word)?;
+            if reply.as_ref().is_some_and(|r| r.is_error) {
+                break;
+            }
+        }
+        Ok(reply.or_else(|| self.codec.acknowledges().then(Reply::default)))
+    }
+
+    fn word(&mut self, word: &str) -> Result<Option<Reply>, Fault> {
+        let driver = self.driver;
+        if let Some(told) = self.asked(word) {
+            return Ok(Some(Reply::of(self.tells(told)?)));
+        }
+        let endings = driver.served.iter().map(|s| &s.exchange).chain(&driver.open).filter_map(|e| e.until.as_ref());
+        for until in endings.collect::<Vec<_>>() {
+            if template::found(&until.asks, word).is_some() {
+                let text = match &until.expects {
+                    Some(pattern) if self.running.is_empty() => pattern::rendered(pattern, |_| "0".to_owned()),
+                    Some(_) => "BUSY".to_owned(),
+                    None => String::new(),
+                };
+                return Ok(Some(Reply::of(text)));
+            }
+        }
+        if let Some((_, with)) = driver.answers.iter().find(|(asked, _)| pattern::matched(asked, word).is_some()) {
+            let engine = self.sim.engine();
+            let text = template::filled(with, |n| Some(engine.eval(n)));
+            return Ok(text.filter(|t| !t.is_empty()).map(Reply::of));
+        }
+        if let Some(reply) = self.command(word)? {
+            return Ok(reply);
+        }
+        for (exchange, halts) in fixed(driver) {
+            let is_it = exchange.sends.iter().any(|t| self.codec.is_word(&template::written(t), word));
+            if is_it {
+                if halts {
+                    self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
+                }
+                return Ok(exchange.expects.as_ref().map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned()))));
+            }
+        }
+        Ok(self.refuse(NOT_UNDERSTOOD))
+    }
+
+    /// The quantity a message asks for.
+    fn asked(&mut self, word: &str) -> Option<&'m Told> {
+        let driver = self.driver;
+        let asked = driver.told.iter().filter(|t| template::found(&t.asks, word).is_some());
+        let all: Vec<&Told> = asked.collect();
+        let holds = |sim: &mut Sim<'m>, t: &Told| t.condition.is_none_or(|c| sim.engine().eval(c) != 0.0);
+        all.iter().find(|t| t.condition.is_some() && holds(&mut self.sim, t)).or_else(|| all.first()).copied()
+    }
+
+    fn tells(&mut self, told: &'m Told) -> Result<String, Fault> {
+        let value = self.sim.value(told.value, &mut ())?.unwrap_or(0.0);
+        let digits = self.digits(told);
+        Ok(pattern::rendered(&told.expects, |unit| number(unit, value, digits)))
+    }
+
+    /// Digits after the point of what a reading shows, in the unit it is told in.
+    fn digits(&mut self, told: &Told) -> Option<u8> {
+        let reading = self.sim.engine().model().readings.get(told.reading? as usize)?;
+        let unit = told.expects.slots.iter().find_map(|s| match s {
+            matterix_ir::wire::Slot::Number(unit) => Some(unit),
+            _ => None,
+        })?;
+        let step = reading.resolution? / unit.factor.abs();
+        (step > 0.0).then(|| (-step.log10()).ceil().clamp(0.0, 9.0) as u8)
+    }
+
+    /// Carries out the command that a message completes; nothing where it belongs to none.
+    fn command(&mut self, word: &str) -> Result<Option<Option<Reply>>, Fault> {
+        let driver = self.driver;
+        let (mut known, mut complete) = (false, Vec::new());
+        for (index, served) in driver.served.iter().enumerate() {
+            for (place, template) in served.exchange.sends.iter().enumerate() {
+                let Some(found) = template::found(template, word) else { continue };
+                known = true;
+                self.heard.insert((index, place), found);
+                let whole = place + 1 == served.exchange.sends.len();
+                let all: Option<Vec<Found>> = (0..served.exchange.sends.len())
+                    .map(|p| self.heard.get(&(index, p)).cloned())
+                    .collect::<Option<Vec<_>>>()
+                    .map(|all| all.concat());
+                if let (true, Some(all)) = (whole, all) {
+                    complete.push((served, all));
+                }
+            }
+        }
+        if !known {
+            return Ok(None);
+        }
+        if complete.is_empty() {
+            // The first part of something.
+            let part =
+                driver.served.iter().find(|s| s.exchange.sends.iter().any(|t| template::found(t, word).is_some()));
+            let expects = part.and_then(|s| s.exchange.expects.as_ref());
+            return Ok(Some(expects.map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned())))));
+        }
+        let mut why = NOT_UNDERSTOOD;
+        for (served, all) in complete {
+            if !solve(served, &all, self.sim.engine()) {
+                continue;
+            }
+            let needs = served.operation.needs.iter().find(|n| self.sim.engine().eval(n.node) == 0.0);
+            if let Some(need) = needs {
+                why = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
+                continue;
+            }
+            if served.exchange.until.is_some() && !self.running.is_empty() {
+                return Ok(Some(self.refuse(BUSY)));
+            }
+            return self.begin(served, &all).map(Some);
+        }
+        Ok(Some(self.refuse(why)))
+    }
+
+    fn begin(&mut self, served: &'m Served, found: &[Found]) -> Result<Option<Reply>, Fault> {
+        let reply = match &served.exchange.expects {
+            Some(pattern) => Some(Reply::of(self.echo(pattern, found)?)),
+            None => None,
+        };
+        let ticket = self.sim.start(&served.operation, &mut ())?;
+        if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
+            self.running.push((ticket, &served.operation));
+        }
+        Ok(reply)
+    }
+
+    /// An answer that says numbers as they were sent, or else as they are told.
+    fn echo(&mut self, pattern: &Pattern, found: &[Found]) -> Result<String, Fault> {
+        let driver = self.driver;
+        let numbers: Vec<&Unit> = pattern
+            .slots
+            .iter()
+            .filter_map(|s| match s {
+                matterix_ir::wire::Slot::Number(unit) => Some(unit),
+                _ => None,
+            })
+            .collect();
+        let mut texts = BTreeMap::new();
+        for unit in numbers {
+            let told =
+                driver.told.iter().find(|t| t.expects.slots.contains(&matterix_ir::wire::Slot::Number(unit.clone())));
+            let text = match (found.first(), told) {
+                (Some(sent), _) => number(unit, sent.value, None),
+                (None, Some(told)) => {
+                    let (value, digits) = (self.sim.value(told.value, &mut ())?.unwrap_or(0.0), self.digits(told));
+                    number(unit, value, digits)
+                }
+                (None, None) => "0".to_owned(),
+            };
+            texts.insert(unit.symbol.clone(), text);
+        }
+        Ok(pattern::rendered(pattern, |unit| texts.get(&unit.symbol).cloned().unwrap_or_default()))
+    }
+
+    /// The answer that means a failure; none where the driver knows none, as devices do that ignore what they do not understand.
+    fn refuse(&self, failure: &str) -> Option<Reply> {
+        let named = |name: &str| self.driver.refusals.iter().find(|r| r.failure == name);
+        let refusal = named(failure).or_else(|| named(NOT_UNDERSTOOD))?;
+        let text = pattern::rendered(&refusal.reply, |_| "0".to_owned());
+        Some(Reply { is_error: self.codec.acknowledges(), ..Reply::of(text) })
+    }
+}
+
+/// What is said apart from commands, and whether it breaks off what the device does.
+fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
+    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).map(|e| (e, false));
+    driver.halt.iter().map(|e| (e, true)).chain(quiet)
+}
+
+fn number(unit: &Unit, si: f64, digits: Option<u8>) -> String {
+    match digits {
+        Some(digits) => template::fixed(unit.of_si(si), digits),
+        None => matterix_ir::quantity::show_number(unit.of_si(si)),
+    }
+}

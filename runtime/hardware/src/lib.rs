@@ -1,0 +1,13 @@
+//! Carries plans out on devices: the lines to them, the framings on these, the journal of a deployment, and emulators.
+
+// A fault ends the run: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
+pub mod binding;
+pub mod codec;
+pub mod deploy;
+pub mod emulate;
+pub mod link;
+pub mod pattern;
+pub mod port;
+pub mod template;

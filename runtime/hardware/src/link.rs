@@ -1,0 +1,184 @@
+//! A device at the other end of a line: exchanges as its driver declares them.
+
+use std::time::{Duration, Instant};
+
+use matterix_ir::wire::{Driver, Pattern, Until};
+
+use crate::codec::{Codec, Reply, shown};
+use crate::pattern::{matched, written};
+use crate::port::Port;
+
+/// Why a device did not do what it was told.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Trouble {
+    /// The line is gone, or nothing came in time.
+    Lost(String),
+    /// What came is no answer to what was said.
+    Garbled(String),
+    /// The device says no: the failure its driver names, and in words.
+    Refused {
+        /// As in `reply "..." fails NAME`.
+        failure: String,
+        /// What it said.
+        text: String,
+    },
+}
+
+impl Trouble {
+    /// In words.
+    pub fn text(&self) -> &str {
+        match self {
+            Trouble::Lost(text) | Trouble::Garbled(text) | Trouble::Refused { text, .. } => text,
+        }
+    }
+}
+
+/// Told of all that goes over a line.
+pub trait Overhear {
+    /// These bytes are about to go out.
+    fn out(&mut self, bytes: &[u8]);
+    /// These bytes have come in.
+    fn back(&mut self, bytes: &[u8]);
+}
+
+/// An open line to a device.
+pub struct Link {
+    port: Box<dyn Port>,
+    codec: Codec,
+    timeout: Duration,
+    buffer: Vec<u8>,
+}
+
+impl Link {
+    /// A line in use by a driver.
+    pub fn new(port: Box<dyn Port>, driver: &Driver, address: Option<&str>) -> Result<Self, String> {
+        let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
+        let timeout =
+            Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
+        Ok(Link { port, codec, timeout, buffer: Vec::new() })
+    }
+
+    /// Says commands one after the other; the numbers of the last answer, SI, where answers are expected.
+    pub fn say(
+        &mut self,
+        texts: &[String],
+        expects: Option<&Pattern>,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        let mut numbers = Vec::new();
+        for frame in self.codec.say(texts) {
+            self.send(&frame, ear)?;
+            if expects.is_none() && !self.codec.acknowledges() {
+                continue;
+            }
+            let reply = self.reply(&frame, ear)?;
+            numbers = self.judged(&frame, &reply, expects, driver)?;
+        }
+        Ok(numbers)
+    }
+
+    /// Asks; the numbers of the answer, SI.
+    pub fn ask(
+        &mut self,
+        text: &str,
+        expects: &Pattern,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        let frame = self.codec.ask(text);
+        self.send(&frame, ear)?;
+        let reply = self.reply(&frame, ear)?;
+        self.judged(&frame, &reply, Some(expects), driver)
+    }
+
+    /// Whether the device is ready.
+    pub fn is_ready(
+        &mut self,
+        text: &str,
+        until: &Until,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<bool, Trouble> {
+        let frame = self.codec.ask(text);
+        self.send(&frame, ear)?;
+        let reply = self.reply(&frame, ear)?;
+        if let Some(refused) = refusal(driver, &reply) {
+            return Err(refused);
+        }
+        Ok(match &until.expects {
+            Some(pattern) => matched(pattern, &reply.text).is_some(),
+            None => !reply.busy,
+        })
+    }
+
+    fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        // What is still there answers nothing that will be asked.
+        loop {
+            match self.port.receive(Duration::ZERO) {
+                Ok(late) if late.is_empty() => break,
+                Ok(late) => ear.back(&late),
+                Err(e) => return Err(Trouble::Lost(format!("the line is gone: {e}"))),
+            }
+        }
+        self.buffer.clear();
+        ear.out(frame);
+        self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "devices answer by the wall clock")]
+    fn reply(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+        let until = Instant::now() + self.timeout;
+        loop {
+            if let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                return reply.map_err(|g| Trouble::Garbled(format!("to `{}` it answered what {}", shown(to), g.why)));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                let seconds = self.timeout.as_secs_f64();
+                return Err(match self.buffer.as_slice() {
+                    [] => Trouble::Lost(format!("it did not answer `{}` within {seconds} s", shown(to))),
+                    half => Trouble::Garbled(format!(
+                        "its answer to `{}` broke off after `{}`: nothing more came within {seconds} s",
+                        shown(to),
+                        shown(half)
+                    )),
+                });
+            }
+            let bytes = self.port.receive(left).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
+            if !bytes.is_empty() {
+                ear.back(&bytes);
+            }
+            self.buffer.extend(bytes);
+        }
+    }
+
+    /// The numbers of an answer, unless it is a refusal or says something else.
+    fn judged(
+        &self,
+        frame: &[u8],
+        reply: &Reply,
+        expects: Option<&Pattern>,
+        driver: &Driver,
+    ) -> Result<Vec<f64>, Trouble> {
+        if let Some(refused) = refusal(driver, reply) {
+            return Err(refused);
+        }
+        let Some(pattern) = expects else { return Ok(Vec::new()) };
+        matched(pattern, &reply.text).ok_or_else(|| {
+            let (to, expected) = (shown(frame), written(pattern));
+            Trouble::Garbled(format!("to `{to}` it answered `{}`, not `{expected}`", reply.text))
+        })
+    }
+}
+
+/// The failure that an answer means.
+fn refusal(driver: &Driver, reply: &Reply) -> Option<Trouble> {
+    let named = driver.refusals.iter().find(|r| matched(&r.reply, &reply.text).is_some());
+    let text = format!("it answered `{}`", reply.text);
+    match named {
+        Some(named) => Some(Trouble::Refused { failure: named.failure.clone(), text }),
+        None if reply.is_error => Some(Trouble::Refused { failure: "refused".to_owned(), text }),
+        None => None,
+    }
+}

@@ -1,0 +1,107 @@
+//! `matterixc deploy`.
+
+use std::io::{BufRead, IsTerminal};
+
+use matterix_hardware::deploy::{Journal, Mode};
+use matterix_ir::Severity;
+use matterix_ir::quantity::show_number;
+
+use super::run::Findings;
+use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
+use crate::pipeline::{self, Choices, DeployPlan, Input, Options, Wires};
+use crate::progress::{Kind, Progress};
+use crate::terminal::{Stream, print};
+use crate::{Exit, cancel, files};
+
+/// Compiles, looks whether devices can do it, and lets them do it.
+pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
+    super::or_complain(attempt(args, color))
+}
+
+fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
+    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
+    let bindings = String::from_utf8(files::read(&args.bind)?)
+        .map_err(|_| format!("`{}` is not text in UTF-8", args.bind.display()))?;
+    if args.mode != DeployMode::Dry && args.journal.is_none() {
+        return Err("what is sent to devices is kept in a journal: say where with `--journal FILE`".to_string());
+    }
+    if args.resume && args.mode == DeployMode::Dry {
+        return Err("a dry run has nothing to go on with".to_string());
+    }
+    let mut findings = Findings::new(RunFormat::Human, color);
+    let options = Options { wires: Wires::Called, ..args.subject.options() };
+    let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
+    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    findings.show(&sources, diagnostics);
+    let Some(program) = program.filter(|_| !is_wrong) else {
+        findings.end();
+        return Ok(Exit::Findings);
+    };
+    let cancel = cancel::on_interrupt()?;
+    if args.mode == DeployMode::SimFirst && !args.resume {
+        let mut progress = Progress::new(&program.plan, Kind::Quiet);
+        let (fidelity, dry) = (Fidelity::Process, false);
+        let choices = Choices { seed: args.seed, fidelity, dry, turns: Vec::new(), moved: Vec::new() };
+        let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
+        let (passed, end) = (ran.passed, ran.end_time());
+        findings.show(&sources, ran.diagnostics.clone());
+        if !passed {
+            findings.end();
+            print(Stream::Err, "the simulation did not pass: nothing was sent\n");
+            return Ok(Exit::Findings);
+        }
+        print(Stream::Err, &format!("the simulation passed in {} s of lab time\n", show_number(end)));
+    }
+    let file = sources.add(args.bind.display().to_string(), bindings.clone());
+    let journal = match (&args.journal, args.resume) {
+        (Some(path), true) => Some(Journal::reopen(path)?),
+        (Some(path), false) if args.mode != DeployMode::Dry => Some((Journal::create(path)?, Vec::new())),
+        _ => None,
+    };
+    let mode = match args.mode {
+        DeployMode::Dry => Mode::Dry,
+        DeployMode::Shadow => Mode::Shadow,
+        DeployMode::Real | DeployMode::SimFirst => Mode::Real,
+    };
+    let yes = args.yes || mode == Mode::Dry;
+    let person = move |text: &str| confirmed(text, yes);
+    let plan = DeployPlan {
+        bindings: (file, &bindings),
+        mode,
+        speed: args.speed,
+        seed: args.seed,
+        trace: args.trace,
+        journal,
+        cancel,
+        person: &person,
+    };
+    if args.speed != 1.0 && mode != Mode::Dry {
+        let speed = show_number(args.speed);
+        print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
+    }
+    let deployed = pipeline::deploy(&program, &sources, plan)?;
+    findings.show(&sources, deployed.diagnostics);
+    findings.end();
+    if let Some(end) = deployed.end {
+        let [judged, met, unseen] = deployed.counts;
+        let how = if deployed.passed { "passed" } else { "did not pass" };
+        let seen = format!("{judged} expectations: {met} met, {unseen} not observed");
+        print(Stream::Err, &format!("the deployment {how} after {} s; {seen}\n", show_number(end)));
+    }
+    Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
+}
+
+/// Whether a person agrees; nobody does where nobody can be asked.
+fn confirmed(text: &str, yes: bool) -> bool {
+    print(Stream::Err, &format!("{text}\n"));
+    if yes {
+        return true;
+    }
+    if !std::io::stdin().is_terminal() {
+        print(Stream::Err, "nobody is there to confirm: run it on a terminal, or with `--yes`\n");
+        return false;
+    }
+    print(Stream::Err, "type y and Enter to confirm: ");
+    let mut line = String::new();
+    std::io::stdin().lock().read_line(&mut line).is_ok() && line.trim().eq_ignore_ascii_case("y")
+}

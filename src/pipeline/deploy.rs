@@ -1,0 +1,183 @@
+//! A program on devices: bindings, checks before anything moves, execution, what is left safe.
+
+// A fault ends the run: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use matterix_hardware::binding;
+use matterix_hardware::codec::shown;
+use matterix_hardware::deploy::{Device, Entry, Hardware, Journal, Mode, Settings, digest, preflight};
+use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
+use matterix_runtime::backend::{Prepared, Sim};
+use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Verdict};
+use matterix_runtime::fault::Fault;
+use matterix_runtime::process::{Engine, Observer, Options};
+
+use crate::terminal::{Stream, print};
+
+/// What a deployment is given beside a program.
+pub struct Plan<'p> {
+    /// The text of the bindings and the file they are in.
+    pub bindings: (FileId, &'p str),
+    /// What is done with devices.
+    pub mode: Mode,
+    /// Seconds of lab time per second.
+    pub speed: f64,
+    /// Where the noise of the twin starts.
+    pub seed: u64,
+    /// Shows all bytes.
+    pub trace: bool,
+    /// The journal, with what an earlier process wrote into it.
+    pub journal: Option<(Journal, Vec<Entry>)>,
+    /// Ends it early.
+    pub cancel: &'p AtomicBool,
+    /// Asks a person.
+    pub person: &'p dyn Fn(&str) -> bool,
+}
+
+/// What came of it.
+pub struct Deployed {
+    /// What was found before or went wrong after.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Whether it came to its end with all expectations met or not observed.
+    pub passed: bool,
+    /// s of lab time; nothing where it did not begin.
+    pub end: Option<f64>,
+    /// Expectations that were judged, met and not observed.
+    pub counts: [usize; 3],
+}
+
+impl Deployed {
+    fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
+        Deployed { diagnostics, passed: false, end: None, counts: [0; 3] }
+    }
+}
+
+/// Carries a program out.
+pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Deployed, String> {
+    let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
+    if found.iter().any(|d| d.severity == Severity::Error) {
+        return Ok(Deployed::not_begun(found));
+    }
+    let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
+    let digest = digest(program, plan.bindings.1)?;
+    let (journal, before) = plan.journal.unwrap_or((Journal::none(), Vec::new()));
+    if let Some(d) = unfit(&before, &digest, plan.speed) {
+        return Ok(Deployed::not_begun(vec![d]));
+    }
+    let prepared = Prepared::new(program);
+    let params = program.model.params.iter().map(|p| p.value).collect();
+    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
+    let engine = match engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)) {
+        Ok(engine) => engine,
+        Err(fault) => return Ok(Deployed::not_begun(vec![of_fault(fault)])),
+    };
+    let twin = Sim::new(engine, &prepared, plan.seed);
+    let shows = plan.trace || plan.mode == Mode::Dry;
+    let trace = move |time: f64, device: &str, out: bool, bytes: &[u8]| {
+        if shows {
+            print(
+                Stream::Out,
+                &format!("{time:10.3} s  {device} {} {}\n", if out { "<-" } else { "->" }, shown(bytes)),
+            );
+        }
+    };
+    let settings = Settings { mode: plan.mode, speed: plan.speed, cancel: plan.cancel, person: plan.person };
+    let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
+    let found = {
+        let (observed, devices) = hardware.view();
+        preflight(program, devices, observed)
+    };
+    if !found.is_empty() {
+        return Ok(Deployed::not_begun(found));
+    }
+    let resumes = !before.is_empty();
+    let opened = if resumes {
+        hardware.follow_journal(before);
+        Ok(())
+    } else {
+        hardware.begin_journal(&digest).and_then(|()| hardware.open(false))
+    };
+    if let Err(fault) = opened {
+        let mut found = vec![of_fault(fault)];
+        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        return Ok(Deployed::not_begun(found));
+    }
+    let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
+    let mut told = Told { person: plan.person, cancel: plan.cancel };
+    let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
+    let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    let mut found = findings(&execution, sources);
+    if !well {
+        found.extend(hardware.secure().into_iter().map(unsafe_left));
+    }
+    found.extend(hardware.close().err().map(of_fault));
+    let status = if well { "ended" } else { "failed" };
+    found.extend(hardware.end_journal(status).err().map(of_fault));
+    let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
+    let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
+    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| d.severity != Severity::Error);
+    Ok(Deployed { diagnostics: found, passed, end: Some(execution.end_time), counts })
+}
+
+/// Why a journal is of another deployment, or of one that has ended.
+fn unfit(before: &[Entry], digest: &str, speed: f64) -> Option<Diagnostic> {
+    let wrong = |headline: &str| {
+        let d = Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on");
+        Some(d.help("begin anew, with a journal of its own"))
+    };
+    match (before.first(), before.last()) {
+        (None, _) => None,
+        (_, Some(Entry::End { .. })) => wrong("the deployment of this journal has come to its end"),
+        (Some(Entry::Begin { digest: of, speed: at, .. }), _) => match () {
+            () if of != digest => wrong("the journal is of another program, or of other bindings"),
+            () if *at != speed => wrong("the journal is of a deployment at another speed"),
+            () => None,
+        },
+        _ => wrong("the journal does not begin as one"),
+    }
+}
+
+fn of_fault(fault: Fault) -> Diagnostic {
+    exec::diagnostic(&FailureTrace::of_fault(fault))
+}
+
+fn unsafe_left(why: String) -> Diagnostic {
+    let headline = format!("a device could not be made safe: {why}");
+    Diagnostic::error(codes::DEVICE_LOST, Span::default(), headline, "see to it").help("go and look at it now")
+}
+
+fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
+    let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
+    let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
+    found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
+    let others = execution.suppressed.iter().map(exec::diagnostic);
+    found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
+    found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
+}
+
+/// Says what is noted, and asks what is asked.
+struct Told<'p> {
+    person: &'p dyn Fn(&str) -> bool,
+    cancel: &'p AtomicBool,
+}
+
+impl Observer for Told<'_> {
+    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn event(&mut self, _: f64, _: usize) {}
+    fn process(&mut self, _: f64, _: usize, _: bool) {}
+}
+
+impl Listener for Told<'_> {
+    fn note(&mut self, time: f64, _: matterix_ir::plan::StepId, text: &str) {
+        print(Stream::Err, &format!("{time:10.3} s  {text}\n"));
+    }
+
+    fn ask(&mut self, _: f64, _: matterix_ir::plan::StepId, text: &str) {
+        // Who does not agree wants it to end.
+        if !(self.person)(text) {
+            self.cancel.store(true, Ordering::Relaxed);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! A device of a lab as an emulator.
+
+// A fault ends the run: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use matterix_hardware::emulate::{Emulator, Stop, serve_pty, serve_tcp};
+use matterix_ir::Program;
+use matterix_runtime::backend::{Prepared, Sim};
+use matterix_runtime::process::{Engine, Options};
+
+/// Where an emulator answers.
+pub enum Line<'p> {
+    /// At a pseudo-terminal, with a link to it.
+    Pty(Option<&'p Path>),
+    /// At a port of this machine.
+    Tcp(u16),
+}
+
+/// Answers as a device of the program's lab until `cancel` is set; `ready` is given the place.
+pub fn emulate(
+    program: &Program,
+    device: &str,
+    driver: Option<&str>,
+    line: &Line<'_>,
+    (speed, seed): (f64, u64),
+    cancel: &AtomicBool,
+    ready: &mut dyn FnMut(&str),
+) -> Result<(), String> {
+    let instance = program.scene.find(device).ok_or_else(|| format!("the lab has no `{device}`"))?;
+    let all: Vec<_> = program.drivers.iter().filter(|d| d.instance == instance).collect();
+    let list = all.iter().map(|d| format!("`{}`", d.name)).collect::<Vec<_>>().join(", ");
+    let chosen = match (driver, all.as_slice()) {
+        (Some(name), _) => all.iter().find(|d| d.name == name).copied(),
+        (None, [only]) => Some(*only),
+        (None, []) => return Err(format!("no driver says how `{device}` is spoken to")),
+        (None, _) => return Err(format!("`{device}` has several drivers: say which with `--driver`: {list}")),
+    };
+    let chosen = chosen.ok_or_else(|| format!("`{device}` has no such driver: it has {list}"))?;
+    let prepared = Prepared::new(program);
+    let params = program.model.params.iter().map(|p| p.value).collect();
+    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
+    let engine = engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)).map_err(|f| f.message)?;
+    let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), chosen, None)?;
+    let stop = Stop { cancel, speed };
+    match line {
+        Line::Pty(link) => serve_pty(&mut emulator, *link, stop, ready),
+        Line::Tcp(port) => serve_tcp(&mut emulator, *port, stop, ready),
+    }
+}

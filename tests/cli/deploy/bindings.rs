@@ -1,0 +1,67 @@
+//! Bindings and plans that are refused before anything is sent.
+
+use super::{HEAT, bench};
+use crate::harness::{matterixc_in, write};
+
+/// Codes and text of the findings of a dry run with these bindings.
+fn found(name: &str, text: &str, bindings: &str) -> String {
+    let dir = bench(name, text, "plate", "");
+    write(&dir, "lab.toml", bindings);
+    let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
+    assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
+    assert!(ended.out.is_empty(), "nothing is sent: {}", ended.out);
+    ended.err
+}
+
+#[test]
+fn what_is_wrong_with_bindings_is_said_where_it_stands() {
+    let cases = [
+        ("[plat]\nport = \"x\"", "has no `plat`"),
+        ("plate = 3", "bound with a table"),
+        ("[plate]\nprot = \"x\"", "has no `prot`"),
+        ("[plate]\n", "is not said"),
+        ("[plate]\nport = 3", "is a text"),
+        ("[plate]\nport = \"x\"\naddress = \"y\"", "two lines"),
+        ("[plate]\nport = \"x\"\ndriver = \"Cavro\"", "no driver `Cavro`"),
+        ("[plate]\nby = \"feet\"", "hands"),
+        ("[plate]\nport = \"x\"\ntolerance = { temperature = \"5 g\" }", "a number of K"),
+        ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not tell `colour`"),
+        ("[beaker]\nport = \"x\"", "no driver says"),
+        ("[plate", "not TOML"),
+    ];
+    for (index, (bindings, wanted)) in cases.iter().enumerate() {
+        let err = found(&format!("binding_{index}"), HEAT, bindings);
+        assert!(err.contains("error[binding]") && err.contains(wanted), "{bindings}: {err}");
+        assert!(err.contains("lab.toml:"), "{bindings}: {err}");
+    }
+}
+
+#[test]
+fn a_step_that_nobody_is_told_of_is_found_first() {
+    let err = found("undriven", HEAT, "");
+    assert_eq!(err.matches("error[undriven]").count(), 4, "{err}");
+    assert!(err.contains("`IkaNamur`"), "{err}");
+}
+
+#[test]
+fn a_decision_on_what_no_device_tells_is_found_first() {
+    let hidden = HEAT.replace("plate.temperature >= 30 degC timeout", "beaker.contents.temperature >= 30 degC timeout");
+    let err = found("unobserved", &hidden, "[plate]\nport = \"x\"");
+    assert!(err.contains("error[unobserved]") && err.contains("lab.mtx:12"), "{err}");
+}
+
+#[test]
+fn hands_do_what_has_no_line_if_someone_confirms() {
+    let dir = bench("hands", HEAT, "plate", "");
+    write(&dir, "lab.toml", "[plate]\nby = \"hand\"");
+    let text = HEAT
+        .replace("wait until plate.temperature >= 30 degC timeout 1 h", "wait 2 s")
+        .replace("expect plate.temperature >= 29 degC", "note \"done\"");
+    write(&dir, "lab.mtx", text);
+    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--speed", "40", "--journal"];
+    let nobody = matterixc_in(&dir, &[&given[..], &["one"]].concat());
+    assert!(nobody.code == 1 && nobody.err.contains("nobody did"), "{}", nobody.err);
+    let yes = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
+    assert_eq!(yes.code, 0, "{}", yes.err);
+    assert!(yes.err.contains("please do this, then confirm: heat plate to 50 degC"), "{}", yes.err);
+}

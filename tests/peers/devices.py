@@ -1,0 +1,164 @@
+"""Drivers and emulators against programs of other authors.
+
+usage: devices.py MATTERIXC FOLDER
+
+Deployments run on the simulators of labmcp-ika, labmcp-mettler-toledo and labmcp-cavro, which know nothing of this project; and
+drivers from PyPI run unchanged on its emulators. Each line printed is a figure or a verdict; the exit status is 1 where one is bad.
+"""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import threading
+
+COMMAND, FOLDER = sys.argv[1], sys.argv[2]
+SPEED = 10
+BAD = []
+
+HEAT = """mtx 1
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    beaker = Beaker250mL on plate holding 100 g of water
+}
+workflow warm in bench {
+    stir plate at 300 rpm
+    heat plate to 50 degC
+    wait until plate.temperature >= 30 degC timeout 1 h
+    expect plate.temperature >= 29 degC
+} finally { stop heating plate; stop stirring plate }
+"""
+
+WEIGH = """mtx 1
+use std::balances::PrecisionBalance
+lab bench { ambient: 22 degC, scale = PrecisionBalance at (0, 0, 0) m }
+workflow weigh_it in bench {
+    tare scale
+    wait 1 s
+    expect scale.net in -0.1 g .. 0.1 g
+}
+"""
+
+DOSE = """mtx 1
+use std::glassware::Beaker50mL
+use std::pumps
+lab bench {
+    ambient: 22 degC
+    pump = CavroXlp6000 at (0, 0, 0) m
+    a = Beaker50mL at (1, 0, 0) m holding 20 mL of water
+    b = Beaker50mL at (2, 0, 0) m
+    between pump and a { piped: true, port: 1 }
+    between pump and b { piped: true, port: 3 }
+}
+workflow dose in bench {
+    draw 2.123 mL from a by pump
+    push 1 mL into b by pump
+    push 1.123 mL into b by pump
+}
+"""
+
+
+def verdict(what, good, said=""):
+    print(f"{'ok ' if good else 'BAD'} {what}{': ' + said if said else ''}", flush=True)
+    if not good:
+        BAD.append(what)
+
+
+def serve(simulator, end, back):
+    """A simulator at a port of this machine, and what went over its line."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    heard = []
+
+    def connection(stream):
+        rest = b""
+        while data := stream.recv(1024):
+            rest += data
+            while end in rest:
+                line, rest = rest.split(end, 1)
+                reply = simulator.handle(line.decode("latin1"))
+                replies = [] if reply is None else [reply] if isinstance(reply, str) else reply
+                heard.append((line.decode("latin1"), replies))
+                stream.sendall(b"".join(r.encode("latin1") + back for r in replies))
+
+    def accept():
+        while True:
+            threading.Thread(target=connection, args=(listener.accept()[0],), daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+    return f"127.0.0.1:{listener.getsockname()[1]}", heard
+
+
+def deploy(name, text, device, address, more=""):
+    folder = os.path.join(FOLDER, name)
+    os.makedirs(folder)
+    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
+        with open(os.path.join(folder, file), "w") as out:
+            out.write(content)
+    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", str(SPEED)]
+    return subprocess.run([COMMAND, "deploy", "lab.mtx", *arguments], cwd=folder, capture_output=True, text=True)
+
+
+def emulator(*arguments):
+    process = subprocess.Popen([COMMAND, "emulate", *arguments], stdout=subprocess.PIPE, text=True)
+    return process, process.stdout.readline().strip()
+
+
+def deployments():
+    from labmcp_cavro.simulator import CavroSimulator
+    from labmcp_ika.simulator import IKASimulator
+    from labmcp_mettler_toledo.simulator import MTSICSSimulator
+
+    plate = IKASimulator(time_scale=SPEED)
+    address, heard = serve(plate, b"\r\n", b"\r\n")
+    ended = deploy("heat", HEAT, "plate", address)
+    armed = sum(line.startswith("OUT_WD1@") for line, _ in heard)
+    verdict("heat and stir on labmcp-ika", ended.returncode == 0, ended.stderr.strip().splitlines()[-1])
+    verdict("its watchdog", armed > 0 and plate.wd_mode is None and not plate.heating, f"armed {armed} times, off at the end")
+
+    address, heard = serve(MTSICSSimulator(), b"\r\n", b"\r\n")
+    ended = deploy("weigh", WEIGH, "scale", address)
+    verdict("weigh and tare on labmcp-mettler-toledo", ended.returncode == 0, ended.stderr.strip().splitlines()[-1])
+    address, heard = serve(MTSICSSimulator(load_g=500.0), b"\r\n", b"\r\n")
+    ended = deploy("overload", WEIGH, "scale", address)
+    verdict("an overload", ended.returncode == 1 and "overload" in ended.stderr, "refused")
+
+    pump = CavroSimulator(standard_steps=3000, valve_ports=9, speed=SPEED)
+    address, heard = serve(pump, b"\r", b"\x03\r\n")
+    ended = deploy("dose", DOSE, "pump", address, 'driver = "CavroDt"\n')
+    verdict("transfers on labmcp-cavro", ended.returncode == 0, ended.stderr.strip().splitlines()[-1])
+    told = [int(m[1]) for line, replies in heard if line.endswith("?") for m in [re.match(r"/0.(\d+)", replies[0])]]
+    wanted = [round(v * 3000 / 5) for v in (2.123, 1.123, 0)]
+    verdict("the plunger", told == wanted, f"{told}, round(volume * 3000 / 5 mL) is {wanted}")
+
+
+def drivers():
+    from matterlab_hotplates import IKAHotplate
+    from mettler_toledo_device import MettlerToledoDevice
+
+    process, address = emulator("IkaRetControl", "--tcp", "0", "--speed", str(SPEED))
+    try:
+        plate = IKAHotplate(com_port=f"socket://{address}", timeout=1.0)
+        before = plate.temp
+        plate.temp, plate.rpm = 60, 400
+        after, speed = plate.temp, plate.rpm
+        plate.stand_by()
+        verdict("matterlab_hotplates on an emulator", after > before and speed == 400, f"{before} to {after} degC, {speed} rpm")
+    finally:
+        process.kill()
+
+    process, path = emulator("PrecisionBalance", "--pty")
+    try:
+        balance = MettlerToledoDevice(port=path)
+        weight = balance.get_weight_stable()
+        verdict("mettler_toledo_device on an emulator", abs(weight[0]) < 0.1 and weight[1] == "g", f"{weight}")
+    finally:
+        process.kill()
+
+
+deployments()
+drivers()
+sys.exit(1 if BAD else 0)
