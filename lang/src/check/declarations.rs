@@ -1,6 +1,6 @@
 //! Every declaration of a file by itself, on stand-ins for the instances it is about.
 
-use matterix_ir::{Diagnostic, Severity, Sources, codes};
+use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::ignored;
 use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
@@ -25,14 +25,6 @@ pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Ve
 
 fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, module: usize) {
     let item: &'a Item = lab.tables.names.decl(id).item;
-    let later = |lab: &mut Elaborator<'a>, what: &str| {
-        // Not part of a run: said, but no reason not to run.
-        let d = unsupported(item.span, what);
-        let span = crate::names::item_name(item).map_or(item.span, |n| n.1);
-        let mut d = Diagnostic { severity: Severity::Warning, ..d };
-        d.labels[0].span = span;
-        lab.report(d);
-    };
     match &item.kind {
         ItemKind::Capability { .. } => capability(lab, id, module),
         ItemKind::Asset { .. } => asset(lab, id, item, module),
@@ -113,8 +105,6 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                 Planner::new(lab, sources).driver(id, this);
             }
         }
-        ItemKind::Study { .. } => later(lab, "studies"),
-        ItemKind::Fit { .. } => later(lab, "fits"),
         _ => {}
     }
 }
