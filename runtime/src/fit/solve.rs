@@ -121,7 +121,7 @@ pub fn solve(
     })
 }
 
-fn squares(residuals: &Vec<f64>) -> f64 {
+fn squares(residuals: &[f64]) -> f64 {
     residuals.iter().map(|r| r * r).sum()
 }
 
@@ -182,7 +182,7 @@ impl Counted<'_> {
         let method = LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-7).with_gtol(1e-9).with_patience(40);
         let (descent, _) = method.minimize(descent);
         let places = descent.places();
-        (descent.residuals.as_ref().map_or(f64::INFINITY, squares), places)
+        (descent.residuals.as_ref().map_or(f64::INFINITY, |r| squares(r)), places)
     }
 }
 
