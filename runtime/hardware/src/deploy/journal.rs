@@ -16,7 +16,7 @@ pub const VERSION: u32 = 1;
 pub enum Entry {
     /// The first line.
     Begin {
-        /// [`VERSION`].
+        /// The version of its form.
         version: u32,
         /// Of the program and its bindings: another program does not go on from here.
         digest: String,
