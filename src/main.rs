@@ -69,6 +69,7 @@ fn obey(cli: Cli) -> Exit {
         Command::Test(args) => command::test(&args, cli.color),
         Command::Bill(args) => command::bill(&args, cli.color),
         Command::Doc(args) => command::doc(&args, cli.color),
+        Command::Emit(args) => command::emit(&args, cli.color),
         Command::Plan(args) => command::plan(&args, cli.color),
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),

@@ -25,4 +25,4 @@ pub mod units;
 pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
-pub use program::{Options, Test, check, check_and, compile, contents, document, tests};
+pub use program::{Options, Test, check, check_and, compile, contents, document, tests, wire};

@@ -3,6 +3,7 @@
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
+use matterix_ir::wire::Wiring;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
@@ -128,8 +129,24 @@ pub fn compile(
     loader: &dyn Loader,
     options: &Options,
 ) -> (Option<Program>, Vec<Diagnostic>) {
-    let (program, diagnostics) = compile_and(sources, file, loader, options, |_, _, _| ());
-    (program.map(|(program, ())| program), diagnostics)
+    let (built, diagnostics) = compile_and(sources, file, loader, options, Wanted::Program, |_, _, _| ());
+    (built.map(|(program, _, ())| program), diagnostics)
+}
+
+/// Compiles one workflow of a file, with what the drivers of its devices say over a wire, such as `opentrons`.
+pub fn wire(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+    transport: &'static str,
+) -> (Option<(Program, Wiring)>, Vec<Diagnostic>) {
+    let wanted = Wanted::Wired(transport);
+    let (built, diagnostics) = compile_and(sources, file, loader, options, wanted, |_, _, (tables, _)| {
+        crate::import::texts(tables.names, "labware", loader)
+    });
+    let wired = built.map(|(program, wiring, files)| (program, Wiring { files, ..wiring.unwrap_or_default() }));
+    (wired, diagnostics)
 }
 
 /// Compiles one workflow of a file and writes it as a protocol for people, in Markdown.
@@ -139,10 +156,10 @@ pub fn document(
     loader: &dyn Loader,
     options: &Options,
 ) -> (Option<String>, Vec<Diagnostic>) {
-    let (text, diagnostics) = compile_and(sources, file, loader, options, |program, task, context| {
+    let (text, diagnostics) = compile_and(sources, file, loader, options, Wanted::Program, |program, task, context| {
         crate::prose::protocol(context.0, context.1, program, task)
     });
-    (text.map(|(_, text)| text), diagnostics)
+    (text.map(|(_, _, text)| text), diagnostics)
 }
 
 /// Compiles one workflow of a file; where that succeeds, `then` makes something more of it.
@@ -151,8 +168,9 @@ fn compile_and<T>(
     file: FileId,
     loader: &dyn Loader,
     options: &Options,
+    wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
-) -> (Option<(Program, T)>, Vec<Diagnostic>) {
+) -> (Option<(Program, Option<Wiring>, T)>, Vec<Diagnostic>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
@@ -174,7 +192,7 @@ fn compile_and<T>(
         }
     };
     let task = Task { item, lab, given };
-    let built = build(&tables, sources, &task, Wanted::Program);
+    let built = build(&tables, sources, &task, wanted);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -185,7 +203,7 @@ fn compile_and<T>(
     let program = built.program.filter(|_| !failed);
     let more = program.map(|program| {
         let more = then(&program, &task, (&tables, sources));
-        (program, more)
+        (program, built.wiring, more)
     });
     (more, diagnostics)
 }
@@ -324,6 +342,8 @@ enum Wanted {
     Findings,
     /// To be run.
     Program,
+    /// The same, with what drivers over this wire say.
+    Wired(&'static str),
     /// What is known at every statement.
     Contents,
     /// A program too, where robots with joints are in the lab.
@@ -333,6 +353,7 @@ enum Wanted {
 /// One workflow, built.
 struct Built {
     program: Option<Program>,
+    wiring: Option<Wiring>,
     points: Option<Points>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
@@ -365,7 +386,7 @@ fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], 
 /// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
 /// of it only where it is wanted.
 fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
-    let to_run = wanted == Wanted::Program;
+    let to_run = matches!(wanted, Wanted::Program | Wanted::Wired(_));
     let lab = task.lab;
     let mut reach = Reach::default();
     let mut draft = true;
@@ -375,7 +396,10 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
         planner.draft = draft;
-        let plan = planner.task(task);
+        if let Wanted::Wired(transport) = wanted {
+            planner.wiring = Some(Wiring { transport: transport.to_string(), ..Wiring::default() });
+        }
+        let (plan, wiring) = planner.task(task);
         elaborator.initialise();
         elaborator.close_holds();
         let mut events = elaborator.events();
@@ -406,7 +430,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !elaborator.has_robots() {
-                return Built { program: None, points, findings: elaborator.diagnostics, starts, uses };
+                return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -432,7 +456,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock };
-        return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses };
+        return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses };
     }
 }
 

@@ -3,6 +3,7 @@
 mod bill;
 mod check;
 mod doc;
+mod emit;
 mod explain;
 mod fmt;
 mod new;
@@ -15,6 +16,7 @@ mod view;
 pub use bill::bill;
 pub use check::check;
 pub use doc::doc;
+pub use emit::emit;
 pub use explain::explain;
 pub use fmt::fmt;
 pub use new::new;

@@ -1,6 +1,7 @@
 //! Every call into the compiler and the runtime.
 
 mod bill;
+mod emit;
 mod neighbours;
 mod plan;
 mod run;
@@ -9,6 +10,7 @@ mod view;
 use std::path::{Path, PathBuf};
 
 use matterix_ir::points::Points;
+use matterix_ir::wire::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
 use crate::args::Fidelity;
@@ -16,6 +18,7 @@ use matterix_runtime::motion::{Store, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
+pub use emit::{Target, emit};
 pub use matterix_lang::{Options, Test};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
@@ -109,6 +112,16 @@ pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, V
         Err(found) => (None, vec![found]),
     };
     (sources, program, found)
+}
+
+/// A file as a program, with what drivers over a wire say; none of both where there is an error.
+pub fn wire(input: &Input, options: &Options, transport: &'static str) -> (Sources, Option<(Program, Wiring)>, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let (wired, found) = match file {
+        Ok(file) => matterix_lang::wire(&mut sources, file, &input.neighbours(), options, transport),
+        Err(found) => (None, vec![found]),
+    };
+    (sources, wired, found)
 }
 
 /// A workflow of a file as a protocol for people, with findings; no text where there is an error.

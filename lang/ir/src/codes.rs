@@ -149,6 +149,8 @@ codes! {
     WAITS_FOR_EVER "waits-for-ever" "X0" "the run waits for something that does not come";
     ENDLESS_INSTANT "endless-instant" "X0" "steps follow one another without time passing";
     PROMISE_BROKEN "promise-broken" "X0" "a skill ended without what it promises";
+    NOT_EXPRESSIBLE "not-expressible" "E0" "a workflow does what the kind of file it is written as cannot say";
+    WRONG_MESSAGE "wrong-message" "E0" "a driver says something that its wire does not know";
     UNUSABLE_NUMBER "unusable-number" "X0" "a duration, an interval or a count is not one";
 }
 

@@ -28,6 +28,7 @@ pub mod scene;
 pub mod span;
 pub mod stock;
 pub mod text;
+pub mod wire;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};

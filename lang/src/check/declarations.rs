@@ -8,7 +8,7 @@ use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
-use crate::lower::Planner;
+use crate::lower::{Planner, driver};
 use crate::names::DeclId;
 
 /// Checks the declarations of one module.
@@ -106,6 +106,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }
+        ItemKind::Driver { transport, .. } if driver::is_known(transport) => Planner::new(lab, sources).check_driver(id),
         ItemKind::Driver { .. } => later(lab, "drivers"),
         ItemKind::Study { .. } => later(lab, "studies"),
         ItemKind::Fit { .. } => later(lab, "fits"),

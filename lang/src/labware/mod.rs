@@ -1,8 +1,8 @@
 //! Labware definitions of Opentrons, schema 2 and 3, as lines of an asset: `asset X from labware "plate.json"`.
 //!
 //! What a definition gives is written with these words of the language: the grid `wells` of `Well`, or `tips` of `Tip`
-//! for a tip rack, each with its `max_volume`; the `mouth` of each well; the `shape` of the whole and of each place; and, where the asset names
-//! no capability itself, the one called like the definition's category: `wellPlate` is `WellPlate`.
+//! for a tip rack, each with its `max_volume`; the `mouth` of each well; the `shape` of the whole and of each place; what the `definition`
+//! is known by, as `NAMESPACE/NAME/VERSION`; and, where the asset names no capability itself, the one called like the definition's category: `wellPlate` is `WellPlate`.
 
 mod definition;
 mod lines;

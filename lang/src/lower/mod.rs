@@ -2,6 +2,7 @@
 
 mod call;
 mod clauses;
+pub mod driver;
 mod holds;
 mod limits;
 mod motion;
@@ -15,6 +16,7 @@ pub use call::Verb;
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
+use matterix_ir::wire::Wiring;
 use matterix_ir::{Sources, Span, Unit};
 
 use self::clauses::Clauses;
@@ -50,6 +52,8 @@ pub struct Planner<'a, 'e> {
     pub said: Vec<Condition>,
     /// Only what the plan moves where is asked for, not how it reads or what it needs.
     pub draft: bool,
+    /// What is said over a wire, where that is asked for.
+    pub wiring: Option<Wiring>,
     clauses: Clauses,
     /// Clauses and limits that a draft has looked at.
     drafted: BTreeSet<Span>,
@@ -89,13 +93,14 @@ impl<'a, 'e> Planner<'a, 'e> {
             jobs: BTreeSet::new(),
             said: Vec::new(),
             draft: false,
+            wiring: None,
             clauses: Clauses::default(),
             drafted: BTreeSet::new(),
         }
     }
 
     /// Lowers a workflow or a test.
-    pub fn task(mut self, task: &Task<'a>) -> Plan {
+    pub fn task(mut self, task: &Task<'a>) -> (Plan, Option<Wiring>) {
         let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
         let mut arguments = Vec::new();
@@ -131,7 +136,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         }
         // A test may leave things as it likes.
         let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
-        Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
+        let wiring = self.wired();
+        let plan = Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends };
+        (plan, wiring)
     }
 
     /// The steps of a workflow; what its parameters are bound to goes into `shown`.

@@ -43,7 +43,9 @@ impl<'a> Planner<'a, '_> {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        Some(self.during(label, span, operation, invariants))
+        let step = self.during(label, span, operation, invariants);
+        self.say(device, sig, &bound, step);
+        Some(step)
     }
 
     /// An operation with what must hold while it lasts.
@@ -357,7 +359,7 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
-    fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
+    pub(super) fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
         let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
         let options = clauses.iter().filter_map(|c| match &c.kind {
             ClauseKind::Option(p) => Some(p),

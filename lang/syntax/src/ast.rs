@@ -866,7 +866,7 @@ pub enum WireKind {
         /// The command's call form.
         sig: Sig,
         /// What goes out.
-        sends: Vec<String>,
+        sends: Vec<Text>,
         /// What must come back.
         expects: Option<String>,
     },
@@ -889,7 +889,7 @@ pub enum WireKind {
     /// `open sends "1@1"`.
     Open {
         /// What goes out first.
-        sends: Vec<String>,
+        sends: Vec<Text>,
     },
 }
 

@@ -9,7 +9,7 @@ use super::{
 use crate::ast::{
     AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Expr, Field, FieldValue, FitLine, Goal,
     Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind, Name, Process,
-    Role, StudyLine, Term, Wire, WireKind,
+    Role, StudyLine, Term, Text, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -300,8 +300,8 @@ fn law(law: &Law) -> Sexp {
     }
 }
 
-fn texts(word: &str, all: &[String]) -> Sexp {
-    node(word).with(all.iter().map(|text| quoted(text)))
+fn texts(word: &str, all: &[Text]) -> Sexp {
+    node(word).with(all.iter().map(super::steps::filled))
 }
 
 fn wire(wire: &Wire) -> Sexp {

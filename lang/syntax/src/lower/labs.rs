@@ -10,7 +10,7 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Wire, WireKind,
+    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Text, Wire, WireKind,
 };
 
 impl Lower<'_> {
@@ -226,9 +226,9 @@ impl Lower<'_> {
         }
     }
 
-    fn sends_in(&mut self, kids: &mut Kids) -> Vec<String> {
+    fn sends_in(&mut self, kids: &mut Kids) -> Vec<Text> {
         let Some(node) = kids.eat(Rule::sends) else { return Vec::new() };
-        Kids::of(node).all(Rule::string).iter().map(|s| self.text(s)).collect()
+        Kids::of(node).all(Rule::string).iter().map(|s| self.filled(s)).collect()
     }
 }
 

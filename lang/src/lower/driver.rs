@@ -1,0 +1,184 @@
+//! Drivers: what a device is told when it gets a command, as texts with values.
+
+use matterix_ir::plan::{Step, StepId};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::{Message, Wired, Wiring};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::Planner;
+use super::call::Bound;
+use crate::ast::{Arg, ExprKind, ItemKind, MemberKind, Name, Param, Path, Sig, Text, Wire, WireKind};
+use crate::elaborate::tables::MemberRef;
+use crate::eval::{Scope, Value};
+use crate::names::{DeclId, verb_text};
+
+/// Wires whose drivers have a meaning.
+const KNOWN: &[&str] = &["opentrons", "urscript"];
+
+/// Whether drivers over this wire have a meaning.
+pub fn is_known(transport: &Name) -> bool {
+    KNOWN.contains(&transport.text.as_str())
+}
+
+/// A driver as it is declared.
+#[derive(Clone, Copy)]
+struct Driver<'a> {
+    name: &'a Name,
+    device: &'a Path,
+    transport: &'a Name,
+    settings: &'a [Arg],
+    wires: &'a [Wire],
+    module: usize,
+}
+
+/// Parameters of a signature, in their order.
+fn parameters(sig: &Sig) -> impl Iterator<Item = &Param> {
+    sig.params.iter().chain(sig.labelled.iter().flat_map(|(_, params)| params))
+}
+
+/// Whether a line of a driver is about a command: the same words, labels and numbers of parameters.
+fn fits(line: &Sig, command: &Sig) -> bool {
+    let labels = |sig: &Sig| -> Vec<(String, usize)> {
+        sig.labelled.iter().map(|(label, params)| (label.text.clone(), params.len())).collect()
+    };
+    verb_text(&line.verb) == verb_text(&command.verb)
+        && line.params.len() == command.params.len()
+        && labels(line) == labels(command)
+}
+
+impl<'a> Planner<'a, '_> {
+    fn driver(&self, id: DeclId) -> Option<Driver<'a>> {
+        let decl = self.lab.tables.names.decl(id);
+        match &decl.item.kind {
+            ItemKind::Driver { name, device, transport, args: settings, wires } => {
+                Some(Driver { name, device, transport, settings, wires, module: decl.module })
+            }
+            _ => None,
+        }
+    }
+
+    /// The driver of an instance over a wire: that of its own type goes before those of what that extends.
+    fn driver_of(&self, device: InstanceId, transport: &str) -> Option<Driver<'a>> {
+        let names = self.lab.tables.names;
+        let all: Vec<(DeclId, Driver<'a>)> = (0..names.decls.len() as u32)
+            .filter_map(|i| self.driver(DeclId(i)))
+            .filter(|d| d.transport.text == transport)
+            .filter_map(|d| Some((names.lookup(d.module, &d.device.segments.last()?.text)?, d)))
+            .collect();
+        self.lab.ancestors_of(device).into_iter().find_map(|kind| all.iter().find(|(of, _)| *of == kind).map(|(_, d)| *d))
+    }
+
+    /// Notes what a device is told when a command begins.
+    pub(super) fn say(&mut self, device: InstanceId, command: &Sig, bound: &Bound, step: StepId) {
+        let Some(transport) = self.wiring.as_ref().map(|w| w.transport.clone()).filter(|_| !self.draft) else { return };
+        let Some(driver) = self.driver_of(device, &transport) else { return };
+        let line = driver.wires.iter().find_map(|wire| match &wire.kind {
+            WireKind::Command { sig, sends, .. } if fits(sig, command) => Some((sig, sends)),
+            _ => None,
+        });
+        let Some((sig, sends)) = line else { return };
+        let mut scope = Scope::of(device, driver.module);
+        for (name, value) in &bound.values {
+            scope.bind(name.clone(), value.clone());
+        }
+        for (own, (_, value)) in parameters(sig).zip(&bound.values) {
+            scope.bind(own.name.text.clone(), value.clone());
+        }
+        let step = match &self.steps[step.0 as usize].step {
+            Step::During { body, .. } => *body,
+            _ => step,
+        };
+        let messages = self.messages(sends, &mut scope);
+        if let Some(wiring) = &mut self.wiring {
+            wiring.steps.insert(step, messages);
+        }
+    }
+
+    fn messages(&mut self, sends: &'a [Text], scope: &mut Scope) -> Vec<Message> {
+        sends.iter().filter_map(|text| Some(Message { text: self.filled(text, scope)?, span: text.span })).collect()
+    }
+
+    /// The wiring with all devices, where it is asked for.
+    pub(super) fn wired(&mut self) -> Option<Wiring> {
+        let transport = self.wiring.as_ref()?.transport.clone();
+        let mut devices = Vec::new();
+        let count = if self.draft { 0 } else { self.lab.instances.len() as u32 };
+        for id in (0..count).map(InstanceId) {
+            let Some(driver) = self.driver_of(id, &transport) else { continue };
+            let mut scope = Scope::of(id, driver.module);
+            let mut opens = Vec::new();
+            for wire in driver.wires {
+                if let WireKind::Open { sends } = &wire.kind {
+                    opens.extend(self.messages(sends, &mut scope));
+                }
+            }
+            let settings = driver.settings.iter().filter_map(|s| self.setting(s, &mut scope)).collect();
+            devices.push(Wired { device: id, driver: driver.name.text.clone(), settings, opens, span: driver.name.span });
+        }
+        let mut wiring = self.wiring.take()?;
+        wiring.devices = devices;
+        Some(wiring)
+    }
+
+    /// What a driver says of its wire, as text.
+    fn setting(&mut self, arg: &'a Arg, scope: &mut Scope) -> Option<(String, String)> {
+        let name = arg.name.as_ref()?.text.clone();
+        let text = match &*arg.value.kind {
+            ExprKind::Name(word) => word.text.clone(),
+            _ => match self.lab.expr(&arg.value, scope) {
+                Value::Text(text) => text,
+                _ => self.text(arg.value.span),
+            },
+        };
+        Some((name, text))
+    }
+
+    /// Checks a driver by itself, on a stand-in for its device.
+    pub fn check_driver(&mut self, id: DeclId) {
+        let Some(driver) = self.driver(id) else { return };
+        let Some(kind) = self.lab.kind_named(driver.device, driver.module) else { return };
+        let device = self.lab.prototype_of(vec![kind], self.lab.tables.kind_name(kind));
+        let commands: Vec<MemberRef<'a>> = self.lab.all_members(device);
+        for wire in driver.wires {
+            match &wire.kind {
+                WireKind::Command { sig, sends, expects } => {
+                    if expects.is_some() {
+                        self.not_said(driver.transport, wire.span, "replies");
+                    }
+                    let command = commands.iter().find_map(|m| match &m.member.kind {
+                        MemberKind::Command { sig: own, clauses } if fits(sig, own) => Some((m, own, clauses)),
+                        _ => None,
+                    });
+                    let Some((member, own, clauses)) = command else {
+                        self.no_command(sig, driver.device);
+                        continue;
+                    };
+                    let mut scope = Scope::of(device, driver.module);
+                    let bound = self.stand_ins(own, clauses, member.module, &mut scope);
+                    for (name, (_, value)) in parameters(sig).zip(&bound.values) {
+                        scope.bind(name.name.text.clone(), value.clone());
+                    }
+                    self.messages(sends, &mut scope);
+                }
+                WireKind::Open { sends } => {
+                    self.messages(sends, &mut Scope::of(device, driver.module));
+                }
+                WireKind::Reading { .. } => self.not_said(driver.transport, wire.span, "readings"),
+                WireKind::Reply { .. } => self.not_said(driver.transport, wire.span, "replies"),
+                WireKind::Error => {}
+            }
+        }
+    }
+
+    fn not_said(&mut self, transport: &Name, span: Span, what: &str) {
+        let headline = format!("`{}` is written to a file, in which there are no {what}", transport.text);
+        self.lab.report(Diagnostic::error(codes::MISPLACED, span, headline, "leave this out"));
+    }
+
+    fn no_command(&mut self, sig: &Sig, device: &Path) {
+        let kind = device.segments.last().map_or("", |n| n.text.as_str());
+        let headline = format!("`{kind}` has no command of the form `{}`", self.form(sig));
+        let d = Diagnostic::error(codes::UNKNOWN_VERB, sig.span, headline, "not one of its commands");
+        self.lab.report(d.help("a line has the words, labels and numbers of parameters of the command"));
+    }
+}
