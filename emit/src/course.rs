@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::wire::Wiring;
-use matterix_ir::{Diagnostic, NodeId, Op, Program, Sources, Span};
+use matterix_ir::{Diagnostic, NodeId, Op, Program, Sources, Span, codes};
 
 use crate::finding::{in_order, not_expressible};
 use crate::performance::{Act, Deed};
@@ -84,9 +84,12 @@ impl<'p> Course<'p> {
             }
             Action::Move { fraction, .. } if self.is_open(*fraction) => self.states.extend(written(self.model, action)),
             Action::Move { from, to, .. } => {
-                let extensive = |i: &u32| self.model.mixtures.get(*i as usize).map(|m| m.extensive.as_slice()).unwrap_or_default();
+                let extensive =
+                    |i: &u32| self.model.mixtures.get(*i as usize).map(|m| m.extensive.as_slice()).unwrap_or_default();
                 let source: BTreeMap<&str, u32> = extensive(from).iter().map(|(k, s)| (k.as_str(), *s)).collect();
-                let open = extensive(to).iter().filter(|(k, _)| source.get(k.as_str()).is_some_and(|s| self.states.contains(s)));
+                let open = extensive(to)
+                    .iter()
+                    .filter(|(k, _)| source.get(k.as_str()).is_some_and(|s| self.states.contains(s)));
                 let open: Vec<u32> = open.map(|(_, s)| *s).collect();
                 self.states.extend(open);
             }
@@ -106,18 +109,27 @@ fn written(model: &Model, action: &Action) -> Vec<u32> {
 }
 
 /// What of a performed workflow a target cannot say, by what decides its course; `what` is the target in words.
-pub fn open(program: &Program, wiring: &Wiring, sources: &Sources, acts: &[Act], means: Means, what: &str) -> Vec<Diagnostic> {
+pub fn open(
+    program: &Program,
+    wiring: &Wiring,
+    sources: &Sources,
+    acts: &[Act],
+    means: Means,
+    what: &str,
+) -> Vec<Diagnostic> {
     let course = Course::of(program);
     let plan = &program.plan;
     let origins = place::origins(plan, sources);
+    let library = |span: Span| sources.get(span.file).is_none_or(|f| f.name.contains("::"));
     let mut found = Vec::new();
     let mut say = |span: Span, headline: String, label: &str, help: &str| {
         found.push(not_expressible(span, headline, label).help(help));
     };
+    let mut handled: Vec<(Span, Span)> = Vec::new();
     let decided = |c: &Condition| !course.is_open(c.node);
     for (index, step) in plan.steps.iter().enumerate() {
         let at = origins.get(index).copied().unwrap_or(step.span);
-        let own = |span: Span| if sources.get(span.file).is_none_or(|f| f.name.contains("::")) { at } else { span };
+        let own = |span: Span| if library(span) { at } else { span };
         match &step.step {
             Step::If { condition, .. } | Step::RepeatWhile { condition, .. } if !decided(condition) => say(
                 own(condition.span),
@@ -155,12 +167,9 @@ pub fn open(program: &Program, wiring: &Wiring, sources: &Sources, acts: &[Act],
                 "a window of time",
                 "leave the window out; `matterixc check` tells whether it can be kept",
             ),
-            Step::Guarded { handlers, .. } if !handlers.is_empty() && !means.handlers => say(
-                at,
-                format!("{what} ends with the first failure: a handler would never run"),
-                "has a handler",
-                "leave the handler out; a run that fails is looked after by whoever stands there",
-            ),
+            Step::Guarded { handlers, .. } if !means.handlers => {
+                handled.extend(handlers.iter().map(|(_, handler)| (at, plan.get(*handler).span)));
+            }
             Step::Try(list) if list.len() > 1 && !means.handlers => say(
                 at,
                 format!("{what} ends with the first failure: the other way would never be tried"),
@@ -187,8 +196,23 @@ pub fn open(program: &Program, wiring: &Wiring, sources: &Sources, acts: &[Act],
         if messages.flat_map(crate::performance::nodes_of).any(|n| course.is_open(n)) {
             let at = origins.get(act.step.0 as usize).copied().unwrap_or_default();
             let label = format!("`{}` depends on it", plan.get(act.step).label);
-            say(at, format!("{what} needs to know every value beforehand"), &label, "write the value, not what is measured");
+            say(
+                at,
+                format!("{what} needs to know every value beforehand"),
+                &label,
+                "write the value, not what is measured",
+            );
         }
+    }
+    for (at, handler) in handled {
+        let headline = format!("{what} ends with the first failure: a handler would never run");
+        found.push(if library(handler) {
+            let label = "a skill of the library handles a failure here";
+            Diagnostic::warning(codes::NOT_EXPRESSIBLE, at, headline, label)
+        } else {
+            let help = "leave the handler out; a run that fails is looked after by whoever stands there";
+            not_expressible(handler, headline, "is for a failure").help(help)
+        });
     }
     in_order(found)
 }

@@ -1,9 +1,10 @@
 //! One run on the digital twin, as a list of what was done and what devices were told.
 
 use matterix_ir::plan::{Argument, Step, StepId};
+use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Message;
-use matterix_ir::{NodeId, Program, TextPart};
+use matterix_ir::{NodeId, Program, Text, TextPart};
 use matterix_runtime::exec::Listener;
 use matterix_runtime::motion::Moment;
 use matterix_runtime::process::{Engine, Observer};
@@ -22,6 +23,8 @@ pub struct Act {
     pub step: StepId,
     /// What it is.
     pub deed: Deed,
+    /// In words, with its values.
+    pub words: String,
     /// Quantities and words among the arguments of an operation, in their order, SI.
     pub values: Vec<Option<f64>>,
 }
@@ -87,7 +90,11 @@ impl<'p> Performance<'p> {
 
 /// The quantities, truths, words and instances of a message.
 pub(crate) fn nodes_of(message: &Message) -> impl Iterator<Item = NodeId> {
-    message.text.parts.iter().filter_map(|part| match part {
+    nodes(&message.text)
+}
+
+fn nodes(text: &Text) -> impl Iterator<Item = NodeId> {
+    text.parts.iter().filter_map(|part| match part {
         TextPart::Quantity { value, .. } => Some(*value),
         TextPart::Bool(node) | TextPart::Instance(node) | TextPart::Word(node, _) => Some(*node),
         TextPart::Plain(_) => None,
@@ -127,6 +134,16 @@ fn fill(program: &Program, message: &Message, values: &mut impl Iterator<Item = 
     Said { text, span: message.span }
 }
 
+/// A text with the next of these values, for people.
+fn tell(program: &Program, text: &Text, values: &mut impl Iterator<Item = Option<f64>>) -> String {
+    let instance = |v: f64| {
+        let known = Some(v).filter(|v| *v >= 0.0).and_then(|v| program.scene.instances.get(v as usize));
+        known.map_or("nothing", |i| &i.name).to_owned()
+    };
+    let told: Result<String, std::convert::Infallible> = text.show(|_| Ok(values.next().flatten()), instance);
+    told.unwrap_or_default()
+}
+
 impl Observer for Performance<'_> {
     fn sample(&mut self, _: f64, _: &Engine<'_>) {}
     fn event(&mut self, _: f64, _: usize) {}
@@ -142,6 +159,7 @@ impl Listener for Performance<'_> {
         match self.plan_step(step) {
             Step::Operation(operation) => {
                 wanted.extend(self.subject.wiring.steps.get(&step).into_iter().flatten().flat_map(nodes_of));
+                wanted.extend(self.subject.wiring.calls.get(&step).into_iter().flat_map(nodes));
                 wanted.extend(operation.arguments.iter().filter_map(|(_, argument)| match argument {
                     Argument::Quantity(node, _) | Argument::Word(node, _) => Some(*node),
                     _ => None,
@@ -161,24 +179,45 @@ impl Listener for Performance<'_> {
                 self.opened.push(device.opens.iter().map(|m| fill(program, m, &mut values)).collect());
             }
         }
+        let mut words = program.plan.get(step).label.clone();
         let deed = match self.plan_step(step) {
             Step::Operation(_) => {
                 let messages = self.subject.wiring.steps.get(&step);
-                Deed::Operation(messages.map(|all| all.iter().map(|m| fill(program, m, &mut values)).collect()))
+                let said = messages.map(|all| all.iter().map(|m| fill(program, m, &mut values)).collect());
+                if let Some(call) = self.subject.wiring.calls.get(&step) {
+                    words = tell(program, call, &mut values);
+                }
+                Deed::Operation(said)
             }
-            Step::Wait { .. } => Deed::Wait(values.next().flatten().unwrap_or(0.0)),
+            Step::Wait { .. } => {
+                let seconds = values.next().flatten().unwrap_or(0.0);
+                words = format!("wait {} s", show_number(seconds));
+                Deed::Wait(seconds)
+            }
             Step::WaitUntil { .. } | Step::Hold { .. } => Deed::WaitUntil,
             _ => return,
         };
-        self.acts.push(Act { time, step, deed, values: values.collect() });
+        self.acts.push(Act { time, step, deed, words, values: values.collect() });
     }
 
     fn note(&mut self, time: f64, step: StepId, text: &str) {
-        self.acts.push(Act { time, step, deed: Deed::Note(text.to_owned()), values: Vec::new() });
+        self.acts.push(Act {
+            time,
+            step,
+            deed: Deed::Note(text.to_owned()),
+            words: format!("note: {text}"),
+            values: Vec::new(),
+        });
     }
 
     fn ask(&mut self, time: f64, step: StepId, text: &str) {
-        self.acts.push(Act { time, step, deed: Deed::Ask(text.to_owned()), values: Vec::new() });
+        self.acts.push(Act {
+            time,
+            step,
+            deed: Deed::Ask(text.to_owned()),
+            words: format!("ask: {text}"),
+            values: Vec::new(),
+        });
     }
 
     fn travels(&mut self, moments: &[Moment]) {

@@ -23,7 +23,8 @@ pub(crate) fn origins(plan: &Plan, sources: &Sources) -> Vec<Span> {
 pub(crate) fn line(sources: &Sources, span: Span) -> (String, usize, String) {
     let (number, _) = sources.line_column(span);
     let Some(source) = sources.get(span.file) else { return (String::new(), number, String::new()) };
-    let name = Path::new(&source.name).file_name().map_or_else(|| source.name.clone(), |n| n.to_string_lossy().into_owned());
+    let name =
+        Path::new(&source.name).file_name().map_or_else(|| source.name.clone(), |n| n.to_string_lossy().into_owned());
     let text = source.text.lines().nth(number.saturating_sub(1)).unwrap_or("").trim().to_owned();
     (name, number, text)
 }

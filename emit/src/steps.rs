@@ -2,11 +2,13 @@
 
 use std::fmt::Write;
 
+use matterix_ir::Diagnostic;
 use matterix_ir::plan::{Argument, Operation, Step};
 use matterix_ir::scene::InstanceId;
 use serde_json::{Map, Value, json};
 
 use crate::course::{self, Means};
+use crate::finding::settle;
 use crate::performance::{Act, Deed, Performance, number};
 use crate::{Subject, Written, place};
 
@@ -18,7 +20,7 @@ const MEANS: Means = Means { beside: true, conditions: true, handlers: false };
 
 /// One step in words: its number, when it begins, its line in the text, what it is.
 pub fn text(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
-    let steps = gather(subject, performance)?;
+    let (steps, warnings) = gather(subject, performance)?;
     let width = steps.len().to_string().len();
     let places: Vec<String> = steps.iter().map(|s| format!("{}:{}", s.file, s.line)).collect();
     let widest = places.iter().map(|p| p.chars().count()).max().unwrap_or(0);
@@ -26,13 +28,14 @@ pub fn text(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     for (index, (step, place)) in steps.iter().zip(&places).enumerate() {
         let _ = writeln!(out, "{:width$}  {:9.1} s  {place:widest$}  {}", index + 1, step.act.time, step.words);
     }
-    Ok((out.into_bytes(), Vec::new()))
+    Ok((out.into_bytes(), warnings))
 }
 
 /// The same for programs; docs/emit.md describes the fields.
 pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let mut out = String::new();
-    for (index, step) in gather(subject, performance)?.iter().enumerate() {
+    let (steps, warnings) = gather(subject, performance)?;
+    for (index, step) in steps.iter().enumerate() {
         let mut line = json!({
             "step": index + 1,
             "time": number(step.act.time),
@@ -45,7 +48,7 @@ pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
         }
         let _ = writeln!(out, "{line}");
     }
-    Ok((out.into_bytes(), Vec::new()))
+    Ok((out.into_bytes(), warnings))
 }
 
 /// An act with its place.
@@ -59,25 +62,16 @@ struct Listed<'a> {
 fn gather<'a>(
     subject: Subject<'_>,
     performance: &'a Performance<'_>,
-) -> Result<Vec<Listed<'a>>, Vec<matterix_ir::Diagnostic>> {
+) -> Result<(Vec<Listed<'a>>, Vec<Diagnostic>), Vec<Diagnostic>> {
     let Subject { program, wiring, sources } = subject;
-    let found = course::open(program, wiring, sources, &performance.acts, MEANS, WHAT);
-    if !found.is_empty() {
-        return Err(found);
-    }
+    let warnings = settle(course::open(program, wiring, sources, &performance.acts, MEANS, WHAT))?;
     let origins = place::origins(&program.plan, sources);
     let listed = performance.acts.iter().map(|act| {
         let at = origins.get(act.step.0 as usize).copied().unwrap_or_default();
         let (file, line, _) = place::line(sources, at);
-        let words = match &act.deed {
-            Deed::Operation(..) | Deed::WaitUntil => program.plan.get(act.step).label.clone(),
-            Deed::Wait(seconds) => format!("wait {} s", number(*seconds)),
-            Deed::Note(text) => format!("note: {text}"),
-            Deed::Ask(text) => format!("ask: {text}"),
-        };
-        Listed { act, file, line, words }
+        Listed { act, file, line, words: act.words.clone() }
     });
-    Ok(listed.collect())
+    Ok((listed.collect(), warnings))
 }
 
 /// What kind of step it is, with its numbers.

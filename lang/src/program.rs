@@ -3,8 +3,8 @@
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
-use matterix_ir::wire::Wiring;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
+use matterix_ir::wire::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};

@@ -1,6 +1,5 @@
 //! `matterixc emit`.
 
-
 use matterix_ir::{Diagnostic, Severity};
 
 use crate::args::{Color, EmitArgs};

@@ -115,7 +115,11 @@ pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, V
 }
 
 /// A file as a program, with what drivers over a wire say; none of both where there is an error.
-pub fn wire(input: &Input, options: &Options, transport: &'static str) -> (Sources, Option<(Program, Wiring)>, Vec<Diagnostic>) {
+pub fn wire(
+    input: &Input,
+    options: &Options,
+    transport: &'static str,
+) -> (Sources, Option<(Program, Wiring)>, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let (wired, found) = match file {
         Ok(file) => matterix_lang::wire(&mut sources, file, &input.neighbours(), options, transport),

@@ -44,10 +44,14 @@ impl<'p> Deck<'p> {
 
     /// Gives an instance an identifier of its own: its name with letters, digits and `_` only.
     pub(super) fn load(&mut self, instance: InstanceId, about: About) -> String {
-        let plain: String = self.scene.get(instance).name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let plain: String =
+            self.scene.get(instance).name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let base = plain.trim_matches('_').to_ascii_lowercase();
         let taken = |id: &str| self.loaded.values().any(|l| l.id == id);
-        let id = (1..).map(|n| if n == 1 { base.clone() } else { format!("{base}_{n}") }).find(|id| !taken(id)).unwrap_or(base.clone());
+        let id = (1..)
+            .map(|n| if n == 1 { base.clone() } else { format!("{base}_{n}") })
+            .find(|id| !taken(id))
+            .unwrap_or(base.clone());
         self.loaded.insert(instance, Loaded { id: id.clone(), about });
         id
     }

@@ -23,7 +23,8 @@ impl<'s> Message<'s> {
         let wrong = |headline: String| wrong_message(said.span, headline, format!("says `{}`", said.text));
         let mut words = said.text.split(' ');
         let name = words.next().unwrap_or_default();
-        let form = form::find(name).ok_or_else(|| wrong(format!("`{name}` is no command of Opentrons that is known here")))?;
+        let form =
+            form::find(name).ok_or_else(|| wrong(format!("`{name}` is no command of Opentrons that is known here")))?;
         let mut fields: Vec<(&str, String)> = Vec::new();
         for word in words.filter(|w| !w.is_empty()) {
             let field = word.split_once('=').filter(|(name, _)| form.field(name).is_some());

@@ -10,7 +10,7 @@ mod python;
 use matterix_ir::Diagnostic;
 
 use crate::course::{self, Means};
-use crate::finding::in_order;
+use crate::finding::settle;
 use crate::performance::Performance;
 use crate::{Subject, Written};
 use protocol::Protocol;
@@ -38,12 +38,8 @@ fn protocol<'p>(
     performance: &Performance<'_>,
 ) -> Result<(Protocol<'p>, Vec<Diagnostic>), Vec<Diagnostic>> {
     let Subject { program, wiring, sources } = subject;
+    let robot = protocol::robot(subject, performance).map_err(|d| vec![*d])?;
     let mut found = course::open(program, wiring, sources, &performance.acts, Means::default(), WHAT);
-    let protocol = Protocol::of(subject, performance, &mut found);
-    let (errors, warnings): (Vec<_>, Vec<_>) =
-        in_order(found).into_iter().partition(|d| d.severity == matterix_ir::Severity::Error);
-    match protocol.filter(|_| errors.is_empty()) {
-        Some(protocol) => Ok((protocol, warnings)),
-        None => Err(errors),
-    }
+    let protocol = Protocol::of(subject, performance, robot, &mut found);
+    settle(found).map(|warnings| (protocol, warnings))
 }

@@ -55,13 +55,24 @@ pub(super) struct Protocol<'p> {
 const OWN: &str = "opentrons";
 
 impl<'p> Protocol<'p> {
-    /// The protocol of what was done; what has no counterpart goes into `found`, and there may be none then.
-    pub(super) fn of(subject: Subject<'p>, performance: &Performance<'_>, found: &mut Vec<Diagnostic>) -> Option<Self> {
-        let robot = robot(subject, performance, found)?;
+    /// The protocol of what was done; what has no counterpart goes into `found`.
+    pub(super) fn of(
+        subject: Subject<'p>,
+        performance: &Performance<'_>,
+        robot: &'p Wired,
+        found: &mut Vec<Diagnostic>,
+    ) -> Self {
         let mut writer = Writer {
             deck: Deck::new(&subject.program.scene, robot.device),
             origins: place::origins(&subject.program.plan, subject.sources),
-            protocol: Protocol { subject, robot, liquids: Vec::new(), definitions: Vec::new(), loads: Vec::new(), commands: Vec::new() },
+            protocol: Protocol {
+                subject,
+                robot,
+                liquids: Vec::new(),
+                definitions: Vec::new(),
+                loads: Vec::new(),
+                commands: Vec::new(),
+            },
             found,
         };
         for (wired, opened) in subject.wiring.devices.iter().zip(&performance.opened) {
@@ -78,37 +89,38 @@ impl<'p> Protocol<'p> {
                 Deed::WaitUntil => {}
             }
         }
-        Some(writer.protocol)
+        writer.protocol
     }
 }
 
 /// The robot whose devices are used, of those that have a driver.
-fn robot<'p>(subject: Subject<'p>, performance: &Performance<'_>, found: &mut Vec<Diagnostic>) -> Option<&'p Wired> {
+pub(super) fn robot<'p>(subject: Subject<'p>, performance: &Performance<'_>) -> Result<&'p Wired, Box<Diagnostic>> {
     let Subject { program, wiring, sources } = subject;
     let robots: Vec<&Wired> = wiring.devices.iter().filter(|w| w.setting("robot").is_some()).collect();
     let root = program.plan.get(program.plan.root).span;
-    if robots.is_empty() {
+    let Some(first) = robots.first() else {
         let label = format!("`{}` has no robot with a driver over `{}`", program.scene.lab, super::WIRE);
-        found.push(not_expressible(root, format!("{WHAT} needs a robot of Opentrons"), label));
-        return None;
-    }
+        return Err(Box::new(not_expressible(root, format!("{WHAT} needs a robot of Opentrons"), label)));
+    };
     let origins = place::origins(&program.plan, sources);
     let mut used: Option<&Wired> = None;
     for act in performance.acts.iter().filter(|a| matches!(a.deed, Deed::Operation(Some(_)))) {
         let Step::Operation(operation) = &program.plan.get(act.step).step else { continue };
-        let Some(own) = operation.device.and_then(|d| robots.iter().find(|r| belongs(subject, d, r.device))) else { continue };
+        let Some(own) = operation.device.and_then(|d| robots.iter().find(|r| belongs(subject, d, r.device))) else {
+            continue;
+        };
         match used {
             Some(other) if other.device != own.device => {
                 let at = origins.get(act.step.0 as usize).copied().unwrap_or_default();
                 let names = [other, own].map(|w| program.scene.get(w.device).name.as_str());
                 let headline = format!("{WHAT} is for one robot, and this uses `{}` and `{}`", names[0], names[1]);
-                found.push(not_expressible(at, headline, format!("is done by `{}`", names[1])).help("write one workflow for each"));
-                return None;
+                let d = not_expressible(at, headline, format!("is done by `{}`", names[1]));
+                return Err(Box::new(d.help("write one workflow for each")));
             }
             _ => used = Some(own),
         }
     }
-    used.or_else(|| robots.first().copied())
+    Ok(used.unwrap_or(first))
 }
 
 /// Whether a device is part of another.
@@ -231,7 +243,11 @@ impl Writer<'_, '_> {
                     let help = format!("`{}` has no driver over `{}`", program.scene.get(device).kind, super::WIRE);
                     not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
                 }
-                (None, _) => not_expressible(at, format!("{WHAT} has no command to `{}`", operation.verb), "is done by no device of it"),
+                (None, _) => not_expressible(
+                    at,
+                    format!("{WHAT} has no command to `{}`", operation.verb),
+                    "is done by no device of it",
+                ),
             };
             return self.found.push(d);
         };
@@ -274,14 +290,21 @@ impl Writer<'_, '_> {
                     params.insert("labwareId".to_owned(), labware.into());
                     params.insert("wellName".to_owned(), well.into());
                 }
-                Holds::Origin if ["top", "bottom", "center"].contains(&value.as_str()) => drop(spot.insert("origin".to_owned(), value.as_str().into())),
+                Holds::Origin if ["top", "bottom", "center"].contains(&value.as_str()) => {
+                    drop(spot.insert("origin".to_owned(), value.as_str().into()))
+                }
                 Holds::Origin => return Err(message.wrong(format!("`{value}` is no place in a well"))),
-                Holds::Height => drop(spot.insert("offset".to_owned(), json!({ "x": 0, "y": 0, "z": parsed(message, name, value)? }))),
-                Holds::Location => drop(params.insert(key, match self.deck.location(value) {
-                    Some(Location::Slot(slot)) => json!({ "slotName": slot }),
-                    Some(Location::Module(id)) => json!({ "moduleId": id }),
-                    None => Value::Null,
-                })),
+                Holds::Height => drop(
+                    spot.insert("offset".to_owned(), json!({ "x": 0, "y": 0, "z": parsed(message, name, value)? })),
+                ),
+                Holds::Location => drop(params.insert(
+                    key,
+                    match self.deck.location(value) {
+                        Some(Location::Slot(slot)) => json!({ "slotName": slot }),
+                        Some(Location::Module(id)) => json!({ "moduleId": id }),
+                        None => Value::Null,
+                    },
+                )),
                 Holds::Definition => self.definition(value, device, &mut params)?,
             }
         }
@@ -319,7 +342,8 @@ impl Writer<'_, '_> {
         let version = parts.get(2).and_then(|v| v.parse::<u64>().ok());
         let ([space, name, _], Some(version)) = (parts.as_slice(), version) else {
             let headline = format!("it is not known as which labware Opentrons knows `{}`", instance.name);
-            let help = format!("say it in `{}`: `definition: \"opentrons/corning_96_wellplate_360ul_flat/2\"`", instance.kind);
+            let help =
+                format!("say it in `{}`: `definition: \"opentrons/corning_96_wellplate_360ul_flat/2\"`", instance.kind);
             return Err(not_expressible(instance.span, headline, "has no definition").help(help));
         };
         params.insert("loadName".to_owned(), (*name).into());

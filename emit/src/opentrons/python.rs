@@ -6,8 +6,8 @@ use std::fmt::Write;
 use matterix_ir::{Diagnostic, Span};
 use serde_json::Value;
 
-use super::protocol::{Command, Protocol};
 use super::WHAT;
+use super::protocol::{Command, Protocol};
 use crate::finding::not_expressible;
 use crate::place;
 
@@ -74,7 +74,12 @@ impl Script {
             self.text.push_str("import json\n\n");
         }
         let _ = writeln!(self.text, "metadata = {{\"protocolName\": {name}}}");
-        let _ = writeln!(self.text, "requirements = {{\"robotType\": {}, \"apiLevel\": {}}}\n", setting("type"), setting("api"));
+        let _ = writeln!(
+            self.text,
+            "requirements = {{\"robotType\": {}, \"apiLevel\": {}}}\n",
+            setting("type"),
+            setting("api")
+        );
         if !protocol.definitions.is_empty() {
             self.text.push_str("# Labware that does not come with Opentrons' software.\nDEFINITIONS = {\n");
             for (uri, definition) in &protocol.definitions {
@@ -85,7 +90,7 @@ impl Script {
         self.text.push_str("\ndef run(protocol):\n");
         for (id, name) in &protocol.liquids {
             let name = quoted(name);
-            self.line(&format!("{id} = protocol.define_liquid(name={name}, description={name})"));
+            self.line(&format!("{id} = protocol.define_liquid(name={name}, description={name}, display_color=None)"));
         }
     }
 
@@ -110,10 +115,14 @@ impl Script {
                 let label = quoted(text("displayName"));
                 if protocol.definitions.iter().any(|(known, _)| *known == uri) {
                     let uri = quoted(&uri);
-                    self.line(&format!("{id} = {on}.load_labware_from_definition(DEFINITIONS[{uri}]{slot}, label={label})"));
+                    self.line(&format!(
+                        "{id} = {on}.load_labware_from_definition(DEFINITIONS[{uri}]{slot}, label={label})"
+                    ));
                 } else {
                     let (name, space) = (quoted(text("loadName")), quoted(text("namespace")));
-                    self.line(&format!("{id} = {on}.load_labware({name}{slot}, label={label}, namespace={space}, version={version})"));
+                    self.line(&format!(
+                        "{id} = {on}.load_labware({name}{slot}, label={label}, namespace={space}, version={version})"
+                    ));
                 }
             }
             "loadLiquid" => {

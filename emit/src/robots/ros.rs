@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Travel, travels};
 use crate::course::{self, Means};
-use crate::finding::not_expressible;
+use crate::finding::{not_expressible, settle};
 use crate::performance::Performance;
 use crate::{Subject, Written, place};
 
@@ -125,10 +125,7 @@ fn topic(subject: Subject<'_>, travel: &Travel) -> String {
 fn gather(subject: Subject<'_>, performance: &Performance<'_>) -> Result<Vec<Travel>, Vec<Diagnostic>> {
     let Subject { program, wiring, sources } = subject;
     let means = Means { beside: true, conditions: true, handlers: true };
-    let found = course::open(program, wiring, sources, &performance.acts, means, WHAT);
-    if !found.is_empty() {
-        return Err(found);
-    }
+    settle(course::open(program, wiring, sources, &performance.acts, means, WHAT))?;
     let root = program.plan.get(program.plan.root).span;
     let wrong = |why: String| vec![not_expressible(root, why, "this workflow")];
     let travels = travels(program, &performance.motions).map_err(wrong)?;
@@ -145,8 +142,9 @@ fn gather(subject: Subject<'_>, performance: &Performance<'_>) -> Result<Vec<Tra
 pub fn mcap(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let travels = gather(subject, performance)?;
     let root = subject.program.plan.get(subject.program.plan.root).span;
-    let written = pack(subject, &travels)
-        .map_err(|e| vec![not_expressible(root, format!("the trajectories cannot be written: {e}"), "this workflow")])?;
+    let written = pack(subject, &travels).map_err(|e| {
+        vec![not_expressible(root, format!("the trajectories cannot be written: {e}"), "this workflow")]
+    })?;
     Ok((written, Vec::new()))
 }
 
@@ -208,8 +206,9 @@ pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
     let mut list = Vec::new();
     let Value::Array(steps) = steps(subject, &travels) else { return Ok((Vec::new(), Vec::new())) };
     for (travel, step) in travels.iter().zip(steps) {
-        let message = serde_json::to_value(JointTrajectory::of(travel, subject))
-            .map_err(|e| vec![not_expressible(root, format!("the trajectories cannot be written: {e}"), "this workflow")])?;
+        let message = serde_json::to_value(JointTrajectory::of(travel, subject)).map_err(|e| {
+            vec![not_expressible(root, format!("the trajectories cannot be written: {e}"), "this workflow")]
+        })?;
         let mut entry = Map::new();
         for part in [step, message] {
             if let Value::Object(part) = part {

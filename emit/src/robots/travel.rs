@@ -72,7 +72,14 @@ pub fn travels(program: &Program, motions: &[Motion]) -> Result<Vec<Travel>, Str
             let moves = points.iter().any(|p| p.positions != points[0].positions);
             if moves {
                 let joints = joints.iter().map(|(name, _)| name.clone()).collect();
-                out.push(Travel { robot: first.robot, owner: *owner, step: motion.step, begins: first.time, joints, points });
+                out.push(Travel {
+                    robot: first.robot,
+                    owner: *owner,
+                    step: motion.step,
+                    begins: first.time,
+                    joints,
+                    points,
+                });
             }
         }
     }

@@ -7,13 +7,13 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use matterix_ir::Span;
 use matterix_ir::plan::{Motion, Step};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Span};
 
 use super::{Travel, travels};
 use crate::course::{self, Means};
-use crate::finding::not_expressible;
+use crate::finding::{not_expressible, settle};
 use crate::performance::{Act, Deed, Performance, number};
 use crate::{Subject, Written, place};
 
@@ -29,6 +29,9 @@ const GAIN: u32 = 300;
 
 /// Shortest time of a `servoj`, s: a cycle of the controller of the e-Series.
 const CYCLE: f64 = 0.002;
+
+/// How long the last position is held, s: what smoothing lags behind, twice.
+const SETTLE: f64 = 2.0 * LOOK_AHEAD;
 
 /// Joints of an arm that understands URScript.
 const JOINTS: usize = 6;
@@ -51,26 +54,27 @@ pub fn script(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
         found.push(not_expressible(root, "no arm moves in this workflow", "nothing to write"));
         return Err(found);
     };
-    let arm = first.robot;
+    let arm = travels.iter().find(|t| wiring.of(t.owner).is_some()).map_or(first.robot, |t| t.robot);
+    let name = |id: InstanceId| program.scene.get(id).name.as_str();
+    let mut others = BTreeSet::from([arm]);
     for travel in travels.iter().filter(|t| t.owner == t.robot) {
-        let name = &program.scene.get(travel.robot).name;
-        if travel.robot != arm {
-            let other = &program.scene.get(arm).name;
-            let headline = format!("{WHAT} is for one arm, and this moves `{other}` and `{name}`");
-            found.push(not_expressible(at(travel), headline, format!("moves `{name}`")));
-        } else if wiring.of(arm).is_none() || travel.joints.len() != JOINTS {
-            let headline = format!("`{name}` does not understand URScript");
-            let help = format!("`{}` has no driver over `{WIRE}`", program.scene.get(arm).kind);
-            found.push(not_expressible(at(travel), headline, format!("moves `{name}`")).help(help));
+        if others.insert(travel.robot) {
+            let headline =
+                format!("{WHAT} is for one arm, and this moves `{}` and `{}`", name(arm), name(travel.robot));
+            found.push(not_expressible(at(travel), headline, format!("moves `{}`", name(travel.robot))));
         }
     }
-    let found = crate::finding::in_order(found);
-    if !found.is_empty() {
-        return Err(found);
+    let own = travels.iter().find(|t| t.owner == arm).unwrap_or(first);
+    if wiring.of(arm).is_none() || own.joints.len() != JOINTS {
+        let headline = format!("`{}` does not understand URScript", name(arm));
+        let help = format!("`{}` has no driver over `{WIRE}`", program.scene.get(arm).kind);
+        found.push(not_expressible(at(own), headline, format!("moves `{}`", name(arm))).help(help));
     }
-    let mut script = Script { subject, origins, arm, functions: Vec::new(), body: String::new(), known: BTreeSet::new() };
+    let warnings = settle(found)?;
+    let mut script =
+        Script { subject, origins, arm, functions: Vec::new(), body: String::new(), known: BTreeSet::new() };
     script.body(performance, &travels);
-    Ok((script.file().into_bytes(), Vec::<Diagnostic>::new()))
+    Ok((script.file().into_bytes(), warnings))
 }
 
 /// A text of URScript, which has no escapes.
@@ -143,6 +147,10 @@ impl Script<'_> {
             let (positions, time) = (list(&pair[1].positions), decimal(time));
             self.line(&format!("servoj({positions}, t={time}, lookahead_time={LOOK_AHEAD}, gain={GAIN})"));
         }
+        if let Some(last) = travel.points.last() {
+            let positions = list(&last.positions);
+            self.line(&format!("servoj({positions}, t={SETTLE}, lookahead_time={LOOK_AHEAD}, gain={GAIN})"));
+        }
         self.line("stopj(2.0)");
     }
 
@@ -153,12 +161,19 @@ impl Script<'_> {
         // To where it is already, it need not go.
         let stands = matches!(
             operation.motion,
-            Some(Motion::To { .. } | Motion::By { .. } | Motion::Upright { .. } | Motion::Tilted { .. } | Motion::Joints { .. } | Motion::Home { .. })
+            Some(
+                Motion::To { .. }
+                    | Motion::By { .. }
+                    | Motion::Upright { .. }
+                    | Motion::Tilted { .. }
+                    | Motion::Joints { .. }
+                    | Motion::Home { .. }
+            )
         );
         if stands {
             return;
         }
-        let (name, label) = (word(&step.label), step.label.clone());
+        let (name, label) = (word(&act.words), act.words.clone());
         if self.known.insert(name.clone()) {
             let text = format!("  popup({}, title=\"matterixc\", blocking=True)\n", quoted(&label));
             self.functions.push((name.clone(), text));

@@ -17,6 +17,8 @@ pub struct Wiring {
     pub devices: Vec<Wired>,
     /// What an operation says when it begins, for those whose device has a line for it.
     pub steps: BTreeMap<StepId, Vec<Message>>,
+    /// Each operation as it is called, with its values.
+    pub calls: BTreeMap<StepId, Text>,
     /// Texts of the files that assets come from, by what the asset's text says after `from`.
     #[serde(default)]
     pub files: BTreeMap<String, String>,

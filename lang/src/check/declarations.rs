@@ -106,7 +106,9 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }
-        ItemKind::Driver { transport, .. } if driver::is_known(transport) => Planner::new(lab, sources).check_driver(id),
+        ItemKind::Driver { transport, .. } if driver::is_known(transport) => {
+            Planner::new(lab, sources).check_driver(id)
+        }
         ItemKind::Driver { .. } => later(lab, "drivers"),
         ItemKind::Study { .. } => later(lab, "studies"),
         ItemKind::Fit { .. } => later(lab, "fits"),

@@ -3,7 +3,7 @@
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Message, Wired, Wiring};
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, Span, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
@@ -65,7 +65,10 @@ impl<'a> Planner<'a, '_> {
             .filter(|d| d.transport.text == transport)
             .filter_map(|d| Some((names.lookup(d.module, &d.device.segments.last()?.text)?, d)))
             .collect();
-        self.lab.ancestors_of(device).into_iter().find_map(|kind| all.iter().find(|(of, _)| *of == kind).map(|(_, d)| *d))
+        self.lab
+            .ancestors_of(device)
+            .into_iter()
+            .find_map(|kind| all.iter().find(|(of, _)| *of == kind).map(|(_, d)| *d))
     }
 
     /// Notes what a device is told when a command begins.
@@ -84,13 +87,59 @@ impl<'a> Planner<'a, '_> {
         for (own, (_, value)) in parameters(sig).zip(&bound.values) {
             scope.bind(own.name.text.clone(), value.clone());
         }
-        let step = match &self.steps[step.0 as usize].step {
-            Step::During { body, .. } => *body,
-            _ => step,
-        };
+        let step = self.operation_of(step);
         let messages = self.messages(sends, &mut scope);
         if let Some(wiring) = &mut self.wiring {
             wiring.steps.insert(step, messages);
+        }
+    }
+
+    /// The operation itself, without what watches over it.
+    fn operation_of(&self, step: StepId) -> StepId {
+        match &self.steps[step.0 as usize].step {
+            Step::During { body, .. } => *body,
+            _ => step,
+        }
+    }
+
+    /// Notes an operation as it is called, with its values in place of the arguments.
+    pub(super) fn note_call(&mut self, sig: &Sig, bound: &Bound, device: Option<(InstanceId, bool)>, step: StepId) {
+        if self.draft || self.wiring.is_none() {
+            return;
+        }
+        let mut parts = vec![TextPart::Plain(verb_text(&sig.verb))];
+        let name = device.map(|(id, object)| (self.lab.instances[id.0 as usize].name.clone(), object));
+        if let Some((name, true)) = &name {
+            parts.push(TextPart::Plain(format!(" {name}")));
+        }
+        let label = |text: &str, parts: &mut Vec<TextPart>| parts.push(TextPart::Plain(format!(" {text}")));
+        let groups =
+            std::iter::once((None, &sig.params)).chain(sig.labelled.iter().map(|(l, params)| (Some(l), params)));
+        for (word, params) in groups {
+            for (i, p) in params.iter().enumerate() {
+                let value = match bound.values.iter().find(|(n, _)| *n == p.name.text) {
+                    Some((_, Value::Nothing)) | None => continue,
+                    // Of one there is no list.
+                    Some((_, Value::List(items))) if items.len() == 1 => items[0].clone(),
+                    Some((_, value)) => value.clone(),
+                };
+                match word {
+                    Some(word) if i == 0 => label(&word.text, &mut parts),
+                    _ if i > 0 => parts.push(TextPart::Plain(",".to_string())),
+                    _ => {}
+                }
+                parts.push(TextPart::Plain(" ".to_string()));
+                if !self.showable(value, sig.span, &mut parts) {
+                    return;
+                }
+            }
+        }
+        if let Some((name, false)) = &name {
+            label(&format!("by {name}"), &mut parts);
+        }
+        let step = self.operation_of(step);
+        if let Some(wiring) = &mut self.wiring {
+            wiring.calls.insert(step, matterix_ir::Text { parts });
         }
     }
 
@@ -113,7 +162,13 @@ impl<'a> Planner<'a, '_> {
                 }
             }
             let settings = driver.settings.iter().filter_map(|s| self.setting(s, &mut scope)).collect();
-            devices.push(Wired { device: id, driver: driver.name.text.clone(), settings, opens, span: driver.name.span });
+            devices.push(Wired {
+                device: id,
+                driver: driver.name.text.clone(),
+                settings,
+                opens,
+                span: driver.name.span,
+            });
         }
         let mut wiring = self.wiring.take()?;
         wiring.devices = devices;

@@ -45,6 +45,7 @@ impl<'a> Planner<'a, '_> {
         operation.at_start = std::mem::take(&mut operation.at_end);
         let step = self.during(label, span, operation, invariants);
         self.say(device, sig, &bound, step);
+        self.note_call(sig, &bound, Some((device, object_is_device)), step);
         Some(step)
     }
 
@@ -69,7 +70,9 @@ impl<'a> Planner<'a, '_> {
             Value::Instance(i) => Some(*i),
             _ => None,
         });
-        Some(self.during(label.to_string(), span, operation, invariants))
+        let step = self.during(label.to_string(), span, operation, invariants);
+        self.note_call(sig, bound, None, step);
+        Some(step)
     }
 
     fn operation(

@@ -1,7 +1,7 @@
 //! Two listeners as one.
 
-use matterix_ir::{NodeId, Unit};
 use matterix_ir::plan::{Condition, Operation, StepId};
+use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
 use super::listener::{ExpectationResult, Listener, OperationState, StepState};

@@ -10,7 +10,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Text, Wire, WireKind,
+    AssetLiteral, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, StudyLine, Text, Wire,
+    WireKind,
 };
 
 impl Lower<'_> {
