@@ -6,6 +6,7 @@ mod contents;
 mod determinism;
 mod devices;
 mod doc;
+mod emit;
 mod environments;
 mod explain;
 mod faults;

@@ -24,6 +24,47 @@ pub(super) enum Location {
     Module(String),
 }
 
+/// Words of Python, and names that a protocol in Python has for itself.
+const RESERVED: &[&str] = &[
+    "and",
+    "as",
+    "assert",
+    "async",
+    "await",
+    "break",
+    "class",
+    "continue",
+    "def",
+    "del",
+    "elif",
+    "else",
+    "except",
+    "finally",
+    "for",
+    "from",
+    "global",
+    "if",
+    "import",
+    "in",
+    "is",
+    "json",
+    "lambda",
+    "metadata",
+    "nonlocal",
+    "not",
+    "or",
+    "pass",
+    "protocol",
+    "raise",
+    "requirements",
+    "return",
+    "run",
+    "try",
+    "while",
+    "with",
+    "yield",
+];
+
 /// What has been loaded so far.
 #[derive(Debug)]
 pub(super) struct Deck<'p> {
@@ -47,7 +88,8 @@ impl<'p> Deck<'p> {
         let plain: String =
             self.scene.get(instance).name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         let base = plain.trim_matches('_').to_ascii_lowercase();
-        let taken = |id: &str| self.loaded.values().any(|l| l.id == id);
+        let taken =
+            |id: &str| RESERVED.contains(&id) || id.starts_with("liquid_") || self.loaded.values().any(|l| l.id == id);
         let id = (1..)
             .map(|n| if n == 1 { base.clone() } else { format!("{base}_{n}") })
             .find(|id| !taken(id))

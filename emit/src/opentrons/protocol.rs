@@ -239,6 +239,13 @@ impl Writer<'_, '_> {
                     not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
                 }
                 (Some(device), None) => {
+                    // What is out of reach is so at every step.
+                    let reached = format!("{WHAT} does not reach `{}`", self.name(device));
+                    if let Some(known) = self.found.iter_mut().find(|d| d.headline == reached) {
+                        let d = known.clone().because(at, "and here");
+                        *known = d;
+                        return;
+                    }
                     let headline = format!("{WHAT} does not reach `{}`", self.name(device));
                     let help = format!("`{}` has no driver over `{}`", program.scene.get(device).kind, super::WIRE);
                     not_expressible(at, headline, format!("does `{}`", step.label)).help(help)

@@ -57,29 +57,27 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
-    /// The driver of an instance over a wire: that of its own type goes before those of what that extends.
-    fn driver_of(&self, device: InstanceId, transport: &str) -> Option<Driver<'a>> {
+    /// The drivers of an instance over a wire: those of its own type go before those of what that extends, and of two for
+    /// the same type the later one, so that one of the user goes before one of the library.
+    fn drivers_of(&self, device: InstanceId, transport: &str) -> Vec<Driver<'a>> {
         let names = self.lab.tables.names;
-        let all: Vec<(DeclId, Driver<'a>)> = (0..names.decls.len() as u32)
-            .filter_map(|i| self.driver(DeclId(i)))
-            .filter(|d| d.transport.text == transport)
-            .filter_map(|d| Some((names.lookup(d.module, &d.device.segments.last()?.text)?, d)))
-            .collect();
-        self.lab
-            .ancestors_of(device)
-            .into_iter()
-            .find_map(|kind| all.iter().find(|(of, _)| *of == kind).map(|(_, d)| *d))
+        let of = |d: Driver<'a>| Some((names.lookup(d.module, &d.device.segments.last()?.text)?, d));
+        let all = (0..names.decls.len() as u32).rev().filter_map(|i| self.driver(DeclId(i)));
+        let all: Vec<_> = all.filter(|d| d.transport.text == transport).filter_map(of).collect();
+        let kinds = self.lab.ancestors_of(device);
+        kinds.iter().flat_map(|kind| all.iter().filter(move |(of, _)| of == kind)).map(|(_, d)| *d).collect()
     }
 
     /// Notes what a device is told when a command begins.
     pub(super) fn say(&mut self, device: InstanceId, command: &Sig, bound: &Bound, step: StepId) {
         let Some(transport) = self.wiring.as_ref().map(|w| w.transport.clone()).filter(|_| !self.draft) else { return };
-        let Some(driver) = self.driver_of(device, &transport) else { return };
-        let line = driver.wires.iter().find_map(|wire| match &wire.kind {
-            WireKind::Command { sig, sends, .. } if fits(sig, command) => Some((sig, sends)),
+        let drivers = self.drivers_of(device, &transport);
+        let lines = drivers.iter().flat_map(|d| d.wires.iter().map(move |wire| (d, wire)));
+        let line = lines.into_iter().find_map(|(driver, wire)| match &wire.kind {
+            WireKind::Command { sig, sends, .. } if fits(sig, command) => Some((driver, sig, sends)),
             _ => None,
         });
-        let Some((sig, sends)) = line else { return };
+        let Some((driver, sig, sends)) = line else { return };
         let mut scope = Scope::of(device, driver.module);
         for (name, value) in &bound.values {
             scope.bind(name.clone(), value.clone());
@@ -153,20 +151,32 @@ impl<'a> Planner<'a, '_> {
         let mut devices = Vec::new();
         let count = if self.draft { 0 } else { self.lab.instances.len() as u32 };
         for id in (0..count).map(InstanceId) {
-            let Some(driver) = self.driver_of(id, &transport) else { continue };
-            let mut scope = Scope::of(id, driver.module);
-            let mut opens = Vec::new();
-            for wire in driver.wires {
-                if let WireKind::Open { sends } = &wire.kind {
-                    opens.extend(self.messages(sends, &mut scope));
+            let drivers = self.drivers_of(id, &transport);
+            let Some(driver) = drivers.first() else { continue };
+            let has_open = |d: &&Driver<'a>| d.wires.iter().any(|w| matches!(w.kind, WireKind::Open { .. }));
+            let mut said = Vec::new();
+            if let Some(opening) = drivers.iter().find(has_open) {
+                let mut scope = Scope::of(id, opening.module);
+                for wire in opening.wires {
+                    if let WireKind::Open { sends } = &wire.kind {
+                        said.extend(self.messages(sends, &mut scope));
+                    }
                 }
             }
-            let settings = driver.settings.iter().filter_map(|s| self.setting(s, &mut scope)).collect();
+            let mut settings: Vec<(String, String)> = Vec::new();
+            for d in &drivers {
+                let mut scope = Scope::of(id, d.module);
+                for setting in d.settings.iter().filter_map(|s| self.setting(s, &mut scope)) {
+                    if !settings.iter().any(|(name, _)| *name == setting.0) {
+                        settings.push(setting);
+                    }
+                }
+            }
             devices.push(Wired {
                 device: id,
                 driver: driver.name.text.clone(),
                 settings,
-                opens,
+                opens: said,
                 span: driver.name.span,
             });
         }
