@@ -4,6 +4,9 @@
 //! only where nothing that is measured decides that course ([`course`]). What devices are told is said by their drivers in
 //! the language ([`matterix_ir::wire`]); here is only what a format asks for.
 
+// A finding ends the writing: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
 pub mod course;
 pub mod finding;
 pub mod opentrons;

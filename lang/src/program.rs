@@ -162,6 +162,9 @@ pub fn document(
     (text.map(|(_, _, text)| text), diagnostics)
 }
 
+/// A program, what drivers say where that is wanted, and what more was made of it.
+type Compiled<T> = (Program, Option<Wiring>, T);
+
 /// Compiles one workflow of a file; where that succeeds, `then` makes something more of it.
 fn compile_and<T>(
     sources: &mut Sources,
@@ -170,7 +173,7 @@ fn compile_and<T>(
     options: &Options,
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
-) -> (Option<(Program, Option<Wiring>, T)>, Vec<Diagnostic>) {
+) -> (Option<Compiled<T>>, Vec<Diagnostic>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);

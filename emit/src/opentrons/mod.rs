@@ -3,9 +3,11 @@
 mod deck;
 mod form;
 mod json;
+mod liquids;
 mod message;
 mod protocol;
 mod python;
+mod writer;
 
 use matterix_ir::Diagnostic;
 
@@ -38,7 +40,7 @@ fn protocol<'p>(
     performance: &Performance<'_>,
 ) -> Result<(Protocol<'p>, Vec<Diagnostic>), Vec<Diagnostic>> {
     let Subject { program, wiring, sources } = subject;
-    let robot = protocol::robot(subject, performance).map_err(|d| vec![*d])?;
+    let robot = protocol::robot(subject, performance).map_err(|d| vec![d])?;
     let mut found = course::open(program, wiring, sources, &performance.acts, Means::default(), WHAT);
     let protocol = Protocol::of(subject, performance, robot, &mut found);
     settle(found).map(|warnings| (protocol, warnings))

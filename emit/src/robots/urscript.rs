@@ -193,7 +193,7 @@ impl Script<'_> {
         for (name, text) in &self.functions {
             let _ = write!(out, "  def {name}():\n  {text}  end\n");
         }
-        let _ = write!(out, "{}end\n", self.body);
+        let _ = writeln!(out, "{}end", self.body);
         out
     }
 }
