@@ -3,17 +3,21 @@
     python3 -m venv venv && venv/bin/pip install opentrons==8.8.2
     venv/bin/python tests/peers/protocols.py target/debug/matterixc examples/opentrons/*.mtx
 
-For each workflow both forms are written; `opentrons.cli analyze --check` must find nothing wrong; and what the analysis moved
+For each workflow both forms are written; the JSON must be valid by the schemas of protocols and commands, 8 and 8;
+`opentrons.cli analyze --check` must find nothing wrong; and what the analysis moved
 into and out of each well must equal what the plan moves, to 1e-9 uL. The plan's volumes come from `--target commands-json`,
 which knows nothing of Opentrons. The exit status is 1 if anything is wrong.
 """
 
 import collections
+import importlib.util
 import json
 import pathlib
 import subprocess
 import sys
 import tempfile
+
+import jsonschema
 
 TOLERANCE = 1e-9
 TARGETS = {"opentrons-json": ".json", "opentrons-python": ".py"}
@@ -74,6 +78,16 @@ def analysed(path, out):
     return good, analysis
 
 
+def validate(path):
+    """Raises where a protocol in JSON does not have the form of the published schemas."""
+    data = pathlib.Path(importlib.util.find_spec("opentrons_shared_data").origin).parent / "data"
+    schema = {kind: json.loads((data / kind / "schemas/8.json").read_text()) for kind in ("protocol", "command")}
+    protocol = json.loads(path.read_text())
+    jsonschema.validate(protocol, schema["protocol"])
+    for command in protocol["commands"]:
+        jsonschema.validate(command, schema["command"])
+
+
 def moved(analysis):
     """Net volume of each well, uL, by the wells that the channels of the pipette reach, and how often a tip was taken."""
     labware, pipettes, net, tips = {}, {}, collections.Counter(), 0
@@ -119,7 +133,10 @@ def main(matterixc, files):
             lines = emit("commands-json", ".jsonl").read_text().splitlines()
             plan, tips = planned(lines)
             for target, suffix in TARGETS.items():
-                good, analysis = analysed(emit(target, suffix), folder / f"analysis{suffix}.json")
+                protocol = emit(target, suffix)
+                if suffix == ".json":
+                    validate(protocol)
+                good, analysis = analysed(protocol, folder / f"analysis{suffix}.json")
                 net, taken = moved(analysis) if good else (collections.Counter(), 0)
                 # Only what is moved: a well that got and gave nothing is left out.
                 places = {w for c in (plan, net) for w, v in c.items() if abs(v) > TOLERANCE}
