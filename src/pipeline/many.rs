@@ -65,7 +65,7 @@ pub fn study(
 ) -> Result<Done, String> {
     let points = Design::grid(study);
     let runs = asked.runs.or(study.runs).or(points).unwrap_or(1);
-    if let Some(points) = points.filter(|points| runs % points != 0) {
+    if let Some(points) = points.filter(|points| !runs.is_multiple_of(*points)) {
         return Err(format!("the grids of `{}` have {points} points: the runs must be a multiple of that", study.name));
     }
     let options = study::Options { runs, seed: asked.seed, jobs: asked.jobs, cancel: asked.cancel };

@@ -46,7 +46,7 @@ fn every_example_with_a_robot_is_judged() {
     assert_eq!(all, known, "examples with robots that are not judged, or are none");
 }
 
-const WITH_ARMS: [&str; 11] = [
+const WITH_ARMS: [&str; 12] = [
     "faucet",
     "fume_hood",
     "handover",
@@ -56,6 +56,7 @@ const WITH_ARMS: [&str; 11] = [
     "sn1",
     "sn1_earlier",
     "sn1_mild",
+    "study_fit",
     "titration",
     "two_plates",
 ];

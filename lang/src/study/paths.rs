@@ -1,5 +1,6 @@
 //! What a path of a study or a fit names: `target`, `bench.beaker.initial[HI]`, `ethyl_iodide.rate.Ea`.
 
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Op, codes};
 
 use super::open::Named;
@@ -76,7 +77,7 @@ impl Elaborator<'_> {
     /// What a member of an instance is worth; it becomes a parameter of the model if it is given as a number.
     fn member_at(&mut self, path: &str, at: &Expr) -> Option<Value> {
         let (instance, member) = path.rsplit_once('.')?;
-        let id = self.find_instance(instance)?;
+        let id = InstanceId(self.instances.iter().position(|i| i.name == instance)? as u32);
         let found = self.members_of(id, member);
         let values: Vec<Value> = found.iter().map(|m| self.member_value(id, *m, at.span)).collect();
         values.into_iter().next()

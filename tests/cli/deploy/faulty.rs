@@ -2,6 +2,9 @@
 
 use super::{Answer, Device, HEAT, bench, deploy};
 
+/// A name, what the device answers, and the code of the fault that it is.
+type Case = (&'static str, fn() -> Answer, &'static str);
+
 /// What a plate answers that does as it is told.
 fn plate(line: &str) -> Answer {
     Answer::Says(match line {
@@ -36,7 +39,7 @@ fn is_safe(heard: &[String]) -> bool {
 
 #[test]
 fn what_makes_no_sense_is_a_fault_and_leaves_the_device_safe() {
-    let cases: [(&str, fn() -> Answer, &str); 5] = [
+    let cases: [Case; 5] = [
         ("silent", || Answer::Nothing, "device-lost"),
         ("garbage", || Answer::Says("2\u{7f}x.3 2 \r\n"), "device-garbled"),
         ("other", || Answer::Says("25.0 1 \r\n"), "device-garbled"),
