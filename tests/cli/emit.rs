@@ -166,7 +166,7 @@ fn what_a_protocol_cannot_say_is_said_at_its_line() {
             format!(
                 "{tip}\naspirate 50 uL from stock[A1] by ot2.left\ndispense 50 uL into aside[A1] by ot2.left\ndrop tip by ot2.left"
             ),
-            &["`aside[A1]` is not on the deck of `ot2`", "a.mtx:18"],
+            &["`ot2.left` does not reach `aside[A1]`", "a.mtx:18"],
         ),
     ];
     for (name, lines, expected) in cases {
