@@ -74,7 +74,8 @@ fn atom() -> Text {
             cond.clone().prop_map(|c| format!("(\n{c})")),
             (cond.clone(), cond.clone()).prop_map(|(a, b)| format!("({a}, {b},) mm")),
             (cond.clone(), cond).prop_map(|(a, b)| format!("[{a},\n{b}\n]")),
-            inner.clone().prop_map(|i| format!("-{i}")),
+            // More than two signs in a row are not read.
+            inner.clone().prop_map(|i| if i.starts_with("--") { i } else { format!("-{i}") }),
             (quantity(), species()).prop_map(|(q, s)| format!("{q} of {s}")),
         ]
         .boxed()
