@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use matterix_runtime::motion::Perturbation;
 
-use crate::pipeline::Options;
+use crate::pipeline::{Options, Target};
 
 use crate::report::Format;
 use crate::report::points::Place;
@@ -60,6 +60,8 @@ pub enum Command {
     Deploy(DeployArgs),
     /// Stand in for a device: answer on a line as it would.
     Emulate(EmulateArgs),
+    /// Write a workflow as a file that another program runs.
+    Emit(EmitArgs),
     /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
@@ -407,6 +409,26 @@ pub struct EmulateArgs {
     /// Where the noise of readings starts.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
+}
+
+/// `matterixc emit`.
+#[derive(Debug, Args)]
+pub struct EmitArgs {
+    /// What is compiled.
+    #[command(flatten)]
+    pub subject: Subject,
+    /// What kind of file.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub target: Target,
+    /// Where to write it; to standard output without it.
+    #[arg(long, short, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Where all randomness of the performance starts that is written down.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Plan all motions anew instead of taking them from the cache of earlier checks.
+    #[arg(long)]
+    pub no_cache: bool,
 }
 
 /// `matterixc verify`.

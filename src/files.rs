@@ -69,7 +69,7 @@ pub fn read_stdin() -> Result<Vec<u8>, String> {
 }
 
 /// Replaces what a file holds in one step, keeping its permissions; a link stays a link.
-pub fn replace(path: &Path, text: &str) -> Result<(), String> {
+pub fn replace(path: &Path, text: impl AsRef<[u8]>) -> Result<(), String> {
     let failed = |e: io::Error| format!("cannot write `{}`: {}", path.display(), reason(&e));
     let target = fs::canonicalize(path).map_err(failed)?;
     let permissions = fs::metadata(&target).map_err(failed)?.permissions();
@@ -77,7 +77,7 @@ pub fn replace(path: &Path, text: &str) -> Result<(), String> {
         return Err(format!("cannot write `{}`: it is read-only", path.display()));
     }
     let beside = beside(&target);
-    let written = fill(&beside, text)
+    let written = fill(&beside, text.as_ref())
         .and_then(|()| fs::set_permissions(&beside, permissions))
         .and_then(|()| fs::rename(&beside, &target));
     written.map_err(|e| {
@@ -88,12 +88,12 @@ pub fn replace(path: &Path, text: &str) -> Result<(), String> {
 }
 
 /// Writes a file, new or not; a reader sees the old text or the new, never a part.
-pub fn write(path: &Path, text: &str) -> Result<(), String> {
+pub fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), String> {
     if path.exists() {
         return replace(path, text);
     }
     let beside = beside(path);
-    fill(&beside, text).and_then(|()| fs::rename(&beside, path)).map_err(|e| {
+    fill(&beside, text.as_ref()).and_then(|()| fs::rename(&beside, path)).map_err(|e| {
         let _ = fs::remove_file(&beside);
         format!("cannot write `{}`: {}", path.display(), reason(&e))
     })
@@ -137,9 +137,9 @@ pub fn reason(error: &io::Error) -> String {
     }
 }
 
-fn fill(path: &Path, text: &str) -> io::Result<()> {
+fn fill(path: &Path, text: impl AsRef<[u8]>) -> io::Result<()> {
     let mut file: File = OpenOptions::new().write(true).create_new(true).open(path)?;
-    file.write_all(text.as_bytes())?;
+    file.write_all(text.as_ref())?;
     file.sync_all()
 }
 

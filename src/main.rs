@@ -71,6 +71,7 @@ fn obey(cli: Cli) -> Exit {
         Command::Study(args) => command::study(&args, cli.color),
         Command::Fit(args) => command::fit(&args, cli.color),
         Command::Doc(args) => command::doc(&args, cli.color),
+        Command::Emit(args) => command::emit(&args, cli.color),
         Command::Plan(args) => command::plan(&args, cli.color),
         Command::Deploy(args) => command::deploy(&args, cli.color),
         Command::Emulate(args) => command::emulate(&args, cli.color),

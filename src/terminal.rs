@@ -23,9 +23,14 @@ pub enum Stream {
 /// Writes text; a reader that has gone away ends the writing, not the command.
 pub fn print(stream: Stream, text: &str) {
     let _ = match stream {
-        Stream::Out => write(io::stdout().lock(), text),
-        Stream::Err => write(io::stderr().lock(), text),
+        Stream::Out => write(io::stdout().lock(), text.as_bytes()),
+        Stream::Err => write(io::stderr().lock(), text.as_bytes()),
     };
+}
+
+/// Writes a result that may not be text.
+pub fn pour(bytes: &[u8]) {
+    let _ = write(io::stdout().lock(), bytes);
 }
 
 /// Writes one `error: ` line to standard error.
@@ -66,7 +71,7 @@ fn is_set(name: &str) -> bool {
     std::env::var_os(name).is_some_and(|value| !value.is_empty())
 }
 
-fn write(mut to: impl Write, text: &str) -> io::Result<()> {
-    to.write_all(text.as_bytes())?;
+fn write(mut to: impl Write, bytes: &[u8]) -> io::Result<()> {
+    to.write_all(bytes)?;
     to.flush()
 }

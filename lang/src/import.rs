@@ -1,5 +1,6 @@
 //! Assets from files of other formats: `asset X from labware "plate.json"`, `asset X from urdf "arm.urdf"`; meshes of shapes.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use matterix_ir::mesh::Mesh;
@@ -7,6 +8,7 @@ use matterix_ir::{Diagnostic, FileId, codes};
 
 use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, File, ItemKind, Name, Path};
 use crate::loader::Loader;
+use crate::names::Names;
 use crate::{labware, library};
 
 /// What a file gives: lines of the asset, and what it is where its text does not say.
@@ -41,6 +43,19 @@ const FORMATS: &[Format] = &[
 /// Whether an asset can come from files of this format.
 pub fn is_known(format: &Name) -> bool {
     FORMATS.iter().any(|f| f.word == format.text)
+}
+
+/// Texts of the files in a format that assets come from, by what stands after the format; what cannot be read is left out.
+pub fn texts(names: &Names<'_>, format: &str, loader: &dyn Loader) -> BTreeMap<String, String> {
+    let named = names.decls.iter().filter_map(|decl| match &decl.item.kind {
+        ItemKind::Asset { source: Some((word, path)), .. } if word.text == format => Some((decl.module, path)),
+        _ => None,
+    });
+    let read = named.filter_map(|(module, path)| {
+        let text = text(names.modules[module].file, &path.text, loader).ok()?;
+        Some((path.text.clone(), text))
+    });
+    read.collect()
 }
 
 /// Replaces each `from FORMAT "file"` of a module by the lines of that file.

@@ -27,5 +27,5 @@ pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
 pub use lower::wires::Wires;
-pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, tests};
+pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, script, tests};
 pub use study::Many;

@@ -4,6 +4,7 @@ use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
+use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
@@ -141,8 +142,25 @@ pub fn compile(
     loader: &dyn Loader,
     options: &Options,
 ) -> (Option<Program>, Vec<Diagnostic>) {
-    let (program, diagnostics) = compile_and(sources, file, loader, options, |_, _, _| ());
-    (program.map(|(program, ())| program), diagnostics)
+    let (built, diagnostics) =
+        compile_and(sources, file, loader, options, Wanted::Program(options.wires), |_, _, _| ());
+    (built.map(|(program, _, ())| program), diagnostics)
+}
+
+/// Compiles one workflow of a file, with what the drivers of its devices say in one kind of file, such as `opentrons`.
+pub fn script(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    options: &Options,
+    transport: &'static str,
+) -> (Option<(Program, Wiring)>, Vec<Diagnostic>) {
+    let wanted = Wanted::Scripted(transport);
+    let (built, diagnostics) = compile_and(sources, file, loader, options, wanted, |_, _, (tables, _)| {
+        crate::import::texts(tables.names, "labware", loader)
+    });
+    let wired = built.map(|(program, wiring, files)| (program, Wiring { files, ..wiring.unwrap_or_default() }));
+    (wired, diagnostics)
 }
 
 /// Compiles one workflow of a file and writes it as a protocol for people, in Markdown.
@@ -152,11 +170,15 @@ pub fn document(
     loader: &dyn Loader,
     options: &Options,
 ) -> (Option<String>, Vec<Diagnostic>) {
-    let (text, diagnostics) = compile_and(sources, file, loader, options, |program, task, context| {
-        crate::prose::protocol(context.0, context.1, program, task)
-    });
-    (text.map(|(_, text)| text), diagnostics)
+    let (text, diagnostics) =
+        compile_and(sources, file, loader, options, Wanted::Program(Wires::Off), |program, task, context| {
+            crate::prose::protocol(context.0, context.1, program, task)
+        });
+    (text.map(|(_, _, text)| text), diagnostics)
 }
+
+/// A program, what drivers say where that is wanted, and what more was made of it.
+type Made<T> = (Program, Option<Wiring>, T);
 
 /// Compiles one workflow of a file; where that succeeds, `then` makes something more of it.
 fn compile_and<T>(
@@ -164,8 +186,9 @@ fn compile_and<T>(
     file: FileId,
     loader: &dyn Loader,
     options: &Options,
+    wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
-) -> (Option<(Program, T)>, Vec<Diagnostic>) {
+) -> (Option<Made<T>>, Vec<Diagnostic>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
@@ -187,7 +210,7 @@ fn compile_and<T>(
         }
     };
     let task = Task { item, lab, given };
-    let built = build(&tables, sources, &task, Wanted::Program(options.wires));
+    let built = build(&tables, sources, &task, wanted);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -198,7 +221,7 @@ fn compile_and<T>(
     let program = built.program.filter(|_| !failed);
     let more = program.map(|program| {
         let more = then(&program, &task, (&tables, sources));
-        (program, more)
+        (program, built.wiring, more)
     });
     (more, diagnostics)
 }
@@ -406,6 +429,8 @@ enum Wanted {
     Findings,
     /// To be run.
     Program(Wires),
+    /// The same, with what drivers for files of this kind say.
+    Scripted(&'static str),
     /// What is known at every statement.
     Contents,
     /// A program too, where robots with joints are in the lab.
@@ -415,6 +440,7 @@ enum Wanted {
 /// One workflow, built.
 struct Built {
     program: Option<Program>,
+    wiring: Option<Wiring>,
     points: Option<Points>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
@@ -450,6 +476,7 @@ fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], 
 fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
     let (to_run, wires) = match wanted {
         Wanted::Program(wires) => (true, wires),
+        Wanted::Scripted(_) => (true, Wires::Off),
         _ => (false, Wires::Off),
     };
     let lab = task.lab;
@@ -462,7 +489,10 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         planner.to_run = to_run;
         planner.draft = draft;
         planner.wires = wires;
-        let plan = planner.task(task);
+        if let Wanted::Scripted(transport) = wanted {
+            planner.wiring = Some(Wiring { transport: transport.to_string(), ..Wiring::default() });
+        }
+        let (plan, wiring) = planner.task(task);
         if !draft {
             elaborator.initialise();
         }
@@ -478,7 +508,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         }
         let (derivatives, balances) = elaborator.close();
         // A look at motions asks for neither what is recorded nor what is used up.
-        let told = matches!(wanted, Wanted::Program(_) | Wanted::Contents);
+        let told = matches!(wanted, Wanted::Program(_) | Wanted::Scripted(_) | Wanted::Contents);
         let observables = if told { observables(&mut elaborator) } else { Vec::new() };
         let mut starts = checks::starts(&elaborator, lab);
         checks::model(&mut elaborator);
@@ -498,7 +528,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !elaborator.has_robots() {
-                return Built { program: None, points, findings: elaborator.diagnostics, starts, uses, many };
+                return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -526,7 +556,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let drivers = elaborator.drivers;
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers };
-        return Built { program: Some(program), points, findings: elaborator.diagnostics, starts, uses, many };
+        return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses, many };
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod bill;
 mod deploy;
+mod emit;
 mod emulate;
 mod many;
 mod neighbours;
@@ -12,6 +13,7 @@ mod view;
 use std::path::{Path, PathBuf};
 
 use matterix_ir::points::Points;
+use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
 
 use crate::args::Fidelity;
@@ -20,6 +22,7 @@ use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
 pub use deploy::{Plan as DeployPlan, deploy};
+pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
@@ -115,6 +118,20 @@ pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, V
         Err(found) => (None, vec![found]),
     };
     (sources, program, found)
+}
+
+/// A file as a program, with what drivers over a wire say; none of both where there is an error.
+pub fn wire(
+    input: &Input,
+    options: &Options,
+    transport: &'static str,
+) -> (Sources, Option<(Program, Wiring)>, Vec<Diagnostic>) {
+    let (mut sources, file) = input.source();
+    let (wired, found) = match file {
+        Ok(file) => matterix_lang::script(&mut sources, file, &input.neighbours(), options, transport),
+        Err(found) => (None, vec![found]),
+    };
+    (sources, wired, found)
 }
 
 /// A workflow of a file as a protocol for people, with findings; no text where there is an error.

@@ -8,6 +8,7 @@ mod deploy;
 mod determinism;
 mod devices;
 mod doc;
+mod emit;
 mod environments;
 mod explain;
 mod faults;

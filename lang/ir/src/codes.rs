@@ -7,7 +7,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 pub struct Code {
     /// Stable name, as in `error[unit-mismatch]`.
     pub name: &'static str,
-    /// The family of checks it belongs to (`U1`, `K2`), or `P0` for parsing, `N0` for names, `X0` for runs.
+    /// The family of checks it belongs to (`U1`, `K2`), or `P0` for parsing, `N0` for names, `X0` for runs,
+    /// `W0` for files that are written for other programs.
     pub family: &'static str,
     /// One line for the index.
     pub summary: &'static str,
@@ -169,6 +170,8 @@ codes! {
     WAITS_FOR_EVER "waits-for-ever" "X0" "the run waits for something that does not come";
     ENDLESS_INSTANT "endless-instant" "X0" "steps follow one another without time passing";
     PROMISE_BROKEN "promise-broken" "X0" "a skill ended without what it promises";
+    NOT_EXPRESSIBLE "not-expressible" "W0" "a workflow does what the kind of file it is written as cannot say";
+    WRONG_MESSAGE "wrong-message" "W0" "a driver says something that its wire does not know";
     UNUSABLE_NUMBER "unusable-number" "X0" "a duration, an interval or a count is not one";
 }
 

@@ -9,6 +9,7 @@
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`wire`]: how devices are spoken to.
+//! - [`script`]: what stands for a workflow in files that other programs run.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
 
@@ -28,6 +29,7 @@ pub mod program;
 pub mod quantity;
 pub mod robot;
 pub mod scene;
+pub mod script;
 pub mod span;
 pub mod stock;
 pub mod study;

@@ -126,6 +126,8 @@ pub enum Argument {
     Quantity(NodeId, Unit),
     /// An instance.
     Instance(InstanceId),
+    /// Several instances.
+    Instances(Vec<InstanceId>),
     /// A text.
     Text(String),
     /// One of these words, by its index.

@@ -8,7 +8,7 @@ use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
-use crate::lower::Planner;
+use crate::lower::{Planner, script};
 use crate::names::DeclId;
 
 /// Checks the declarations of one module.
@@ -97,6 +97,9 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
         ItemKind::Skill { .. } => {
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
+        }
+        ItemKind::Driver { transport, .. } if script::is_known(transport) => {
+            Planner::new(lab, sources).check_script(id);
         }
         ItemKind::Driver { device, .. } => {
             if let Some(kind) = lab.kind_named(device, module) {

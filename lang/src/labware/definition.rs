@@ -15,6 +15,10 @@ pub(super) struct Definition {
     dimensions: Option<Size>,
     extents: Option<Extents>,
     wells: BTreeMap<String, Well>,
+    #[serde(default)]
+    namespace: String,
+    #[serde(default)]
+    version: u32,
 }
 
 #[derive(Debug, Deserialize)]
@@ -27,6 +31,8 @@ struct Metadata {
 #[serde(rename_all = "camelCase")]
 struct Parameters {
     is_tiprack: bool,
+    #[serde(default)]
+    load_name: String,
     tip_length: Option<f64>,
     tip_overlap: Option<f64>,
 }
@@ -126,6 +132,13 @@ impl Definition {
             }
         }
         Ok(())
+    }
+
+    /// What it is known by: its name space, name and version; nothing where it does not say them.
+    pub(super) fn uri(&self) -> Option<String> {
+        let name = &self.parameters.load_name;
+        let is_known = !self.namespace.is_empty() && !name.is_empty() && self.version > 0;
+        is_known.then(|| format!("{}/{name}/{}", self.namespace, self.version))
     }
 
     /// Outer size left to right, front to back, bottom to top, mm.

@@ -25,6 +25,8 @@ pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
         .map(|size| AssetLine::Field(write.shape("shape", "box", &size)))
         .into_iter()
         .collect();
+    let known_by = definition.uri().map(|uri| write.expr(ExprKind::Text(uri)));
+    lines.extend(known_by.map(|uri| AssetLine::Field(write.field("definition", uri))));
     lines.extend(write.grids().into_iter().map(AssetLine::Grid));
     lines
 }

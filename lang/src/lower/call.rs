@@ -601,6 +601,13 @@ impl<'a> Planner<'a, '_> {
                     Value::Frame(i, frame) => {
                         Argument::Text(format!("{}.{frame}", self.lab.instances[i.0 as usize].name))
                     }
+                    Value::List(items) => {
+                        let one = |v: &Value| match v {
+                            Value::Instance(i) | Value::Qualified(i, _) => Some(*i),
+                            _ => None,
+                        };
+                        Argument::Instances(items.iter().map(one).collect::<Option<_>>()?)
+                    }
                     Value::Text(t) => Argument::Text(t.clone()),
                     Value::Enum(node, words) => Argument::Word(*node, words.to_vec()),
                     _ => return None,

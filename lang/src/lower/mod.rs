@@ -7,6 +7,7 @@ mod limits;
 mod motion;
 mod operation;
 pub mod roles;
+pub mod script;
 mod stmt;
 mod text;
 pub mod wires;
@@ -16,6 +17,7 @@ pub use call::Verb;
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
+use matterix_ir::script::Wiring;
 use matterix_ir::{Sources, Span, Unit};
 
 use self::clauses::Clauses;
@@ -55,6 +57,8 @@ pub struct Planner<'a, 'e> {
     pub wires: wires::Wires,
     /// Drivers of the lab, with their declarations.
     drivers: Vec<(DeclId, matterix_ir::wire::Driver)>,
+    /// What is said over a wire, where that is asked for.
+    pub wiring: Option<Wiring>,
     clauses: Clauses,
     /// Clauses and limits that a draft has looked at.
     drafted: BTreeSet<Span>,
@@ -96,13 +100,14 @@ impl<'a, 'e> Planner<'a, 'e> {
             draft: false,
             wires: wires::Wires::Off,
             drivers: Vec::new(),
+            wiring: None,
             clauses: Clauses::default(),
             drafted: BTreeSet::new(),
         }
     }
 
     /// Lowers a workflow or a test.
-    pub fn task(mut self, task: &Task<'a>) -> Plan {
+    pub fn task(mut self, task: &Task<'a>) -> (Plan, Option<Wiring>) {
         let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
         self.begin_wires();
@@ -145,8 +150,10 @@ impl<'a, 'e> Planner<'a, 'e> {
         }
         // A test may leave things as it likes.
         let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
+        let wiring = self.wired();
         self.lab.drivers = self.drivers.into_iter().map(|(_, driver)| driver).collect();
-        Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends }
+        let plan = Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends };
+        (plan, wiring)
     }
 
     /// The steps of a workflow; what its parameters are bound to goes into `shown`. Its parameters that a study or a fit

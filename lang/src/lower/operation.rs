@@ -43,7 +43,10 @@ impl<'a> Planner<'a, '_> {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        Some(self.during(label, span, operation, invariants, &bound))
+        let step = self.during(label, span, operation, invariants, &bound);
+        self.say(device, sig, &bound, step);
+        self.note_call(sig, &bound, Some((device, object_is_device)), step);
+        Some(step)
     }
 
     /// An operation with what must hold while it lasts.
@@ -76,7 +79,9 @@ impl<'a> Planner<'a, '_> {
             Value::Instance(i) => Some(*i),
             _ => None,
         });
-        Some(self.during(label.to_string(), span, operation, invariants, bound))
+        let step = self.during(label.to_string(), span, operation, invariants, bound);
+        self.note_call(sig, bound, None, step);
+        Some(step)
     }
 
     pub(super) fn operation(
@@ -361,7 +366,7 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
-    fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
+    pub(super) fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
         let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
         let options = clauses.iter().filter_map(|c| match &c.kind {
             ClauseKind::Option(p) => Some(p),

@@ -161,6 +161,20 @@ impl<'a> Planner<'a, '_> {
         good.then_some(Text { parts })
     }
 
+    /// Adds a value as a text shows it; false, without a finding, where it has none.
+    pub(super) fn showable(&mut self, value: Value, span: Span, out: &mut Vec<TextPart>) -> bool {
+        let value = match value {
+            Value::Frame(id, frame) if frame.is_empty() => Value::Instance(id),
+            Value::Frame(id, frame) => Value::Text(format!("{}.{frame}", self.lab.instances[id.0 as usize].name)),
+            other => other,
+        };
+        let (found, reported) = (self.lab.diagnostics.len(), self.lab.reported);
+        let good = self.shown(value, None, span, out);
+        self.lab.diagnostics.truncate(found);
+        self.lab.reported = reported;
+        good
+    }
+
     /// Adds a value as a text shows it; false where it has none.
     fn shown(&mut self, value: Value, digits: Option<u8>, span: Span, out: &mut Vec<TextPart>) -> bool {
         let plain = |text: &str| TextPart::Plain(text.to_owned());

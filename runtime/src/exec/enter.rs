@@ -24,9 +24,19 @@ impl<'p> Executor<'p, '_> {
         frame.started = now;
         frame.kind = Kind::Pass;
         self.mark(step, StepState::Running);
-        if let Err(fault) = self.begin(id, step) {
+        if let Err(fault) = self.tell(step).and_then(|()| self.begin(id, step)) {
             self.fault(id, fault);
         }
+    }
+
+    /// Tells the listener that a node begins, with the values that it wants.
+    fn tell(&mut self, step: StepId) -> Result<(), Fault> {
+        let mut values = Vec::new();
+        for node in self.out.wanted(step) {
+            values.push(self.backend.value(node, self.out)?);
+        }
+        self.out.begins(self.now, step, &values);
+        Ok(())
     }
 
     fn begin(&mut self, id: FrameId, step: StepId) -> Result<(), Fault> {

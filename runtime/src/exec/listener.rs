@@ -1,7 +1,7 @@
 //! What a run tells the outside while it goes on.
 
 use matterix_ir::plan::{Condition, Operation, StepId};
-use matterix_ir::{Span, Unit};
+use matterix_ir::{NodeId, Span, Unit};
 use serde::{Deserialize, Serialize};
 
 use crate::motion::Moment;
@@ -88,6 +88,12 @@ pub struct Assumption {
 pub trait Listener: Observer {
     /// A node of the plan changed its state.
     fn step(&mut self, time: f64, step: StepId, state: StepState) {}
+    /// What it wants to know whenever a node of the plan begins.
+    fn wanted(&self, step: StepId) -> Vec<NodeId> {
+        Vec::new()
+    }
+    /// A node of the plan begins: the values of what was wanted, SI, those that can be known.
+    fn begins(&mut self, time: f64, step: StepId, values: &[Option<f64>]) {}
     /// An operation changed its state.
     fn operation(&mut self, time: f64, step: StepId, operation: &Operation, state: OperationState) {}
     /// An expectation was judged.

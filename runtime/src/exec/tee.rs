@@ -1,7 +1,7 @@
 //! Two listeners as one.
 
-use matterix_ir::Unit;
 use matterix_ir::plan::{Condition, Operation, StepId};
+use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
 use super::listener::{ExpectationResult, Listener, OperationState, StepState};
@@ -30,6 +30,18 @@ impl Observer for Tee<'_> {
 }
 
 impl Listener for Tee<'_> {
+    fn wanted(&self, step: StepId) -> Vec<NodeId> {
+        let mut wanted = self.0.wanted(step);
+        wanted.extend(self.1.wanted(step));
+        wanted
+    }
+
+    fn begins(&mut self, time: f64, step: StepId, values: &[Option<f64>]) {
+        let (first, second) = values.split_at(self.0.wanted(step).len().min(values.len()));
+        self.0.begins(time, step, first);
+        self.1.begins(time, step, second);
+    }
+
     both! {
         step(time: f64, step: StepId, state: StepState);
         travels(moments: &[Moment]);

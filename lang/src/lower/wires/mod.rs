@@ -14,8 +14,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{self, Driver};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::Planner;
 use super::call::Bound;
+use super::{Planner, script};
 use crate::ast::{ItemKind, Sig, Wire, WireKind};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Value};
@@ -54,7 +54,10 @@ impl<'a> Planner<'a, '_> {
         let names = self.lab.tables.names;
         for index in 0..names.decls.len() as u32 {
             let id = DeclId(index);
-            let ItemKind::Driver { device, .. } = &names.decl(id).item.kind else { continue };
+            let ItemKind::Driver { device, transport, .. } = &names.decl(id).item.kind else { continue };
+            if script::is_known(transport) {
+                continue;
+            }
             let Some(kind) = self.lab.kind_named(device, names.decl(id).module) else { continue };
             for instance in self.lab.instances_of(kind) {
                 if let Some(driver) = self.driver(id, instance) {

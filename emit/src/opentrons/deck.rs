@@ -1,0 +1,123 @@
+//! What stands on the deck of the robot, and what it is called in the protocol.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::scene::{InstanceId, Scene};
+
+use super::form::About;
+
+/// Something that has been loaded.
+#[derive(Clone, Debug)]
+pub(super) struct Loaded {
+    /// Its identifier.
+    pub(super) id: String,
+    /// What it is.
+    pub(super) about: About,
+}
+
+/// Where something stands.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Location {
+    /// A place of the deck.
+    Slot(String),
+    /// A module, by its identifier.
+    Module(String),
+}
+
+/// Words of Python, and names that a protocol in Python has for itself.
+const RESERVED: &[&str] = &[
+    "and",
+    "as",
+    "assert",
+    "async",
+    "await",
+    "break",
+    "class",
+    "continue",
+    "def",
+    "del",
+    "elif",
+    "else",
+    "except",
+    "finally",
+    "for",
+    "from",
+    "global",
+    "if",
+    "import",
+    "in",
+    "is",
+    "json",
+    "lambda",
+    "metadata",
+    "nonlocal",
+    "not",
+    "or",
+    "pass",
+    "protocol",
+    "raise",
+    "requirements",
+    "return",
+    "run",
+    "try",
+    "while",
+    "with",
+    "yield",
+];
+
+/// What has been loaded so far.
+#[derive(Debug)]
+pub(super) struct Deck<'p> {
+    scene: &'p Scene,
+    robot: InstanceId,
+    loaded: BTreeMap<InstanceId, Loaded>,
+}
+
+impl<'p> Deck<'p> {
+    pub(super) fn new(scene: &'p Scene, robot: InstanceId) -> Self {
+        Deck { scene, robot, loaded: BTreeMap::new() }
+    }
+
+    /// What an instance was loaded as.
+    pub(super) fn get(&self, id: InstanceId) -> Option<&Loaded> {
+        self.loaded.get(&id)
+    }
+
+    /// Gives an instance an identifier of its own: its name with letters, digits and `_` only.
+    pub(super) fn load(&mut self, instance: InstanceId, about: About) -> String {
+        let plain: String =
+            self.scene.get(instance).name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        let base = plain.trim_matches('_').to_ascii_lowercase();
+        let taken =
+            |id: &str| RESERVED.contains(&id) || id.starts_with("liquid_") || self.loaded.values().any(|l| l.id == id);
+        let id = (1..)
+            .map(|n| if n == 1 { base.clone() } else { format!("{base}_{n}") })
+            .find(|id| !taken(id))
+            .unwrap_or(base.clone());
+        self.loaded.insert(instance, Loaded { id: id.clone(), about });
+        id
+    }
+
+    /// Where what stands on this thing stands; none where that is neither a place of this deck nor a module on it.
+    pub(super) fn location(&self, name: &str) -> Option<Location> {
+        let support = self.scene.find(name)?;
+        match self.loaded.get(&support) {
+            Some(Loaded { id, about: About::Module }) => return Some(Location::Module(id.clone())),
+            Some(_) => return None,
+            None => {}
+        }
+        (self.scene.get(support).owner == Some(self.robot)).then(|| Location::Slot(label(name).to_owned()))
+    }
+
+    /// The identifier of the labware that a well or tip belongs to, and its name in it.
+    pub(super) fn well(&self, id: InstanceId) -> Option<(String, String)> {
+        let instance = self.scene.get(id);
+        let labware = self.loaded.get(&instance.owner?).filter(|l| l.about == About::Labware)?;
+        Some((labware.id.clone(), label(&instance.name).to_owned()))
+    }
+}
+
+/// How a place is called in its grid: `A1` of `plate[A1]`, `3` of `ot2.slot[3]`.
+pub(super) fn label(name: &str) -> &str {
+    name.rsplit_once('[').map_or(name, |(_, label)| label.trim_end_matches(']'))
+}

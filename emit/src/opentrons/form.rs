@@ -1,0 +1,107 @@
+//! Commands of Opentrons' run engine and their fields, as far as drivers may use them: command schema 8 of the package
+//! opentrons-shared-data 8.8.2.
+
+/// What a command is about; its identifier is put in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum About {
+    /// The pipette that gets the command.
+    Pipette,
+    /// The plate, rack or reservoir.
+    Labware,
+    /// The module.
+    Module,
+    /// A well: its labware and its name.
+    Well,
+}
+
+/// What a field of a message holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Holds {
+    /// A word.
+    Text,
+    /// A number.
+    Number,
+    /// `true` or `false`.
+    Flag,
+    /// A place of loaded labware, or those of all channels.
+    Well,
+    /// Where in a well: `top`, `bottom`, `center`.
+    Origin,
+    /// Above that, mm.
+    Height,
+    /// What a thing stands on: a place of the deck, or a module.
+    Location,
+    /// A labware definition by `NAMESPACE/NAME/VERSION`.
+    Definition,
+}
+
+/// A command.
+#[derive(Debug)]
+pub(super) struct Form {
+    /// Its `commandType`.
+    pub(super) name: &'static str,
+    /// What it is about.
+    pub(super) about: About,
+    /// What it must say.
+    pub(super) needs: &'static [(&'static str, Holds)],
+    /// What it may say.
+    pub(super) takes: &'static [(&'static str, Holds)],
+}
+
+impl Form {
+    /// What a field holds.
+    pub(super) fn field(&self, name: &str) -> Option<Holds> {
+        self.needs.iter().chain(self.takes).find(|(n, _)| *n == name).map(|(_, holds)| *holds)
+    }
+}
+
+/// Where a pipette does something in a well.
+const SPOT: &[(&str, Holds)] = &[("origin", Holds::Origin), ("z", Holds::Height)];
+
+const fn form(
+    name: &'static str,
+    about: About,
+    needs: &'static [(&'static str, Holds)],
+    takes: &'static [(&'static str, Holds)],
+) -> Form {
+    Form { name, about, needs, takes }
+}
+
+use Holds::{Definition, Flag, Location, Number, Text, Well};
+
+/// All of them.
+const FORMS: &[Form] = &[
+    form("loadPipette", About::Pipette, &[("pipetteName", Text), ("mount", Text)], &[]),
+    form("loadLabware", About::Labware, &[("definition", Definition), ("location", Location)], &[]),
+    form("loadModule", About::Module, &[("model", Text), ("location", Location)], &[]),
+    form("loadLiquid", About::Well, &[("volume", Number)], &[]),
+    form("pickUpTip", About::Pipette, &[("well", Well)], SPOT),
+    form("aspirate", About::Pipette, &[("well", Well), ("volume", Number), ("flowRate", Number)], SPOT),
+    form("dispense", About::Pipette, &[("well", Well), ("volume", Number), ("flowRate", Number)], SPOT),
+    form("blowout", About::Pipette, &[("well", Well), ("flowRate", Number)], SPOT),
+    form(
+        "touchTip",
+        About::Pipette,
+        &[("well", Well)],
+        &[("origin", Holds::Origin), ("z", Holds::Height), ("radius", Number), ("speed", Number)],
+    ),
+    form("dropTip", About::Pipette, &[("well", Well)], &[("alternateDropLocation", Flag)]),
+    form(
+        "moveToAddressableAreaForDropTip",
+        About::Pipette,
+        &[("addressableAreaName", Text)],
+        &[("alternateDropLocation", Flag)],
+    ),
+    form("dropTipInPlace", About::Pipette, &[], &[]),
+    form("heaterShaker/setTargetTemperature", About::Module, &[("celsius", Number)], &[]),
+    form("heaterShaker/deactivateHeater", About::Module, &[], &[]),
+    form("heaterShaker/setAndWaitForShakeSpeed", About::Module, &[("rpm", Number)], &[]),
+    form("heaterShaker/deactivateShaker", About::Module, &[], &[]),
+    form("heaterShaker/openLabwareLatch", About::Module, &[], &[]),
+    form("heaterShaker/closeLabwareLatch", About::Module, &[], &[]),
+];
+
+/// The command with this name.
+pub(super) fn find(name: &str) -> Option<&'static Form> {
+    FORMS.iter().find(|f| f.name == name)
+}

@@ -1,0 +1,47 @@
+//! Protocols of Opentrons, as JSON of schema 8 and as Python.
+
+mod deck;
+mod form;
+mod json;
+mod liquids;
+mod message;
+mod protocol;
+mod python;
+mod writer;
+
+use matterix_ir::Diagnostic;
+
+use crate::course::{self, Means};
+use crate::finding::settle;
+use crate::performance::Performance;
+use crate::{Subject, Written};
+use protocol::Protocol;
+
+/// The wire of the drivers that these files are written from.
+pub const WIRE: &str = "opentrons";
+
+/// What the target is called in findings.
+const WHAT: &str = "a protocol of Opentrons";
+
+/// A JSON protocol of schema 8, with commands of schema 8.
+pub fn json(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
+    let (protocol, warnings) = protocol(subject, performance)?;
+    Ok((json::write(&protocol), warnings))
+}
+
+/// A Python protocol.
+pub fn python(subject: Subject<'_>, performance: &Performance<'_>) -> Written {
+    let (protocol, warnings) = protocol(subject, performance)?;
+    Ok((python::write(&protocol)?, warnings))
+}
+
+fn protocol<'p>(
+    subject: Subject<'p>,
+    performance: &Performance<'_>,
+) -> Result<(Protocol<'p>, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let Subject { program, wiring, sources } = subject;
+    let robot = protocol::robot(subject, performance).map_err(|d| vec![d])?;
+    let mut found = course::open(program, wiring, sources, &performance.acts, Means::default(), WHAT);
+    let protocol = Protocol::of(subject, performance, robot, &mut found);
+    settle(found).map(|warnings| (protocol, warnings))
+}

@@ -1,0 +1,130 @@
+//! A performance as commands of the run engine.
+
+use matterix_ir::plan::Step;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::script::Wired;
+use matterix_ir::{Diagnostic, Span};
+use serde_json::{Map, Value, json};
+
+use super::WHAT;
+use super::deck::Deck;
+use super::writer::Writer;
+use crate::Subject;
+use crate::finding::not_expressible;
+use crate::performance::{Deed, Performance, number};
+use crate::place;
+
+/// A command with its parameters as the command schema has them.
+#[derive(Debug)]
+pub(super) struct Command {
+    /// Its `commandType`.
+    pub(super) name: &'static str,
+    /// Its parameters.
+    pub(super) params: Map<String, Value>,
+    /// Where the user's text says it.
+    pub(super) at: Span,
+}
+
+impl Command {
+    /// A parameter that is a text; empty where there is none.
+    pub(super) fn text(&self, name: &str) -> &str {
+        self.params.get(name).and_then(Value::as_str).unwrap_or("")
+    }
+}
+
+/// A protocol before it is written in either form.
+#[derive(Debug)]
+pub(super) struct Protocol<'p> {
+    pub(super) subject: Subject<'p>,
+    /// What the driver of the robot says.
+    pub(super) robot: &'p Wired,
+    /// Liquids by identifier, with their names.
+    pub(super) liquids: Vec<(String, String)>,
+    /// Labware definitions that Opentrons does not know by itself, by `NAMESPACE/NAME/VERSION`.
+    pub(super) definitions: Vec<(String, Value)>,
+    /// What is loaded.
+    pub(super) loads: Vec<Command>,
+    /// What is done.
+    pub(super) commands: Vec<Command>,
+}
+
+impl<'p> Protocol<'p> {
+    /// The protocol of what was done; what has no counterpart goes into `found`.
+    pub(super) fn of(
+        subject: Subject<'p>,
+        performance: &Performance<'_>,
+        robot: &'p Wired,
+        found: &mut Vec<Diagnostic>,
+    ) -> Self {
+        let mut writer = Writer {
+            deck: Deck::new(&subject.program.scene, robot.device),
+            origins: place::origins(&subject.program.plan, subject.sources),
+            protocol: Protocol {
+                subject,
+                robot,
+                liquids: Vec::new(),
+                definitions: Vec::new(),
+                loads: Vec::new(),
+                commands: Vec::new(),
+            },
+            found,
+        };
+        for (wired, opened) in subject.wiring.devices.iter().zip(&performance.opened) {
+            opened.iter().for_each(|said| writer.open(wired, said));
+        }
+        writer.gather_liquids();
+        for act in &performance.acts {
+            let at = writer.origins.get(act.step.0 as usize).copied().unwrap_or_default();
+            match &act.deed {
+                Deed::Operation(said) => writer.operation(act.step.0, said.as_deref(), at),
+                Deed::Wait(seconds) => writer.push("waitForDuration", json!({ "seconds": number(*seconds) }), at),
+                Deed::Note(text) => writer.push("comment", json!({ "message": text }), at),
+                Deed::Ask(text) => writer.push("waitForResume", json!({ "message": text }), at),
+                Deed::WaitUntil => {}
+            }
+        }
+        writer.protocol
+    }
+}
+
+/// The robot whose devices are used, of those that have a driver.
+pub(super) fn robot<'p>(subject: Subject<'p>, performance: &Performance<'_>) -> Result<&'p Wired, Diagnostic> {
+    let Subject { program, wiring, sources } = subject;
+    let robots: Vec<&Wired> = wiring.devices.iter().filter(|w| w.setting("robot").is_some()).collect();
+    let root = program.plan.get(program.plan.root).span;
+    let Some(first) = robots.first() else {
+        let label = format!("`{}` has no robot with a driver over `{}`", program.scene.lab, super::WIRE);
+        return Err(not_expressible(root, format!("{WHAT} needs a robot of Opentrons"), label));
+    };
+    let origins = place::origins(&program.plan, sources);
+    let mut used: Option<&Wired> = None;
+    for act in performance.acts.iter().filter(|a| matches!(a.deed, Deed::Operation(Some(_)))) {
+        let Step::Operation(operation) = &program.plan.get(act.step).step else { continue };
+        let Some(own) = operation.device.and_then(|d| robots.iter().find(|r| belongs(subject, d, r.device))) else {
+            continue;
+        };
+        match used {
+            Some(other) if other.device != own.device => {
+                let at = origins.get(act.step.0 as usize).copied().unwrap_or_default();
+                let names = [other, own].map(|w| program.scene.get(w.device).name.as_str());
+                let headline = format!("{WHAT} is for one robot, and this uses `{}` and `{}`", names[0], names[1]);
+                let d = not_expressible(at, headline, format!("is done by `{}`", names[1]));
+                return Err(d.help("write one workflow for each"));
+            }
+            _ => used = Some(own),
+        }
+    }
+    Ok(used.unwrap_or(first))
+}
+
+/// Whether a device is part of another.
+pub(super) fn belongs(subject: Subject<'_>, device: InstanceId, whole: InstanceId) -> bool {
+    let mut next = Some(device);
+    while let Some(id) = next {
+        if id == whole {
+            return true;
+        }
+        next = subject.program.scene.get(id).owner;
+    }
+    false
+}

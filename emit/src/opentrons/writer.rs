@@ -1,0 +1,221 @@
+//! Steps as commands: each message of a driver with the identifiers of what it is about.
+
+use matterix_ir::plan::Step;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::script::Wired;
+use matterix_ir::{Diagnostic, Span};
+use serde_json::{Map, Value, json};
+
+use super::WHAT;
+use super::deck::{Deck, Location};
+use super::form::{About, Holds};
+use super::message::{Message, names};
+use super::protocol::{Command, Protocol, belongs};
+use crate::finding::not_expressible;
+use crate::performance::Said;
+
+/// The name space of the definitions that come with Opentrons' software.
+const OWN: &str = "opentrons";
+
+/// A protocol that is being put together.
+pub(super) struct Writer<'p, 'f> {
+    pub(super) protocol: Protocol<'p>,
+    pub(super) deck: Deck<'p>,
+    pub(super) origins: Vec<Span>,
+    pub(super) found: &'f mut Vec<Diagnostic>,
+}
+
+impl Writer<'_, '_> {
+    /// Adds a command.
+    pub(super) fn push(&mut self, name: &'static str, params: Value, at: Span) {
+        let Value::Object(params) = params else { return };
+        self.protocol.commands.push(Command { name, params, at });
+    }
+
+    fn name(&self, id: InstanceId) -> &str {
+        &self.protocol.subject.program.scene.get(id).name
+    }
+
+    /// What a device is told before anything else: it is loaded if it is part of the robot or stands on it.
+    pub(super) fn open(&mut self, wired: &Wired, said: &Said) {
+        let message = match Message::read(said) {
+            Ok(message) => message,
+            Err(d) => return self.found.push(d),
+        };
+        let (robot, at) = (self.protocol.robot.device, self.protocol.subject.program.scene.get(wired.device).span);
+        let here = match message.form.about {
+            About::Pipette => belongs(self.protocol.subject, wired.device, robot),
+            About::Labware | About::Module => message.get("location").is_some_and(|l| self.deck.location(l).is_some()),
+            About::Well => self.deck.well(wired.device).is_some() && message.get("volume") != Some("0"),
+        };
+        if !here {
+            return;
+        }
+        if message.form.about != About::Well && self.deck.get(wired.device).is_none() {
+            self.deck.load(wired.device, message.form.about);
+        }
+        match self.command(wired.device, &message, at) {
+            Ok(command) => self.protocol.loads.push(command),
+            Err(d) => self.found.push(d),
+        }
+    }
+
+    /// Says what a step says.
+    pub(super) fn operation(&mut self, step: u32, said: Option<&[Said]>, at: Span) {
+        let program = self.protocol.subject.program;
+        let step = &program.plan.steps[step as usize];
+        let Step::Operation(operation) = &step.step else { return };
+        let wired = operation.device.and_then(|d| self.protocol.subject.wiring.of(d));
+        let (Some(said), Some(device)) = (said, operation.device) else {
+            let d = match (operation.device, wired) {
+                (Some(device), Some(wired)) => {
+                    let headline = format!("{WHAT} has no command to `{}` `{}`", operation.verb, self.name(device));
+                    let help = format!("its driver `{}` has no line for it", wired.driver);
+                    not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
+                }
+                (Some(device), None) => {
+                    // What is out of reach is so at every step.
+                    let reached = format!("{WHAT} does not reach `{}`", self.name(device));
+                    if let Some(known) = self.found.iter_mut().find(|d| d.headline == reached) {
+                        let d = known.clone().because(at, "and here");
+                        *known = d;
+                        return;
+                    }
+                    let headline = format!("{WHAT} does not reach `{}`", self.name(device));
+                    let help = format!("`{}` has no driver over `{}`", program.scene.get(device).kind, super::WIRE);
+                    not_expressible(at, headline, format!("does `{}`", step.label)).help(help)
+                }
+                (None, _) => not_expressible(
+                    at,
+                    format!("{WHAT} has no command to `{}`", operation.verb),
+                    "is done by no device of it",
+                ),
+            };
+            return self.found.push(d);
+        };
+        if self.deck.get(device).is_none() {
+            let headline = format!("`{}` is no part of `{}`", self.name(device), self.name(self.protocol.robot.device));
+            return self.found.push(not_expressible(at, headline, format!("does `{}`", step.label)));
+        }
+        for said in said {
+            match Message::read(said).and_then(|message| self.command(device, &message, at)) {
+                Ok(command) => self.protocol.commands.push(command),
+                Err(d) => self.found.push(d),
+            }
+        }
+    }
+
+    /// A message as a command.
+    fn command(&mut self, device: InstanceId, message: &Message<'_>, at: Span) -> Result<Command, Diagnostic> {
+        let mut params = Map::new();
+        let own = self.deck.get(device).map(|l| l.id.clone()).unwrap_or_default();
+        match message.form.about {
+            About::Pipette => drop(params.insert("pipetteId".to_owned(), own.into())),
+            About::Module => drop(params.insert("moduleId".to_owned(), own.into())),
+            About::Labware => drop(params.insert("labwareId".to_owned(), own.into())),
+            About::Well => {
+                let (labware, well) = self.deck.well(device).unwrap_or_default();
+                params.insert("labwareId".to_owned(), labware.into());
+                params.insert("wellName".to_owned(), well.into());
+            }
+        }
+        let mut spot = Map::new();
+        for (name, value) in &message.fields {
+            let Some(holds) = message.form.field(name) else { continue };
+            let key = (*name).to_owned();
+            match holds {
+                Holds::Text => drop(params.insert(key, value.as_str().into())),
+                Holds::Number => drop(params.insert(key, parsed(message, name, value)?.into())),
+                Holds::Flag => drop(params.insert(key, flag(message, name, value)?.into())),
+                Holds::Well => {
+                    let (labware, well) = self.well(message, value, at)?;
+                    params.insert("labwareId".to_owned(), labware.into());
+                    params.insert("wellName".to_owned(), well.into());
+                }
+                Holds::Origin if ["top", "bottom", "center"].contains(&value.as_str()) => {
+                    drop(spot.insert("origin".to_owned(), value.as_str().into()))
+                }
+                Holds::Origin => return Err(message.wrong(format!("`{value}` is no place in a well"))),
+                Holds::Height => drop(
+                    spot.insert("offset".to_owned(), json!({ "x": 0, "y": 0, "z": parsed(message, name, value)? })),
+                ),
+                Holds::Location => drop(params.insert(
+                    key,
+                    match self.deck.location(value) {
+                        Some(Location::Slot(slot)) => json!({ "slotName": slot }),
+                        Some(Location::Module(id)) => json!({ "moduleId": id }),
+                        None => Value::Null,
+                    },
+                )),
+                Holds::Definition => self.definition(value, device, &mut params)?,
+            }
+        }
+        if !spot.is_empty() {
+            params.insert("wellLocation".to_owned(), spot.into());
+        }
+        Ok(Command { name: message.form.name, params, at })
+    }
+
+    /// The place a command is about: where its first channel goes.
+    fn well(&self, message: &Message<'_>, value: &str, at: Span) -> Result<(String, String), Diagnostic> {
+        let scene = &self.protocol.subject.program.scene;
+        let all = names(value);
+        let mut places = Vec::new();
+        for name in &all {
+            let place = scene.find(name).and_then(|id| self.deck.well(id));
+            let Some(place) = place else {
+                let headline = format!("`{name}` is not on the deck of `{}`", self.name(self.protocol.robot.device));
+                let help = "stand it on a place of the deck or on a module there when the workflow begins";
+                return Err(not_expressible(at, headline, "goes there").help(help));
+            };
+            places.push(place);
+        }
+        let Some(first) = places.first().cloned() else { return Err(message.wrong("it names no place".to_owned())) };
+        if places.iter().any(|(labware, _)| *labware != first.0) {
+            return Err(not_expressible(at, format!("{WHAT} goes to one labware at a time"), "goes to several"));
+        }
+        Ok(first)
+    }
+
+    /// Puts in the definition of a labware, and keeps it where Opentrons does not know it.
+    fn definition(&mut self, uri: &str, device: InstanceId, params: &mut Map<String, Value>) -> Result<(), Diagnostic> {
+        let instance = self.protocol.subject.program.scene.get(device);
+        let parts: Vec<&str> = uri.split('/').collect();
+        let version = parts.get(2).and_then(|v| v.parse::<u64>().ok());
+        let ([space, name, _], Some(version)) = (parts.as_slice(), version) else {
+            let headline = format!("it is not known as which labware Opentrons knows `{}`", instance.name);
+            let help =
+                format!("say it in `{}`: `definition: \"opentrons/corning_96_wellplate_360ul_flat/2\"`", instance.kind);
+            return Err(not_expressible(instance.span, headline, "has no definition").help(help));
+        };
+        params.insert("loadName".to_owned(), (*name).into());
+        params.insert("namespace".to_owned(), (*space).into());
+        params.insert("version".to_owned(), version.into());
+        params.insert("displayName".to_owned(), instance.name.as_str().into());
+        if *space != OWN && !self.protocol.definitions.iter().any(|(known, _)| known == uri) {
+            let texts = self.protocol.subject.wiring.files.values();
+            let found = texts.filter_map(|t| serde_json::from_str::<Value>(t).ok()).find(|d| {
+                let text = |v: &Value| v.as_str().map(str::to_owned);
+                text(&d["namespace"]).as_deref() == Some(space)
+                    && text(&d["parameters"]["loadName"]).as_deref() == Some(name)
+                    && d["version"].as_u64() == Some(version)
+            });
+            let Some(found) = found else {
+                let headline = format!("the definition `{uri}` of `{}` is not there", instance.name);
+                let help = "make the asset `from labware \"FILE.json\"`";
+                return Err(not_expressible(instance.span, headline, "has a definition of its own").help(help));
+            };
+            self.protocol.definitions.push((uri.to_owned(), found));
+        }
+        Ok(())
+    }
+}
+
+fn parsed(message: &Message<'_>, name: &str, value: &str) -> Result<f64, Diagnostic> {
+    let known = value.parse::<f64>().ok().filter(|v| v.is_finite());
+    known.ok_or_else(|| message.wrong(format!("`{name}` is `{value}`, which is no number")))
+}
+
+fn flag(message: &Message<'_>, name: &str, value: &str) -> Result<bool, Diagnostic> {
+    value.parse().map_err(|_| message.wrong(format!("`{name}` is `{value}`, neither `true` nor `false`")))
+}

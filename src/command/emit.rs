@@ -1,0 +1,39 @@
+//! `matterixc emit`.
+
+use matterix_ir::{Diagnostic, Severity};
+
+use crate::args::{Color, EmitArgs};
+use crate::pipeline::{self, Input};
+use crate::terminal;
+
+use super::bill::show;
+use crate::{Exit, cache, cancel, files};
+
+/// Compiles, performs once on the digital twin and writes what was done; findings go to standard error. Nothing is written
+/// where there is an error.
+pub fn emit(args: &EmitArgs, color: Color) -> Exit {
+    super::or_complain(attempt(args, color))
+}
+
+fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
+    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
+    let (sources, wired, mut found) = pipeline::wire(&input, &args.subject.options(), args.target.wire());
+    let is_wrong = |found: &[Diagnostic]| found.iter().any(|d| d.severity == Severity::Error);
+    let mut written = None;
+    if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {
+        found.extend(pipeline::motions(&program, &*cache::of(args.no_cache)));
+        if !is_wrong(&found) {
+            let cancel = cancel::on_interrupt()?;
+            let (bytes, more) = pipeline::emit(&program, &wiring, &sources, args.target, args.seed, cancel);
+            found.extend(more);
+            written = bytes;
+        }
+    }
+    show(&sources, found, color);
+    let Some(bytes) = written else { return Ok(Exit::Findings) };
+    match &args.out {
+        Some(path) => files::write(path, bytes)?,
+        None => terminal::pour(&bytes),
+    }
+    Ok(Exit::Fine)
+}

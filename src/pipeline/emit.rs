@@ -1,0 +1,87 @@
+//! A workflow as a file that another program runs: performed once on the digital twin and written down.
+
+use std::sync::atomic::AtomicBool;
+
+use clap::ValueEnum;
+use matterix_emit::robots::{ros, urscript};
+use matterix_emit::{Performance, Subject, opentrons, steps};
+use matterix_ir::script::Wiring;
+use matterix_ir::{Diagnostic, Program, Severity, Sources};
+use matterix_runtime::exec::Limits;
+use matterix_runtime::run::{Fidelity, RunOptions};
+
+/// A kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Target {
+    /// A protocol of Opentrons in JSON, schema 8.
+    OpentronsJson,
+    /// A protocol of Opentrons in Python.
+    OpentronsPython,
+    /// Numbered steps to read.
+    Commands,
+    /// The same, one JSON object per line.
+    CommandsJson,
+    /// The motions of an arm of Universal Robots.
+    Urscript,
+    /// Motions of robots as messages of ROS 2 in MCAP.
+    JointTrajectory,
+    /// The same as JSON.
+    JointTrajectoryJson,
+}
+
+impl Target {
+    /// The wire whose drivers say what devices are told.
+    pub fn wire(self) -> &'static str {
+        match self {
+            Target::OpentronsJson | Target::OpentronsPython => opentrons::WIRE,
+            Target::Urscript => urscript::WIRE,
+            _ => "",
+        }
+    }
+
+    fn fidelity(self) -> Fidelity {
+        match self {
+            Target::Urscript | Target::JointTrajectory | Target::JointTrajectoryJson => Fidelity::Motion,
+            _ => Fidelity::Process,
+        }
+    }
+}
+
+/// The bytes of the file, none where something keeps it from being written, and what was found.
+pub fn emit(
+    program: &Program,
+    wiring: &Wiring,
+    sources: &Sources,
+    target: Target,
+    seed: u64,
+    cancel: &AtomicBool,
+) -> (Option<Vec<u8>>, Vec<Diagnostic>) {
+    let limits = Limits { cancel: Some(cancel), ..Limits::default() };
+    let options = RunOptions { seed, fidelity: target.fidelity(), limits, ..RunOptions::default() };
+    let subject = Subject { program, wiring, sources };
+    let mut performance = Performance::new(subject);
+    let outcome = matterix_runtime::run::run(program, &options, &mut performance);
+    let mut found = super::run::findings(&outcome, sources);
+    if found.iter().any(|d| d.severity == Severity::Error) {
+        return (None, found);
+    }
+    let written = match target {
+        Target::OpentronsJson => opentrons::json(subject, &performance),
+        Target::OpentronsPython => opentrons::python(subject, &performance),
+        Target::Commands => steps::text(subject, &performance),
+        Target::CommandsJson => steps::json(subject, &performance),
+        Target::Urscript => urscript::script(subject, &performance),
+        Target::JointTrajectory => ros::mcap(subject, &performance),
+        Target::JointTrajectoryJson => ros::json(subject, &performance),
+    };
+    match written {
+        Ok((bytes, warnings)) => {
+            found.extend(warnings);
+            (Some(bytes), found)
+        }
+        Err(errors) => {
+            found.extend(errors);
+            (None, found)
+        }
+    }
+}

@@ -1,0 +1,298 @@
+//! `matterixc emit`: files that other programs run. That Opentrons' own software takes the protocols is judged by
+//! `.ci/peers`.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::harness::{Ended, folder, matterixc, matterixc_in, root, write};
+
+fn emit(file: &str, target: &str) -> Ended {
+    matterixc(&["emit", file, "--target", target])
+}
+
+/// What is written agrees with a file that somebody has read; `MATTERIX_UPDATE=1` writes it anew.
+fn agrees(file: &str, target: &str, golden: &str) {
+    let ended = emit(file, target);
+    assert_eq!(ended.code, 0, "{file} as {target}: {}", ended.err);
+    let path = root().join("tests/emit").join(golden);
+    if std::env::var_os("MATTERIX_UPDATE").is_some() {
+        fs::write(&path, &ended.out).expect("the file can be written");
+    }
+    let known = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        known == ended.out,
+        "tests/emit/{golden} differs: MATTERIX_UPDATE=1 cargo test --test cli emit, and read it"
+    );
+}
+
+#[test]
+fn protocols_and_lists_are_as_they_were_read() {
+    let blend = "tests/emit/blend.mtx";
+    agrees(blend, "opentrons-json", "blend.json");
+    agrees(blend, "opentrons-python", "blend.py");
+    agrees(blend, "commands", "blend.txt");
+    agrees(blend, "commands-json", "blend.jsonl");
+}
+
+#[test]
+fn the_motions_of_an_arm_are_as_they_were_read() {
+    agrees("tests/emit/arm.mtx", "urscript", "arm.script");
+}
+
+#[test]
+fn trajectories_follow_one_another_and_do_not_jump() {
+    let ended = emit("tests/emit/arm.mtx", "joint-trajectory-json");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let document: Value = serde_json::from_str(&ended.out).expect("a JSON document");
+    let list = document["trajectories"].as_array().expect("a list");
+    let arm: Vec<&Value> = list.iter().filter(|t| t["topic"] == "/ur5e/joint_trajectory").collect();
+    assert!(arm.len() >= 8, "{} motions", arm.len());
+    assert!(list.iter().any(|t| t["topic"] == "/ur5e/gripper/joint_trajectory"));
+    let time = |t: &Value| t["sec"].as_f64().expect("s") + t["nanosec"].as_f64().expect("ns") * 1e-9;
+    let positions = |p: &Value| -> Vec<f64> {
+        p["positions"].as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number")).collect()
+    };
+    let mut before: Option<(f64, Vec<f64>)> = None;
+    for t in arm {
+        assert_eq!(t["joint_names"].as_array().map(Vec::len), Some(6));
+        let points = t["points"].as_array().expect("a list");
+        let begins = time(&t["header"]["stamp"]);
+        if let Some((ended, stood)) = &before {
+            assert!(begins >= ended - 1e-6, "begins at {begins} s, before {ended} s");
+            let first = positions(&points[0]);
+            assert!(first.iter().zip(stood).all(|(a, b)| (a - b).abs() < 1e-6), "{first:?} after {stood:?}");
+        }
+        for pair in points.windows(2) {
+            assert!(time(&pair[1]["time_from_start"]) > time(&pair[0]["time_from_start"]));
+        }
+        let last = &points[points.len() - 1];
+        before = Some((begins + time(&last["time_from_start"]), positions(last)));
+    }
+}
+
+#[test]
+fn trajectories_in_mcap_are_messages_of_ros() {
+    let dir = folder("emit_mcap");
+    let out = dir.join("arm.mcap");
+    let ended =
+        matterixc(&["emit", "tests/emit/arm.mtx", "--target", "joint-trajectory", "-o", out.to_str().expect("text")]);
+    assert_eq!((ended.code, ended.out.as_str()), (0, ""), "{}", ended.err);
+    let bytes = fs::read(&out).expect("it is written");
+    assert!(bytes.starts_with(b"\x89MCAP"));
+    let has = |text: &str| bytes.windows(text.len()).any(|w| w == text.as_bytes());
+    for text in ["trajectory_msgs/msg/JointTrajectory", "ros2msg", "cdr", "/ur5e/joint_trajectory", "wrist_3_joint"] {
+        assert!(has(text), "no {text}");
+    }
+}
+
+#[test]
+fn the_same_workflow_gives_the_same_bytes() {
+    for target in ["opentrons-json", "opentrons-python", "commands-json"] {
+        assert_eq!(emit("tests/emit/blend.mtx", target).out, emit("tests/emit/blend.mtx", target).out);
+    }
+}
+
+/// Codes and headlines of what keeps a workflow from being written.
+fn refused(name: &str, text: &str, target: &str) -> String {
+    let dir = folder(&format!("emit_{name}"));
+    write(&dir, "a.mtx", text);
+    let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", target, "-o", "out"]);
+    assert_eq!(ended.code, 1, "{name}: {}", ended.err);
+    assert!(!dir.join("out").exists(), "{name}: something is written");
+    assert!(ended.out.is_empty());
+    ended.err.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// A deck with a hotplate beside it.
+fn workflow(lines: &str) -> String {
+    format!(
+        "mtx 1
+use std::heating::IkaRetControl
+use std::opentrons::{{Corning96, OT2, P300Single, Reservoir12, TipRack300}}
+lab deck {{
+    ambient: 22 degC
+    ot2 = OT2 {{ left: P300Single }} at (0, 0, 0) m
+    other = OT2 {{ left: P300Single }} at (2, 0, 0) m
+    tips = TipRack300 on ot2.slot[1]
+    more = TipRack300 on other.slot[1]
+    plate = Corning96 on ot2.slot[2]
+    stock = Reservoir12 on ot2.slot[3] holding {{ A1: 10 mL of water }}
+    hotplate = IkaRetControl at (1, 1, 0) m
+    aside = Corning96 on hotplate
+}}
+workflow work in deck {{
+{lines}
+}}"
+    )
+}
+
+#[test]
+fn what_a_protocol_cannot_say_is_said_at_its_line() {
+    let tip = "pick up tip from tips by ot2.left";
+    let cases: [(&str, String, &[&str]); 9] = [
+        (
+            "device",
+            "heat hotplate to 60 degC\nstop heating hotplate".into(),
+            &["does not reach `hotplate`", "a.mtx:16"],
+        ),
+        (
+            "branch",
+            "let m <- read hotplate\nif m > 1 g { note \"heavy\" }".into(),
+            &["cannot branch on `m > 1 g`", "a.mtx:17"],
+        ),
+        ("condition", "wait until hotplate.temperature < 30 degC".into(), &["cannot wait for", "a.mtx:16"]),
+        (
+            "value",
+            format!(
+                "let m <- read hotplate\n{tip}\naspirate m / (1 kg/mL) + 50 uL from stock[A1] by ot2.left\ndrop tip by ot2.left"
+            ),
+            &["needs to know every value beforehand", "a.mtx:18"],
+        ),
+        ("beside", format!("parallel {{ {tip}; wait 1 s }}\ndrop tip by ot2.left"), &["one thing after the other"]),
+        ("handler", format!("sequence {{ {tip} }} on failure {{ wait 1 s }}\ndrop tip by ot2.left"), &["a handler"]),
+        (
+            "robots",
+            format!("{tip}\npick up tip from more by other.left\ndrop tip by ot2.left\ndrop tip by other.left"),
+            &["is for one robot", "a.mtx:17"],
+        ),
+        (
+            "bin",
+            format!("{tip}\ndrop tip into ot2.trash by ot2.left"),
+            &["no command to `drop tip`", "`PipetteCommands`"],
+        ),
+        (
+            "elsewhere",
+            format!(
+                "{tip}\naspirate 50 uL from stock[A1] by ot2.left\ndispense 50 uL into aside[A1] by ot2.left\ndrop tip by ot2.left"
+            ),
+            &["`ot2.left` does not reach `aside[A1]`", "a.mtx:18"],
+        ),
+    ];
+    for (name, lines, expected) in cases {
+        let said = refused(name, &workflow(&lines), "opentrons-json");
+        for text in expected {
+            assert!(said.contains(text), "{name}: no `{text}` in\n{said}");
+        }
+        assert!(said.ends_with("1 error"), "{name}: one mistake is one message\n{said}");
+    }
+}
+
+#[test]
+fn errors_of_check_and_failures_of_the_performance_keep_it_from_being_written() {
+    let underflow =
+        workflow("pick up tip from tips by ot2.left\naspirate 50 uL from stock[A2] by ot2.left\ndrop tip by ot2.left");
+    assert!(refused("check", &underflow, "opentrons-json").contains("error[never-filled]"));
+    let missed = workflow("expect elapsed > 1 h");
+    assert!(refused("missed", &missed, "commands").contains("error[expectation-failed]"));
+    let none =
+        "mtx 1\nuse std::heating::IkaRetControl\nlab bench { ambient: 22 degC, plate = IkaRetControl at (0, 0, 0) m }
+workflow rest in bench { heat plate to 60 degC; stop heating plate }\n";
+    assert!(refused("no_robot", none, "opentrons-json").contains("needs a robot of Opentrons"));
+    assert!(refused("no_arm", none, "urscript").contains("no arm moves"));
+    assert!(refused("no_joints", none, "joint-trajectory").contains("no robot with joints moves"));
+}
+
+#[test]
+fn what_the_text_decides_is_no_branch() {
+    let text = workflow(
+        "for i in [1, 2] {
+        if i == 2 { pick up tip from tips by ot2.left; wait 1 s; drop tip by ot2.left } else { note \"first\" }
+    }",
+    );
+    let dir = folder("emit_decided");
+    write(&dir, "a.mtx", text);
+    let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_eq!(ended.out.matches("pick_up_tip").count(), 1);
+    assert_eq!(ended.out.matches("protocol.comment").count(), 1);
+}
+
+/// A plate whose definition does not come with Opentrons' software.
+fn own_plate() -> String {
+    let text = fs::read_to_string(root().join("assets/labware/corning_96_wellplate_360ul_flat.json")).expect("read");
+    let mut definition: Value = serde_json::from_str(&text).expect("JSON");
+    definition["namespace"] = "house".into();
+    definition["parameters"]["loadName"] = "flat_96".into();
+    definition["version"] = 7.into();
+    definition.to_string()
+}
+
+#[test]
+fn a_line_of_ones_own_takes_the_place_of_one_of_the_library() {
+    let page = fs::read_to_string(root().join("docs/emit.md")).expect("the page can be read");
+    let driver = page.split_once("```mtx\n").and_then(|(_, rest)| rest.split_once("```")).expect("an example").0;
+    let dir = folder("emit_careful");
+    write(&dir, "driver.mtx", driver);
+    let checked = matterixc_in(&dir, &["check", "--strict", "driver.mtx"]);
+    assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
+    let steps = "pick up tip from tips by ot2.left\naspirate 50 uL from stock[A1] by ot2.left\ndrop tip by ot2.left";
+    let own = driver.trim_start_matches("mtx 1\n");
+    write(&dir, "a.mtx", format!("{}\n{own}", workflow(steps)));
+    let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert!(ended.out.contains("ot2_left.flow_rate.aspirate = 46.43\n"), "{}{}", ended.out, ended.err);
+    assert!(ended.out.contains("ot2_left.aspirate(50, stock[\"A1\"].bottom(2))"), "{}", ended.out);
+    assert!(ended.out.contains("ot2_left.drop_tip("), "{}", ended.out);
+}
+
+#[test]
+fn names_that_python_has_itself_are_not_taken() {
+    let dir = folder("emit_names");
+    let text = workflow("pick up tip from run by ot2.left\ndrop tip by ot2.left").replace("tips = ", "run = ");
+    write(&dir, "a.mtx", text);
+    let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert!(ended.out.contains("ot2_left.pick_up_tip(run_2[\"A1\"])"), "{}{}", ended.out, ended.err);
+}
+
+#[test]
+fn labware_of_ones_own_goes_along() {
+    let dir = folder("emit_own");
+    write(&dir, "plate.json", own_plate());
+    let text = workflow("pick up tip from tips by ot2.left\naspirate 50 uL from stock[A1] by ot2.left\ndispense 50 uL into own[B2] by ot2.left\ndrop tip by ot2.left")
+        .replace("lab deck {", "asset Own from labware \"plate.json\"\nlab deck {\n    own = Own on ot2.slot[5]");
+    write(&dir, "a.mtx", text);
+    let json = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
+    assert_eq!(json.code, 0, "{}", json.err);
+    let document: Value = serde_json::from_str(&json.out).expect("JSON");
+    assert_eq!(document["labwareDefinitions"]["house/flat_96/7"]["version"], 7);
+    let python = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-python"]);
+    assert!(
+        python.out.contains("load_labware_from_definition(DEFINITIONS[\"house/flat_96/7\"], \"5\", label=\"own\")")
+    );
+}
+
+#[test]
+fn a_driver_that_says_something_unknown_is_named() {
+    let dir = folder("emit_driver");
+    let text = workflow("blink lamp").replace(
+        "lab deck {",
+        "capability Lamp: Body { command blink }\nasset Led: Lamp { mass: 1 g }
+driver LedCommands for Led over opentrons { open sends \"loadModule model=led location={support}\"; blink sends \"blink times=3\" }
+lab deck {\n    lamp = Led on ot2.slot[9]",
+    );
+    write(&dir, "a.mtx", text);
+    let ended = matterixc_in(&dir, &["emit", "a.mtx", "--target", "opentrons-json"]);
+    assert_eq!(ended.code, 1);
+    assert!(ended.err.contains("error[wrong-message]: `blink` is no command of Opentrons"), "{}", ended.err);
+}
+
+#[test]
+fn drivers_over_opentrons_are_checked_where_they_are_declared() {
+    let check = |wires: &str| {
+        let dir = folder("emit_declared");
+        let text = format!(
+            "mtx 1\nuse std::opentrons::OpentronsPipette\ndriver Mine for OpentronsPipette over opentrons {{ {wires} }}\n"
+        );
+        write(&dir, "a.mtx", text);
+        matterixc_in(&dir, &["check", "a.mtx", "--format", "json"])
+    };
+    assert_eq!(check("drop tip sends \"dropTipInPlace\"").code, 0);
+    for (wires, code) in [
+        ("drop tip onto(x) sends \"dropTipInPlace\"", "unknown-verb"),
+        ("drop tip sends \"dropTipInPlace {volum}\"", "unknown-name"),
+        ("reply \"#\" fails blocked", "misplaced"),
+    ] {
+        let found: Vec<Value> = check(wires).out_lines();
+        assert_eq!(found.iter().map(|l| l["code"].as_str().unwrap_or("")).collect::<Vec<_>>(), [code], "{wires}");
+    }
+}
