@@ -8,8 +8,9 @@ use matterix_ir::robot::{JointKind, JointLimits};
 /// Share by which a limit may be passed: rounding of what is recorded.
 const ROUNDING: f64 = 1e-6;
 
-/// Recorded links may be this far from where the joints put them, m.
-const ASTRAY: f64 = 1e-9;
+/// Recorded links may be this far from where the joints put them, m: of a turn by nearly 180 deg the quaternion that is written keeps
+/// half the digits.
+const ASTRAY: f64 = 1e-6;
 
 /// Samples nearer in time than this are of one moment, s.
 const MOMENT: f64 = 1e-6;
