@@ -200,16 +200,9 @@ fn compile_and<T>(
     let Some(item) = choose_workflow(&names, root, file, options, &mut diagnostics) else {
         return (None, finish(diagnostics, sources));
     };
-    let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
-    diagnostics.extend(task::check_given(&tables, item, &given));
-    let lab = match task::lab(&tables, sources, root, item, &given, options.lab.as_deref()) {
-        Ok(lab) => lab,
-        Err(d) => {
-            diagnostics.push(*d);
-            return (None, finish(diagnostics, sources));
-        }
+    let Some(task) = task_of(&tables, sources, (root, item), &set, options, &mut diagnostics) else {
+        return (None, finish(diagnostics, sources));
     };
-    let task = Task { item, lab, given };
     let built = build(&tables, sources, &task, wanted);
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
@@ -224,6 +217,26 @@ fn compile_and<T>(
         (program, built.wiring, more)
     });
     (more, diagnostics)
+}
+
+/// An item of the root module with what it is given and its lab; none where that is not clear, which is said.
+fn task_of<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    (root, item): (usize, DeclId),
+    set: &'a [(Name, Expr)],
+    options: &Options,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Option<Task<'a>> {
+    let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
+    diagnostics.extend(task::check_given(tables, item, &given));
+    match task::lab(tables, sources, root, item, &given, options.lab.as_deref()) {
+        Ok(lab) => Some(Task { item, lab, given }),
+        Err(d) => {
+            diagnostics.push(*d);
+            None
+        }
+    }
 }
 
 /// A study or a fit of a file with the program that all its runs execute.
@@ -259,16 +272,10 @@ pub fn many_runs(
             return (None, finish(diagnostics, sources));
         }
     };
-    let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
-    diagnostics.extend(task::check_given(&tables, item, &given));
-    let lab = match task::lab(&tables, sources, root, item, &given, options.lab.as_deref()) {
-        Ok(lab) => lab,
-        Err(d) => {
-            diagnostics.push(*d);
-            return (None, finish(diagnostics, sources));
-        }
+    let Some(task) = task_of(&tables, sources, (root, item), &set, options, &mut diagnostics) else {
+        return (None, finish(diagnostics, sources));
     };
-    let mut built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program(Wires::default()));
+    let mut built = build(&tables, sources, &task, Wanted::Program(Wires::default()));
     diagnostics.extend(built.findings);
     if let Some(Many::Fit(fit)) = &mut built.many
         && let Err(d) = study::data::read(fit, &tables, sources, loader)

@@ -7,6 +7,7 @@ drivers from PyPI run unchanged on its emulators. Each line printed is a figure 
 """
 
 import os
+import pathlib
 import re
 import socket
 import subprocess
@@ -43,23 +44,7 @@ workflow weigh_it in bench {
 }
 """
 
-DOSE = """mtx 1
-use std::glassware::Beaker50mL
-use std::pumps
-lab bench {
-    ambient: 22 degC
-    pump = CavroXlp6000 at (0, 0, 0) m
-    a = Beaker50mL at (1, 0, 0) m holding 20 mL of water
-    b = Beaker50mL at (2, 0, 0) m
-    between pump and a { piped: true, port: 1 }
-    between pump and b { piped: true, port: 3 }
-}
-workflow dose in bench {
-    draw 2.123 mL from a by pump
-    push 1 mL into b by pump
-    push 1.123 mL into b by pump
-}
-"""
+DOSE = (pathlib.Path(__file__).parent.parent / "deploy" / "dose.mtx").read_text()
 
 
 def verdict(what, good, said=""):

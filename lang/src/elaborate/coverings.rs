@@ -14,11 +14,7 @@ const PLACE: [&str; 2] = ["at", "with"];
 impl<'a> Elaborator<'a> {
     /// Reads `mesh` and `collision`; where an asset has no `shape`, either stands for it.
     pub(super) fn coverings(&mut self, id: InstanceId, out: &mut Geometry) {
-        if let Some(setting) = self.instances[id.0 as usize].setting("mesh")
-            && let FieldValue::Expr(e) = setting.value()
-        {
-            out.visual = self.shape(id, e, &mut setting.scope());
-        }
+        out.visual = self.given_shape(id, "mesh");
         if let Some(setting) = self.instances[id.0 as usize].setting("collision")
             && let FieldValue::Expr(e) = setting.value()
         {

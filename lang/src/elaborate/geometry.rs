@@ -74,7 +74,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The shape that a field gives.
-    fn given_shape(&mut self, id: InstanceId, field: &str) -> Option<Shape> {
+    pub(super) fn given_shape(&mut self, id: InstanceId, field: &str) -> Option<Shape> {
         let setting = self.instances[id.0 as usize].setting(field)?;
         let FieldValue::Expr(e) = setting.value() else { return None };
         self.shape(id, e, &mut setting.scope())

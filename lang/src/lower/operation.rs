@@ -177,12 +177,11 @@ impl<'a> Planner<'a, '_> {
 
     /// What the types of the parameters ask for with `where`.
     pub fn asked(&mut self, sig: &'a Sig, clauses: &'a [Clause], inner: &mut Scope) -> Vec<Arc<Condition>> {
-        let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
         let options = clauses.iter().filter_map(|c| match &c.kind {
             ClauseKind::Option(p) => Some(p),
             _ => None,
         });
-        let asked = groups.chain(options).filter_map(super::roles::condition_of);
+        let asked = sig.all_params().chain(options).filter_map(super::roles::condition_of);
         asked.filter_map(|e| self.condition(e, inner)).map(Arc::new).collect()
     }
 
@@ -367,12 +366,11 @@ impl<'a> Planner<'a, '_> {
     }
 
     pub(super) fn stand_ins(&mut self, sig: &'a Sig, clauses: &'a [Clause], module: usize, scope: &mut Scope) -> Bound {
-        let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten();
         let options = clauses.iter().filter_map(|c| match &c.kind {
             ClauseKind::Option(p) => Some(p),
             _ => None,
         });
-        for p in groups.chain(options) {
+        for p in sig.all_params().chain(options) {
             let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, module));
             let value = ty.map_or(Value::Error, |ty| self.lab.placeholder(&ty, &p.name.text));
             scope.bind(p.name.text.clone(), value);

@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Span, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
-use crate::ast::{Arg, Exchange, ExprKind, ItemKind, MemberKind, Name, Param, Path, Sig, Text, Wire, WireKind};
+use crate::ast::{Arg, Exchange, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
@@ -34,11 +34,6 @@ struct Driver<'a> {
     module: usize,
 }
 
-/// Parameters of a signature, in their order.
-fn parameters(sig: &Sig) -> impl Iterator<Item = &Param> {
-    sig.params.iter().chain(sig.labelled.iter().flat_map(|(_, params)| params))
-}
-
 /// What is said before anything else.
 fn opening(wire: &Wire) -> Option<&Exchange> {
     match &wire.kind {
@@ -49,12 +44,7 @@ fn opening(wire: &Wire) -> Option<&Exchange> {
 
 /// Whether a line of a driver is about a command: the same words, labels and numbers of parameters.
 fn fits(line: &Sig, command: &Sig) -> bool {
-    let labels = |sig: &Sig| -> Vec<(String, usize)> {
-        sig.labelled.iter().map(|(label, params)| (label.text.clone(), params.len())).collect()
-    };
-    verb_text(&line.verb) == verb_text(&command.verb)
-        && line.params.len() == command.params.len()
-        && labels(line) == labels(command)
+    verb_text(&line.verb) == verb_text(&command.verb) && line.has_form_of(command)
 }
 
 impl<'a> Planner<'a, '_> {
@@ -93,7 +83,7 @@ impl<'a> Planner<'a, '_> {
         for (name, value) in &bound.values {
             scope.bind(name.clone(), value.clone());
         }
-        for (own, (_, value)) in parameters(sig).zip(&bound.values) {
+        for (own, (_, value)) in sig.all_params().zip(&bound.values) {
             scope.bind(own.name.text.clone(), value.clone());
         }
         let step = self.carried_out(step);
@@ -229,7 +219,7 @@ impl<'a> Planner<'a, '_> {
                     };
                     let mut scope = Scope::of(device, driver.module);
                     let bound = self.stand_ins(own, clauses, member.module, &mut scope);
-                    for (name, (_, value)) in parameters(sig).zip(&bound.values) {
+                    for (name, (_, value)) in sig.all_params().zip(&bound.values) {
                         scope.bind(name.name.text.clone(), value.clone());
                     }
                     self.messages(&exchange.sends, &mut scope);

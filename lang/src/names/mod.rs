@@ -58,8 +58,7 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
     let mut queue = vec![(String::new(), root)];
     let mut parsed = Some(first);
     while let Some((name, file)) = queue.pop() {
-        let parse = || crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text));
-        let (tree, found) = parsed.take().unwrap_or_else(parse);
+        let (tree, found) = parsed.take().unwrap_or_else(|| parse(sources, file));
         diagnostics.extend(found);
         for item in &tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
@@ -118,14 +117,17 @@ fn used(modules: &[Module]) -> Vec<bool> {
     used
 }
 
+fn parse(sources: &Sources, file: FileId) -> (ast::File, Vec<Diagnostic>) {
+    crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text))
+}
+
 /// The library's modules and their findings, and the tree of the root file, which is parsed meanwhile.
 fn library(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
     let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
     let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
-    let parse = || crate::syntax::parse(root, sources.get(root).map_or("", |s| &s.text));
     let (trees, first) = std::thread::scope(|scope| {
         let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
-        let first = parse();
+        let first = parse(sources, root);
         // Where there is no thread to be had, this one does the work.
         (reading.ok().and_then(|reading| reading.join().ok()).unwrap_or_else(read), first)
     });

@@ -111,8 +111,7 @@ impl<'a> Prose<'a, '_> {
             next += 1;
             let decl = self.lab.tables.names.decl(id);
             let ItemKind::Skill { sig, clauses, body: Some(body), handlers, .. } = &decl.item.kind else { continue };
-            let groups = std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params));
-            self.vars = groups.flatten().map(|p| p.name.text.clone()).collect();
+            self.vars = sig.all_params().map(|p| p.name.text.clone()).collect();
             self.vars.extend(calls::options(clauses).map(|p| p.name.text.clone()));
             let form = calls::form(sig);
             out.push(format!("### To {form} {}", self.place(sig.span)));

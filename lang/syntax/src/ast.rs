@@ -694,6 +694,20 @@ pub struct Sig {
     pub span: Span,
 }
 
+impl Sig {
+    /// The parameters of all groups, in the order of the text.
+    pub fn all_params(&self) -> impl Iterator<Item = &Param> {
+        self.params.iter().chain(self.labelled.iter().flat_map(|(_, params)| params))
+    }
+
+    /// Whether another has the same labels in the same order, with as many parameters each.
+    pub fn has_form_of(&self, other: &Sig) -> bool {
+        self.params.len() == other.params.len()
+            && self.labelled.len() == other.labelled.len()
+            && self.labelled.iter().zip(&other.labelled).all(|(a, b)| a.0.text == b.0.text && a.1.len() == b.1.len())
+    }
+}
+
 /// A clause of a skill or command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Clause {

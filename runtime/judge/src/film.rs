@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use matterix_ir::bodies::{self, Bodies, Machine};
+use matterix_ir::bodies::{Bodies, Machine};
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::Shape;
 use matterix_recording::{Recording, Topic, list, number, text};
-use matterix_solids::{Body, Isometry, isometry};
+use matterix_solids::{Body, Isometry, Made, isometry};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -93,27 +93,19 @@ impl Film {
         if !meshes(&bodies).all(Mesh::is_sound) {
             return Err(Unreadable("`/bodies` is damaged: a mesh lacks corners".to_owned()));
         }
-        let mut known: Vec<(&bodies::Thing, Option<Body>)> = Vec::new();
-        let mut body = |thing| {
-            // Tips and vials come by the dozen.
-            if let Some(same) = known.iter().find(|(other, _)| are_alike(thing, other)) {
-                return same.1.clone();
-            }
-            let main = thing.shape.as_ref().filter(|_| !thing.hollow);
-            let made = match thing.collision.is_empty() {
-                true => Body::with_rooms(main, &thing.solids, &thing.rooms),
-                false => Body::of_shapes(thing.hull()),
-            };
-            known.push((thing, made.clone()));
-            made
-        };
+        let mut alike = matterix_solids::Bodies::default();
         let things: Vec<Thing> = bodies
             .things
             .iter()
-            .map(|thing: &bodies::Thing| Thing {
+            .map(|thing| Thing {
                 name: thing.name.clone(),
                 whole: thing.whole.clone(),
-                body: body(thing),
+                body: alike.body(Made {
+                    main: thing.shape.as_ref().filter(|_| !thing.hollow),
+                    more: &thing.solids,
+                    rooms: thing.rooms.as_slice().into(),
+                    collision: &thing.collision,
+                }),
                 points: points.get(&thing.name).cloned().unwrap_or_default(),
                 way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
@@ -146,16 +138,6 @@ impl Film {
 
 /// How far from where it stood at first a thing has to be to be away from there, m.
 const BACK: f64 = 2e-3;
-
-/// Whether two things have one body.
-fn are_alike(a: &bodies::Thing, b: &bodies::Thing) -> bool {
-    let places = |t: &bodies::Thing| t.solids.len() + t.collision.len() + t.rooms.len();
-    (a.hollow, places(a)) == (b.hollow, places(b))
-        && a.shape == b.shape
-        && a.solids == b.solids
-        && a.collision == b.collision
-        && a.rooms == b.rooms
-}
 
 impl Thing {
     /// Where it was last said to be.

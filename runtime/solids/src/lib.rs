@@ -6,10 +6,12 @@
 
 mod body;
 mod bored;
+mod made;
 mod mesh;
 mod place;
 pub mod turned;
 
 pub use body::{Body, Touch};
+pub use made::{Bodies, Made};
 pub use parry3d_f64::math::{Pose as Isometry, Vector};
 pub use place::{isometry, pose};

@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
-use matterix_ir::scene::{InstanceId, Scene, Shape, Solid};
+use matterix_ir::scene::{InstanceId, Scene};
 use matterix_motion::placement;
 use matterix_motion::spheres::{Contact, Figure, Other, Referee};
-use matterix_solids::{Body, Isometry, Touch, isometry};
+use matterix_solids::{Bodies, Body, Isometry, Made, Touch, isometry};
 use nalgebra::Point3;
 
 use super::fixture::following;
@@ -160,35 +160,15 @@ impl Referee for Exact<'_> {
     }
 }
 
-/// What a body is made of.
-#[derive(PartialEq)]
-struct Made<'s> {
-    main: Option<&'s Shape>,
-    more: &'s [Solid],
-    rooms: Vec<Solid>,
-}
-
 /// The true shapes of all instances.
 pub fn bodies(scene: &Scene) -> Vec<Option<Body>> {
+    let mut bodies = Bodies::default();
     let each = scene.instances.iter().enumerate();
-    let mut known: Vec<(Made<'_>, Option<Body>)> = Vec::new();
-    let bodies = each.map(|(index, instance)| {
-        if !instance.collision.is_empty() {
-            return Body::of_shapes(instance.hull());
-        }
-        let (main, more) = (instance.solid(), instance.solids.as_slice());
-        if main.is_none() && more.is_empty() {
-            return None;
-        }
-        // Tips and vials come by the dozen.
-        let rooms = scene.rooms(InstanceId(index as u32));
-        let made = Made { main, more, rooms };
-        if let Some((_, same)) = known.iter().find(|(other, _)| *other == made) {
-            return same.clone();
-        }
-        let body = Body::with_rooms(main, more, &made.rooms);
-        known.push((made, body.clone()));
-        body
-    });
-    bodies.collect()
+    each.map(|(index, instance)| {
+        let main = instance.solid();
+        // Only of a main shape is anything taken out.
+        let rooms = main.map(|_| scene.rooms(InstanceId(index as u32))).unwrap_or_default();
+        bodies.body(Made { main, more: &instance.solids, rooms: rooms.into(), collision: &instance.collision })
+    })
+    .collect()
 }

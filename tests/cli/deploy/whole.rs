@@ -43,23 +43,7 @@ fn a_plate_heats_and_stirs_on_its_emulator() {
     assert!(journal.contains("\"event\":\"starting\"") && journal.contains("lab.mtx:11:5"), "{journal}");
 }
 
-const DOSE: &str = "mtx 1
-use std::glassware::Beaker50mL
-use std::pumps
-lab bench {
-    ambient: 22 degC
-    pump = CavroXlp6000 at (0, 0, 0) m
-    a = Beaker50mL at (1, 0, 0) m holding 20 mL of water
-    b = Beaker50mL at (2, 0, 0) m
-    between pump and a { piped: true, port: 1 }
-    between pump and b { piped: true, port: 3 }
-}
-workflow dose in bench {
-    draw 2.123 mL from a by pump
-    push 1 mL into b by pump
-    push 1.123 mL into b by pump
-}
-";
+const DOSE: &str = include_str!("../../deploy/dose.mtx");
 
 #[test]
 fn a_plunger_goes_where_the_volume_says_in_both_protocols() {

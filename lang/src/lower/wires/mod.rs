@@ -97,7 +97,7 @@ impl<'a> Planner<'a, '_> {
         let ItemKind::Driver { wires, .. } = &self.lab.tables.names.decl(driver).item.kind else { return None };
         wires.iter().find_map(|w| {
             let WireKind::Command { sig, exchange } = &w.kind else { return None };
-            if verb_text(&sig.verb) != verb || count(sig) > bound.values.len() {
+            if verb_text(&sig.verb) != verb || sig.all_params().count() > bound.values.len() {
                 return None;
             }
             let is_it = match self_of(sig) {
@@ -194,10 +194,10 @@ impl<'a> Planner<'a, '_> {
         if let Some(at) = self_of(sig) {
             let names = self.lab.tables.names;
             let skill = names.lookup(module, &verb).and_then(|id| match &names.decl(id).item.kind {
-                ItemKind::Skill { sig: of, external: true, .. } if same_form(sig, of) => Some((id, of)),
+                ItemKind::Skill { sig: of, external: true, .. } if sig.has_form_of(of) => Some((id, of)),
                 _ => None,
             });
-            let found = skill.and_then(|(id, of)| Some(Mapped::Skill(id, of, &params(of).nth(at)?.name.text)));
+            let found = skill.and_then(|(id, of)| Some(Mapped::Skill(id, of, &of.all_params().nth(at)?.name.text)));
             if found.is_none() {
                 self.not_mapped(sig, "primitive skill", &[]);
             }
@@ -206,7 +206,7 @@ impl<'a> Planner<'a, '_> {
         let commands = self.lab.tables.commands(&verb).to_vec();
         let own: Vec<MemberRef<'a>> =
             commands.into_iter().filter(|m| self.lab.instance_is(instance, m.owner)).collect();
-        let found = own.iter().find(|m| command_sig(m).is_some_and(|of| same_form(sig, of)));
+        let found = own.iter().find(|m| command_sig(m).is_some_and(|of| sig.has_form_of(of)));
         if found.is_none() {
             let forms: Vec<String> = own.iter().filter_map(|m| command_sig(m)).map(|of| self.form(of)).collect();
             self.not_mapped(sig, "command of the device", &forms);
@@ -253,32 +253,14 @@ fn command_sig<'a>(m: &MemberRef<'a>) -> Option<&'a Sig> {
     }
 }
 
-/// All parameters of a call form, in order.
-fn params(sig: &Sig) -> impl Iterator<Item = &crate::ast::Param> {
-    std::iter::once(&sig.params).chain(sig.labelled.iter().map(|(_, params)| params)).flatten()
-}
-
-fn count(sig: &Sig) -> usize {
-    params(sig).count()
-}
-
 /// Which parameter is the device.
 fn self_of(sig: &Sig) -> Option<usize> {
-    params(sig).position(|p| p.name.text == SELF)
-}
-
-/// Whether two call forms have the same labels in the same order, with as many parameters each.
-fn same_form(a: &Sig, b: &Sig) -> bool {
-    let groups = |s: &Sig| -> Vec<(String, usize)> {
-        let first = (String::new(), s.params.len());
-        std::iter::once(first).chain(s.labelled.iter().map(|(l, p)| (l.text.clone(), p.len()))).collect()
-    };
-    groups(a) == groups(b)
+    sig.all_params().position(|p| p.name.text == SELF)
 }
 
 /// The parameters of a driver's line stand for the values of the command's, in their order.
 fn bind(sig: &Sig, values: &[(String, Value)], scope: &mut Scope) {
-    for (p, (_, value)) in params(sig).zip(values) {
+    for (p, (_, value)) in sig.all_params().zip(values) {
         if p.name.text != SELF {
             scope.bind(p.name.text.clone(), value.clone());
         }

@@ -5,7 +5,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Served;
 use matterix_ir::{Diagnostic, Op, Span, codes};
 
-use super::{Mapped, bind, command_sig, params};
+use super::{Mapped, bind, command_sig};
 use crate::ast::{self, Clause, ItemKind, MemberKind, Name, Sig, WireKind};
 use crate::eval::{Num, Scope, Type, Value};
 use crate::lower::Planner;
@@ -40,7 +40,7 @@ impl<'a> Planner<'a, '_> {
             },
         };
         let mut arrangements: Vec<Arrangement> = vec![(Vec::new(), Vec::new())];
-        for p in params(sig) {
+        for p in sig.all_params() {
             let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, of));
             let name = p.name.text.clone();
             let (values, local): (Vec<Value>, Option<u32>) = match ty {
@@ -153,7 +153,7 @@ impl<'a> Planner<'a, '_> {
         let span = verb.first()?.span.to(verb.last()?.span);
         let commands = self.lab.tables.commands(&text).to_vec();
         let own = commands.into_iter().find(|m| {
-            self.lab.instance_is(instance, m.owner) && command_sig(m).is_some_and(|s| params(s).next().is_none())
+            self.lab.instance_is(instance, m.owner) && command_sig(m).is_some_and(|s| s.all_params().next().is_none())
         });
         let Some(m) = own else {
             let headline = format!("the device has no command `{text}` without arguments");
@@ -161,7 +161,9 @@ impl<'a> Planner<'a, '_> {
             return None;
         };
         let line = self.lines_beside(span).iter().find_map(|w| match &w.kind {
-            WireKind::Command { sig, exchange } if verb_text(&sig.verb) == text && params(sig).next().is_none() => {
+            WireKind::Command { sig, exchange }
+                if verb_text(&sig.verb) == text && sig.all_params().next().is_none() =>
+            {
                 Some((sig, exchange, w.span))
             }
             _ => None,
