@@ -60,6 +60,9 @@ pub enum Command {
     Deploy(DeployArgs),
     /// Stand in for a device: answer on a line as it would.
     Emulate(EmulateArgs),
+    /// Offer the devices of a lab to others, as features of SiLA 2: on the digital twin, or with `--bind` on devices.
+    #[cfg(feature = "sila")]
+    Serve(ServeArgs),
     /// Write a workflow as a file that another program runs.
     Emit(EmitArgs),
     /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
@@ -403,6 +406,37 @@ pub struct EmulateArgs {
     /// Answer at a port of this machine; 0 takes any that is free.
     #[arg(long, value_name = "PORT")]
     pub tcp: Option<u16>,
+    /// Let lab time pass so many times as fast.
+    #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
+    pub speed: f64,
+    /// Where the noise of readings starts.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+}
+
+/// `matterixc serve`.
+#[cfg(feature = "sila")]
+#[derive(Debug, Args)]
+pub struct ServeArgs {
+    /// The lab, in a file with a workflow in it.
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The workflow whose lab it is, where the file has several.
+    #[arg(long, value_name = "NAME")]
+    pub workflow: Option<String>,
+    /// The port; 0 takes any that is free.
+    #[arg(long, value_name = "PORT")]
+    pub tcp: u16,
+    /// The address of this machine to answer at. Connections are not encrypted: no other than this machine's own unless
+    /// everybody on the network may use the lab.
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    pub host: String,
+    /// Where the devices of the lab are; the digital twin answers without it.
+    #[arg(long, value_name = "FILE")]
+    pub bind: Option<PathBuf>,
+    /// Show all bytes that go to devices and come from them.
+    #[arg(long, requires = "bind")]
+    pub trace: bool,
     /// Let lab time pass so many times as fast.
     #[arg(long, value_name = "N", default_value_t = 1.0, value_parser = speed)]
     pub speed: f64,

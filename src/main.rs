@@ -75,6 +75,8 @@ fn obey(cli: Cli) -> Exit {
         Command::Plan(args) => command::plan(&args, cli.color),
         Command::Deploy(args) => command::deploy(&args, cli.color),
         Command::Emulate(args) => command::emulate(&args, cli.color),
+        #[cfg(feature = "sila")]
+        Command::Serve(args) => command::serve(&args, cli.color),
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),
         Command::Explain(args) => command::explain(&args),

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use matterix_ir::mesh::Mesh;
-use matterix_ir::{Diagnostic, FileId, codes};
+use matterix_ir::{Diagnostic, FileId, Sources, codes};
 
-use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, File, ItemKind, Name, Path};
+use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, File, ItemKind, Member, MemberKind, Name, Path};
 use crate::loader::Loader;
 use crate::names::Names;
-use crate::{labware, library};
+use crate::units::Units;
+use crate::{labware, library, sila};
 
 /// What a file gives: lines of the asset, and what it is where its text does not say.
 type Given = (Vec<AssetLine>, Option<Path>);
@@ -56,6 +57,66 @@ pub fn texts(names: &Names<'_>, format: &str, loader: &dyn Loader) -> BTreeMap<S
         Some((path.text.clone(), text))
     });
     read.collect()
+}
+
+/// The one format that a capability can come from.
+const FEATURE: &str = "sila";
+
+/// Whether a capability of a module comes from a file.
+pub fn has_features(tree: &File) -> bool {
+    tree.items.iter().any(|i| matches!(&i.kind, ItemKind::Capability { source: Some(_), .. }))
+}
+
+/// Writes out each `capability NAME from sila "file"` of a module, with a driver for it beside it.
+pub fn features(
+    tree: &mut File,
+    file: FileId,
+    units: &Units,
+    sources: &mut Sources,
+    loader: &dyn Loader,
+) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    let mut beside = Vec::new();
+    for item in &mut tree.items {
+        let ItemKind::Capability { name, source: Some((word, path)), members, .. } = &mut item.kind else { continue };
+        if word.text != FEATURE {
+            let headline = format!("a capability does not come from `{}`", word.text);
+            let d = Diagnostic::error(codes::MISPLACED, word.span, headline, "not a format of capabilities");
+            found.push(d.help(format!("it may come from `{FEATURE}`, a feature of SiLA 2")));
+            continue;
+        }
+        let read = text(file, &path.text, loader).and_then(|text| {
+            matterix_sila::read(&text).map_err(|p| format!("`{}` is no feature of SiLA 2: {p}", path.text))
+        });
+        let feature = match read {
+            Ok(feature) => feature,
+            Err(headline) => {
+                found.push(Diagnostic::error(codes::SILA_FILE, path.span, headline, "this file"));
+                members.push(Member { docs: Vec::new(), kind: MemberKind::Error, span: path.span });
+                continue;
+            }
+        };
+        let declared = sila::declarations(&feature, &name.text, units, sila::declared(members));
+        if !declared.left_out.is_empty() {
+            let list: Vec<String> = declared.left_out.iter().map(|(what, why)| format!("`{what}` {why}")).collect();
+            let headline = format!("not all of `{}` can be used: {}", feature.identifier, list.join("; "));
+            found.push(Diagnostic::warning(codes::SILA_FILE, path.span, headline, "in this file"));
+        }
+        let written = sources.add(format!("{} as `{}`", path.text, name.text), declared.text.as_str());
+        let (inner, wrong) = crate::syntax::parse(written, &declared.text);
+        found.extend(wrong);
+        for other in inner.items {
+            match other.kind {
+                ItemKind::Capability { members: given, .. } => {
+                    members.extend(given);
+                    item.docs.extend(other.docs);
+                }
+                _ => beside.push(other),
+            }
+        }
+    }
+    tree.items.extend(beside);
+    found
 }
 
 /// Replaces each `from FORMAT "file"` of a module by the lines of that file.

@@ -561,8 +561,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             graph: elaborator.graph,
         };
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let drivers = elaborator.drivers;
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers };
+        let (drivers, offers) = (elaborator.drivers, elaborator.offers);
+        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
         return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses, many };
     }
 }

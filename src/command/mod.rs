@@ -12,6 +12,8 @@ mod fmt;
 mod new;
 mod plan;
 mod run;
+#[cfg(feature = "sila")]
+mod serve;
 mod study;
 mod test;
 mod verify;
@@ -29,6 +31,8 @@ pub use fmt::fmt;
 pub use new::new;
 pub use plan::plan;
 pub use run::run;
+#[cfg(feature = "sila")]
+pub use serve::serve;
 pub use study::study;
 pub use test::test;
 pub use verify::verify;

@@ -143,7 +143,7 @@ fn of_fault(fault: Fault) -> Diagnostic {
     exec::diagnostic(&FailureTrace::of_fault(fault))
 }
 
-fn unsafe_left(why: String) -> Diagnostic {
+pub(super) fn unsafe_left(why: String) -> Diagnostic {
     let headline = format!("a device could not be made safe: {why}");
     Diagnostic::error(codes::DEVICE_LOST, Span::default(), headline, "see to it").help("go and look at it now")
 }

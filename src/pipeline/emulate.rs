@@ -8,6 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::emulate::{Emulator, Stop, serve_pty, serve_tcp};
 use matterix_ir::Program;
+use matterix_ir::wire::Transport;
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::process::{Engine, Options};
 
@@ -39,6 +40,10 @@ pub fn emulate(
         (None, _) => return Err(format!("`{device}` has several drivers: say which with `--driver`: {list}")),
     };
     let chosen = chosen.ok_or_else(|| format!("`{device}` has no such driver: it has {list}"))?;
+    if let Transport::Sila { .. } = chosen.transport {
+        let why = "what a driver over `sila` speaks to is a server, not a line";
+        return Err(format!("{why}: `matterixc serve` offers a lab as one"));
+    }
     let prepared = Prepared::new(program);
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());

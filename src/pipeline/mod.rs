@@ -8,6 +8,8 @@ mod many;
 mod neighbours;
 mod plan;
 mod run;
+#[cfg(feature = "sila")]
+mod serve;
 mod view;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +30,8 @@ pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
+#[cfg(feature = "sila")]
+pub use serve::{Service, serve};
 pub use view::still;
 
 /// A text to compile, and where its neighbours are.

@@ -51,6 +51,7 @@ codes! {
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
     MESH_FILE "mesh-file" "N0" "a mesh cannot be read";
     LABWARE_FILE "labware-file" "N0" "a labware definition cannot be read";
+    SILA_FILE "sila-file" "N0" "a definition of a SiLA 2 feature cannot be read, or not all of it can be used";
     URDF_FILE "urdf-file" "N0" "a description of a robot cannot be read";
     UNKNOWN_NAME "unknown-name" "N0" "a name is not declared";
     UNKNOWN_UNIT "unknown-unit" "N0" "a unit is not declared";

@@ -22,6 +22,7 @@ pub mod inertia;
 pub mod math;
 pub mod mesh;
 pub mod model;
+pub mod offer;
 pub mod plan;
 pub mod points;
 pub mod pose;

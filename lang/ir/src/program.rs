@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::Model;
+use crate::offer::Offers;
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::stock::Stock;
@@ -30,4 +31,7 @@ pub struct Program {
     /// How devices are spoken to, where that was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drivers: Vec<Driver>,
+    /// What the lab offers to others, where that was asked for.
+    #[serde(default, skip_serializing_if = "Offers::is_empty")]
+    pub offers: Offers,
 }

@@ -22,10 +22,18 @@ pub enum Transport {
     },
     /// A connection over a network.
     Tcp,
+    /// A server of SiLA 2.
+    Sila {
+        /// Full identifier of the feature that is meant where a text names none.
+        feature: String,
+    },
 }
 
 /// Names of the codecs that put a text on a line and take it off again.
 pub const FRAMINGS: &[&str] = &["line", "cr", "lf", "namur", "sics", "cavro_dt", "cavro_oem"];
+
+/// The name that stands for a framing where commands are calls of a server: each is one text.
+pub const CALLS: &str = "calls";
 
 /// A piece of what is sent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -185,6 +185,8 @@ pub struct Elaborator<'a> {
     pub extensive: BTreeMap<ExtensiveKey, u32>,
     /// How devices are spoken to, where that was asked for.
     pub drivers: Vec<matterix_ir::wire::Driver>,
+    /// What the lab offers to others.
+    pub offers: matterix_ir::offer::Offers,
     /// Readings taken by the plan.
     pub readings: Vec<model::Reading>,
     /// Species that can get into each mixture.
@@ -284,6 +286,7 @@ impl<'a> Elaborator<'a> {
             copies: BTreeSet::new(),
             extensive: BTreeMap::new(),
             drivers: Vec::new(),
+            offers: matterix_ir::offer::Offers::default(),
             readings: Vec::new(),
             reach,
             moves: BTreeSet::new(),

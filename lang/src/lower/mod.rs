@@ -57,6 +57,8 @@ pub struct Planner<'a, 'e> {
     pub wires: wires::Wires,
     /// Drivers of the lab, with their declarations.
     drivers: Vec<(DeclId, matterix_ir::wire::Driver)>,
+    /// What the lab offers to others.
+    offers: matterix_ir::offer::Offers,
     /// What is said over a wire, where that is asked for.
     pub wiring: Option<Wiring>,
     clauses: Clauses,
@@ -100,6 +102,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             draft: false,
             wires: wires::Wires::Off,
             drivers: Vec::new(),
+            offers: matterix_ir::offer::Offers::default(),
             wiring: None,
             clauses: Clauses::default(),
             drafted: BTreeSet::new(),
@@ -111,8 +114,17 @@ impl<'a, 'e> Planner<'a, 'e> {
         let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
         self.begin_wires();
+        if self.wires == wires::Wires::Offered {
+            self.lab.readings_live = true;
+            self.begin_offers();
+            self.offer_skills(decl.module);
+        }
         let mut arguments = Vec::new();
         let root = match &decl.item.kind {
+            _ if self.wires == wires::Wires::Offered => {
+                let idle = self.idle();
+                self.add("wait for what is asked", Span::default(), idle)
+            }
             ItemKind::Test { name, lab: Some(_), body, handlers } => {
                 self.lab.readings_live = true;
                 self.guarded(&name.text, name.span, body, handlers, &mut scope)
@@ -151,6 +163,7 @@ impl<'a, 'e> Planner<'a, 'e> {
         // A test may leave things as it likes.
         let ends = if matches!(decl.item.kind, ItemKind::Workflow { .. }) { self.limits(true) } else { Vec::new() };
         let wiring = self.wired();
+        self.lab.offers = self.offers;
         self.lab.drivers = self.drivers.into_iter().map(|(_, driver)| driver).collect();
         let plan = Plan { workflow: name, arguments, steps: self.steps, root, locals: self.locals, limits, ends };
         (plan, wiring)

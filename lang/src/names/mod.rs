@@ -97,6 +97,12 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
     for (module, _) in modules.iter_mut().zip(used).filter(|(_, used)| *used) {
         diagnostics.extend(crate::import::import(&mut module.tree, module.file, loader));
     }
+    if modules.iter().any(|m| crate::import::has_features(&m.tree)) {
+        let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
+        for module in &mut modules {
+            diagnostics.extend(crate::import::features(&mut module.tree, module.file, &units, sources, loader));
+        }
+    }
     (modules, diagnostics)
 }
 

@@ -112,6 +112,11 @@ impl Dimension {
         Dimension { powers, any: self.any }
     }
 
+    /// Its bases, by index, with their exponents.
+    pub fn powers(&self) -> impl Iterator<Item = (u16, Rational)> {
+        self.powers.iter().copied()
+    }
+
     /// Whether it contains none of the bases of another.
     pub fn is_free_of(&self, other: &Self) -> bool {
         !self.any && !self.powers.iter().any(|(b, _)| other.powers.iter().any(|(o, _)| o == b))

@@ -190,6 +190,15 @@ impl Units {
         best
     }
 
+    /// The symbols of base units with their exponents; nothing where one is not whole.
+    pub fn in_bases(&self, dimension: &Dimension) -> Option<Vec<(String, i32)>> {
+        let power = |(base, exponent): (u16, Rational)| {
+            let symbol = self.base_units.get(&base)?.clone();
+            (exponent.den == 1).then_some((symbol, exponent.num))
+        };
+        if dimension.is_any() { None } else { dimension.powers().map(power).collect() }
+    }
+
     /// The percent unit of a fraction, in which fractions are shown.
     pub fn percent(&self, dimension: &Dimension) -> Option<Unit> {
         let mut percents = self.units.range("%".to_string()..).take_while(|(n, _)| n.starts_with('%'));

@@ -168,6 +168,8 @@ pub enum ItemKind {
         name: Name,
         /// Extended capabilities.
         extends: Vec<Path>,
+        /// `sila "file"` after `from`.
+        source: Option<(Name, Name)>,
         /// In order.
         members: Vec<Member>,
     },

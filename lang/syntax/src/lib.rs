@@ -84,6 +84,11 @@ pub fn parse_value(file: FileId, text: &str, start: usize) -> (Expr, Vec<Diagnos
     with_stack(depth, || lower::Lower::new(file, text, &Offsets::default()).value(start, text.len()))
 }
 
+/// Whether a word can be a name of the language.
+pub fn is_name(word: &str) -> bool {
+    Grammar::parse(Rule::ident, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
+}
+
 /// Reads a text whose brackets match.
 fn read(file: FileId, text: &str, offsets: &Offsets) -> (File, Vec<Diagnostic>, usize) {
     match Grammar::parse(Rule::file, text).ok().and_then(|mut pairs| pairs.next()) {

@@ -6,6 +6,7 @@
 //! tolerance = { temperature = "5 K" }
 //! ```
 
+use matterix_ir::wire::Transport;
 use matterix_ir::{Diagnostic, FileId, Program, Span, codes};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -13,7 +14,7 @@ use toml::de::{DeTable, DeValue};
 use crate::deploy::{Binding, Carrier};
 use crate::port::Place;
 
-const KEYS: [&str; 6] = ["port", "address", "driver", "unit", "by", "tolerance"];
+const KEYS: [&str; 7] = ["port", "address", "sila", "driver", "unit", "by", "tolerance"];
 const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
@@ -86,7 +87,7 @@ impl Reader<'_> {
                 }
             }
         };
-        let (port, address) = (text(self, "port"), text(self, "address"));
+        let (port, address, sila) = (text(self, "port"), text(self, "address"), text(self, "sila"));
         let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
         if let Some((by, at)) = &by {
             if by != HAND {
@@ -97,7 +98,7 @@ impl Reader<'_> {
                     Some("write `by = \"hand\"`".into()),
                 );
             }
-            if port.is_some() || address.is_some() || driver.is_some() {
+            if port.is_some() || address.is_some() || sila.is_some() || driver.is_some() {
                 self.wrong(
                     at.clone(),
                     &format!("`{key}` is done by hand and bound to a line"),
@@ -108,20 +109,38 @@ impl Reader<'_> {
             let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
             return (self.found.len() == before).then_some(binding);
         }
-        let place = match (port, address) {
-            (Some((port, _)), None) => Place::Serial(port),
-            (None, Some((address, _))) => Place::Tcp(address),
-            (Some(_), Some((_, at))) => {
+        let (place, said) = match (port, address, sila) {
+            (Some((port, at)), None, None) => (Place::Serial(port), at),
+            (None, Some((address, at)), None) => (Place::Tcp(address), at),
+            (None, None, Some((server, at))) => (Place::Sila(server), at),
+            (Some(_), Some((_, at)), _) => {
                 self.wrong(at, &format!("`{key}` has two lines"), "a port and an address", None);
                 return None;
             }
-            (None, None) => {
-                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"` or `by = \"hand\"`";
+            (_, _, Some((_, at))) => {
+                self.wrong(at, &format!("`{key}` has two lines"), "a line and a server", None);
+                return None;
+            }
+            (None, None, None) => {
+                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `sila = \"HOST:PORT\"` or \
+                            `by = \"hand\"`";
                 self.wrong(name.span(), &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
                 return None;
             }
         };
         let driver = self.driver(key, instance, driver, name.span())?;
+        let calls = matches!(self.program.drivers[driver].transport, Transport::Sila { .. });
+        if calls != matches!(place, Place::Sila(_)) {
+            let name = &self.program.drivers[driver].name;
+            let (headline, help) = match calls {
+                true => (format!("`{name}` speaks to a server of SiLA 2"), "write `sila = \"HOST:PORT\"`"),
+                false => (
+                    format!("`{name}` speaks over a line"),
+                    "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`",
+                ),
+            };
+            self.wrong(said, &headline, "another kind of place", Some(help.into()));
+        }
         if let Some((unit, at)) = &unit
             && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
         {

@@ -10,4 +10,8 @@ pub mod emulate;
 pub mod link;
 pub mod pattern;
 pub mod port;
+#[cfg(feature = "sila")]
+pub mod serve;
+#[cfg(feature = "sila")]
+mod sila;
 pub mod template;

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use matterix_ir::wire::{Driver, Pattern, Until};
+use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
 use crate::pattern::{matched, written};
-use crate::port::Port;
+use crate::port::{self, Place, Port};
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,6 +41,52 @@ pub trait Overhear {
     fn back(&mut self, bytes: &[u8]);
 }
 
+/// A device that is spoken to.
+pub trait Line {
+    /// Says commands one after the other; the numbers of the last answer, SI, where answers are expected.
+    fn say(
+        &mut self,
+        texts: &[String],
+        expects: Option<&Pattern>,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble>;
+
+    /// Asks; the numbers of the answer, SI.
+    fn ask(
+        &mut self,
+        text: &str,
+        expects: &Pattern,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble>;
+
+    /// Whether the device is ready.
+    fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
+    -> Result<bool, Trouble>;
+}
+
+/// Opens the line to a device.
+pub fn open(place: &Place, driver: &Driver, address: Option<&str>) -> Result<Box<dyn Line>, Trouble> {
+    if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
+        return sila(server, feature, driver.timeout);
+    }
+    let opened = port::open(place, &driver.transport).map_err(|e| format!("cannot open `{place}`: {e}"));
+    let link = opened.and_then(|port| Link::new(port, driver, address)).map_err(Trouble::Lost)?;
+    Ok(Box::new(link))
+}
+
+#[cfg(feature = "sila")]
+fn sila(server: &str, feature: &str, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
+    Ok(Box::new(crate::sila::Server::connect(server, feature, timeout)?))
+}
+
+#[cfg(not(feature = "sila"))]
+fn sila(server: &str, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
+    let why = "this build does not speak SiLA 2: build it with `--features sila`";
+    Err(Trouble::Lost(format!("cannot connect to `{server}`: {why}")))
+}
+
 /// An open line to a device.
 pub struct Link {
     port: Box<dyn Port>,
@@ -56,60 +102,6 @@ impl Link {
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
         Ok(Link { port, codec, timeout, buffer: Vec::new() })
-    }
-
-    /// Says commands one after the other; the numbers of the last answer, SI, where answers are expected.
-    pub fn say(
-        &mut self,
-        texts: &[String],
-        expects: Option<&Pattern>,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
-        let mut numbers = Vec::new();
-        for frame in self.codec.say(texts) {
-            self.send(&frame, ear)?;
-            if expects.is_none() && !self.codec.acknowledges() {
-                continue;
-            }
-            let reply = self.reply(&frame, ear)?;
-            numbers = self.judged(&frame, &reply, expects, driver)?;
-        }
-        Ok(numbers)
-    }
-
-    /// Asks; the numbers of the answer, SI.
-    pub fn ask(
-        &mut self,
-        text: &str,
-        expects: &Pattern,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.reply(&frame, ear)?;
-        self.judged(&frame, &reply, Some(expects), driver)
-    }
-
-    /// Whether the device is ready.
-    pub fn is_ready(
-        &mut self,
-        text: &str,
-        until: &Until,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<bool, Trouble> {
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.reply(&frame, ear)?;
-        if let Some(refused) = refusal(driver, &reply) {
-            return Err(refused);
-        }
-        Ok(match &until.expects {
-            Some(pattern) => matched(pattern, &reply.text).is_some(),
-            None => !reply.busy,
-        })
     }
 
     fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -172,8 +164,61 @@ impl Link {
     }
 }
 
+impl Line for Link {
+    fn say(
+        &mut self,
+        texts: &[String],
+        expects: Option<&Pattern>,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        let mut numbers = Vec::new();
+        for frame in self.codec.say(texts) {
+            self.send(&frame, ear)?;
+            if expects.is_none() && !self.codec.acknowledges() {
+                continue;
+            }
+            let reply = self.reply(&frame, ear)?;
+            numbers = self.judged(&frame, &reply, expects, driver)?;
+        }
+        Ok(numbers)
+    }
+
+    fn ask(
+        &mut self,
+        text: &str,
+        expects: &Pattern,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        let frame = self.codec.ask(text);
+        self.send(&frame, ear)?;
+        let reply = self.reply(&frame, ear)?;
+        self.judged(&frame, &reply, Some(expects), driver)
+    }
+
+    fn is_ready(
+        &mut self,
+        text: &str,
+        until: &Until,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<bool, Trouble> {
+        let frame = self.codec.ask(text);
+        self.send(&frame, ear)?;
+        let reply = self.reply(&frame, ear)?;
+        if let Some(refused) = refusal(driver, &reply) {
+            return Err(refused);
+        }
+        Ok(match &until.expects {
+            Some(pattern) => matched(pattern, &reply.text).is_some(),
+            None => !reply.busy,
+        })
+    }
+}
+
 /// The failure that an answer means.
-fn refusal(driver: &Driver, reply: &Reply) -> Option<Trouble> {
+pub(crate) fn refusal(driver: &Driver, reply: &Reply) -> Option<Trouble> {
     let named = driver.refusals.iter().find(|r| matched(&r.reply, &reply.text).is_some());
     let text = format!("it answered `{}`", reply.text);
     match named {

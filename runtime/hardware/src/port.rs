@@ -22,11 +22,13 @@ pub enum Place {
     Serial(String),
     /// `HOST:PORT`.
     Tcp(String),
+    /// A server of SiLA 2, `HOST:PORT`.
+    Sila(String),
 }
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Place::Serial(text) | Place::Tcp(text)) = self;
+        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text)) = self;
         f.write_str(text)
     }
 }
@@ -42,6 +44,7 @@ pub fn open(place: &Place, transport: &Transport) -> io::Result<Box<dyn Port>> {
     match place {
         Place::Serial(path) => Ok(Box::new(Serial(serial(path, transport)?))),
         Place::Tcp(address) => Ok(Box::new(Tcp(connect(address)?))),
+        Place::Sila(_) => Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
     }
 }
 

@@ -6,6 +6,9 @@ use super::frame::{End, FrameId, Job, Kind, Stop};
 use super::judge::Raised;
 use super::{Executor, Task};
 
+/// The frame around the whole plan.
+const ROOT: FrameId = 0;
+
 impl<'p> Executor<'p, '_> {
     pub(super) fn begin_job(&mut self, id: FrameId, name: &'p str, body: StepId) {
         let scope = self.ancestors(id).find(|f| self.is_scope(*f)).unwrap_or(0);
@@ -22,6 +25,31 @@ impl<'p> Executor<'p, '_> {
         self.job_names.insert(name);
         self.push_end(id, End::Done);
         self.tasks.push(Task::Enter(frame));
+    }
+
+    /// Begins what is asked for from outside, beside the plan; whatever becomes of it is nobody else's business.
+    pub(super) fn begin_asked(&mut self) {
+        if self.abort.is_some() {
+            return;
+        }
+        for asked in self.out.asked(self.now) {
+            if self.plan.steps.len() <= asked.step.0 as usize {
+                continue;
+            }
+            for (local, value) in asked.locals {
+                self.backend.set_local(local, Some(value));
+            }
+            let frame = self.insert(Some(ROOT), Some(asked.step));
+            if let Some(new) = self.frames.get_mut(&frame) {
+                new.job = true;
+            }
+            if let Some(root) = self.frames.get_mut(&ROOT) {
+                root.jobs.retain(|j| j.end.is_none());
+                root.jobs.push(Job { name: String::new(), frame, end: None, awaited: true });
+            }
+            self.tasks.push(Task::Enter(frame));
+            self.drain();
+        }
     }
 
     pub(super) fn begin_await(&mut self, id: FrameId, name: &str) {

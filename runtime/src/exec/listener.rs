@@ -83,6 +83,15 @@ pub struct Assumption {
     pub time: f64,
 }
 
+/// A step that is asked for from outside of the plan's course.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asked {
+    /// A node of the plan that its root does not lead to.
+    pub step: StepId,
+    /// Values for locals of the plan, SI.
+    pub locals: Vec<(u32, f64)>,
+}
+
 /// Receives what happens, in order; times are seconds since the run began. Every method may be left out.
 #[expect(unused_variables, reason = "the defaults ignore their arguments")]
 pub trait Listener: Observer {
@@ -112,6 +121,10 @@ pub trait Listener: Observer {
     fn reading(&mut self, time: f64, reading: usize, value: f64) {}
     /// A robot begins to move: where it is from moment to moment until it stands still again.
     fn travels(&mut self, moments: &[Moment]) {}
+    /// Steps that are asked for now: each is done beside the plan, and its failure is told but ends nothing else.
+    fn asked(&mut self, time: f64) -> Vec<Asked> {
+        Vec::new()
+    }
     /// A remark.
     fn note(&mut self, time: f64, step: StepId, text: &str) {}
     /// A person is asked.

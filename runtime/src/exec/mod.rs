@@ -38,7 +38,7 @@ use matterix_ir::{NodeId, Unit};
 use serde::{Deserialize, Serialize};
 
 pub use failure::{FailureTrace, Measured, TraceStep, diagnostic, expectation_diagnostic};
-pub use listener::{Assumption, ExpectationResult, Listener, OperationState, StepState, Verdict};
+pub use listener::{Asked, Assumption, ExpectationResult, Listener, OperationState, StepState, Verdict};
 pub use tee::Tee;
 
 use crate::backend::Backend;
@@ -260,6 +260,7 @@ impl<'p, 'b> Executor<'p, 'b> {
                 self.drain();
                 continue;
             }
+            self.begin_asked();
             self.pass_time();
         }
         self.judge_ends(&begun);

@@ -39,6 +39,7 @@ impl Lab {
             plan,
             stock: Default::default(),
             drivers: Vec::new(),
+            offers: Default::default(),
         };
         Lab { program }
     }

@@ -5,6 +5,7 @@
 //! device. What is sent is an expression of the command's arguments and the device's members.
 
 mod lines;
+mod offers;
 mod pattern;
 mod served;
 mod transport;
@@ -14,6 +15,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{self, Driver};
 use matterix_ir::{Diagnostic, Span, codes};
 
+use self::served::Arrangement;
 use super::call::Bound;
 use super::{Planner, script};
 use crate::ast::{ItemKind, Sig, Wire, WireKind};
@@ -31,6 +33,8 @@ pub enum Wires {
     Called,
     /// Also what their devices may be told by others.
     Served,
+    /// What all devices may be told by others, and what drivers say for it; the workflow is left out.
+    Offered,
 }
 
 /// What a line of a driver maps.
@@ -258,8 +262,11 @@ fn self_of(sig: &Sig) -> Option<usize> {
     sig.all_params().position(|p| p.name.text == SELF)
 }
 
-/// The parameters of a driver's line stand for the values of the command's, in their order.
+/// The parameters of a driver's line stand for the values of the command's, in their order; options have their names.
 fn bind(sig: &Sig, values: &[(String, Value)], scope: &mut Scope) {
+    for (name, value) in values.iter().skip(sig.all_params().count()) {
+        scope.bind(name.clone(), value.clone());
+    }
     for (p, (_, value)) in sig.all_params().zip(values) {
         if p.name.text != SELF {
             scope.bind(p.name.text.clone(), value.clone());

@@ -1,6 +1,6 @@
 //! Commands of a device apart from any plan: for emulators, for what is repeated, and to check a driver by itself.
 
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Condition, Operation};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Served;
 use matterix_ir::{Diagnostic, Op, Span, codes};
@@ -13,7 +13,11 @@ use crate::lower::call::Bound;
 use crate::names::verb_text;
 
 /// Values of parameters, and the locals among them.
-type Arrangement = (Vec<(String, Value)>, Vec<(String, u32)>);
+#[derive(Clone, Default)]
+pub(super) struct Arrangement {
+    pub values: Vec<(String, Value)>,
+    pub locals: Vec<(String, u32)>,
+}
 
 /// More arrangements of things than a lab has.
 const MOST: usize = 10_000;
@@ -39,39 +43,12 @@ impl<'a> Planner<'a, '_> {
                 _ => return Vec::new(),
             },
         };
-        let mut arrangements: Vec<Arrangement> = vec![(Vec::new(), Vec::new())];
-        for p in sig.all_params() {
-            let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, of));
-            let name = p.name.text.clone();
-            let (values, local): (Vec<Value>, Option<u32>) = match ty {
-                _ if name == own => (vec![Value::Instance(instance)], None),
-                Some(Type::Instance { kinds, .. }) if !self.lab.prototype => {
-                    let all = 0..self.lab.instances.len() as u32;
-                    let fits = |i: &InstanceId| kinds.iter().all(|k| self.lab.instance_is(*i, *k));
-                    (all.map(InstanceId).filter(fits).map(Value::Instance).collect(), None)
-                }
-                Some(ty) => self.open_value(&ty, &name),
-                None => (vec![Value::Error], None),
-            };
-            arrangements = arrangements
-                .into_iter()
-                .flat_map(|(bound, locals)| {
-                    let (name, local) = (name.clone(), local);
-                    values.clone().into_iter().map(move |v| {
-                        let mut bound = bound.clone();
-                        bound.push((name.clone(), v));
-                        let locals = locals.iter().cloned().chain(local.map(|l| (name.clone(), l))).collect();
-                        (bound, locals)
-                    })
-                })
-                .take(MOST)
-                .collect();
-        }
+        let arrangements = self.arrangements(sig, clauses, own, instance, of);
         let mut out = Vec::new();
-        for (values, arguments) in arrangements {
+        for Arrangement { values, locals: arguments } in arrangements {
             let mut scope = Scope::of(instance, module);
             bind(line, &values, &mut scope);
-            let Some(operation) = self.operation_of(mapped, sig, clauses, Bound { values }, instance, of) else {
+            let Some((operation, _)) = self.operation_of(mapped, sig, clauses, Bound { values }, instance, of) else {
                 continue;
             };
             // What can never begin in this lab is not served.
@@ -85,8 +62,64 @@ impl<'a> Planner<'a, '_> {
         out
     }
 
+    /// Every arrangement of the things that a command is about, as far as the lab has them.
+    pub(super) fn arrangements(
+        &mut self,
+        sig: &'a Sig,
+        clauses: &'a [Clause],
+        own: &str,
+        instance: InstanceId,
+        of: usize,
+    ) -> Vec<Arrangement> {
+        let mut arrangements = vec![Arrangement::default()];
+        let options = clauses.iter().filter_map(|clause| match &clause.kind {
+            ast::ClauseKind::Option(p) => Some(p),
+            _ => None,
+        });
+        for (p, is_option) in sig.all_params().map(|p| (p, false)).chain(options.map(|p| (p, true))) {
+            let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, of));
+            let name = p.name.text.clone();
+            let (values, local): (Vec<Value>, Option<u32>) = match ty {
+                _ if name == own => (vec![Value::Instance(instance)], None),
+                // What the command takes where nothing is said: a line says nothing of it.
+                ty if is_option && p.default.is_some() => {
+                    let value = p
+                        .default
+                        .as_ref()
+                        .map(|e| self.lab.typed(e, &ty.unwrap_or(Type::Any), &mut Scope::module(of), &p.name.text));
+                    (vec![value.unwrap_or(Value::Error)], None)
+                }
+                Some(Type::Instance { kinds, .. }) if !self.lab.prototype => {
+                    let all = 0..self.lab.instances.len() as u32;
+                    let fits = |i: &InstanceId| kinds.iter().all(|k| self.lab.instance_is(*i, *k));
+                    (all.map(InstanceId).filter(fits).map(Value::Instance).collect(), None)
+                }
+                Some(ty) => self.open_value(&ty, &name),
+                None => (vec![Value::Error], None),
+            };
+            arrangements = arrangements
+                .into_iter()
+                .flat_map(|before| {
+                    let (name, local) = (name.clone(), local);
+                    values.clone().into_iter().map(move |v| {
+                        let mut next = before.clone();
+                        next.values.push((name.clone(), v));
+                        next.locals.extend(local.map(|l| (name.clone(), l)));
+                        next
+                    })
+                })
+                .take(MOST)
+                .collect();
+        }
+        arrangements
+    }
+
     /// A value that is known only when it comes over the line.
     fn open_value(&mut self, ty: &Type, name: &str) -> (Vec<Value>, Option<u32>) {
+        if *ty == Type::Bool {
+            let local = self.local(name, matterix_ir::Unit::one());
+            return (vec![Value::Bool(self.lab.graph.add(Op::Local(local)))], Some(local));
+        }
         let (dimension, point, words) = match ty {
             Type::Quantity { dimension, point, .. } => (dimension.clone(), *point, None),
             Type::Int => match Type::ratio() {
@@ -108,7 +141,8 @@ impl<'a> Planner<'a, '_> {
         (vec![value], Some(local))
     }
 
-    fn operation_of(
+    /// The command with these values, and what must hold while it lasts.
+    pub(super) fn operation_of(
         &mut self,
         mapped: Mapped<'a>,
         sig: &'a Sig,
@@ -116,26 +150,15 @@ impl<'a> Planner<'a, '_> {
         bound: Bound,
         instance: InstanceId,
         module: usize,
-    ) -> Option<Operation> {
+    ) -> Option<(Operation, Vec<Condition>)> {
         let mut scope = match mapped {
             Mapped::Command(m) => Scope::of_member(instance, m),
             Mapped::Skill(..) => Scope::module(module),
         };
-        let mut bound = bound;
-        // Options of the command have their default: a line says nothing of them.
-        for clause in clauses {
-            let ast::ClauseKind::Option(p) = &clause.kind else { continue };
-            let ty = p.ty.as_ref().map_or(Type::Any, |ty| self.lab.resolve_parameter_type(ty, module));
-            let value = match &p.default {
-                Some(e) => self.lab.typed(e, &ty, &mut Scope::module(module), &p.name.text),
-                None => self.lab.placeholder(&ty, &p.name.text),
-            };
-            bound.values.push((p.name.text.clone(), value));
-        }
         for (name, v) in &bound.values {
             scope.bind(name.clone(), v.clone());
         }
-        let (mut operation, _) = self.operation(sig, clauses, &bound, &mut scope)?;
+        let (mut operation, invariants) = self.operation(sig, clauses, &bound, &mut scope)?;
         if let Mapped::Command(m) = mapped {
             operation.capability = Some(self.lab.tables.kind_name(m.owner).to_string());
             operation.at_start = std::mem::take(&mut operation.at_end);
@@ -144,7 +167,7 @@ impl<'a> Planner<'a, '_> {
         if !operation.claims.contains(&instance) {
             operation.claims.insert(0, instance);
         }
-        Some(operation)
+        Some((operation, invariants))
     }
 
     /// The command without arguments that these words mean, by the line the same driver has for it.

@@ -1,6 +1,6 @@
 //! The line of a driver: `serial(baud: 9600, frame: "7E1", framing: line, timeout: 1 s)`.
 
-use matterix_ir::wire::{FRAMINGS, Transport};
+use matterix_ir::wire::{CALLS, FRAMINGS, Transport};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Arg, Expr, ExprKind, Name};
@@ -18,6 +18,7 @@ pub(super) struct Line {
 
 const SERIAL: &[&str] = &["baud", "frame", "framing", "address", "timeout"];
 const TCP: &[&str] = &["framing", "address", "timeout"];
+const SILA: &[&str] = &["feature", "timeout"];
 const BAUDS: std::ops::RangeInclusive<f64> = 50.0..=4_000_000.0;
 
 impl<'a> Planner<'a, '_> {
@@ -25,9 +26,15 @@ impl<'a> Planner<'a, '_> {
         let known = match name.text.as_str() {
             "serial" => SERIAL,
             "tcp" => TCP,
+            "sila" => SILA,
             _ => {
                 let headline = format!("there is no transport `{}`", name.text);
-                self.wrong(name.span, &headline, "not a kind of line", "a driver speaks over `serial` or `tcp`");
+                self.wrong(
+                    name.span,
+                    &headline,
+                    "not a kind of line",
+                    "a driver speaks over `serial`, `tcp` or `sila`",
+                );
                 return None;
             }
         };
@@ -57,9 +64,17 @@ impl<'a> Planner<'a, '_> {
         let missing: Vec<&str> = known.iter().copied().filter(|k| *k != "address" && given(k).is_none()).collect();
         if !missing.is_empty() {
             let headline = format!("the line of this driver lacks {}", list(&missing));
-            let help = "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`";
+            let help = match name.text.as_str() {
+                "sila" => "as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
+                _ => "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
+            };
             self.wrong(at, &headline, "nothing is taken for granted here", help);
             return None;
+        }
+        if name.text == "sila" {
+            let transport = self.sila(given("feature")?)?;
+            let timeout = self.timeout(given("timeout")?, module)?;
+            return Some(Line { transport, framing: CALLS.to_owned(), address: None, timeout });
         }
         let transport = match name.text.as_str() {
             "serial" => self.serial(given("baud")?, given("frame")?, module)?,
@@ -74,9 +89,32 @@ impl<'a> Planner<'a, '_> {
             self.wrong(at, "this framing needs the `address` of the device", "no address", "as in `address: 1`");
             return None;
         }
-        let timeout = self.duration_node(given("timeout")?, &mut Scope::module(module), "timeout")?;
-        let timeout = self.lab.known(timeout)?;
+        let timeout = self.timeout(given("timeout")?, module)?;
         Some(Line { transport, framing, address, timeout })
+    }
+
+    fn timeout(&mut self, e: &'a Expr, module: usize) -> Option<f64> {
+        let timeout = self.duration_node(e, &mut Scope::module(module), "timeout")?;
+        self.lab.known(timeout)
+    }
+
+    /// `org.example/heating/Hotplate/v1`.
+    fn sila(&mut self, feature: &'a Expr) -> Option<Transport> {
+        let parts: Vec<&str> = match &*feature.kind {
+            ExprKind::Text(text) => text.split('/').collect(),
+            _ => Vec::new(),
+        };
+        let word = |p: &str| !p.is_empty() && p.chars().all(|c| c.is_ascii_alphanumeric() || c == '.');
+        match parts.as_slice() {
+            [_, _, _, version] if parts.iter().all(|p| word(p)) && version.starts_with('v') => {
+                Some(Transport::Sila { feature: parts.join("/") })
+            }
+            _ => {
+                let help = "originator, category, identifier, version: `\"org.example/heating/Hotplate/v1\"`";
+                self.wrong(feature.span, "a feature is named by its full identifier", "not one", help);
+                None
+            }
+        }
     }
 
     fn serial(&mut self, baud: &'a Expr, frame: &'a Expr, module: usize) -> Option<Transport> {

@@ -62,9 +62,11 @@ fn item_kind(kind: &ItemKind) -> Sexp {
             .with(params.iter().map(param))
             .with([node("when").with([expr(when)])])
             .with(help.iter().map(|h| quoted(h))),
-        ItemKind::Capability { name: word, extends, members } => {
-            node("capability").with([name(word)]).with(extends.iter().map(path)).with(members.iter().map(member))
-        }
+        ItemKind::Capability { name: word, extends, source, members } => node("capability")
+            .with([name(word)])
+            .with(extends.iter().map(path))
+            .with(source.as_ref().map(|(kind, file)| node("from").with([name(kind), quoted(&file.text)])))
+            .with(members.iter().map(member)),
         ItemKind::Asset { name: word, extends, source, lines } => node("asset")
             .with([name(word)])
             .with(extends.iter().map(path))

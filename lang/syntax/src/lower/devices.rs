@@ -16,6 +16,7 @@ impl Lower<'_> {
     pub(super) fn capability(&mut self, kids: &mut Kids) -> ItemKind {
         let name = self.name_in(kids);
         let extends = self.extends_in(kids);
+        let source = self.source_in(kids);
         let members = self.lines(
             kids.eat(Rule::members),
             Rule::only_member,
@@ -25,7 +26,17 @@ impl Lower<'_> {
             },
             |_, _, span| Some(Member { docs: Vec::new(), kind: MemberKind::Error, span }),
         );
-        ItemKind::Capability { name, extends, members }
+        ItemKind::Capability { name, extends, source, members }
+    }
+
+    /// `from FORMAT "file"`.
+    fn source_in(&mut self, kids: &mut Kids) -> Option<(Name, Name)> {
+        kids.eat(Rule::source).map(|node| {
+            let kids = &mut Kids::of(node);
+            let format = self.name_in(kids);
+            let span = kids.peek_span().map_or(format.span, |(start, end)| self.place(start, end));
+            (format, Name { text: self.text_in(kids), span })
+        })
     }
 
     fn extends_in(&mut self, kids: &mut Kids) -> Vec<Path> {
@@ -230,12 +241,7 @@ impl Lower<'_> {
     pub(super) fn asset(&mut self, kids: &mut Kids) -> ItemKind {
         let name = self.name_in(kids);
         let extends = self.extends_in(kids);
-        let source = kids.eat(Rule::source).map(|node| {
-            let kids = &mut Kids::of(node);
-            let format = self.name_in(kids);
-            let span = kids.peek_span().map_or(format.span, |(start, end)| self.place(start, end));
-            (format, Name { text: self.text_in(kids), span })
-        });
+        let source = self.source_in(kids);
         let lines = self.asset_lines(kids.eat(Rule::asset_body));
         ItemKind::Asset { name, extends, source, lines }
     }

@@ -68,6 +68,8 @@ impl Codec {
             "namur" => Codec::Line(Line::new("\r\n", " \r\n")),
             "cr" => Codec::Line(Line::new("\r", "\r")),
             "lf" => Codec::Line(Line::new("\n", "\n")),
+            // Calls are no bytes on a line; they are only shown.
+            matterix_ir::wire::CALLS => Codec::Line(Line::new("", "")),
             "cavro_dt" => Codec::Cavro(Cavro::new(false, address)?),
             "cavro_oem" => Codec::Cavro(Cavro::new(true, address)?),
             other => return Err(format!("there is no framing `{other}`")),

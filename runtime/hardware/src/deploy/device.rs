@@ -7,7 +7,7 @@ use matterix_ir::wire::Driver;
 use super::Trace;
 use super::journal::{Entry, Journal};
 use crate::codec::{Codec, shown};
-use crate::link::{Link, Overhear};
+use crate::link::{Line, Overhear};
 use crate::port::Place;
 
 /// What carries out what a device is told.
@@ -46,7 +46,7 @@ pub struct Device<'m> {
     /// How it is spoken to; none where hands do it.
     pub driver: Option<&'m Driver>,
     /// The open line.
-    pub link: Option<Link>,
+    pub link: Option<Box<dyn Line>>,
     /// Frames for a dry run.
     pub codec: Option<Codec>,
     /// Why nothing more is said to it.

@@ -8,8 +8,7 @@ use matterix_runtime::fault::Fault;
 use super::backend::{Hardware, Mode, wall};
 use super::device::{Carrier, Ear};
 use super::journal::Entry;
-use crate::link::{Link, Trouble};
-use crate::port;
+use crate::link::{self, Trouble};
 
 /// Rounding, in units of the last digit that a device tells.
 const ROUNDING: f64 = 0.51;
@@ -24,13 +23,9 @@ impl Hardware<'_, '_> {
             };
             let (place, address, name) = (place.clone(), address.clone(), device.name);
             if !self.is_dry() {
-                let opened = port::open(&place, &driver.transport).map_err(|e| format!("cannot open `{place}`: {e}"));
-                let link = opened.and_then(|port| Link::new(port, driver, address.as_deref()));
-                match link {
+                match link::open(&place, driver, address.as_deref()) {
                     Ok(link) => self.devices[index].link = Some(link),
-                    Err(why) => {
-                        return Err(self.fault(codes::DEVICE_LOST, driver.span, format!("`{name}`: {why}")));
-                    }
+                    Err(trouble) => return Err(self.trouble(index, &trouble, driver.span)),
                 }
             }
             for exchange in driver.open.iter().filter(|_| !again) {
@@ -200,8 +195,7 @@ impl Hardware<'_, '_> {
             if self.devices[index].link.is_none() && !self.is_dry() && !driver.safe.is_empty() {
                 // A line that was lost may be there again.
                 if let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() {
-                    let again = port::open(&place, &driver.transport).ok();
-                    self.devices[index].link = again.and_then(|p| Link::new(p, driver, address.as_deref()).ok());
+                    self.devices[index].link = link::open(&place, driver, address.as_deref()).ok();
                     if self.devices[index].link.is_some() {
                         self.devices[index].lost = None;
                     }

@@ -280,6 +280,7 @@ pub(super) fn lab() -> Lab {
         plan,
         stock: Default::default(),
         drivers: Vec::new(),
+        offers: Default::default(),
     };
     let mut sources = Sources::default();
     sources.add("sn1.mtx", TEXT);

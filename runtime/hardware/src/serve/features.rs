@@ -1,0 +1,186 @@
+//! What a lab offers, as features: one for each device and capability.
+
+use matterix_ir::Unit;
+use matterix_ir::offer::{Kind, Offer, Shown};
+use matterix_ir::scene::{InstanceId, Scene};
+use matterix_sila::Feature;
+use matterix_sila::feature::{BASES, Basic, Command, Constraints, DataType, Element, Named, Property, SiUnit};
+use matterix_sila::words::identifier;
+use matterix_sila_wire::spaced;
+
+/// Who defines the features.
+const ORIGINATOR: &str = "org.matterixc";
+
+/// Symbols of the base units, as [`BASES`] has them.
+const SYMBOLS: [&str; 8] = ["", "m", "kg", "s", "A", "K", "mol", "cd"];
+
+/// A unit of plain angles, which the standard counts as nothing.
+const ANGLE: &str = "rad";
+
+/// Features with what stands behind each of their commands and properties.
+pub struct Catalogue<'p> {
+    /// As they are offered.
+    pub features: Vec<Feature>,
+    /// By feature and command.
+    pub commands: Vec<Vec<&'p Offer>>,
+    /// By feature and property.
+    pub properties: Vec<Vec<&'p Shown>>,
+}
+
+/// The features of what is offered in a lab.
+pub fn catalogue<'p>(scene: &'p Scene, offers: Vec<&'p Offer>, shown: Vec<&'p Shown>) -> Catalogue<'p> {
+    let mut out = Catalogue { features: Vec::new(), commands: Vec::new(), properties: Vec::new() };
+    let mut places: Vec<(Option<InstanceId>, &str)> = Vec::new();
+    let of_offers = offers.iter().map(|o| (o.device, o.capability.as_str()));
+    for place in of_offers.chain(shown.iter().map(|s| (Some(s.device), s.capability.as_str()))) {
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    places.sort_by_key(|(device, _)| *device);
+    let category: String = scene.lab.to_lowercase().chars().filter(char::is_ascii_lowercase).collect();
+    let category = if category.is_empty() { "lab".to_owned() } else { category };
+    for (device, capability) in places {
+        let (name, display, description) = match device.map(|d| &scene.get(d).name) {
+            Some(name) => (
+                format!("{name} {capability}"),
+                format!("{name}: {capability}"),
+                format!("What `{name}` of the lab `{}` does as a {capability}.", scene.lab),
+            ),
+            None => (
+                format!("{} skills", scene.lab),
+                "Skills".to_owned(),
+                format!("What is done with several things of the lab `{}`.", scene.lab),
+            ),
+        };
+        let mut feature = Feature {
+            identifier: unique(identifier(&name), |n| {
+                out.features.iter().any(|f| f.identifier.eq_ignore_ascii_case(n))
+            }),
+            display,
+            description,
+            originator: ORIGINATOR.to_owned(),
+            category: category.clone(),
+            version: (1, 0),
+            ..Feature::default()
+        };
+        let is_here = |d: Option<InstanceId>, c: &str| d == device && c == capability;
+        let commands: Vec<&Offer> = offers.iter().copied().filter(|o| is_here(o.device, &o.capability)).collect();
+        for offer in &commands {
+            let command = command(scene, offer, &feature);
+            for error in offer.fails.iter().map(|f| defined(f)) {
+                if !feature.errors.iter().any(|e| e.identifier == error.identifier) {
+                    feature.errors.push(error);
+                }
+            }
+            feature.commands.push(command);
+        }
+        let properties: Vec<&Shown> =
+            shown.iter().copied().filter(|s| is_here(Some(s.device), &s.capability)).collect();
+        for shown in &properties {
+            let taken = |n: &str| {
+                feature.properties.iter().any(|p| p.identifier == n)
+                    || feature.commands.iter().any(|c| c.identifier == n)
+            };
+            let identifier = unique(identifier(&shown.name), taken);
+            feature.properties.push(Property {
+                display: spaced(&identifier),
+                identifier,
+                description: said(&shown.docs, &format!("`{}`.", shown.name), &shown.kind),
+                observable: true,
+                ty: data_type(scene, &shown.kind),
+                errors: Vec::new(),
+            });
+        }
+        out.features.push(feature);
+        out.commands.push(commands);
+        out.properties.push(properties);
+    }
+    out
+}
+
+fn command(scene: &Scene, offer: &Offer, feature: &Feature) -> Command {
+    let name = unique(identifier(&offer.verb), |n| feature.commands.iter().any(|c| c.identifier == n));
+    let mut parameters: Vec<Element> = Vec::new();
+    for parameter in &offer.parameters {
+        let identifier = unique(identifier(&parameter.name), |n| parameters.iter().any(|p| p.identifier == n));
+        parameters.push(Element {
+            display: spaced(&identifier),
+            identifier,
+            description: said("", &format!("`{}`.", parameter.name), &parameter.kind),
+            ty: data_type(scene, &parameter.kind),
+        });
+    }
+    Command {
+        display: spaced(&name),
+        identifier: name,
+        description: said(&offer.docs, &format!("`{}`.", offer.verb), &Kind::Truth),
+        observable: offer.lasts,
+        parameters,
+        responses: Vec::new(),
+        intermediate: Vec::new(),
+        errors: offer.fails.iter().map(|f| defined(f).identifier).collect(),
+    }
+}
+
+/// What stands in a declaration, or else this; with the unit where the type cannot say it.
+fn said(docs: &str, otherwise: &str, kind: &Kind) -> String {
+    let text = if docs.is_empty() { otherwise } else { docs };
+    match kind {
+        Kind::Quantity { unit, bases } if si_unit(unit, bases.as_deref()).is_none() && !unit.symbol.is_empty() => {
+            format!("{text} In {}.", unit.symbol)
+        }
+        _ => text.to_owned(),
+    }
+}
+
+/// The failure of a need that names none.
+const NEED: &str = "need";
+
+/// A failure as a defined error.
+pub(super) fn defined(failure: &str) -> Named {
+    let (identifier, description) = match failure {
+        NEED => ("NeedUnmet".to_owned(), "What the command needs does not hold.".to_owned()),
+        other => (identifier(other), format!("The failure `{other}`.")),
+    };
+    Named { display: spaced(&identifier), identifier, description }
+}
+
+/// A name that is not taken: with a number at its end where it would be.
+fn unique(name: String, taken: impl Fn(&str) -> bool) -> String {
+    if !taken(&name) {
+        return name;
+    }
+    (2..).map(|n| format!("{name}{n}")).find(|n| !taken(n)).unwrap_or(name)
+}
+
+fn data_type(scene: &Scene, kind: &Kind) -> DataType {
+    let basic = DataType::Basic;
+    let among = |set: Vec<String>| {
+        let constraints = Constraints { set, ..Constraints::default() };
+        DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))
+    };
+    match kind {
+        Kind::Quantity { unit, bases } => match si_unit(unit, bases.as_deref()) {
+            Some(unit) => {
+                let constraints = Constraints { unit: Some(unit), ..Constraints::default() };
+                DataType::Constrained(Box::new(basic(Basic::Real)), Box::new(constraints))
+            }
+            None => basic(Basic::Real),
+        },
+        Kind::Whole => basic(Basic::Integer),
+        Kind::Truth => basic(Basic::Boolean),
+        Kind::Words(words) => among(words.clone()),
+        Kind::Things(things) => among(things.iter().map(|t| scene.get(*t).name.clone()).collect()),
+    }
+}
+
+/// A unit as the standard has it; nothing where it has no such thing.
+fn si_unit(unit: &Unit, bases: Option<&[(String, i32)]>) -> Option<SiUnit> {
+    let bases = bases.filter(|b| !b.is_empty())?;
+    let known = bases.iter().filter(|(symbol, _)| symbol != ANGLE);
+    let component = |(symbol, exponent): &(String, i32)| Some((SYMBOLS.iter().position(|s| s == symbol)?, *exponent));
+    let components = known.map(component).collect::<Option<Vec<_>>>()?;
+    debug_assert_eq!(SYMBOLS.len(), BASES.len());
+    Some(SiUnit { label: unit.symbol.clone(), factor: unit.factor, offset: unit.offset, components })
+}

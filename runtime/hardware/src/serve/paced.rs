@@ -1,0 +1,105 @@
+//! A backend whose time is the clock's, and that looks after what is asked while time passes.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use matterix_ir::NodeId;
+use matterix_ir::plan::Operation;
+use matterix_runtime::backend::{Backend, Follow, Status, Ticket};
+use matterix_runtime::exec::Listener;
+use matterix_runtime::fault::Fault;
+use matterix_runtime::process::{Advance, Watch};
+
+use super::Desk;
+
+/// Longest time in which nobody looks at what is asked.
+const TICK: Duration = Duration::from_millis(5);
+
+/// Another backend, no faster than the clock.
+pub struct Paced<'b, 'd, 'p> {
+    inner: &'b mut dyn Backend,
+    desk: &'d Desk<'p>,
+    cancel: &'d AtomicBool,
+    begun: (f64, Instant),
+    speed: f64,
+}
+
+impl<'b, 'd, 'p> Paced<'b, 'd, 'p> {
+    /// Lab time passes `speed` times as fast as the clock.
+    #[allow(clippy::disallowed_methods, reason = "who calls a lab lives by the wall clock")]
+    pub fn new(inner: &'b mut dyn Backend, desk: &'d Desk<'p>, cancel: &'d AtomicBool, speed: f64) -> Self {
+        let begun = (inner.now(), Instant::now());
+        Paced { inner, desk, cancel, begun, speed }
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "who calls a lab lives by the wall clock")]
+    fn clock(&self) -> f64 {
+        self.begun.0 + self.begun.1.elapsed().as_secs_f64() * self.speed
+    }
+
+    /// Answers what is asked of the lab as it is.
+    fn answer(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
+        while let Some((read, node, kind)) = self.desk.next_read() {
+            let value = self.inner.observe(node, out);
+            self.desk.answer(read, kind, value.as_ref().ok().copied().flatten());
+            value?;
+        }
+        for (step, node) in self.desk.unmeasured() {
+            let takes = self.inner.value(node, out)?.unwrap_or(0.0);
+            self.desk.measured(step, takes);
+        }
+        self.desk.tell(self.inner.now());
+        Ok(())
+    }
+}
+
+impl Backend for Paced<'_, '_, '_> {
+    fn now(&self) -> f64 {
+        self.inner.now()
+    }
+
+    fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        self.inner.value(node, out)
+    }
+
+    fn observe(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+        self.inner.observe(node, out)
+    }
+
+    fn follow(&mut self, condition: NodeId) -> Follow {
+        self.inner.follow(condition)
+    }
+
+    fn set_local(&mut self, local: u32, value: Option<f64>) {
+        self.inner.set_local(local, value);
+    }
+
+    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        self.inner.start(operation, out)
+    }
+
+    fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+        self.inner.poll(ticket, out)
+    }
+
+    fn halt(&mut self, ticket: Ticket) {
+        self.inner.halt(ticket);
+    }
+
+    fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        loop {
+            let waiting = self.desk.look();
+            self.answer(out)?;
+            let target = until.min(self.clock()).max(self.inner.now());
+            match self.inner.advance(target, watches, out)? {
+                Advance::Watch(fired) => return Ok(Advance::Watch(fired)),
+                Advance::Reached if self.inner.now() >= until => return Ok(Advance::Reached),
+                Advance::Reached => {}
+            }
+            if waiting || self.cancel.load(Ordering::Relaxed) {
+                return Ok(Advance::Watch(Vec::new()));
+            }
+            std::thread::sleep(TICK);
+        }
+    }
+}

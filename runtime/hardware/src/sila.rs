@@ -1,0 +1,111 @@
+//! Devices that are servers of SiLA 2: what a driver says is a call, what it asks a property or what a command answered.
+
+use std::time::Duration;
+
+use matterix_ir::wire::{Driver, Pattern, Until};
+use matterix_sila_wire::{Client, Failure, is_of};
+
+use crate::codec::Reply;
+use crate::link::{Line, Overhear, Trouble, refusal};
+use crate::pattern::{matched, written};
+use crate::template;
+
+/// A server that is connected.
+pub struct Server(Client);
+
+impl Server {
+    /// Connects to `HOST:PORT`, which must offer the feature.
+    pub fn connect(address: &str, feature: &str, timeout: f64) -> Result<Server, Trouble> {
+        let timeout = Duration::try_from_secs_f64(timeout)
+            .ok()
+            .filter(|t| !t.is_zero())
+            .ok_or_else(|| Trouble::Lost("the timeout is no duration".to_owned()))?;
+        match Client::connect(address, feature, timeout) {
+            Ok(client) => Ok(Server(client)),
+            Err(Failure::Refused { name, message }) => {
+                Err(Trouble::Garbled(format!("it answered `{name}`: {message}")))
+            }
+            Err(Failure::Lost(why)) => Err(Trouble::Lost(why)),
+            Err(Failure::Garbled(why)) => Err(Trouble::Garbled(why)),
+        }
+    }
+}
+
+/// What went wrong as what the driver calls it.
+fn trouble(failure: Failure, driver: &Driver, ear: &mut dyn Overhear) -> Trouble {
+    match failure {
+        Failure::Lost(why) => Trouble::Lost(why),
+        Failure::Garbled(why) => Trouble::Garbled(why),
+        Failure::Refused { name, message } => {
+            ear.back(format!("{name}: {message}").as_bytes());
+            let reply = Reply { is_error: true, ..Reply::of(name.as_str()) };
+            let failure = match refusal(driver, &reply) {
+                Some(Trouble::Refused { failure, .. }) => failure,
+                _ => name.clone(),
+            };
+            Trouble::Refused { failure, text: format!("it answered `{name}`: {message}") }
+        }
+    }
+}
+
+/// Whether a command goes on after it was said, because its line says how its end is known.
+fn goes_on(driver: &Driver, text: &str) -> bool {
+    let all = driver.calls.iter().map(|(_, e)| e).chain(driver.served.iter().map(|s| &s.exchange)).chain(&driver.open);
+    let mut asked = all.filter_map(|e| e.until.as_ref()).filter(|u| u.expects.is_none());
+    asked.any(|u| is_of(text, &template::written(&u.asks)))
+}
+
+fn understood(asked: &str, reply: &str, expects: &Pattern) -> Result<Vec<f64>, Trouble> {
+    matched(expects, reply)
+        .ok_or_else(|| Trouble::Garbled(format!("to `{asked}` it answered `{reply}`, not `{}`", written(expects))))
+}
+
+impl Line for Server {
+    fn say(
+        &mut self,
+        texts: &[String],
+        expects: Option<&Pattern>,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        let mut numbers = Vec::new();
+        for text in texts {
+            ear.out(text.as_bytes());
+            let reply = self.0.say(text, !goes_on(driver, text)).map_err(|f| trouble(f, driver, ear))?;
+            ear.back(reply.as_bytes());
+            if let Some(expects) = expects {
+                numbers = understood(text, &reply, expects)?;
+            }
+        }
+        Ok(numbers)
+    }
+
+    fn ask(
+        &mut self,
+        text: &str,
+        expects: &Pattern,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<Vec<f64>, Trouble> {
+        ear.out(text.as_bytes());
+        let reply = self.0.ask(text).map_err(|f| trouble(f, driver, ear))?;
+        ear.back(reply.as_bytes());
+        understood(text, &reply, expects)
+    }
+
+    fn is_ready(
+        &mut self,
+        text: &str,
+        until: &Until,
+        driver: &Driver,
+        ear: &mut dyn Overhear,
+    ) -> Result<bool, Trouble> {
+        let Some(expects) = &until.expects else {
+            return self.0.is_done(text).map_err(|f| trouble(f, driver, ear));
+        };
+        ear.out(text.as_bytes());
+        let reply = self.0.ask(text).map_err(|f| trouble(f, driver, ear))?;
+        ear.back(reply.as_bytes());
+        Ok(matched(expects, &reply).is_some())
+    }
+}

@@ -1,0 +1,61 @@
+//! Commands that were called and last: how each stands, for whoever asks.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use tokio::sync::watch;
+
+use crate::call::Failure;
+use crate::value::Value;
+
+/// The most that are kept; the oldest that have ended are forgotten first.
+const MOST: usize = 1000;
+
+/// How an execution stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// From 0 to 1.
+    pub progress: f64,
+    /// s.
+    pub remaining: Option<f64>,
+    /// Whether it has begun.
+    pub begun: bool,
+    /// How it ended.
+    pub end: Option<Result<Vec<Value>, Failure>>,
+}
+
+/// One of them.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// Index of its feature and of its command.
+    pub of: (usize, usize),
+    /// How it stands.
+    pub state: watch::Receiver<State>,
+}
+
+/// All of them, by their names.
+#[derive(Debug, Default)]
+pub struct Executions(Mutex<(u64, BTreeMap<String, (u64, Known)>)>);
+
+impl Executions {
+    /// A new one; nothing where too many go on.
+    pub fn add(&self, of: (usize, usize), state: watch::Receiver<State>) -> Option<String> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if all.1.len() >= MOST {
+            let ended = all.1.iter().filter(|(_, (_, known))| known.state.borrow().end.is_some());
+            let oldest = ended.min_by_key(|(_, (turn, _))| *turn).map(|(name, _)| name.clone())?;
+            all.1.remove(&oldest);
+        }
+        let name = uuid::Uuid::new_v4().to_string();
+        all.0 += 1;
+        let turn = all.0;
+        all.1.insert(name.clone(), (turn, Known { of, state }));
+        Some(name)
+    }
+
+    /// One of a command.
+    pub fn find(&self, name: &str, of: (usize, usize)) -> Option<Known> {
+        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.1.get(name).map(|(_, known)| known.clone()).filter(|k| k.of == of)
+    }
+}

@@ -1,0 +1,84 @@
+//! The feature that every server has: `org.silastandard/core/SiLAService/v1` (part A, appendix).
+
+use matterix_sila::feature::{Basic, Command, DataType, Element, Feature, Named, Property};
+
+/// Its identifier.
+pub const IDENTIFIER: &str = "SiLAService";
+
+/// The error where a feature is asked for that the server does not have.
+pub const UNIMPLEMENTED: &str = "UnimplementedFeature";
+
+/// The definition.
+pub fn feature() -> Feature {
+    let text = || DataType::Basic(Basic::String);
+    let element = |identifier: &str, description: &str| Element {
+        identifier: identifier.to_owned(),
+        display: spaced(identifier),
+        description: description.to_owned(),
+        ty: text(),
+    };
+    let property = |identifier: &str, description: &str, ty: DataType| Property {
+        identifier: identifier.to_owned(),
+        display: spaced(identifier),
+        description: description.to_owned(),
+        observable: false,
+        ty,
+        errors: Vec::new(),
+    };
+    let command = |identifier: &str, description: &str| Command {
+        identifier: identifier.to_owned(),
+        display: spaced(identifier),
+        description: description.to_owned(),
+        ..Command::default()
+    };
+    let features = DataType::List(Box::new(text()));
+    Feature {
+        identifier: IDENTIFIER.to_owned(),
+        display: "SiLA Service".to_owned(),
+        description: "What every server says of itself and of its features.".to_owned(),
+        originator: "org.silastandard".to_owned(),
+        category: "core".to_owned(),
+        version: (1, 0),
+        commands: vec![
+            Command {
+                parameters: vec![element("FeatureIdentifier", "The full identifier of a feature.")],
+                responses: vec![element("FeatureDefinition", "Its definition as XML.")],
+                errors: vec![UNIMPLEMENTED.to_owned()],
+                ..command("GetFeatureDefinition", "Gives the definition of a feature.")
+            },
+            Command {
+                parameters: vec![element("ServerName", "The name from now on.")],
+                ..command("SetServerName", "Names the server.")
+            },
+        ],
+        properties: vec![
+            property("ServerName", "Its name.", text()),
+            property("ServerType", "What kind of server it is.", text()),
+            property("ServerUUID", "Its identifier.", text()),
+            property("ServerDescription", "What it is for.", text()),
+            property("ServerVersion", "The version of its program.", text()),
+            property("ServerVendorURL", "Where its program comes from.", text()),
+            property("ImplementedFeatures", "The full identifiers of its features.", features),
+        ],
+        metadata: Vec::new(),
+        errors: vec![Named {
+            identifier: UNIMPLEMENTED.to_owned(),
+            display: spaced(UNIMPLEMENTED),
+            description: "The server does not have this feature.".to_owned(),
+        }],
+        types: Vec::new(),
+    }
+}
+
+/// An identifier for people: `Get Feature Definition`.
+pub fn spaced(identifier: &str) -> String {
+    let mut out = String::new();
+    for (i, c) in identifier.chars().enumerate() {
+        let lower = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+        if i > 0 && c.is_ascii_uppercase() && out.ends_with(lower) {
+            out.push(' ');
+        }
+        out.push(c);
+    }
+    out
+}

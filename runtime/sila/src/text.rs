@@ -1,0 +1,143 @@
+//! What goes over the wire as people and drivers write it: `SetTargetTemperature(Target: 60)`, `FinalTemperature: 59.8`.
+
+use matterix_sila::feature::{Basic, DataType, Feature};
+
+use crate::value::{Value, fits};
+
+/// A command or a question, taken apart.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Call {
+    /// `CancelController`, `CancelAll`.
+    pub path: Vec<String>,
+    /// By the names of parameters, as written.
+    pub arguments: Vec<(String, String)>,
+}
+
+/// A text taken apart; why it cannot be.
+pub fn call(text: &str) -> Result<Call, String> {
+    let text = text.trim();
+    let (head, inner) = match text.split_once('(') {
+        Some((head, rest)) => {
+            let inner = rest.trim_end().strip_suffix(')').ok_or_else(|| format!("`{text}` has no `)` at its end"))?;
+            (head.trim(), inner)
+        }
+        None => (text, ""),
+    };
+    let path: Vec<String> = head.split('.').map(|p| p.trim().to_owned()).collect();
+    let is_identifier = |p: &String| !p.is_empty() && p.chars().all(|c| c.is_ascii_alphanumeric());
+    if path.len() > 2 || !path.iter().all(is_identifier) {
+        return Err(format!("`{head}` is no command or property: write `Command(Parameter: value)`"));
+    }
+    let named = |part: &str| {
+        let (name, value) =
+            part.split_once(':').ok_or_else(|| format!("`{}` has no name: write `Parameter: value`", part.trim()))?;
+        Ok::<_, String>((name.trim().to_owned(), value.trim().to_owned()))
+    };
+    let arguments = parts(inner)?.into_iter().map(named).collect::<Result<_, _>>()?;
+    Ok(Call { path, arguments })
+}
+
+/// What stands between commas that are in no brackets and no quotes.
+fn parts(text: &str) -> Result<Vec<&str>, String> {
+    let (mut out, mut depth, mut quoted, mut from) = (Vec::new(), 0usize, false, 0);
+    for (at, c) in text.char_indices() {
+        match c {
+            '"' => quoted = !quoted,
+            _ if quoted => {}
+            '[' | '{' => depth += 1,
+            ']' | '}' => depth = depth.checked_sub(1).ok_or_else(|| format!("`{text}` closes what is not open"))?,
+            ',' if depth == 0 => {
+                out.push(&text[from..at]);
+                from = at + 1;
+            }
+            _ => {}
+        }
+    }
+    if quoted || depth > 0 {
+        return Err(format!("`{text}` is not closed"));
+    }
+    if !text[from..].trim().is_empty() || !out.is_empty() {
+        out.push(&text[from..]);
+    }
+    Ok(out)
+}
+
+/// A value of a type as it is written.
+pub fn value(feature: &Feature, ty: &DataType, text: &str) -> Result<Value, String> {
+    within(feature, ty, text.trim(), 0)
+}
+
+fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<Value, String> {
+    if depth > 32 {
+        return Err("it is nested too deeply".to_owned());
+    }
+    Ok(match ty {
+        DataType::Constrained(inner, constraints) => {
+            let value = within(feature, inner, text, depth + 1)?;
+            fits(&value, constraints)?;
+            value
+        }
+        DataType::Identifier(name) => {
+            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            within(feature, of, text, depth + 1)?
+        }
+        DataType::Basic(Basic::String) => Value::Text(unquoted(text).to_owned()),
+        DataType::Basic(Basic::Real) => {
+            let number = text.parse::<f64>().ok().filter(|n| n.is_finite());
+            Value::Real(number.ok_or_else(|| format!("`{text}` is no number"))?)
+        }
+        DataType::Basic(Basic::Integer) => {
+            let whole = text.parse::<i64>().ok().or_else(|| {
+                let number = text.parse::<f64>().ok()?;
+                (number.fract() == 0.0 && number.abs() < 9e15).then_some(number as i64)
+            });
+            Value::Integer(whole.ok_or_else(|| format!("`{text}` is no whole number"))?)
+        }
+        DataType::Basic(Basic::Boolean) => match text {
+            "true" | "1" => Value::Boolean(true),
+            "false" | "0" => Value::Boolean(false),
+            _ => return Err(format!("`{text}` is neither `true` nor `false`")),
+        },
+        DataType::Basic(other) => return Err(format!("a value of type {} cannot be written here", other.name())),
+        DataType::List(of) => {
+            let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']'));
+            let inner = inner.ok_or_else(|| format!("`{text}` is no list: write `[1, 2]`"))?;
+            let values = parts(inner)?.into_iter().map(|p| within(feature, of, p.trim(), depth + 1));
+            Value::List(values.collect::<Result<_, _>>()?)
+        }
+        DataType::Structure(elements) => {
+            let inner = text.strip_prefix('{').and_then(|t| t.strip_suffix('}'));
+            let inner = inner.ok_or_else(|| format!("`{text}` is no structure: write `{{Part: value}}`"))?;
+            let given: Vec<(&str, &str)> = parts(inner)?.into_iter().filter_map(|p| p.split_once(':')).collect();
+            let part = |element: &matterix_sila::feature::Element| {
+                let found = given.iter().find(|(name, _)| name.trim() == element.identifier);
+                let (_, text) = found.ok_or_else(|| format!("`{}` is missing", element.identifier))?;
+                Ok::<_, String>((element.identifier.clone(), within(feature, &element.ty, text.trim(), depth + 1)?))
+            };
+            Value::Structure(elements.iter().map(part).collect::<Result<_, _>>()?)
+        }
+    })
+}
+
+fn unquoted(text: &str) -> &str {
+    text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
+}
+
+/// A value as text: numbers as they are, truth as 1 and 0.
+pub fn shown(value: &Value) -> String {
+    let list = |values: &[Value]| values.iter().map(shown).collect::<Vec<_>>().join(", ");
+    match value {
+        Value::Text(text) => text.clone(),
+        Value::Integer(n) => n.to_string(),
+        Value::Real(n) => n.to_string(),
+        Value::Boolean(b) => u8::from(*b).to_string(),
+        Value::List(values) => format!("[{}]", list(values)),
+        Value::Structure(parts) => format!("{{{}}}", named(parts)),
+        Value::Other(basic) => format!("({})", basic.name()),
+    }
+}
+
+/// Values with their names as text.
+pub fn named(parts: &[(String, Value)]) -> String {
+    parts.iter().map(|(name, value)| format!("{name}: {}", shown(value))).collect::<Vec<_>>().join(", ")
+}

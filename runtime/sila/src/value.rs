@@ -1,0 +1,158 @@
+//! Values as messages, by the types of a feature.
+
+use matterix_sila::feature::{Basic, Constraints, DataType, Element, Feature};
+use prost::Message;
+
+use crate::framework;
+use crate::raw::Raw;
+
+/// A value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A text.
+    Text(String),
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Real(f64),
+    /// A truth value.
+    Boolean(bool),
+    /// Several.
+    List(Vec<Value>),
+    /// By the names of its parts.
+    Structure(Vec<(String, Value)>),
+    /// A value of a type that is only passed on.
+    Other(Basic),
+}
+
+/// The fields of a message: one for each of these, from 1.
+pub fn encode(feature: &Feature, elements: &[Element], values: &[Value]) -> Result<Raw, String> {
+    let mut raw = Raw::default();
+    for ((element, value), number) in elements.iter().zip(values).zip(1..) {
+        put(feature, &element.ty, value, number, &mut raw).map_err(|why| format!("`{}`: {why}", element.identifier))?;
+    }
+    Ok(raw)
+}
+
+fn put(feature: &Feature, ty: &DataType, value: &Value, number: u32, raw: &mut Raw) -> Result<(), String> {
+    match (ty.plain(), value) {
+        (DataType::List(of), Value::List(values)) => values.iter().try_for_each(|v| put(feature, of, v, number, raw)),
+        (of, value) => {
+            raw.fields.push((number, message(feature, of, value)?));
+            Ok(())
+        }
+    }
+}
+
+fn message(feature: &Feature, ty: &DataType, value: &Value) -> Result<Vec<u8>, String> {
+    Ok(match (ty, value) {
+        (DataType::Basic(Basic::String), Value::Text(text)) => framework::Text { value: text.clone() }.encode_to_vec(),
+        (DataType::Basic(Basic::Integer), Value::Integer(n)) => framework::Integer { value: *n }.encode_to_vec(),
+        (DataType::Basic(Basic::Real), Value::Real(n)) => framework::Real { value: *n }.encode_to_vec(),
+        (DataType::Basic(Basic::Boolean), Value::Boolean(b)) => framework::Boolean { value: *b }.encode_to_vec(),
+        (DataType::Structure(parts), Value::Structure(given)) => {
+            let mut raw = Raw::default();
+            for (part, number) in parts.iter().zip(1..) {
+                let found = given.iter().find(|(name, _)| *name == part.identifier);
+                let (_, value) = found.ok_or_else(|| format!("it has no `{}`", part.identifier))?;
+                put(feature, &part.ty, value, number, &mut raw)?;
+            }
+            raw.encode_to_vec()
+        }
+        (DataType::Identifier(name), value) => {
+            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            let mut raw = Raw::default();
+            put(feature, of, value, 1, &mut raw)?;
+            raw.encode_to_vec()
+        }
+        (DataType::Constrained(inner, _), value) => return message(feature, inner, value),
+        (DataType::Basic(basic), _) => return Err(format!("it is no {}", basic.name())),
+        (DataType::Structure(_), _) => return Err("it is no structure".to_owned()),
+        (DataType::List(_), _) => return Err("it is no list".to_owned()),
+    })
+}
+
+/// The values of a message, one for each of these.
+pub fn decode(feature: &Feature, elements: &[Element], raw: &Raw) -> Result<Vec<Value>, String> {
+    let value = |(element, number): (&Element, u32)| {
+        take(feature, &element.ty, number, raw).map_err(|why| format!("`{}`: {why}", element.identifier))
+    };
+    elements.iter().zip(1..).map(value).collect()
+}
+
+fn take(feature: &Feature, ty: &DataType, number: u32, raw: &Raw) -> Result<Value, String> {
+    let mut all = raw.all(number);
+    if let DataType::List(of) = ty.plain() {
+        return all.map(|bytes| understood(feature, of, bytes)).collect::<Result<_, _>>().map(Value::List);
+    }
+    match (all.next(), all.next()) {
+        (Some(bytes), None) => understood(feature, ty, bytes),
+        (None, _) => Err("it is missing".to_owned()),
+        (_, Some(_)) => Err("it is there twice".to_owned()),
+    }
+}
+
+fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, String> {
+    fn read<M: Message + Default>(bytes: &[u8]) -> Result<M, String> {
+        M::decode(bytes).map_err(|e| e.to_string())
+    }
+    Ok(match ty {
+        DataType::Basic(Basic::String) => Value::Text(read::<framework::Text>(bytes)?.value),
+        DataType::Basic(Basic::Integer) => Value::Integer(read::<framework::Integer>(bytes)?.value),
+        DataType::Basic(Basic::Real) => Value::Real(read::<framework::Real>(bytes)?.value),
+        DataType::Basic(Basic::Boolean) => Value::Boolean(read::<framework::Boolean>(bytes)?.value),
+        DataType::Basic(other) => Value::Other(*other),
+        DataType::Structure(parts) => {
+            let raw = read::<Raw>(bytes)?;
+            let part = |(part, number): (&Element, u32)| {
+                let value =
+                    take(feature, &part.ty, number, &raw).map_err(|why| format!("`{}`: {why}", part.identifier));
+                Ok::<_, String>((part.identifier.clone(), value?))
+            };
+            Value::Structure(parts.iter().zip(1..).map(part).collect::<Result<_, _>>()?)
+        }
+        DataType::Identifier(name) => {
+            let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
+            take(feature, of, 1, &read::<Raw>(bytes)?)?
+        }
+        DataType::Constrained(inner, constraints) => {
+            let value = understood(feature, inner, bytes)?;
+            fits(&value, constraints)?;
+            value
+        }
+        DataType::List(_) => return Err("a list holds no lists".to_owned()),
+    })
+}
+
+/// Whether a value is one of those that are allowed; why it is not.
+pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
+    let number = match value {
+        Value::Real(n) => Some(*n),
+        Value::Integer(n) => Some(*n as f64),
+        _ => None,
+    };
+    let shown = crate::text::shown(value);
+    if let Some(number) = number {
+        if let Some((least, out)) = constraints.least
+            && (number < least || out && number == least)
+        {
+            return Err(format!("{shown} is below {least}"));
+        }
+        if let Some((greatest, out)) = constraints.greatest
+            && (number > greatest || out && number == greatest)
+        {
+            return Err(format!("{shown} is above {greatest}"));
+        }
+    }
+    let is_it = |allowed: &String| match value {
+        Value::Text(text) => text == allowed,
+        _ => number.is_none() || allowed.parse::<f64>().ok() == number,
+    };
+    if !constraints.set.is_empty() && !constraints.set.iter().any(is_it) {
+        return Err(format!("`{shown}` is none of {}", constraints.set.join(", ")));
+    }
+    if number.is_some_and(|n| !n.is_finite()) {
+        return Err(format!("{shown} is no finite number"));
+    }
+    Ok(())
+}

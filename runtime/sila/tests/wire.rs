@@ -1,0 +1,152 @@
+//! Values over the wire and in text; a server and a client of this crate against each other.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::sync::mpsc::Receiver;
+use std::time::Duration;
+
+use matterix_sila::{Feature, read};
+use matterix_sila_wire::text::{call, shown, value};
+use matterix_sila_wire::{Client, Failure, News, Raw, Request, Value, decode, encode, serve};
+use proptest::prelude::*;
+use prost::Message;
+
+const PLATE: &str = include_str!("../../../tests/deploy/hotplate.sila.xml");
+const ID: &str = "org.example/heating/HotPlate/v1";
+
+fn plate() -> Feature {
+    read(PLATE).expect("the feature is sound")
+}
+
+/// Does what is asked until nobody asks any more.
+fn lab(requests: Receiver<Request>) {
+    let mut target = 25.0;
+    while let Ok(request) = requests.recv() {
+        match request {
+            Request::Read(read) => {
+                let answer = match read.property {
+                    0 => Ok(Value::Real(target)),
+                    1 => Ok(Value::Text("A-17".into())),
+                    _ => Err(Failure::Refused { name: "SensorFailed".into(), message: "no probe".into() }),
+                };
+                let _ = read.answer.send(answer);
+            }
+            Request::Call(call) => {
+                let news = match (call.command, call.arguments.first()) {
+                    (0, Some(Value::Real(13.0))) => {
+                        News::Failed(Failure::Refused { name: "SensorFailed".into(), message: "no probe".into() })
+                    }
+                    (0, Some(Value::Real(t))) => {
+                        target = *t;
+                        News::Done(Vec::new())
+                    }
+                    (1, Some(Value::Real(n))) if *n > 100.0 => News::NotNow("it is in use".into()),
+                    (1, _) => {
+                        let _ = call.news.send(News::Begun);
+                        std::thread::sleep(Duration::from_millis(50));
+                        News::Done(vec![Value::Real(target)])
+                    }
+                    _ => News::Done(Vec::new()),
+                };
+                let _ = call.news.send(news);
+            }
+        }
+    }
+}
+
+fn refused(result: Result<String, Failure>) -> (String, String) {
+    match result {
+        Err(Failure::Refused { name, message }) => (name, message),
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+#[test]
+fn a_client_and_a_server_understand_each_other() {
+    let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+    let (server, requests) = serve(any, "plate", "a plate", "1.0", vec![plate()]).expect("a port is free");
+    let working = std::thread::spawn(move || lab(requests));
+    let (address, time) = (server.address.to_string(), Duration::from_secs(5));
+    let mut client = Client::connect(&address, ID, time).expect("it answers");
+    assert_eq!(client.feature().id(), ID);
+    assert_eq!(client.ask("CurrentTemperature"), Ok("25".into()));
+    assert_eq!(client.ask("SiLAService.ServerName"), Ok("plate".into()));
+    let said = "SetTarget(Target: 60.5, Mode: fast, Quiet: true)";
+    assert_eq!(client.say(said, false), Ok(String::new()));
+    assert_eq!(client.ask("CurrentTemperature"), Ok("60.5".into()));
+    assert_eq!(refused(client.ask("Power")).0, "SensorFailed");
+    let sensor = refused(client.say("SetTarget(Target: 13, Mode: fast, Quiet: false)", false));
+    assert_eq!(sensor, ("SensorFailed".into(), "no probe".into()));
+    assert_eq!(client.say("HoldTemperature(Time: 0.5)", true), Ok("FinalTemperature: 60.5".into()));
+    assert_eq!(client.ask("HoldTemperature.FinalTemperature"), Ok("60.5".into()));
+    assert_eq!(refused(client.say("HoldTemperature(Time: 101)", true)).0, "CommandExecutionNotAccepted");
+    assert_eq!(client.say("HoldTemperature(Time: 0.5)", false), Ok(String::new()));
+    while !client.is_done("HoldTemperature").expect("it goes on") {}
+    for wrong in [
+        "SetTarget(Target: 400, Mode: fast, Quiet: true)",
+        "SetTarget(Target: 60, Mode: loud, Quiet: true)",
+        "SetTarget(Target: 60, Mode: fast)",
+        "SetTarget(Target: 60, Mode: fast, Quiet: true, More: 1)",
+        "Heat",
+        "Other.Heat",
+        "SetTarget(",
+    ] {
+        assert!(matches!(client.say(wrong, false), Err(Failure::Garbled(_))), "{wrong}");
+    }
+    let other = Client::connect(&address, "org.example/heating/Oven/v1", time).err();
+    assert!(matches!(other, Some(Failure::Garbled(why)) if why.contains("does not offer")));
+    drop(server);
+    assert!(matches!(client.say(said, false), Err(Failure::Lost(_))));
+    drop(client);
+    working.join().expect("the lab ends");
+}
+
+#[test]
+fn a_server_that_is_not_there_is_lost() {
+    let gone = Client::connect("127.0.0.1:1", ID, Duration::from_millis(500)).err();
+    assert!(matches!(gone, Some(Failure::Lost(_))), "{gone:?}");
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_understood_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
+        let feature = plate();
+        if let Ok(raw) = Raw::decode(bytes.as_slice()) {
+            for command in &feature.commands {
+                if let Ok(values) = decode(&feature, &command.parameters, &raw) {
+                    prop_assert!(encode(&feature, &command.parameters, &values).is_ok());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn any_text_is_a_call_or_refused(text in "\\PC{0,80}") {
+        let feature = plate();
+        let _ = call(&text);
+        for parameter in feature.commands.iter().flat_map(|c| &c.parameters) {
+            if let Ok(value) = value(&feature, &parameter.ty, &text) {
+                prop_assert!(!shown(&value).is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn values_go_over_the_wire_and_come_back(target in 0.0..340.0f64, fast in any::<bool>(), quiet in any::<bool>()) {
+        let feature = plate();
+        let parameters = &feature.commands[0].parameters;
+        let mode = if fast { "fast" } else { "slow" };
+        let values = vec![Value::Real(target), Value::Text(mode.into()), Value::Boolean(quiet)];
+        let raw = encode(&feature, parameters, &values).expect("they fit");
+        let back = Raw::decode(raw.encode_to_vec().as_slice()).expect("it is a message");
+        prop_assert_eq!(decode(&feature, parameters, &back), Ok(values));
+    }
+
+    #[test]
+    fn lists_go_over_the_wire_and_come_back(steps in proptest::collection::vec(-1e9..1e9f64, 0..5)) {
+        let feature = plate();
+        let parameters = &feature.command("Program").expect("it is there").parameters;
+        let values = vec![Value::List(steps.into_iter().map(Value::Real).collect())];
+        let raw = encode(&feature, parameters, &values).expect("they fit");
+        prop_assert_eq!(decode(&feature, parameters, &raw), Ok(values));
+    }
+}

@@ -1,0 +1,61 @@
+//! `matterixc serve`.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+
+use matterix_ir::Severity;
+
+use super::run::Findings;
+use crate::args::{Color, RunFormat, ServeArgs};
+use crate::pipeline::{self, Input, Options, Service, Wires};
+use crate::terminal::{Stream, print};
+use crate::{Exit, cancel, files};
+
+/// Offers a lab to others until it is interrupted; where it answers is printed first.
+pub fn serve(args: &ServeArgs, color: Color) -> Exit {
+    super::or_complain(attempt(args, color))
+}
+
+fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
+    let input = Input::file(&args.file, files::read(&args.file)?);
+    let bindings = match &args.bind {
+        Some(path) => {
+            let text = String::from_utf8(files::read(path)?);
+            Some((path, text.map_err(|_| format!("`{}` is not text in UTF-8", path.display()))?))
+        }
+        None => None,
+    };
+    let mut findings = Findings::new(RunFormat::Human, color);
+    let options = Options { workflow: args.workflow.clone(), wires: Wires::Offered, ..Options::default() };
+    let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
+    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    findings.show(&sources, diagnostics);
+    let Some(program) = program.filter(|_| !is_wrong) else {
+        findings.end();
+        return Ok(Exit::Findings);
+    };
+    let place = (args.host.as_str(), args.tcp).to_socket_addrs().ok().and_then(|mut all| all.next());
+    let address: SocketAddr = place.ok_or_else(|| format!("there is no host `{}`", args.host))?;
+    let file =
+        bindings.as_ref().map(|(path, text)| (sources.add(path.display().to_string(), text.clone()), text.as_str()));
+    let mut ready = |address: SocketAddr, catalogue: &matterix_hardware::serve::Catalogue<'_>| {
+        print(Stream::Out, &format!("{address}\n"));
+        for feature in &catalogue.features {
+            let (commands, properties) = (feature.commands.len(), feature.properties.len());
+            print(Stream::Err, &format!("{}: {commands} commands, {properties} properties\n", feature.id()));
+        }
+    };
+    let service = Service {
+        address,
+        bindings: file,
+        speed: args.speed,
+        seed: args.seed,
+        trace: args.trace,
+        cancel: cancel::on_interrupt_quietly()?,
+        ready: &mut ready,
+    };
+    let found = pipeline::serve(&program, &sources, service)?;
+    let failed = found.iter().any(|d| d.severity == Severity::Error);
+    findings.show(&sources, found);
+    findings.end();
+    Ok(if failed { Exit::Findings } else { Exit::Fine })
+}

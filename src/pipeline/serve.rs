@@ -1,0 +1,139 @@
+//! The lab of a program as a server of SiLA 2: on the twin, or on devices.
+
+// A fault ends the run: how many bytes it is returned in is of no account.
+#![allow(clippy::result_large_err)]
+
+use std::net::SocketAddr;
+use std::sync::atomic::AtomicBool;
+
+use matterix_hardware::binding;
+use matterix_hardware::codec::shown;
+use matterix_hardware::deploy::{Device, Hardware, Journal, Mode, Settings};
+use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
+use matterix_ir::offer::{Offer, Shown};
+use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources};
+use matterix_runtime::backend::{Backend, Prepared, Sim};
+use matterix_runtime::exec::{self, FailureTrace, Limits, RunStatus};
+use matterix_runtime::process::{Engine, Options};
+use matterix_sila_wire::serve as answer;
+
+use crate::terminal::{Stream, print};
+
+/// What a server is given beside a program.
+pub struct Service<'p> {
+    /// Where it answers.
+    pub address: SocketAddr,
+    /// The text of the bindings and the file they are in; the twin alone without them.
+    pub bindings: Option<(FileId, &'p str)>,
+    /// Seconds of lab time per second.
+    pub speed: f64,
+    /// Where the noise of the twin starts.
+    pub seed: u64,
+    /// Shows all that goes over lines.
+    pub trace: bool,
+    /// Ends it.
+    pub cancel: &'p AtomicBool,
+    /// Told where it answers, and what it offers.
+    pub ready: &'p mut dyn FnMut(SocketAddr, &Catalogue<'_>),
+}
+
+/// Serves until it is ended; what was wrong before, or went wrong then.
+pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Result<Vec<Diagnostic>, String> {
+    let prepared = Prepared::new(program);
+    let params = program.model.params.iter().map(|p| p.value).collect();
+    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
+    let engine = engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)).map_err(|f| f.message)?;
+    let twin = Sim::new(engine, &prepared, service.seed);
+    let Some((file, text)) = service.bindings else {
+        let mut twin = twin;
+        let offers = program.offers.commands.iter().collect();
+        let shown = program.offers.shown.iter().collect();
+        return attend(program, sources, &mut twin, offers, shown, service).map(|(found, _)| found);
+    };
+    let (bindings, found) = binding::read(program, file, text);
+    if found.iter().any(|d| d.severity == Severity::Error) {
+        return Ok(found);
+    }
+    let devices: Vec<Device<'_>> = bindings.into_iter().map(|b| Device::new(program, b)).collect::<Result<_, _>>()?;
+    let trace = service.trace;
+    let over = move |time: f64, device: &str, out: bool, bytes: &[u8]| {
+        if trace {
+            let way = if out { "<-" } else { "->" };
+            print(Stream::Out, &format!("{time:10.3} s  {device} {way} {}\n", shown(bytes)));
+        }
+    };
+    let nobody = |_: &str| false;
+    let settings = Settings { mode: Mode::Real, speed: service.speed, cancel: service.cancel, person: &nobody };
+    let mut hardware = Hardware::new(program, sources, twin, devices, settings, Journal::none(), Box::new(over));
+    // What no device does or tells is not offered.
+    let (offers, shown) = {
+        let (observed, devices) = hardware.view();
+        let driven = |o: &&Offer| {
+            let said = |step| devices.iter().any(|d| d.driver.is_some_and(|driver| driver.call(step).is_some()));
+            o.arrangements.iter().all(|a| operations(&program.plan, a.step).into_iter().all(said))
+        };
+        let seen = |s: &&Shown| !observed.asks(&program.model, s.value).1;
+        let offers: Vec<&Offer> = program.offers.commands.iter().filter(driven).collect();
+        let shown: Vec<&Shown> = program.offers.shown.iter().filter(seen).collect();
+        (offers, shown)
+    };
+    if let Err(fault) = hardware.open(false) {
+        let mut found = vec![of_fault(fault)];
+        found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
+        return Ok(found);
+    }
+    let (mut found, well) = attend(program, sources, &mut hardware, offers, shown, service)?;
+    if !well {
+        found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
+    }
+    found.extend(hardware.close().err().map(of_fault));
+    Ok(found)
+}
+
+/// Lets the executor do what is asked for, until it is ended; what went wrong, and whether nothing was going on then.
+fn attend<'p>(
+    program: &'p Program,
+    sources: &'p Sources,
+    backend: &mut dyn Backend,
+    offers: Vec<&'p Offer>,
+    shown: Vec<&'p Shown>,
+    service: Service<'_>,
+) -> Result<(Vec<Diagnostic>, bool), String> {
+    let catalogue = catalogue(&program.scene, offers, shown);
+    let (name, features) = (program.scene.lab.clone(), catalogue.features.clone());
+    let about = format!("The lab `{name}`.");
+    let version = env!("CARGO_PKG_VERSION");
+    let (server, requests) = answer(service.address, &name, &about, version, features)?;
+    (service.ready)(server.address, &catalogue);
+    let desk = Desk::new(catalogue, &program.scene, &program.plan, requests);
+    let mut say = |text: &str| print(Stream::Err, text);
+    let mut listener = Attendant::new(&desk, sources, &mut say);
+    let mut paced = Paced::new(backend, &desk, service.cancel, service.speed);
+    let limits = Limits { cancel: Some(service.cancel), horizon: f64::INFINITY, ..Limits::default() };
+    let execution = exec::execute(&program.plan, &program.scene, &mut paced, limits, &mut listener);
+    let well = execution.status == RunStatus::Cancelled;
+    desk.end(if well { "the server is shut down" } else { "the lab has come to a fault" });
+    // What was told last is still on its way.
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    drop(server);
+    let fault = execution.failure.iter().filter(|_| !well);
+    let found = fault.map(exec::diagnostic).map(|d| super::run::led_by_the_user(d, sources)).collect();
+    Ok((found, well && !desk.was_busy()))
+}
+
+/// The operations below a node of the plan.
+fn operations(plan: &Plan, step: StepId) -> Vec<StepId> {
+    let (mut found, mut open) = (Vec::new(), vec![step]);
+    while let Some(step) = open.pop() {
+        if matches!(plan.get(step).step, Step::Operation(_)) {
+            found.push(step);
+        }
+        open.extend(plan.get(step).step.children());
+    }
+    found
+}
+
+fn of_fault(fault: matterix_runtime::fault::Fault) -> Diagnostic {
+    exec::diagnostic(&FailureTrace::of_fault(fault))
+}

@@ -1,0 +1,371 @@
+"""SiLA 2 in both directions against the standard's reference implementation for Python.
+
+usage: sila.py MATTERIXC FOLDER
+
+`sila2` (PyPI, MIT) drives a lab that is served, and serves a plate that a workflow drives. The features that are served are held
+against the schema of the standard, which comes with it. Each line printed is a figure or a verdict; the exit status is 1 where one
+is bad.
+"""
+
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+import grpc
+import lxml.etree
+import sila2
+from sila2.client import SilaClient
+from sila2.framework import (
+    CommandExecutionNotAccepted,
+    CommandExecutionNotFinished,
+    DefinedExecutionError,
+    Feature,
+    SilaConnectionError,
+    ValidationError,
+)
+from sila2.server import FeatureImplementationBase, SilaServer
+
+COMMAND, FOLDER = os.path.abspath(sys.argv[1]), sys.argv[2]
+INPUTS = pathlib.Path(__file__).parent.parent / "deploy"
+FEATURE = (INPUTS / "hotplate.sila.xml").read_text()
+SPEED = 10
+BAD = []
+
+LAB = """mtx 1
+use std::heating::IkaRetControl
+use std::pumps::TubePump
+use std::glassware::Beaker250mL
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    beaker = Beaker250mL on plate holding 100 g of water
+}
+capability Turner {
+    param limit: Frequency
+    state turns: Ratio = 0
+    command turn for_a_while with(speed: Frequency)
+        needs speed <= limit else too_fast "turn more slowly"
+        fails jammed
+        effect turns = turns + 1
+        takes 3 s in 1 s .. 10 s
+}
+workflow idle in bench { wait 1 s }
+"""
+
+
+def verdict(what, good, said=""):
+    print(f"{'ok ' if good else 'BAD'} {what}{': ' + str(said) if said != '' else ''}", flush=True)
+    if not good:
+        BAD.append(what)
+
+
+def raised(call, kind):
+    """What a call raises, if it is of this kind."""
+    try:
+        call()
+    except kind as error:
+        return error
+    except Exception as error:  # noqa: BLE001
+        print("    another error:", type(error).__name__, error)
+    return None
+
+
+# ---- a lab, served
+
+
+def start(folder, text, *more):
+    os.makedirs(folder, exist_ok=True)
+    (pathlib.Path(folder) / "lab.mtx").write_text(text)
+    process = subprocess.Popen(
+        [COMMAND, "serve", "lab.mtx", "--tcp", "0", "--speed", str(SPEED), *more],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=open(os.path.join(folder, "said"), "w"),
+        text=True,
+    )
+    address = process.stdout.readline().strip()
+    if not address:
+        raise SystemExit(f"nothing is served: {open(os.path.join(folder, 'said')).read()}")
+    host, port = address.rsplit(":", 1)
+    return process, host, int(port)
+
+
+def schema():
+    return lxml.etree.XMLSchema(lxml.etree.parse(os.path.join(os.path.dirname(sila2.__file__), "resources", "xsd", "FeatureDefinition.xsd")))
+
+
+def served():
+    text = LAB.replace("    beaker =", "    turner = Turning at (1, 0, 0) m\n    beaker =").replace(
+        "workflow idle", "asset Turning: Turner { limit: 5 Hz }\nworkflow idle"
+    )
+    process, host, port = start(os.path.join(FOLDER, "served"), text)
+    try:
+        client = SilaClient(host, port, insecure=True)
+        service = client.SiLAService
+        names = service.ImplementedFeatures.get()
+        verdict("the official client connects", service.ServerName.get() == "bench", f"{len(names)} features")
+        xsd, valid = schema(), 0
+        for name in names:
+            definition = service.GetFeatureDefinition(name).FeatureDefinition
+            valid += xsd.validate(lxml.etree.fromstring(definition.encode()))
+        verdict("features keep to the standard's schema", valid == len(names), f"{valid} of {len(names)}")
+        service.SetServerName("renamed")
+        verdict("the server is renamed", service.ServerName.get() == "renamed")
+        missing = raised(lambda: service.GetFeatureDefinition("org.example/none/None/v1"), DefinedExecutionError)
+        verdict("a feature that is not there", missing is not None and missing.identifier == "UnimplementedFeature")
+
+        plate = client.PlateHeater
+        before = client.PlateThermometer.Temperature.get() if hasattr(client, "PlateThermometer") else None
+        plate.Heat(T=60.0)
+        verdict("a command sets what it sets", plate.Active.get() is True and abs(plate.Target.get() - 60.0) < 1e-9)
+        time.sleep(1.5)
+        warm = [p.get() for f in client._features.values() for n, p in vars(f).items() if n == "Temperature"]
+        verdict("the twin heats", any(t > (before or 22.5) for t in warm), f"{warm} degC")
+        needs = raised(lambda: plate.Heat(T=500.0), DefinedExecutionError)
+        verdict("a need that does not hold is a defined error", needs is not None, f"{needs!r:.160}")
+
+        turner = client.TurnerTurner
+        began = time.monotonic()
+        turning = turner.TurnForAWhile(Speed=2.0)
+        early = raised(turning.get_responses, CommandExecutionNotFinished)
+        busy = raised(lambda: turner.TurnForAWhile(Speed=2.0), CommandExecutionNotAccepted)
+        verdict("it cannot be asked for its end too early", early is not None)
+        verdict("a device that is in use takes no other command", busy is not None, busy)
+        news = []
+        while not turning.done:
+            news.append((turning.status, turning.progress))
+            time.sleep(0.02)
+        took = time.monotonic() - began
+        turning.get_responses()
+        moved = sorted({p for _, p in news if p is not None})
+        verdict("an observable command", 0.2 < took < 3 and len(moved) > 1, f"{took:.2f} s, progress {moved}")
+        verdict("its effect", turner.Turns.get() == 1.0, turner.Turns.get())
+        fast = turner.TurnForAWhile(Speed=9.0)
+        while not fast.done:
+            time.sleep(0.02)
+        error = raised(fast.get_responses, DefinedExecutionError)
+        verdict("a failure of an observable command", error is not None and error.identifier == "TooFast", f"{error!r:.160}")
+        seen = turner.Turns.subscribe()
+        first = next(iter(seen))
+        turner.TurnForAWhile(Speed=1.0)
+        second = next(iter(seen))
+        seen.cancel()
+        verdict("a property that is subscribed to", (first, second) == (1.0, 2.0), (first, second))
+        rubbish(host, port, names)
+        verdict("it still answers after rubbish", service.ServerName.get() == "renamed")
+        client.close()
+        process.send_signal(signal.SIGTERM)
+        verdict("it ends when it is told to", process.wait(10) == 0)
+    finally:
+        process.kill()
+
+
+def rubbish(host, port, names):
+    for content in (b"GET / HTTP/1.1\r\n\r\n", b"\x00" * 4096, b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + b"\xff" * 2000):
+        with socket.create_connection((host, port)) as stream:
+            stream.sendall(content)
+    channel = grpc.insecure_channel(f"{host}:{port}")
+    ends = set()
+    for path in ["/x", "/x/y", "/sila2.org.silastandard.core.silaservice.v1.SiLAService/Get_ServerName"]:
+        for message in (b"", b"\xff\xff\xff\xff", b"\x0a\x7f\x00", os.urandom(64)):
+            try:
+                channel.unary_unary(path)(message, timeout=5)
+                ends.add("answered")
+            except grpc.RpcError as error:
+                ends.add(error.code().name)
+    heat = next(n for n in names if n.endswith("PlateHeater/v1")).split("/")
+    path = f"/sila2.{heat[0]}.{heat[1]}.{heat[2].lower()}.{heat[3]}.{heat[2]}/Heat"
+    for message in (b"", b"\x0a\x00", b"\x0a\x09\x09" + struct.pack("<d", float("nan")), b"\x0a\x05hello", b"\x0a\x02\xff\xff"):
+        try:
+            channel.unary_unary(path)(message, timeout=5)
+            ends.add("obeyed")
+        except grpc.RpcError as error:
+            ends.add(error.code().name)
+    channel.close()
+    verdict("rubbish is refused", {"UNIMPLEMENTED", "ABORTED"} <= ends and "obeyed" not in ends, sorted(ends))
+
+
+# ---- a plate of the official server, driven by a workflow
+
+
+class Plate(FeatureImplementationBase):
+    def __init__(self, server, trouble=None):
+        super().__init__(server)
+        from queue import Queue
+
+        self._CurrentTemperature_producer_queue = Queue()
+        self.HoldTemperature_default_lifetime_of_execution = None
+        self.heard, self.trouble, self.temperature = [], trouble, 25.0
+        self._CurrentTemperature_producer_queue.put(self.temperature)
+
+    def SetTarget(self, Target, Mode, Quiet, *, metadata):
+        self.heard.append(("SetTarget", Target, Mode, Quiet))
+        if self.trouble == "fails":
+            raise self.parent_server.features["HotPlate"].defined_execution_errors["SensorFailed"].error_class("no probe") if False else failed(self)
+        if self.trouble == "silent":
+            time.sleep(30)
+        self.temperature = Target
+        self._CurrentTemperature_producer_queue.put(self.temperature)
+
+    def HoldTemperature(self, Time, *, metadata, instance):
+        self.heard.append(("HoldTemperature", Time))
+        instance.begin_execution()
+        for i in range(10):
+            instance.send_intermediate_response(i * 0.1)
+            instance.progress = i / 10
+            time.sleep(Time * 60 / 10)
+            if self.trouble == "fails while it lasts":
+                raise failed(self)
+            if self.trouble == "cut" and i == 3:
+                self.cut()
+                time.sleep(60)
+        return self.temperature - 0.5
+
+    def Stop(self, *, metadata):
+        self.heard.append(("Stop",))
+
+    def Program(self, Steps, *, metadata):
+        self.heard.append(("Program", Steps))
+
+    def get_SerialNumber(self, *, metadata):
+        return "A-17"
+
+    def get_Power(self, *, metadata):
+        return 2.5
+
+
+def failed(plate):
+    """The error that the feature defines."""
+
+    class SensorFailed(DefinedExecutionError):
+        def __init__(self):
+            feature = plate.parent_server.features["HotPlate"]
+            super().__init__("the probe is broken", feature.defined_execution_errors["SensorFailed"].fully_qualified_identifier)
+
+    return SensorFailed()
+
+
+class Relay:
+    """A connection that can be cut."""
+
+    def __init__(self, to):
+        self.to, self.open, self.listener = to, [], socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def accept(self):
+        while True:
+            try:
+                here, _ = self.listener.accept()
+            except OSError:
+                return
+            there = socket.create_connection(self.to)
+            self.open += [here, there]
+            for a, b in ((here, there), (there, here)):
+                threading.Thread(target=self.pump, args=(a, b), daemon=True).start()
+
+    def pump(self, a, b):
+        try:
+            while data := a.recv(4096):
+                b.sendall(data)
+        except OSError:
+            pass
+
+    def cut(self):
+        for stream in self.open:
+            try:
+                stream.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+
+def free():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return listener.getsockname()[1]
+
+
+def plate(trouble=None, feature=FEATURE):
+    server = SilaServer("plate", "Plate", "a plate", "1.0", "https://example.org")
+    implementation = Plate(server, trouble)
+    server.set_feature_implementation(Feature(feature), implementation)
+    port = free()
+    server.start_insecure("127.0.0.1", port, enable_discovery=False)
+    relay = Relay(("127.0.0.1", port))
+    implementation.cut = relay.cut
+    return server, implementation, f"127.0.0.1:{relay.listener.getsockname()[1]}"
+
+
+def deploy(name, address, text=None, mode="real"):
+    folder = pathlib.Path(FOLDER) / name
+    folder.mkdir()
+    shutil.copy(INPUTS / "hotplate.sila.xml", folder)
+    (folder / "lab.mtx").write_text(text or (INPUTS / "hotplate.mtx").read_text())
+    (folder / "lab.toml").write_text(f'[plate]\nsila = "{address}"\n')
+    arguments = [COMMAND, "deploy", "lab.mtx", "--bind", "lab.toml", "--mode", mode]
+    arguments += [] if mode == "dry" else ["--journal", "journal"]
+    return subprocess.run(arguments, cwd=folder, capture_output=True, text=True, timeout=120)
+
+
+def last(ended):
+    lines = ended.stderr.strip().splitlines()
+    return lines[-1] if lines else ""
+
+
+def driven():
+    server, one, address = plate()
+    dry = deploy("dry", address, mode="dry")
+    verdict("a dry run says what would be called", "SetTarget(Target: 60, Mode: fast, Quiet: true)" in dry.stdout and not one.heard, last(dry))
+    ended = deploy("whole", address)
+    heard = [h[:2] for h in one.heard]
+    verdict("a workflow drives the official server", ended.returncode == 0, last(ended))
+    wanted = [("SetTarget", 60.0), ("HoldTemperature", 0.02), ("Stop",)]
+    verdict("what it heard", heard == wanted and one.heard[0][2:] == ("fast", True), one.heard)
+    if ended.returncode:
+        print(ended.stdout, ended.stderr)
+    server.stop()
+
+    handled = (INPUTS / "hotplate.mtx").read_text().replace("} finally", '} on sensor_failed {\n    note "handled"\n} finally')
+    cases = [
+        ("fails", None, "sensor_failed", "lab.mtx:"),
+        ("fails while it lasts", None, "sensor_failed", "lab.mtx:"),
+        ("fails", handled, "handled", ""),
+        ("cut", None, "error[device-lost]", "lab.mtx:"),
+    ]
+    for number, (trouble, text, wanted, place) in enumerate(cases):
+        server, one, address = plate(trouble)
+        ended = deploy(f"trouble {number}", address, text)
+        good = wanted in ended.stderr and place in ended.stderr and ended.returncode == (0 if text else 1)
+        safe = one.heard[-1:] == [("Stop",)] or trouble == "cut"
+        verdict(f"the server {trouble}{', handled' if text else ''}", good and safe, last(ended))
+        if not (good and safe):
+            print(ended.stderr, one.heard)
+        server.stop()
+
+    server, one, address = plate("silent")
+    ended = deploy("silent", address)
+    verdict("a server that does not answer", ended.returncode == 1 and "error[device-lost]" in ended.stderr and "lab.mtx:" in ended.stderr, last(ended))
+    verdict("is told to stop all the same", ("Stop",) in one.heard, one.heard)
+    server.stop()
+
+    server, one, address = plate(feature=FEATURE)
+    other = (INPUTS / "hotplate.mtx").read_text()
+    folder = pathlib.Path(FOLDER) / "other feature"
+    folder.mkdir()
+    (folder / "hotplate.sila.xml").write_text(FEATURE.replace("org.example", "org.another"))
+    (folder / "lab.mtx").write_text(other)
+    (folder / "lab.toml").write_text(f'[plate]\nsila = "{address}"\n')
+    arguments = [COMMAND, "deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal"]
+    ended = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, timeout=60)
+    verdict("a server with other features", ended.returncode == 1 and "does not offer `org.another/heating/HotPlate/v1`" in ended.stderr and not one.heard)
+    server.stop()
+
+
+served()
+driven()
+sys.exit(1 if BAD else 0)
