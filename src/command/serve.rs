@@ -29,10 +29,11 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, diagnostics);
-    let Some(program) = program.filter(|_| !is_wrong) else {
+    let Some(mut program) = program.filter(|_| !is_wrong) else {
         findings.end();
         return Ok(Exit::Findings);
     };
+    matterix_hardware::serve::wait_for_ever(&mut program);
     let place = (args.host.as_str(), args.tcp).to_socket_addrs().ok().and_then(|mut all| all.next());
     let address: SocketAddr = place.ok_or_else(|| format!("there is no host `{}`", args.host))?;
     let file =

@@ -28,7 +28,6 @@ pub struct Declared {
 
 /// Text that is put together.
 struct Writer<'f> {
-    feature: &'f Feature,
     types: Types<'f>,
     /// Lines of the capability.
     members: String,
@@ -54,7 +53,6 @@ pub fn declared(members: &[Member]) -> BTreeSet<String> {
 /// A feature as a capability of this name and a driver for it; what the capability declares by itself is left to it.
 pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTreeSet<String>) -> Declared {
     let mut writer = Writer {
-        feature,
         types: Types::new(feature, units, capability),
         members: String::new(),
         wires: String::new(),

@@ -1,9 +1,9 @@
 //! What a lab offers to others: every command of its devices, written out apart from any workflow, and what they show.
 
 use matterix_ir::offer::{Arranged, Kind, Offer, Parameter, Shown};
-use matterix_ir::plan::{Condition, Step};
+use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Severity, Span, Unit};
+use matterix_ir::{Severity, Unit};
 
 use super::{Arrangement, Mapped};
 use crate::ast::{Clause, ClauseKind, ItemKind, Member, MemberKind, Param, Role, Sig};
@@ -26,7 +26,9 @@ impl<'a> Planner<'a, '_> {
             for m in members {
                 match &m.member.kind {
                     MemberKind::Command { .. } => self.offer(id, m),
-                    MemberKind::Value { role: Role::Reading | Role::State, .. } if is_top && !self.draft => {
+                    MemberKind::Value { role: Role::Reading | Role::State | Role::Derived, .. }
+                        if is_top && !self.draft =>
+                    {
                         let shown = self.shown_of(id, m);
                         self.offers.shown.extend(shown);
                     }
@@ -210,7 +212,7 @@ impl<'a> Planner<'a, '_> {
         Kind::Quantity { unit, bases }
     }
 
-    /// A reading or a state, where it is a number, a truth or a word.
+    /// A reading, a state or what follows from states, where it is a number, a truth or a word.
     fn shown_of(&mut self, id: InstanceId, m: MemberRef<'a>) -> Option<Shown> {
         let MemberKind::Value { name, ty, options, .. } = &m.member.kind else { return None };
         if options.iter().any(|o| o.name.text == "hidden") {
@@ -238,21 +240,6 @@ impl<'a> Planner<'a, '_> {
             kind,
             value,
         })
-    }
-
-    /// What never comes to an end: the plan of a lab that waits for what others ask of it.
-    pub(in crate::lower) fn idle(&mut self) -> Step {
-        let node = self.lab.graph.number(0.0);
-        let condition = Condition {
-            node,
-            text: "the end".to_owned(),
-            span: Span::default(),
-            compared: Vec::new(),
-            terms: Vec::new(),
-            refusal: None,
-            each: Vec::new(),
-        };
-        Step::WaitUntil { condition, timeout: None }
     }
 }
 
