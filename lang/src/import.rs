@@ -98,9 +98,9 @@ pub fn features(
         };
         let declared = sila::declarations(&feature, &name.text, units, sila::declared(members));
         if !declared.left_out.is_empty() {
-            let list: Vec<String> = declared.left_out.iter().map(|(what, why)| format!("`{what}` {why}")).collect();
+            let list: Vec<String> = declared.left_out.iter().map(|(what, why)| format!("`{what}`, {why}")).collect();
             let headline = format!("not all of `{}` can be used: {}", feature.identifier, list.join("; "));
-            found.push(Diagnostic::warning(codes::SILA_FILE, path.span, headline, "in this file"));
+            found.push(Diagnostic::advice(codes::SILA_FILE, path.span, headline, "in this file"));
         }
         let written = sources.add(format!("{} as `{}`", path.text, name.text), declared.text.as_str());
         let (inner, wrong) = crate::syntax::parse(written, &declared.text);

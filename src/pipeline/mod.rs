@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use matterix_ir::points::Points;
 use matterix_ir::script::Wiring;
-use matterix_ir::{Diagnostic, FileId, Program, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::args::Fidelity;
 use matterix_runtime::motion::{Store, preflight};
@@ -114,6 +114,12 @@ pub fn contents(input: &Input) -> (Sources, Vec<Diagnostic>, Vec<Points>) {
     (sources, found, points)
 }
 
+/// Findings of what is to be done, not looked through: advice is for `check`.
+fn without_advice(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    found.retain(|d| d.severity != Severity::Advice);
+    found
+}
+
 /// A file as a program, with findings; no program where there is an error.
 pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
@@ -121,7 +127,7 @@ pub fn compile(input: &Input, options: &Options) -> (Sources, Option<Program>, V
         Ok(file) => matterix_lang::compile(&mut sources, file, &input.neighbours(), options),
         Err(found) => (None, vec![found]),
     };
-    (sources, program, found)
+    (sources, program, without_advice(found))
 }
 
 /// A file as a program, with what drivers over a wire say; none of both where there is an error.
@@ -135,7 +141,7 @@ pub fn wire(
         Ok(file) => matterix_lang::script(&mut sources, file, &input.neighbours(), options, transport),
         Err(found) => (None, vec![found]),
     };
-    (sources, wired, found)
+    (sources, wired, without_advice(found))
 }
 
 /// A workflow of a file as a protocol for people, with findings; no text where there is an error.
@@ -145,7 +151,7 @@ pub fn document(input: &Input, options: &Options) -> (Sources, Option<String>, V
         Ok(file) => matterix_lang::document(&mut sources, file, &input.neighbours(), options),
         Err(found) => (None, vec![found]),
     };
-    (sources, text, found)
+    (sources, text, without_advice(found))
 }
 
 /// The tests of a file whose names hold `wanted`, with what is wrong with the file beside them.

@@ -74,7 +74,18 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
             o.arrangements.iter().all(|a| operations(&program.plan, a.step).into_iter().all(said))
         };
         let seen = |s: &&Shown| !observed.asks(&program.model, s.value).1;
-        let offers: Vec<&Offer> = program.offers.commands.iter().filter(driven).collect();
+        let offers = program.offers.commands.iter().filter(driven).cloned();
+        let refusable = |mut offer: Offer| {
+            let drivers = devices.iter().filter_map(|d| d.driver);
+            let refused = drivers.flat_map(|d| d.refusals.iter().map(|r| r.failure.clone()));
+            for failure in refused.collect::<Vec<_>>() {
+                if !offer.fails.contains(&failure) {
+                    offer.fails.push(failure);
+                }
+            }
+            offer
+        };
+        let offers: Vec<Offer> = offers.map(refusable).collect();
         let shown: Vec<&Shown> = program.offers.shown.iter().filter(seen).collect();
         (offers, shown)
     };
@@ -83,7 +94,7 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
         found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
         return Ok(found);
     }
-    let (mut found, well) = attend(program, sources, &mut hardware, offers, shown, service)?;
+    let (mut found, well) = attend(program, sources, &mut hardware, offers.iter().collect(), shown, service)?;
     if !well {
         found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
     }
@@ -92,12 +103,12 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
 }
 
 /// Lets the executor do what is asked for, until it is ended; what went wrong, and whether nothing was going on then.
-fn attend<'p>(
-    program: &'p Program,
-    sources: &'p Sources,
+fn attend(
+    program: &Program,
+    sources: &Sources,
     backend: &mut dyn Backend,
-    offers: Vec<&'p Offer>,
-    shown: Vec<&'p Shown>,
+    offers: Vec<&Offer>,
+    shown: Vec<&Shown>,
     service: Service<'_>,
 ) -> Result<(Vec<Diagnostic>, bool), String> {
     let catalogue = catalogue(&program.scene, offers, shown);

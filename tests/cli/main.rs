@@ -30,6 +30,7 @@ mod plan;
 mod reference;
 mod science;
 mod screening;
+mod sila;
 mod slips;
 mod strict;
 mod studies;

@@ -7,6 +7,7 @@ against the schema of the standard, which comes with it. Each line printed is a 
 is bad.
 """
 
+import logging
 import os
 import pathlib
 import shutil
@@ -27,6 +28,7 @@ from sila2.framework import (
     CommandExecutionNotFinished,
     DefinedExecutionError,
     Feature,
+    UndefinedExecutionError,
     ValidationError,
 )
 from sila2.server import FeatureImplementationBase, SilaServer
@@ -54,6 +56,15 @@ capability Turner {
         fails jammed
         effect turns = turns + 1
         takes 3 s in 1 s .. 10 s
+}
+/// Warms a plate and lets it be.
+skill warm_up(plate: Heater) to(t: Temperature)
+    fails cold
+    takes 2 s in 0 s .. 1 min
+{
+    heat plate to t
+    wait 2 s
+    stop heating plate
 }
 workflow idle in bench { wait 1 s }
 """
@@ -168,6 +179,14 @@ def served():
             time.sleep(0.02)
         error = raised(fast.get_responses, DefinedExecutionError)
         verdict("a failure of an observable command", error is not None and error.identifier == "TooFast", f"{error!r:.160}")
+        warming = client.BenchSkills.WarmUp(Plate="plate", T=45.0)
+        held = raised(lambda: plate.Heat(T=30.0), CommandExecutionNotAccepted)
+        while not warming.done:
+            time.sleep(0.02)
+        warming.get_responses()
+        verdict("a skill of the file", held is not None and plate.Target.get() == 45.0 and plate.Active.get() is False, held)
+        wrong = raised(lambda: client.BenchSkills.WarmUp(Plate="beaker", T=45.0), ValidationError)
+        verdict("a thing that does not fit", wrong is not None, f"{wrong!r:.120}")
         seen = turner.Turns.subscribe()
         first = next(iter(seen))
         turner.TurnForAWhile(Speed=1.0)
@@ -384,6 +403,94 @@ def driven():
     server.stop()
 
 
+def served_on_devices():
+    """Client, served lab, official server: what is called goes through."""
+    server, one, address = plate()
+    folder = os.path.join(FOLDER, "on devices")
+    os.makedirs(folder)
+    (pathlib.Path(folder) / "lab.toml").write_text(f'[plate]\nsila = "{address}"\n')
+    process, host, port = start(folder, OWN, "--bind", "lab.toml")
+    try:
+        client = SilaClient(host, port, insecure=True)
+        client.PlateHeater.Heat(T=70.0)
+        verdict("a served lab on devices", one.heard == [("SetTarget", 70.0, "fast", False)], one.heard)
+        verdict("tells what they tell", client.PlateWarm.Temperature.get() == 70.0)
+        verdict("offers what they can do only", not hasattr(client, "PlateStirrer") or not hasattr(client.PlateStirrer, "Stir"))
+        one.trouble = "fails"
+        error = raised(lambda: client.PlateHeater.Heat(T=60.0), DefinedExecutionError)
+        verdict("a refusal goes through", error is not None and error.identifier == "SensorFailed", f"{error!r:.120}")
+        one.trouble = None
+        client.close()
+        process.send_signal(signal.SIGTERM)
+        verdict("it leaves them safe", process.wait(15) == 0 and one.heard[-1] == ("Stop",), one.heard)
+    finally:
+        process.kill()
+    process, host, port = start(folder, OWN, "--bind", "lab.toml")
+    try:
+        client = SilaClient(host, port, insecure=True)
+        one.cut()
+        error = raised(lambda: client.PlateHeater.Heat(T=50.0), UndefinedExecutionError)
+        verdict("a device that is lost ends it", error is not None and process.wait(20) == 1, f"{error!r:.120}")
+        said = open(os.path.join(folder, "said")).read()
+        verdict("with a fault, and safe", "error[device-lost]" in said and one.heard[-1] == ("Stop",), one.heard)
+    finally:
+        process.kill()
+        server.stop()
+
+
+BLOCK = """mtx 1
+capability Block from sila "block.sila.xml"
+asset Peltier: Block {
+    control_temperature_takes: 5 s
+    control_temperature_timeout: 1 min
+    supposed_final_temperature: 40
+    supposed_current_temperature: 40 degC
+    supposed_control_temperature_current_temperature: 40
+    supposed_previous_ramp_rate: 1
+    supposed_target_temperature: 40 degC
+    supposed_ramp_rate: 10
+}
+lab bench { ambient: 22 degC, block = Peltier at (0, 0, 0) m }
+workflow warm in bench {
+    set ramp rate block { ramp_rate: 10 K/s }
+    control temperature block { target_temperature: 313.15 K }
+    expect block.final_temperature in 39 .. 41
+    expect block.current_temperature in 39 degC .. 41 degC
+    expect block.target_temperature == 40 degC
+    expect block.ramp_rate == 10
+} finally { switch off block }
+"""
+
+
+def another_author():
+    """A server by somebody else, and a client."""
+    try:
+        from labmcp_sila2.simulator import TEMPERATURE_CONTROLLER_FDL, SimulatedSilaServer
+    except ImportError as why:
+        print(f"skipped: labmcp-sila2: {why}")
+        return
+    server = SimulatedSilaServer().start()
+    folder = pathlib.Path(FOLDER) / "block"
+    folder.mkdir()
+    (folder / "block.sila.xml").write_text(TEMPERATURE_CONTROLLER_FDL)
+    (folder / "lab.mtx").write_text(BLOCK)
+    (folder / "lab.toml").write_text(f'[block]\nsila = "127.0.0.1:{server.port}"\n')
+    arguments = [COMMAND, "deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal"]
+    ended = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, timeout=120)
+    verdict("a workflow on labmcp-sila2", ended.returncode == 0, last(ended))
+    if ended.returncode:
+        print(ended.stderr)
+    server.stop()
+    process, host, port = start(os.path.join(FOLDER, "bridge"), OWN)
+    bridge = [os.path.join(os.path.dirname(sys.executable), "labmcp-sila2"), "-a", f"{host}:{port}"]
+    seen = subprocess.run([*bridge, "--option", "insecure=true", "--check"], capture_output=True, text=True, timeout=60)
+    verdict("labmcp-sila2 on a served lab", seen.returncode == 0 and "bench" in seen.stdout, seen.stdout.strip()[:120])
+    process.kill()
+
+
+logging.disable(logging.CRITICAL)
 served()
 driven()
+served_on_devices()
+another_author()
 sys.exit(1 if BAD else 0)

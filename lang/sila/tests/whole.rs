@@ -106,26 +106,32 @@ fn data_type() -> impl Strategy<Value = DataType> {
     })
 }
 
+/// Identifier, and what people read.
+type Head = (String, String, String);
+
+/// A command: given and answered.
+type Told = (Head, bool, DataType, DataType);
+
 fn feature() -> impl Strategy<Value = Feature> {
     let commands = proptest::collection::vec((named(), any::<bool>(), data_type(), data_type()), 0..3);
     let properties = proptest::collection::vec((named(), any::<bool>(), data_type()), 0..3);
     (named(), commands, properties, named()).prop_map(|(head, commands, properties, error)| {
         let numbered = |name: &str, i: usize| format!("{name}N{i}");
         let element = |ty| Element { identifier: "A".into(), display: "a".into(), description: String::new(), ty };
-        let command = |(i, ((id, display, description), observable, given, answered))| Command {
-            identifier: numbered(&id, i),
-            display,
-            description,
+        let command = |(i, (head, observable, given, answered)): (usize, Told)| Command {
+            identifier: numbered(&head.0, i),
+            display: head.1,
+            description: head.2,
             observable,
             parameters: vec![element(given)],
             responses: vec![element(answered)],
             intermediate: Vec::new(),
             errors: vec![error.0.clone()],
         };
-        let property = |(i, ((id, display, description), observable, ty))| Property {
-            identifier: numbered(&id, i),
-            display,
-            description,
+        let property = |(i, (head, observable, ty)): (usize, (Head, bool, DataType))| Property {
+            identifier: numbered(&head.0, i),
+            display: head.1,
+            description: head.2,
             observable,
             ty,
             errors: Vec::new(),

@@ -14,7 +14,7 @@ impl Writer<'_> {
             let given = match self.types.given(&option, &parameter.ty) {
                 Ok(given) => given,
                 Err(why) => {
-                    let why = format!("its parameter `{}` {why}", parameter.identifier);
+                    let why = format!("whose parameter `{}` {why}", parameter.identifier);
                     return self.leave_out(&command.identifier, why);
                 }
             };

@@ -60,10 +60,11 @@ pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTr
         own,
         told: BTreeSet::new(),
     };
-    feature.commands.iter().for_each(|c| writer.command(c));
+    // Properties first: a response of the same name gets a longer one.
     for property in &feature.properties {
         writer.reading(&property.identifier, &name(&property.identifier), &property.ty, &property.description);
     }
+    feature.commands.iter().for_each(|c| writer.command(c));
     for error in &feature.errors {
         writer.wire(&format!("reply \"{}\" fails {}", error.identifier, name(&error.identifier)));
     }
@@ -107,15 +108,14 @@ impl Writer<'_> {
     fn reading(&mut self, asks: &str, member: &str, ty: &matterix_sila::feature::DataType, description: &str) {
         let told = match self.types.told(ty) {
             Ok(told) => told,
-            Err(why) => return self.leave_out(asks, why),
+            Err(why) => return self.leave_out(asks, format!("which {why}")),
         };
-        // Two commands may answer something of the same name.
         let member = match self.told.contains(member) {
             true => name(&asks.replace('.', "")),
             false => member.to_owned(),
         };
         if !self.told.insert(member.clone()) {
-            return;
+            return self.leave_out(asks, format!("which would have the name `{member}` of another"));
         }
         if !self.own.contains(&member) {
             let supposed = format!("supposed_{member}");

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::future::Future;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use http::uri::PathAndQuery;
+use hyper_util::rt::TokioIo;
 use matterix_sila::feature::{Command, Element, Feature};
 use prost::Message;
+use tokio::net::TcpStream;
 use tokio::runtime::{Builder, Runtime};
 use tonic::client::Grpc;
 use tonic::transport::{Channel, Endpoint};
@@ -22,6 +25,10 @@ use crate::value::{Value, decode, encode};
 
 /// Longest time in which news of an execution is waited for when it is only looked at.
 const GLANCE: Duration = Duration::from_millis(20);
+
+/// How often a server is asked for something while a command goes on of which nothing is heard. Pings of HTTP/2 would do,
+/// but servers of gRPC turn those away who send more than one in some minutes.
+const WATCH: Duration = Duration::from_secs(5);
 
 /// A command that goes on.
 struct Running {
@@ -40,26 +47,47 @@ pub struct Client {
     running: BTreeMap<(usize, String), Running>,
     /// What commands answered last, and told while they went on.
     last: BTreeMap<(usize, String), Vec<(String, Value)>>,
+    /// When it was last asked whether it is there.
+    seen: Instant,
 }
 
 impl Client {
     /// A connection to a server, `HOST:PORT`, that must offer this feature; no call lasts longer than `timeout`. The
     /// connection is not encrypted.
+    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
     pub fn connect(address: &str, feature: &str, timeout: Duration) -> Result<Client, Failure> {
         let lost = |why: String| Failure::Lost(format!("cannot connect to `{address}`: {why}"));
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.map_err(|e| lost(e.to_string()))?;
         let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(|e| lost(e.to_string()))?;
-        let endpoint = endpoint
-            .connect_timeout(timeout)
-            .http2_keep_alive_interval(Duration::from_secs(10))
-            .keep_alive_timeout(timeout);
-        let channel = within(&runtime, timeout, endpoint.connect())
+        // A connection that is gone is not made again in silence: nobody knows what became of the device meanwhile.
+        let once = AtomicBool::new(false);
+        let place = address.to_owned();
+        let connector = tower::service_fn(move |_: http::Uri| {
+            let (again, place) = (once.swap(true, Ordering::SeqCst), place.clone());
+            async move {
+                if again {
+                    return Err(std::io::Error::other("it was cut"));
+                }
+                let stream = TcpStream::connect(place).await?;
+                stream.set_nodelay(true)?;
+                Ok(TokioIo::new(stream))
+            }
+        });
+        let channel = within(&runtime, timeout, endpoint.connect_with_connector(connector))
             .ok_or_else(|| lost("it did not answer in time".to_owned()))?
             .map_err(|e| lost(source(&e)))?;
         let grpc = Grpc::new(channel).max_decoding_message_size(16 << 20);
         let features = vec![service::feature()];
-        let mut client = Client { runtime, grpc, timeout, features, running: BTreeMap::new(), last: BTreeMap::new() };
+        let mut client = Client {
+            runtime,
+            grpc,
+            timeout,
+            features,
+            running: BTreeMap::new(),
+            last: BTreeMap::new(),
+            seen: Instant::now(),
+        };
         let offered = client.read(0, "ImplementedFeatures")?;
         let offered: Vec<String> = match offered {
             Value::List(list) => list.iter().map(shown).collect(),
@@ -116,22 +144,23 @@ impl Client {
         if !waited {
             return Ok(String::new());
         }
-        let until = self.timeout;
-        loop {
-            let Some(running) = self.running.get_mut(&key) else { return Ok(String::new()) };
-            let news = within(&self.runtime, until, running.news.message());
-            let news = news
-                .ok_or_else(|| Failure::Lost(format!("nothing came of `{}` within {} s", key.1, until.as_secs_f64())));
-            let stage = match news? {
-                Ok(Some(info)) => info.stage(),
-                Ok(None) => Stage::Done,
-                Err(status) => return Err(Failure::of(&status)),
-            };
-            if matches!(stage, Stage::Done | Stage::Failed) {
-                self.end(&key, &command)?;
-                return Ok(self.last.get(&key).map(|v| named(v)).unwrap_or_default());
+        let late = Failure::Lost(format!("`{}` did not end within {} s", key.1, self.timeout.as_secs_f64()));
+        if let Some(running) = self.running.get_mut(&key) {
+            let ended = within(&self.runtime, self.timeout, async {
+                while let Some(info) = running.news.message().await? {
+                    if has_ended(&info) {
+                        break;
+                    }
+                }
+                Ok::<(), tonic::Status>(())
+            });
+            if let Some(failure) = ended.map_or(Some(late), |end| end.err().map(|s| Failure::of(&s))) {
+                self.running.remove(&key);
+                return Err(failure);
             }
         }
+        self.end(&key, &command)?;
+        Ok(self.last.get(&key).map(|answered| named(answered)).unwrap_or_default())
     }
 
     /// Whether a command that was begun has ended; its failure, if that is how.
@@ -141,11 +170,20 @@ impl Client {
         let Some(command) = self.features[key.0].command(&key.1).cloned() else {
             return Err(Failure::Garbled(format!("`{asked}` is no command")));
         };
-        let Some(running) = self.running.get_mut(&key) else { return Ok(true) };
+        let Some(running) = self.running.get_mut(&key) else {
+            return match self.last.contains_key(&key) {
+                true => Ok(true),
+                false => Err(Failure::Garbled(format!(
+                    "`{}` was not begun over this connection: whether it has ended is not known",
+                    key.1
+                ))),
+            };
+        };
         loop {
             match within(&self.runtime, GLANCE, running.news.message()) {
-                None => return Ok(false),
-                Some(Ok(Some(info))) if matches!(info.stage(), Stage::Waiting | Stage::Running) => {}
+                // A server that is gone without a word is missed when it is asked for something.
+                None => return self.is_there().map(|()| false),
+                Some(Ok(Some(info))) if !has_ended(&info) => {}
                 Some(Ok(_)) => break,
                 Some(Err(status)) => {
                     self.running.remove(&key);
@@ -154,6 +192,17 @@ impl Client {
             }
         }
         self.end(&key, &command).map(|()| true)
+    }
+
+    /// Asks now and then for something that every server knows.
+    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
+    fn is_there(&mut self) -> Result<(), Failure> {
+        if self.seen.elapsed() < WATCH {
+            return Ok(());
+        }
+        self.seen = Instant::now();
+        let service = self.features.iter().position(|f| f.identifier == service::IDENTIFIER).unwrap_or(0);
+        self.read(service, "ServerUUID").map(|_| ())
     }
 
     /// Asks for a property, or for what a command told or answered last: `HoldTemperature.FinalTemperature`.
@@ -315,6 +364,10 @@ impl Client {
         let answer = within(&self.runtime, self.timeout, call);
         answer.unwrap_or(Err(silent))
     }
+}
+
+fn has_ended(info: &Info) -> bool {
+    matches!(info.stage(), Stage::Done | Stage::Failed)
 }
 
 /// What comes of something, unless it takes longer than that.

@@ -69,6 +69,8 @@ impl<'a> Planner<'a, '_> {
             let span = sig.span;
             let step = self.add(label, span, Step::Operation(Box::new(operation)));
             self.call_wires(step, &verb, &Bound { values }, Some(id));
+            // A device may also take its time.
+            lasts |= self.drivers.iter().any(|(_, d)| d.call(step).is_some_and(|e| e.until.is_some()));
             let step = match invariants.is_empty() {
                 true => step,
                 false => {
