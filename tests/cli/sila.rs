@@ -30,7 +30,7 @@ fn a_definition_becomes_commands_and_readings() {
     assert!(checked.code == 0 && !checked.out.contains("sila-file"), "{}", checked.out);
     let strict = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
     let found = strict.out.replace("\n  ", " ");
-    assert!(strict.code == 0 && found.contains("1 warning") && found.contains("warning[sila-file]"), "{found}");
+    assert!(strict.code == 0 && found.contains("warning[sila-file]"), "{found}");
     assert!(found.contains("`Program`, whose parameter `Steps` is a list"), "{found}");
     assert!(found.contains("`SerialNumber`, which is of type String"), "{found}");
     let ran = matterixc_in(&dir, &["run", "lab.mtx"]);
@@ -80,7 +80,12 @@ fn a_definition_that_is_none_is_refused_with_its_line() {
     write(&dir, "hotplate.sila.xml", text.replace("<Basic>Boolean</Basic>", "<Basic>Bool</Basic>"));
     let checked = matterixc_in(&dir, &["check", "lab.mtx"]);
     assert!(checked.code == 1 && checked.out.contains("error[sila-file]"), "{}", checked.out);
-    assert!(checked.out.contains("no basic type `Bool`") && checked.out.contains("lab.mtx:4"), "{}", checked.out);
+    assert!(checked.out.contains("\n1 error\n"), "one mistake, one message: {}", checked.out);
+    assert!(
+        checked.out.replace("\n  ", " ").contains("no basic type `Bool`") && checked.out.contains("lab.mtx:4"),
+        "{}",
+        checked.out
+    );
 }
 
 #[test]

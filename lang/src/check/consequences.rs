@@ -57,6 +57,12 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
         let broken = |e: &Diagnostic| syntax(e) || e.code == codes::UNKNOWN_FIELD;
         return others().any(|(e, q)| broken(e) && q.file == p.file && (p.block.0..=p.block.1).contains(&q.line));
     }
+    // Nobody knows what a definition declares that could not be read.
+    if [codes::UNKNOWN_FIELD, codes::UNKNOWN_MEMBER, codes::UNKNOWN_VERB, codes::WRONG_DEVICE].contains(&d.code)
+        && others().any(|(e, _)| e.code == codes::SILA_FILE)
+    {
+        return true;
+    }
     // A name from a line above with a mistake of its own may be fine.
     if d.code == codes::UNKNOWN_NAME
         || d.code == codes::UNKNOWN_VERB
