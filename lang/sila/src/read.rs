@@ -97,7 +97,7 @@ pub fn read(text: &str) -> Result<Feature, Problem> {
 fn judge(feature: &Feature, root: Node<'_, '_>) -> Result<(), Problem> {
     let at = |identifier: &str| {
         let holds = |n: &Node<'_, '_>| n.has_tag_name_of("Identifier") && n.text().map(str::trim) == Some(identifier);
-        root.descendants().filter(holds).last().unwrap_or(root)
+        root.descendants().rfind(holds).unwrap_or(root)
     };
     let groups: [Vec<&String>; 4] = [
         feature.commands.iter().map(|c| &c.identifier).collect(),

@@ -1,20 +1,19 @@
 //! A client: commands and properties of one server, by the features that it says it has. It blocks.
 
+mod given;
+mod wire;
+
 use std::collections::BTreeMap;
-use std::future::Future;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use http::uri::PathAndQuery;
 use hyper_util::rt::TokioIo;
 use matterix_sila::feature::{Command, Element, Feature};
-use prost::Message;
 use tokio::net::TcpStream;
 use tokio::runtime::{Builder, Runtime};
+use tonic::Streaming;
 use tonic::client::Grpc;
 use tonic::transport::{Channel, Endpoint};
-use tonic::{Request, Streaming};
-use tonic_prost::ProstCodec;
 
 use crate::call::Failure;
 use crate::framework::{Confirmation, Execution, Info, Stage};
@@ -22,6 +21,9 @@ use crate::raw::Raw;
 use crate::service;
 use crate::text::{self, Call, named, shown};
 use crate::value::{Value, decode, encode};
+use given::arguments;
+pub use given::is_of;
+use wire::{source, within};
 
 /// Longest time in which news of an execution is waited for when it is only looked at.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -323,92 +325,8 @@ impl Client {
         self.last.entry(key.clone()).or_default().extend(answered);
         Ok(())
     }
-
-    fn path(&self, index: usize, method: &str) -> Result<PathAndQuery, Failure> {
-        let path = format!("/{}/{method}", self.features[index].service());
-        PathAndQuery::try_from(path).map_err(|e| Failure::Garbled(e.to_string()))
-    }
-
-    fn silent(&self, what: &str) -> Failure {
-        Failure::Lost(format!("it did not answer `{what}` within {} s", self.timeout.as_secs_f64()))
-    }
-
-    fn unary<A, B>(&mut self, path: PathAndQuery, message: A) -> Result<B, Failure>
-    where
-        A: Message + Send + Sync + 'static,
-        B: Message + Default + Send + Sync + 'static,
-    {
-        let silent = self.silent(path.path().rsplit('/').next().unwrap_or_default());
-        let grpc = &mut self.grpc;
-        let call = async {
-            grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection broke off: {}", source(&e))))?;
-            let answer = grpc.unary(Request::new(message), path, ProstCodec::<A, B>::default()).await;
-            answer.map(tonic::Response::into_inner).map_err(|s| Failure::of(&s))
-        };
-        let answer = within(&self.runtime, self.timeout, call);
-        answer.unwrap_or(Err(silent))
-    }
-
-    fn stream<A, B>(&mut self, path: PathAndQuery, message: A) -> Result<Streaming<B>, Failure>
-    where
-        A: Message + Send + Sync + 'static,
-        B: Message + Default + Send + Sync + 'static,
-    {
-        let silent = self.silent(path.path().rsplit('/').next().unwrap_or_default());
-        let grpc = &mut self.grpc;
-        let call = async {
-            grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection broke off: {}", source(&e))))?;
-            let answer = grpc.server_streaming(Request::new(message), path, ProstCodec::<A, B>::default()).await;
-            answer.map(tonic::Response::into_inner).map_err(|s| Failure::of(&s))
-        };
-        let answer = within(&self.runtime, self.timeout, call);
-        answer.unwrap_or(Err(silent))
-    }
 }
 
 fn has_ended(info: &Info) -> bool {
     matches!(info.stage(), Stage::Done | Stage::Failed)
-}
-
-/// What comes of something, unless it takes longer than that.
-fn within<F: Future>(runtime: &Runtime, time: Duration, future: F) -> Option<F::Output> {
-    runtime.block_on(async { tokio::time::timeout(time, future).await.ok() })
-}
-
-/// The innermost reason of an error.
-fn source(error: &dyn std::error::Error) -> String {
-    let mut inner = error;
-    while let Some(next) = inner.source() {
-        inner = next;
-    }
-    inner.to_string()
-}
-
-/// The values of a command's parameters, in their order.
-fn arguments(feature: &Feature, command: &Command, call: &Call) -> Result<Vec<Value>, String> {
-    let name = &command.identifier;
-    for (given, _) in &call.arguments {
-        if !command.parameters.iter().any(|p| p.identifier == *given) {
-            let known: Vec<String> = command.parameters.iter().map(|p| format!("`{}`", p.identifier)).collect();
-            return Err(format!("`{name}` has no parameter `{given}`; it has {}", known.join(", ")));
-        }
-    }
-    let value = |element: &Element| {
-        let mut given = call.arguments.iter().filter(|(given, _)| *given == element.identifier);
-        match (given.next(), given.next()) {
-            (Some((_, text)), None) => text::value(feature, &element.ty, text)
-                .map_err(|why| format!("`{}` of `{name}`: {why}", element.identifier)),
-            (None, _) => Err(format!("`{name}` is not given `{}`", element.identifier)),
-            (_, Some(_)) => Err(format!("`{name}` is given `{}` twice", element.identifier)),
-        }
-    };
-    command.parameters.iter().map(value).collect()
-}
-
-/// Whether a text that is sent begins this command.
-pub fn is_of(said: &str, asked: &str) -> bool {
-    match (text::call(said), text::call(asked)) {
-        (Ok(said), Ok(asked)) => said.path == asked.path,
-        _ => false,
-    }
 }

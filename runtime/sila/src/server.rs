@@ -2,6 +2,7 @@
 
 mod answer;
 mod executions;
+mod streams;
 
 use std::net::SocketAddr;
 use std::sync::mpsc;

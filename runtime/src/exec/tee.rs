@@ -4,7 +4,7 @@ use matterix_ir::plan::{Condition, Operation, StepId};
 use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
-use super::listener::{ExpectationResult, Listener, OperationState, StepState};
+use super::listener::{Asked, ExpectationResult, Listener, OperationState, StepState};
 use crate::motion::Moment;
 use crate::process::{Engine, Observer};
 
@@ -34,6 +34,12 @@ impl Listener for Tee<'_> {
         let mut wanted = self.0.wanted(step);
         wanted.extend(self.1.wanted(step));
         wanted
+    }
+
+    fn asked(&mut self, time: f64) -> Vec<Asked> {
+        let mut asked = self.0.asked(time);
+        asked.extend(self.1.asked(time));
+        asked
     }
 
     fn begins(&mut self, time: f64, step: StepId, values: &[Option<f64>]) {

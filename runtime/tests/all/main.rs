@@ -6,6 +6,7 @@ mod engine_events;
 mod engine_faults;
 mod engine_model;
 mod engine_segments;
+mod exec_asked;
 mod exec_build;
 mod exec_claims;
 mod exec_dry;

@@ -1,6 +1,5 @@
 //! Calls of gRPC, answered.
 
-use std::pin::Pin;
 use std::sync::mpsc;
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
@@ -8,16 +7,16 @@ use std::time::Duration;
 use hyper::body::Incoming;
 use matterix_sila::feature::{Element, Feature};
 use tokio::sync::{mpsc as news, oneshot, watch};
-use tokio_stream::{Stream, StreamExt};
 use tonic::body::Body;
 use tonic::{Response, Status};
 use tonic_prost::ProstCodec;
 use tower::service_fn;
 
 use super::executions::{Executions, Known, State};
+use super::streams::{LIFETIME, Streamed, follow, infos, subscribed};
 use super::{About, Call, News, Read, Request};
 use crate::call::{Failure, refused, status};
-use crate::framework::{self, Confirmation, Execution, Fully, Info, Kind, Real, Refusal, Stage};
+use crate::framework::{self, Confirmation, Execution, Fully, Info, Kind, Refusal};
 use crate::raw::Raw;
 use crate::service::UNIMPLEMENTED;
 use crate::value::{Value, decode, encode};
@@ -28,16 +27,8 @@ const LONGEST: usize = 1 << 20;
 /// Longest time until the lab answers; it looks at what is asked many times a second.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// How often a property that is subscribed to is looked at.
-const LOOK: Duration = Duration::from_millis(500);
-
-/// How long the end of an execution can be asked for, s; it is kept longer where few are.
-const LIFETIME: f64 = 3600.0;
-
 /// Index of the feature that every server has.
 const SERVICE: usize = 0;
-
-type Streamed<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
 /// What is offered, and whoever carries it out.
 pub struct Answers {
@@ -252,7 +243,7 @@ impl Answers {
         }
     }
 
-    async fn read(&self, f: usize, p: usize) -> Result<Raw, Status> {
+    pub(super) async fn read(&self, f: usize, p: usize) -> Result<Raw, Status> {
         let feature = &self.features[f];
         let (answer, value) = oneshot::channel();
         self.send(Request::Read(Read { feature: f - 1, property: p, answer }))?;
@@ -273,7 +264,7 @@ impl Answers {
             "ServerUUID" => about.uuid,
             "ServerDescription" => about.description,
             "ServerVersion" => about.version,
-            "ServerVendorURL" => "https://example.org/matterixc".to_owned(),
+            "ServerVendorURL" => "https://matterixc.invalid".to_owned(),
             _ => {
                 let all = self.features.iter().map(|f| Value::Text(f.id())).collect();
                 return told(feature, p, Value::List(all));
@@ -321,64 +312,4 @@ fn told(feature: &Feature, p: usize, value: Value) -> Result<Raw, Status> {
         ty: property.ty.clone(),
     };
     encode(feature, &[element], &[value]).map_err(Status::internal)
-}
-
-fn follow(state: &mut State, news: News) {
-    match news {
-        News::Begun => state.begun = true,
-        News::Goes(progress, remaining) => {
-            (state.begun, state.progress, state.remaining) = (true, progress.clamp(0.0, 1.0), remaining);
-        }
-        News::Done(values) => {
-            (state.begun, state.progress, state.remaining) = (true, 1.0, Some(0.0));
-            state.end = Some(Ok(values));
-        }
-        News::Failed(failure) => state.end = Some(Err(failure)),
-        News::NotNow(why) => state.end = Some(Err(Failure::Garbled(why))),
-    }
-}
-
-/// How an execution stands, now and whenever that changes, until it has ended.
-fn infos(known: Known) -> Streamed<Info> {
-    let all = tokio_stream::wrappers::WatchStream::new(known.state);
-    let mut over = false;
-    let info = move |state: State| {
-        if std::mem::replace(&mut over, state.end.is_some()) {
-            return None;
-        }
-        let stage = match &state.end {
-            Some(Ok(_)) => Stage::Done,
-            Some(Err(_)) => Stage::Failed,
-            None if state.begun => Stage::Running,
-            None => Stage::Waiting,
-        };
-        Some(Ok(Info {
-            stage: stage as i32,
-            progress: Some(Real { value: state.progress }),
-            remaining: state.remaining.map(framework::Duration::of),
-            lifetime: Some(framework::Duration::of(LIFETIME)),
-        }))
-    };
-    Box::pin(all.map_while(info))
-}
-
-/// A property now and whenever it has changed.
-fn subscribed(this: std::sync::Arc<Answers>, f: usize, p: usize) -> Streamed<Raw> {
-    let (sender, all) = news::channel(1);
-    tokio::spawn(async move {
-        let mut last = None;
-        loop {
-            let now = this.read(f, p).await;
-            let over = now.is_err();
-            let fresh = match &now {
-                Ok(raw) => last.replace(raw.clone()).as_ref() != Some(raw),
-                Err(_) => true,
-            };
-            if fresh && sender.send(now).await.is_err() || over || sender.is_closed() {
-                return;
-            }
-            tokio::time::sleep(LOOK).await;
-        }
-    });
-    Box::pin(tokio_stream::wrappers::ReceiverStream::new(all))
 }

@@ -33,29 +33,36 @@ pub struct Known {
     pub state: watch::Receiver<State>,
 }
 
-/// All of them, by their names.
+/// All of them.
 #[derive(Debug, Default)]
-pub struct Executions(Mutex<(u64, BTreeMap<String, (u64, Known)>)>);
+pub struct Executions(Mutex<Kept>);
+
+/// How many there were, and those that are kept, by their names and with their numbers.
+#[derive(Debug, Default)]
+struct Kept {
+    count: u64,
+    all: BTreeMap<String, (u64, Known)>,
+}
 
 impl Executions {
     /// A new one; nothing where too many go on.
     pub fn add(&self, of: (usize, usize), state: watch::Receiver<State>) -> Option<String> {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if all.1.len() >= MOST {
-            let ended = all.1.iter().filter(|(_, (_, known))| known.state.borrow().end.is_some());
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.all.len() >= MOST {
+            let ended = kept.all.iter().filter(|(_, (_, known))| known.state.borrow().end.is_some());
             let oldest = ended.min_by_key(|(_, (turn, _))| *turn).map(|(name, _)| name.clone())?;
-            all.1.remove(&oldest);
+            kept.all.remove(&oldest);
         }
         let name = uuid::Uuid::new_v4().to_string();
-        all.0 += 1;
-        let turn = all.0;
-        all.1.insert(name.clone(), (turn, Known { of, state }));
+        kept.count += 1;
+        let turn = kept.count;
+        kept.all.insert(name.clone(), (turn, Known { of, state }));
         Some(name)
     }
 
     /// One of a command.
     pub fn find(&self, name: &str, of: (usize, usize)) -> Option<Known> {
-        let all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.1.get(name).map(|(_, known)| known.clone()).filter(|k| k.of == of)
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.all.get(name).map(|(_, known)| known.clone()).filter(|k| k.of == of)
     }
 }
