@@ -9,7 +9,7 @@ use matterix_lang::{library, syntax};
 use crate::harness::{Ended, folder, matterixc_in, root, write};
 
 /// Pages whose `mtx` blocks run as tests.
-const PAGES: [&str; 4] = ["docs/language.md", "docs/library.md", "docs/devices.md", "README.md"];
+const PAGES: [&str; 5] = ["docs/language.md", "docs/library.md", "docs/devices.md", "docs/sila.md", "README.md"];
 
 /// A fenced block of a page.
 #[derive(Debug, PartialEq, Eq)]

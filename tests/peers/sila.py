@@ -488,7 +488,7 @@ def another_author():
     process, host, port = start(os.path.join(FOLDER, "bridge"), OWN)
     bridge = [os.path.join(os.path.dirname(sys.executable), "labmcp-sila2"), "-a", f"{host}:{port}"]
     seen = subprocess.run([*bridge, "--option", "insecure=true", "--check"], capture_output=True, text=True, timeout=60)
-    verdict("labmcp-sila2 on a served lab", seen.returncode == 0 and "bench" in seen.stdout, seen.stdout.strip()[:120])
+    verdict("labmcp-sila2 on a served lab", seen.returncode == 0 and "bench" in seen.stdout, " ".join(seen.stdout.split())[:120])
     process.kill()
 
 
