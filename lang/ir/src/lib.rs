@@ -38,7 +38,7 @@ pub mod wire;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};
-pub use graph::{BinaryOp, Env, Graph, NodeId, Op, UnaryOp};
+pub use graph::{BinaryOp, Env, Graph, Leaves, NodeId, Op, UnaryOp};
 pub use program::Program;
 pub use quantity::Unit;
 pub use span::{FileId, Sources, Span};

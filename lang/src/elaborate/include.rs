@@ -274,7 +274,7 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let show = |this: &Self, v: &Value, si: Option<f64>| match (v, si) {
-            (Value::Num(n), Some(si)) => n.unit.clone().unwrap_or_else(|| this.shown(n)).show(si),
+            (Value::Num(n), Some(si)) => this.unit_of(n).show(si),
             _ => "another value".to_string(),
         };
         let (a, b) = (show(self, first, a), show(self, second, b));

@@ -32,7 +32,7 @@ use std::sync::RwLock;
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Graph, NodeId, Op, Span};
+use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
 use rustc_hash::FxHashMap;
 
 use crate::ast::{self, Expr, FieldValue};
@@ -142,6 +142,8 @@ pub struct Elaborator<'a> {
     types: FxHashMap<(usize, usize), Type>,
     /// Instances; parts after owners.
     pub instances: Vec<Instance<'a>>,
+    /// Those without an owner, by name.
+    pub top_level: FxHashMap<String, InstanceId>,
     /// Those of them that count amounts per species, in order.
     pub mixtures: Vec<InstanceId>,
     /// Where the lab's name stands.
@@ -263,6 +265,7 @@ impl<'a> Elaborator<'a> {
             reported: 0,
             types: FxHashMap::default(),
             instances: Vec::new(),
+            top_level: FxHashMap::default(),
             mixtures: Vec::new(),
             lab_name: Span::default(),
             settings: BTreeMap::new(),
@@ -384,8 +387,7 @@ impl<'a> Elaborator<'a> {
 
     /// The same for what is only said or judged.
     pub fn glance(&self, node: NodeId) -> Option<f64> {
-        let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
-        if self.graph.depends(node, live) {
+        if self.graph.leaves(node).meets(Leaves::LIVE) {
             return None;
         }
         Some(self.graph.eval_on(node, |leaf| match leaf {

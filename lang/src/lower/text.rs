@@ -77,7 +77,7 @@ impl<'a> Planner<'a, '_> {
             let (_, value) = bound.values.iter().find(|(name, _)| *name == p.name.text)?;
             match value {
                 Value::Num(n) => {
-                    let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
+                    let unit = self.lab.unit_of(n);
                     Some(unit.show(self.lab.glance(n.node)?))
                 }
                 Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
@@ -185,7 +185,7 @@ impl<'a> Planner<'a, '_> {
         match value {
             Value::Error => return false,
             Value::Num(n) => {
-                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                let unit = self.lab.unit_of(&n);
                 out.push(TextPart::Quantity { value: n.node, unit, digits });
             }
             Value::Bool(n) => out.push(TextPart::Bool(n)),
