@@ -5,9 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::seal::{self, MADE_BY, Store};
 
-/// What they are kept under.
-const NAME: &str = "programs";
-/// How many programs are kept, the last ones looked at.
+/// What they are kept under, with the first digits of a key: a file may have thousands of workflows, and no check should
+/// have to read what is known of all.
+const NAME: &str = "programs-";
+/// How many digits.
+const DIGITS: usize = 2;
+/// How many programs are kept under a name, the last ones looked at.
 const MOST: usize = 64;
 
 #[derive(Serialize, Deserialize)]
@@ -35,7 +38,8 @@ fn key(program: &Program) -> Option<String> {
 /// A program is known by all of it, texts and their places included, as findings quote them.
 pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagnostic>) -> Vec<Diagnostic> {
     let Some(key) = store.keeps().then(|| key(program)).flatten() else { return look() };
-    let kept = store.load(NAME).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
+    let name = format!("{NAME}{}", &key[..DIGITS]);
+    let kept = store.load(&name).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
     let mut verdicts = kept.map(|k| k.verdicts).unwrap_or_default();
     if let Some((_, found)) = verdicts.iter().find(|(k, _)| *k == key) {
         return found.clone();
@@ -44,7 +48,7 @@ pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagn
     verdicts.insert(0, (key, found.clone()));
     verdicts.truncate(MOST);
     if let Some(bytes) = seal::closed(&Kept { made_by: MADE_BY.to_string(), verdicts }) {
-        store.save(NAME, &bytes);
+        store.save(&name, &bytes);
     }
     found
 }
