@@ -24,6 +24,14 @@ fn examples_with_arms_are_within_reach_and_free_of_collisions() {
 }
 
 #[test]
+fn examples_end_as_expected_when_their_arms_take_the_time_they_need() {
+    for name in ["heat_network", "sn1", "sn1_earlier", "sn1_mild", "titration"] {
+        let ended = matterixc(&["run", &format!("examples/{name}.mtx"), "--fidelity", "motion"]);
+        assert_eq!(ended.code, 0, "{name}: {}", ended.err);
+    }
+}
+
+#[test]
 fn redox_reaches_the_same_ends_with_an_arm_that_moves() {
     let dir = folder("motion_redox");
     let args = ["run", "examples/redox.mtx", "--fidelity", "motion", "--out"];
