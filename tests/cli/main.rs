@@ -30,6 +30,7 @@ mod plan;
 mod reference;
 mod science;
 mod screening;
+mod sizes;
 mod slips;
 mod strict;
 mod studies;

@@ -4,6 +4,7 @@ pub mod articulation;
 pub mod balances;
 pub mod contents;
 mod coverings;
+mod extents;
 pub mod fields;
 pub mod geometry;
 pub mod grids;
