@@ -91,6 +91,42 @@ fn a_ring_is_reported_once() {
 }
 
 #[test]
+fn what_a_lab_puts_where_nothing_bears_it() {
+    let lab = |lines: &str| {
+        let asset = "asset Step: Surface, Graspable {\n    mass: 1 kg\n    shape: box(50 mm, 50 mm, 50 mm)\n}";
+        format!(
+            "mtx 1\n\nuse std::furniture::OpticalTable\n\n{asset}\nlab bench {{\n    ambient: 25 degC\n    \
+             table = OpticalTable at (0, 0, 0) m\n{lines}\n}}\nworkflow rest in bench {{\n    wait 1 s\n}}\n"
+        )
+    };
+    let bad = [
+        ("beyond", "    a = Step on table at (0, 700) mm", "`a` stands beyond the edge of `table`"),
+        ("half", "    a = Step on table at (0, 460) mm", "`a` stands beyond the edge of `table`"),
+        ("on_another", "    b = Step on table\n    a = Step on b at (30, 0) mm", "`a` stands beyond the edge of `b`"),
+        ("each_other", "    a = Step on b\n    b = Step on a", "`a` stands on `b` and that on `a`"),
+        (
+            "three",
+            "    a = Step on b\n    b = Step on c\n    c = Step on a",
+            "`a` stands on `b`, that on `c` and that on `a`",
+        ),
+    ];
+    for (name, lines, headline) in bad {
+        let found = findings(&format!("standing_{name}"), &lab(lines));
+        assert!(found.iter().any(|f| f.1 == headline), "{name}: {found:?}");
+        assert!(found.iter().all(|f| f.1 == headline || f.0 == "unused"), "{name}: {found:?}");
+    }
+    let good = [
+        ("edge", "    a = Step on table at (0, 440) mm"),
+        ("higher", "    a = Step on table at (0, 700, 20) mm"),
+        ("side_by_side", "    next = OpticalTable at (0, 0.9, 0) m\n    a = Step on table at (0, 700) mm"),
+    ];
+    for (name, lines) in good {
+        let found = findings(&format!("standing_{name}"), &lab(lines));
+        assert!(found.iter().all(|f| f.0 == "unused"), "{name}: {found:?}");
+    }
+}
+
+#[test]
 fn a_capability_means_its_own_members() {
     let own = "mtx 1
 

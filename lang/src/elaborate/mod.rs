@@ -22,6 +22,7 @@ pub mod reach;
 pub mod reactions;
 pub mod solutions;
 pub mod species;
+mod standing;
 pub mod states;
 pub mod tables;
 pub mod units;

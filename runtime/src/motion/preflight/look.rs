@@ -170,6 +170,15 @@ impl<'p, 's> Looker<'p, 's> {
         }
     }
 
+    /// A motion that is refused before it is looked at.
+    pub fn cannot(&self, course: &mut Course<'p>, operation: &Operation, why: &Refused, site: Span) {
+        let Some(motion) = &operation.motion else { return };
+        self.refuse(course, motion, why, site, false);
+        if let Some(robot) = course.stage.actor_of(motion.mover()) {
+            course.drifts(robot);
+        }
+    }
+
     fn refuse(&self, course: &mut Course<'p>, motion: &Motion, why: &Refused, site: Span, unsure: bool) {
         let finding = told::finding(&course.stage, motion, why, None, site).filter(|_| !unsure);
         course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));

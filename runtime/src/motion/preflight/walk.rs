@@ -11,8 +11,10 @@ use super::beside::{Job, Moved};
 use super::course::{Course, Refusal};
 use super::look::{Looker, on_step};
 use super::memory::Memory;
+use super::starts::Starts;
 use super::told;
 use super::values::Values;
+use crate::motion::perform::Refused;
 use crate::motion::stage::{Carried, Stage};
 
 /// How many courses are followed at a time.
@@ -20,8 +22,12 @@ const COURSES: usize = 6;
 /// How many turns of a loop are followed.
 const TURNS: u32 = 4;
 
-/// What would go wrong with the motions of a program in a lab.
-pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) -> Vec<Diagnostic> {
+/// What would go wrong with the motions of a program in a lab, and which robots are in each other before they move.
+pub fn follow<'p>(
+    program: &'p Program,
+    stage: Stage<'p>,
+    memory: Memory<'_>,
+) -> (Vec<Diagnostic>, Vec<[InstanceId; 2]>) {
     let mut stage = stage;
     let ids = (0..program.scene.instances.len() as u32).map(InstanceId);
     stage.unknown.places = ids.filter(|id| !program.scene.get(*id).placed).collect();
@@ -34,12 +40,13 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) ->
         sites: Vec::new(),
         raised: Vec::new(),
         beside: Moved::default(),
+        starts: Starts::default(),
         unsure: 0,
     };
     walk.step(program.plan.root, vec![Course { stage, values, choices: Vec::new(), lost: None }]);
-    let Walk { looker, found, .. } = walk;
+    let Walk { looker, found, starts, .. } = walk;
     looker.keep();
-    found.into_iter().map(|f| f.finding).collect()
+    (found.into_iter().map(|f| f.finding).collect(), starts.told())
 }
 
 /// What was found at a statement reached by a call.
@@ -66,6 +73,8 @@ struct Walk<'p, 's> {
     raised: Vec<Raised<'p>>,
     /// What moves at the same time.
     beside: Moved,
+    /// What robots are in where lines that run beside each other begin.
+    starts: Starts,
     /// How many steps around may be left out without a condition of the plan's own.
     unsure: usize,
 }
@@ -207,7 +216,10 @@ impl<'p> Walk<'p, '_> {
         if operation.motion.is_some() && course.lost.is_none() {
             let site = self.sites.last().copied().unwrap_or(span);
             let beside = std::mem::take(&mut self.beside);
-            self.looker.motion(&mut course, operation, site, &beside);
+            match self.overlap(&course, operation) {
+                Some(why) => self.looker.cannot(&mut course, operation, &why, site),
+                None => self.looker.motion(&mut course, operation, site, &beside),
+            }
             self.beside = beside;
             if let Some(lost) = &mut course.lost {
                 lost.finding = on_step(lost.finding.clone(), span);
@@ -230,6 +242,12 @@ impl<'p> Walk<'p, '_> {
             }
         }
         course
+    }
+
+    /// What the robot of an operation was in when the lines began that run beside each other.
+    fn overlap(&mut self, course: &Course<'p>, operation: &Operation) -> Option<Refused> {
+        let motion = operation.motion.as_ref()?;
+        self.starts.take(motion, course.stage.actor_of(motion.mover())?)
     }
 
     /// One after the other; a job runs beside what follows it, until it is awaited.
@@ -270,6 +288,9 @@ impl<'p> Walk<'p, '_> {
     ) -> Courses<'p> {
         if own.is_empty() || others.is_empty() {
             return follow(self, courses);
+        }
+        if let Some(course) = courses.first() {
+            self.starts.look(&course.stage, own, others);
         }
         let blurred = courses.iter_mut().map(|course| others.blur(course)).reduce(Moved::common).unwrap_or_default();
         let before = self.beside.clone();
