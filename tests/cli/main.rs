@@ -23,6 +23,7 @@ mod joints;
 mod meshes;
 mod motion;
 mod new;
+mod offers;
 mod pages;
 mod physique;
 mod pipeline_tests;

@@ -4,6 +4,8 @@ pub(super) mod beside;
 mod course;
 mod look;
 mod memory;
+mod more;
+mod offer;
 mod seal;
 mod starts;
 mod told;
