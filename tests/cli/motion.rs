@@ -68,7 +68,7 @@ fn a_thing_is_carried_in_the_time_that_the_joints_need() {
 #[test]
 fn what_is_out_of_reach_fails_in_a_run_and_is_found_before_it() {
     let dir = folder("motion_far");
-    write(&dir, "far.mtx", bench("(1200, -250)"));
+    write(&dir, "far.mtx", bench("(840, -250)"));
     let found = matterixc_in(&dir, &["check", "far.mtx", "--format", "concise"]);
     assert_eq!(found.code, 1);
     assert!(found.out.contains("far.mtx:17:5: error[out-of-reach]"), "{}", found.out);

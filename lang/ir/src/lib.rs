@@ -17,6 +17,7 @@ pub mod bodies;
 pub mod codes;
 pub mod diagnostic;
 pub mod extent;
+pub mod footing;
 pub mod graph;
 pub mod inertia;
 pub mod math;

@@ -71,8 +71,8 @@ pub struct Instance<'a> {
     pub placed: Vec<(String, InstanceId)>,
     /// Where.
     pub pose: Pose,
-    /// Whether the text says where.
-    pub at: bool,
+    /// Where the text says that.
+    pub at: Option<Span>,
     /// Whether a line makes it together with others.
     pub one_of_many: bool,
     /// Its declaration.

@@ -4,6 +4,7 @@ pub mod articulation;
 pub mod balances;
 pub mod contents;
 mod coverings;
+mod extents;
 pub mod fields;
 pub mod geometry;
 pub mod grids;
@@ -21,6 +22,7 @@ pub mod reach;
 pub mod reactions;
 pub mod solutions;
 pub mod species;
+mod standing;
 pub mod states;
 pub mod tables;
 pub mod units;
@@ -223,6 +225,10 @@ pub struct Elaborator<'a> {
     pub looked_into: BTreeSet<Span>,
     /// What the expression evaluated last asks of each of several things.
     pub asked_of: Vec<Asked>,
+    /// What is bound wherever a condition is asked of something in turn is noted: it is named in words.
+    pub noting: bool,
+    /// What was noted: what is asked there, and what is bound.
+    pub noted: Vec<(NodeId, Vec<(String, Value)>)>,
     /// The species that the expression evaluated last asks for, and that can never get into the mixture asked.
     pub absent: Vec<(InstanceId, SpeciesId)>,
     /// The same by the place of the condition.
@@ -305,6 +311,8 @@ impl<'a> Elaborator<'a> {
             terms: Vec::new(),
             looked_into: BTreeSet::new(),
             asked_of: Vec::new(),
+            noting: false,
+            noted: Vec::new(),
             absent: Vec::new(),
             absent_in: BTreeMap::new(),
             initial_mode: false,

@@ -24,9 +24,9 @@ const PLACES: usize = 6;
 const ROOM: f64 = 0.12;
 
 /// A place to stand.
-struct Place {
+pub(super) struct Place {
     /// What drives the robot about, rad or m.
-    drive: Vec<f64>,
+    pub(super) drive: Vec<f64>,
     /// How far it is from where it stands.
     far: f64,
 }
@@ -134,7 +134,7 @@ impl Stage<'_> {
     }
 
     /// Places where the robot is free to stand and from which its arm gets to one of some poses and on; the nearest first.
-    fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
+    pub(super) fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
         let (Some(actor), [x, y, turn]) = (self.actors.get(&robot), drive) else { return Vec::new() };
         let around = Surroundings::of_driving(self, robot);
         let Ok(figure) = self.figure(robot, actor, drive) else { return Vec::new() };

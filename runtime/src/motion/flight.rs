@@ -109,7 +109,7 @@ impl Stage<'_> {
 
     /// How many samples are drawn for a way, where so many are as a rule.
     pub(super) fn samples(&self, many: usize) -> usize {
-        if self.around_sweeps { DETOUR } else { many }
+        if self.around_sweeps || self.hasty { DETOUR } else { many }
     }
 
     /// Whether it is another robot that is in the way of a motion: it may go away.

@@ -11,6 +11,7 @@ mod gantry;
 pub mod goal;
 mod hands;
 mod outline;
+mod passage;
 pub mod perform;
 mod perturb;
 mod postures;

@@ -26,6 +26,8 @@ const NOMINAL: f64 = 2e-3;
 const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
 const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
+/// From this share of a line on it ends there.
+const LAST: f64 = 0.999;
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
 /// Samples drawn before a way counts as not found.
@@ -210,6 +212,14 @@ impl Refused {
         }
     }
 
+    /// The same where what meets does so where the way ends.
+    pub(super) fn ending(self, end: bool) -> Self {
+        match self {
+            Refused::Collides(meeting) => Refused::Collides(Meeting { end, ..meeting }),
+            other => other,
+        }
+    }
+
     /// In words, for the run of an operation.
     pub fn text(&self, scene: &Scene, operation: &Operation) -> String {
         let Some(mover) = operation.motion.as_ref().map(Motion::mover) else { return String::new() };
@@ -255,6 +265,8 @@ pub struct Meeting {
     pub depth: f64,
     /// Whether they are there before anything moves.
     pub before: bool,
+    /// Whether they meet only where the way ends.
+    pub end: bool,
 }
 
 impl Meeting {
@@ -673,7 +685,7 @@ impl Stage<'_> {
         let start = actor.positions(variables);
         let refused = |failure| match failure {
             plan::Failure::Collision(end, contacts) => {
-                self.meeting(&figure, &around, &contacts, end == plan::End::Start)
+                self.meeting(&figure, &around, &contacts, end == plan::End::Start).ending(end == plan::End::Goal)
             }
             plan::Failure::Tilt(_, by) => Refused::Tilted(by),
             _ => Refused::NoWay,
@@ -721,7 +733,9 @@ impl Stage<'_> {
             let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
             let followed = followed.map_err(|blocked| match blocked {
                 Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
-                Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),
+                Blocked::Collision(share, contacts) => {
+                    self.meeting(&figure, &around, &contacts, false).ending(share > LAST)
+                }
                 Blocked::Endless | Blocked::Jump(..) => Refused::NoWay,
             })?;
             points.extend(followed.into_iter().skip(1));
@@ -795,6 +809,7 @@ impl Stage<'_> {
             at,
             depth: contact.depth,
             before,
+            end: false,
         })
     }
 }

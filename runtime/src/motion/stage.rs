@@ -77,6 +77,8 @@ pub struct Stage<'p> {
     pub(super) flights: BTreeMap<InstanceId, Flight>,
     /// Whether ways are planned around all that robots under way sweep.
     pub(super) around_sweeps: bool,
+    /// Whether ways count as not found after few samples: it is only tried what would be.
+    pub(super) hasty: bool,
     /// How often something was moved so far.
     pub(super) changes: u64,
     /// What cannot be told: empty in a run.
@@ -134,6 +136,7 @@ impl<'p> Stage<'p> {
             now: 0.0,
             flights: BTreeMap::new(),
             around_sweeps: false,
+            hasty: false,
             changes: 0,
             unknown: Unknown::default(),
             bodies: Arc::default(),

@@ -70,6 +70,7 @@ impl Stage<'_> {
                 at,
                 depth,
                 before: false,
+                end: false,
             })
         })
     }
