@@ -9,6 +9,7 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Checker;
 
+use super::effort::EFFORT;
 use super::perform::{Part, Performed, Refused, Way};
 use super::stage::Stage;
 use super::surroundings::Surroundings;
@@ -116,6 +117,7 @@ impl Stage<'_> {
             _ => None,
         };
         for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
+            self.refresh(EFFORT / 2);
             let before = self.clone();
             let mut parts = Vec::new();
             // On the way the arm is where it is at home, if it gets there.
@@ -128,7 +130,7 @@ impl Stage<'_> {
                 parts.extend(reached);
                 return Some(parts);
             }
-            *self = before;
+            self.back_to(&before);
         }
         None
     }

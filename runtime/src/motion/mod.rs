@@ -3,6 +3,7 @@
 mod approach;
 mod assembly;
 mod drive;
+mod effort;
 pub mod exact;
 pub mod fingers;
 pub mod fixture;
@@ -10,6 +11,7 @@ pub mod flight;
 mod gantry;
 pub mod goal;
 mod hands;
+mod lead_in;
 mod outline;
 pub mod perform;
 mod perturb;

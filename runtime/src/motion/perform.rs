@@ -5,12 +5,13 @@ use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::{InstanceId, Scene, frame};
 use matterix_motion::inverse::{Request, Unreached};
-use matterix_motion::plan::{self, Blocked, Judge, Level, Settings, Stride};
+use matterix_motion::plan::{self, Blocked, Judge, Level, Stride};
 use matterix_motion::pose::{distance, pose};
 use matterix_motion::spheres::{Checker, Figure, Other};
 use matterix_motion::time::{Limits, State, Trajectory, follow};
 use serde::{Deserialize, Serialize};
 
+use super::effort::EFFORT;
 use super::exact::Exact;
 use super::fixture::Led;
 use super::goal::{carried_to, spots, targets, targets_at};
@@ -25,11 +26,9 @@ const NOMINAL: f64 = 2e-3;
 /// Distance of checked configurations along a way, rad or m.
 const FINENESS: f64 = 0.02;
 /// Steps along a straight line.
-const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
+pub(super) const STRIDE: Stride = Stride { linear: 0.01, angular: 0.05, jump: 0.35 };
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
-/// Samples drawn before a way counts as not found.
-const SAMPLES: usize = 60_000;
 /// Where a description gives no acceleration or jerk: times to full speed and to full acceleration, s (assumed).
 const RAMP: (f64, f64) = (0.3, 0.1);
 
@@ -276,6 +275,7 @@ impl Meeting {
 impl Stage<'_> {
     /// Carries out a motion. `values` are those of [`Motion::values`], SI.
     pub fn perform(&mut self, motion: &Motion, values: &[f64]) -> Result<Option<Performed>, Refused> {
+        self.refresh(EFFORT);
         match motion {
             Motion::To { mover, goal, frame, straight, within, .. } => {
                 // What has a time of its own and nothing to move with, or nowhere to go, takes that time.
@@ -518,7 +518,10 @@ impl Stage<'_> {
                 Err(_) => {}
             }
             if let Some(before) = &before {
-                self.clone_from(before);
+                self.back_to(before);
+            }
+            if self.is_weary() {
+                break;
             }
         }
         Err(refused)
@@ -598,21 +601,12 @@ impl Stage<'_> {
                 Err(why) => keep(why),
             }
         }
-        // What is in the way beside a line may not be if the gripper turns before it sets out.
-        for (_, target, q) in found.iter().filter(|_| way == Way::Straight) {
-            if self.is_free_there(robot, q, goal)
-                && let Ok(turned) = self.turned_line(robot, target, goal.as_slice())
-            {
-                return Ok(turned.into());
-            }
-        }
-        // A line that ends beyond what a posture reaches, or on which that meets something, may be within what another one
-        // does.
-        if way == Way::Straight && matches!(refused, Refused::OutOfReach(..) | Refused::Collides(_)) {
-            for (_, target, _) in &found {
-                if let Ok(parts) = self.line_from_elsewhere(robot, target, goal.as_slice()) {
-                    return Ok(parts.into());
-                }
+        // What is in the way of a line may not be if the gripper turns before it sets out, or the arm takes another posture;
+        // a line that ends beyond what one posture reaches may be within what another one does.
+        if way == Way::Straight {
+            let nearest: Vec<(Pose, Vec<f64>)> = found.iter().map(|(_, target, q)| (**target, q.clone())).collect();
+            if let Some(parts) = self.line_from_elsewhere(robot, to, &nearest, goal.as_slice()) {
+                return Ok(parts.into());
             }
         }
         // Another posture may be free where the nearest is not; a search that finds no way to one takes long.
@@ -632,17 +626,6 @@ impl Stage<'_> {
             }
         }
         Err(refused)
-    }
-
-    /// Whether nothing is in the way of a robot where a straight line to something ends.
-    fn is_free_there(&self, robot: InstanceId, q: &[f64], goal: Option<InstanceId>) -> bool {
-        let around = self.beside_line(robot, goal.as_slice());
-        let figure = self.actors.get(&robot).and_then(|actor| self.figure(robot, actor, &actor.arm).ok());
-        figure.is_some_and(|figure| {
-            let exact = Exact::of(self, robot, &figure, &around);
-            let mut checker = self.checker(&figure, &around, &exact);
-            checker.contacts(q).is_empty() || checker.ask(true) && checker.contacts(q).is_empty()
-        })
     }
 
     /// What a robot must not touch on a straight line: all but what it comes up to or leaves, and what that stands on.
@@ -669,7 +652,10 @@ impl Stage<'_> {
         let figure = self.figure(robot, actor, variables)?;
         let exact = Exact::of(self, robot, &figure, &around);
         let mut checker = self.checker(&figure, &around, &exact);
-        let settings = Settings { iterations: self.samples(SAMPLES), ..Settings::default() };
+        if self.is_weary() {
+            return Err(Refused::NoWay);
+        }
+        let settings = self.search();
         let start = actor.positions(variables);
         let refused = |failure| match failure {
             plan::Failure::Collision(end, contacts) => {
@@ -682,11 +668,15 @@ impl Stage<'_> {
             Some(upright) => {
                 let mut solver = actor.solver();
                 let mut level = Level { checker: &mut checker, solver: &mut solver, upright };
-                let route = plan::plan_upright(&mut level, &start, q, &settings).map_err(refused)?;
+                let route = plan::plan_upright(&mut level, &start, q, &settings);
+                self.spent_on(level.checker, 0);
+                let route = route.map_err(refused)?;
                 timed(actor, variables, &route.points, Some(&mut level))?
             }
             None => {
-                let route = plan::plan(&mut checker, &start, q, &settings).map_err(refused)?;
+                let route = plan::plan(&mut checker, &start, q, &settings);
+                self.spent_on(&checker, 0);
+                let route = route.map_err(refused)?;
                 timed(actor, variables, &route.points, Some(&mut checker))?
             }
         };
@@ -718,7 +708,9 @@ impl Stage<'_> {
         for to in to {
             let from = points.last().cloned().unwrap_or_default();
             let to = pose(&base.then(*to));
+            let before = checker.effort();
             let followed = plan::straight(&mut solver, &mut checker, &from, &to, &STRIDE);
+            self.spent_on(&checker, before);
             let followed = followed.map_err(|blocked| match blocked {
                 Blocked::Reach(_, far, turned) => Refused::OutOfReach(far, turned),
                 Blocked::Collision(_, contacts) => self.meeting(&figure, &around, &contacts, false),

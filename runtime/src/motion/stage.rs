@@ -1,5 +1,6 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
@@ -79,6 +80,8 @@ pub struct Stage<'p> {
     pub(super) around_sweeps: bool,
     /// How often something was moved so far.
     pub(super) changes: u64,
+    /// How much may still be looked at for the motion that is being planned.
+    pub(super) effort: Cell<u64>,
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
     /// Shared by all copies of a stage.
@@ -135,6 +138,7 @@ impl<'p> Stage<'p> {
             flights: BTreeMap::new(),
             around_sweeps: false,
             changes: 0,
+            effort: Cell::default(),
             unknown: Unknown::default(),
             bodies: Arc::default(),
         }
