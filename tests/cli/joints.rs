@@ -34,6 +34,28 @@ fn a_sash_too_far_away_is_out_of_reach_before_the_run() {
 }
 
 #[test]
+fn a_part_that_a_process_turns_stops_the_run_where_it_runs_into_something() {
+    let dir = folder("joints_turning");
+    let text = "mtx 1\nuse std::furniture::OpticalTable\nuse std::robots::{FrankaHand, FrankaPanda}\n\
+                asset Post: Body { mass: 5 kg, shape: box(40 mm, 40 mm, 200 mm) }\n\
+                capability Turning: Body {\n    state angle: Angle = 0 deg { unit: \"deg\" }\n    \
+                process turning while angle < 170 deg { angle' += 20 deg/s }\n}\n\
+                asset Disc: Turning {\n    mass: 2 kg\n    joint plate turns (0, 0, 1) at (0, 0, 60) mm by angle\n    \
+                solid box(300 mm, 40 mm, 20 mm) at (150, 0, 0) mm from plate\n}\n\
+                lab l {\n    ambient: 22 degC\n    table = OpticalTable at (0, 0, 0) m\n    \
+                arm = FrankaPanda { gripper: FrankaHand {} } on table at (-500, 0) mm\n    \
+                disc = Disc on table at (200, 0) mm\n    post = Post on table at (200, 200) mm\n}\n\
+                workflow w in l {\n    wait 20 s\n}\n";
+    write(&dir, "disc.mtx", text);
+    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
+    assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
+    assert!(ended.err.contains("`plate` of `disc` runs into `post`"), "{}", ended.err);
+    write(&dir, "disc.mtx", text.replace("(200, 200) mm", "(200, 400) mm"));
+    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+}
+
+#[test]
 fn mistakes_in_joints_are_reported_where_they_are() {
     let dir = folder("joints_mistakes");
     let text = "mtx 1\nasset Box: HandledLid {\n    mass: 1 kg\n    \

@@ -30,11 +30,11 @@ pub struct Fixture {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Led {
     /// What it is a part of.
-    item: InstanceId,
+    pub(super) item: InstanceId,
     /// Which of its joints moves.
-    variable: usize,
+    pub(super) variable: usize,
     /// Where that was at first, rad or m.
-    from: f64,
+    pub(super) from: f64,
     /// Along its axis instead of about it.
     slides: bool,
     /// The axis in the lab.
@@ -171,7 +171,11 @@ impl Stage<'_> {
                 stage.pose(item).then(stage.link(item, link)).then(inner)
             })
             .collect();
+        let before = self.clone();
         let part = self.lines(robot, &way, &[item], false)?;
+        if let Some(refused) = before.lead_meets(robot, &led, to, &part) {
+            return Err(refused);
+        }
         self.set_joint(item, variable, to);
         self.led.insert(item);
         Ok(Performed { robot, parts: vec![part], led: Some(led) })
@@ -184,7 +188,7 @@ impl Stage<'_> {
         }
     }
 
-    fn set_joint(&mut self, item: InstanceId, variable: usize, to: f64) {
+    pub(super) fn set_joint(&mut self, item: InstanceId, variable: usize, to: f64) {
         if let Some(slot) = self.fixtures.get_mut(&item).and_then(|f| f.joints.get_mut(variable)) {
             *slot = to;
         }

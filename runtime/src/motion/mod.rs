@@ -12,6 +12,7 @@ mod gantry;
 pub mod goal;
 mod hands;
 mod lead_in;
+mod led;
 mod outline;
 pub mod perform;
 mod perturb;

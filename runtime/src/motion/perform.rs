@@ -170,6 +170,8 @@ pub enum Refused {
     OutOfReach(f64, f64),
     /// At the end of the way, or on a straight one, something meets something.
     Collides(Meeting),
+    /// A part of this thing, which the hand leads, meets something on its way.
+    Swings(InstanceId, Meeting),
     /// Nothing meets anything where it begins and ends, but no way was found between.
     NoWay,
     /// The thing to be gripped, or to be put down, is this far from where it should be: m and rad.
@@ -200,7 +202,7 @@ impl Refused {
                 "unmovable"
             }
             Refused::OutOfReach(..) => "unreachable",
-            Refused::Collides(_) => "collision",
+            Refused::Collides(_) | Refused::Swings(..) => "collision",
             Refused::NoWay => "no_way",
             Refused::Misplaced(..) | Refused::NotHeld => "missed",
             Refused::TooWide(..) => "too_wide",
@@ -218,6 +220,9 @@ impl Refused {
             Refused::NoFrame => format!("`{name}` is sent to a frame that nothing gives a place"),
             Refused::OutOfReach(far, _) => format!("`{name}` stays {:.0} mm short of it", far * 1e3),
             Refused::Collides(m) => format!("`{}` of `{name}` runs into {} at {}", m.mine, m.whom(), m.place()),
+            Refused::Swings(item, m) => {
+                format!("`{}` of `{}` runs into {} at {}", m.mine, scene.get(*item).name, m.whom(), m.place())
+            }
             Refused::NoWay => format!("no way was found for `{name}`"),
             Refused::Misplaced(far, _) => format!("`{name}` is {:.0} mm away from where it should be", far * 1e3),
             Refused::Bound(item, other) => {

@@ -94,7 +94,7 @@ impl<'p, 's> Looker<'p, 's> {
             Outcome::Refused { why, nearer } => {
                 let sure = match &why {
                     Refused::OutOfReach(..) => true,
-                    Refused::Collides(m) => {
+                    Refused::Collides(m) | Refused::Swings(_, m) => {
                         !adrift && m.with.is_none_or(|w| !beside.robots.contains(&w) && !beside.items.contains(&w))
                     }
                     _ => !adrift && beside.is_empty(),

@@ -46,6 +46,7 @@ pub fn finding(
             let label = format!("`{}` meets {met} at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
+        Refused::Swings(item, meeting) => return Some(swing(stage, *item, meeting, span)),
         Refused::NoWay => Diagnostic::error(
             codes::COLLISION,
             span,
