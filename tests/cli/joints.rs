@@ -4,7 +4,7 @@ use crate::harness::{folder, matterixc, matterixc_in, write};
 
 #[test]
 fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
-    for name in ["faucet", "fume_hood", "kuka_transport"] {
+    for name in ["faucet", "fume_hood", "glove_box", "kuka_transport"] {
         let file = format!("examples/{name}.mtx");
         for fidelity in ["process", "motion"] {
             let dir = folder(&format!("joints_{name}_{fidelity}"));
@@ -17,7 +17,7 @@ fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
 
 #[test]
 fn what_is_moved_by_hand_and_where_a_base_drives_is_looked_at_beforehand() {
-    for name in ["faucet", "fume_hood", "kuka_transport"] {
+    for name in ["faucet", "fume_hood", "glove_box", "kuka_transport"] {
         let ended = matterixc(&["check", &format!("examples/{name}.mtx"), "--fidelity", "motion"]);
         assert!(ended.code == 0 && ended.out.contains("no findings"), "{name}: {}", ended.out);
     }

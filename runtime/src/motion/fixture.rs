@@ -10,6 +10,7 @@ use matterix_ir::{NodeId, Op, Program};
 use matterix_motion::Tree;
 
 use super::perform::{Moment, Performed, Refused};
+use super::regrip::may_help;
 use super::stage::Stage;
 
 /// Least change of a joint that is worth telling, rad or m.
@@ -41,6 +42,24 @@ pub struct Led {
     axis: [f64; 3],
     /// Where the hand was at first.
     hand: Pose,
+    /// When it is taken along, s since the motion began.
+    pub(super) since: f64,
+}
+
+/// A link of a thing by which a hand leads it, and the joint that carries the link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Handle {
+    link: u32,
+    variable: usize,
+    slides: bool,
+    axis: [f64; 3],
+}
+
+impl Led {
+    /// The same, so much later, s.
+    pub(super) fn later(self, by: f64) -> Self {
+        Led { since: self.since + by, ..self }
+    }
 }
 
 /// The description of a thing whose joints follow the model.
@@ -156,13 +175,32 @@ impl Stage<'_> {
         let articulation = following(self.scene, item).ok_or(Refused::NoFrame)?;
         let link = place.link.ok_or(Refused::NoFrame)?;
         let (variable, joint) = Self::carrying(&articulation.robot, link).ok_or(Refused::NoFrame)?;
+        let handle = Handle { link, variable, slides: joint.kind == JointKind::Prismatic, axis: joint.axis };
+        let before = self.clone();
+        match self.lead_from(robot, item, &handle, to) {
+            Err(why) if may_help(&why) => {
+                self.back_to(&before);
+                self.lead_anew(robot, (item, frame), &handle, to).ok_or(why)
+            }
+            done => done,
+        }
+    }
+
+    /// As [`Stage::lead`], from where the hand is.
+    pub(super) fn lead_from(
+        &mut self,
+        robot: InstanceId,
+        item: InstanceId,
+        handle: &Handle,
+        to: f64,
+    ) -> Result<Performed, Refused> {
+        let Handle { link, variable, slides, axis } = *handle;
         let from = self.fixtures.get(&item).and_then(|f| f.joints.get(variable).copied()).ok_or(Refused::NoFrame)?;
         let hand = self.tip(robot);
         let start = self.pose(item).then(self.link(item, link));
         let inner = start.inverse().then(hand);
         let turned = Pose { position: [0.0; 3], ..start };
-        let slides = joint.kind == JointKind::Prismatic;
-        let led = Led { item, variable, from, slides, axis: turned.point(joint.axis), hand };
+        let led = Led { item, variable, from, slides, axis: turned.point(axis), hand, since: 0.0 };
         let pieces = if slides { 1 } else { ((to - from).abs() / PIECE).ceil().max(1.0) as u32 };
         let mut stage = self.clone();
         let way: Vec<Pose> = (1..=pieces)

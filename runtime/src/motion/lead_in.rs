@@ -19,11 +19,11 @@ const TRIED: usize = 12;
 const SHARE: u64 = 4;
 
 /// One way to follow a line: from a configuration at one end of it to a pose at the other.
-struct Lead {
-    from: Vec<f64>,
-    to: Pose,
+pub(super) struct Lead {
+    pub(super) from: Vec<f64>,
+    pub(super) to: Pose,
     /// Whether the configuration is at the end of the line.
-    back: bool,
+    pub(super) back: bool,
 }
 
 impl Stage<'_> {
@@ -90,7 +90,7 @@ impl Stage<'_> {
     }
 
     /// The straight line of a lead, if nothing is in the way on it, with its configurations.
-    fn led(&self, robot: InstanceId, lead: &Lead, near: &[InstanceId]) -> Option<(Part, Vec<Vec<f64>>)> {
+    pub(super) fn led(&self, robot: InstanceId, lead: &Lead, near: &[InstanceId]) -> Option<(Part, Vec<Vec<f64>>)> {
         let around = self.beside_line(robot, near);
         let actor = self.actors.get(&robot)?;
         let figure = self.figure(robot, actor, &actor.arm).ok()?;

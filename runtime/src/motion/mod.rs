@@ -18,6 +18,7 @@ pub mod perform;
 mod perturb;
 mod postures;
 mod preflight;
+mod regrip;
 pub mod stage;
 pub mod surroundings;
 mod swing;

@@ -426,7 +426,7 @@ impl Stage<'_> {
             if let Some(actor) = stage.actors.get_mut(&robot) {
                 performed.bring(actor, since);
             }
-            if let Some(led) = &performed.led {
+            if let Some(led) = performed.led.as_ref().filter(|led| since >= led.since) {
                 let item = stage.dragged(led, robot);
                 out.extend(stage.moment(item, begin + since));
             }
