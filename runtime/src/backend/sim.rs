@@ -180,6 +180,7 @@ impl<'m> Sim<'m> {
         for action in actions {
             let Action::Assign { state, .. } = action else { continue };
             let Some(value) = self.engine.states().get(*state as usize).copied() else { continue };
+            stage.follow_load(*state, value);
             let Some(state) = self.prepared.model.states.get(*state as usize) else { continue };
             if let Some(id) = supported(stage.scene, &state.name, &state.domain) {
                 stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));

@@ -13,6 +13,7 @@ use super::effort::EFFORT;
 use super::perform::{Part, Performed, Refused, Way};
 use super::stage::Stage;
 use super::surroundings::Surroundings;
+use super::tilt::LEVEL;
 
 /// Distances from the target at which the foot of the arm is tried, m.
 const DISTANCES: [f64; 5] = [0.65, 0.55, 0.75, 0.45, 0.85];
@@ -114,7 +115,8 @@ impl Stage<'_> {
         };
         let within = match way {
             Way::Upright(within) => Some(within),
-            _ => None,
+            // What stands upright in the hand stays so on the way.
+            Way::Free | Way::Straight => self.is_held_upright(robot).then_some(LEVEL),
         };
         for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
             self.refresh(EFFORT / 2);

@@ -59,7 +59,7 @@ pub struct Stage<'p> {
     /// By instance.
     pub carried: Vec<Carried>,
     /// Where things stood before they were picked up.
-    before: BTreeMap<InstanceId, Stand>,
+    pub(super) before: BTreeMap<InstanceId, Stand>,
     /// By instance.
     pub actors: BTreeMap<InstanceId, Actor>,
     /// Things with parts that move as the model says.
