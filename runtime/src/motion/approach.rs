@@ -6,9 +6,11 @@ use matterix_motion::placement;
 use matterix_motion::spheres::{ASKED, Checker, Figure, Other};
 
 use super::exact::Exact;
-use super::perform::{Part, Refused, timed};
+use super::performed::Part;
+use super::refused::Refused;
 use super::stage::{Actor, Stage};
 use super::surroundings::Surroundings;
+use super::way::timed;
 
 /// How much less far than asked for is far enough, m.
 const LOOSE: f64 = 1e-3;

@@ -9,8 +9,10 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Checker;
 
+use super::bring::Way;
 use super::effort::EFFORT;
-use super::perform::{Part, Performed, Refused, Way};
+use super::performed::{Part, Performed};
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 use super::tilt::LEVEL;

@@ -9,7 +9,9 @@ use matterix_ir::scene::{Articulation, Follow, InstanceId, Scene};
 use matterix_ir::{NodeId, Op, Program};
 use matterix_motion::Tree;
 
-use super::perform::{Moment, Performed, Refused};
+use super::moment::Moment;
+use super::performed::Performed;
+use super::refused::Refused;
 use super::regrip::may_help;
 use super::stage::Stage;
 

@@ -13,7 +13,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Mover};
 use matterix_motion::spheres::{Figure, Other};
 
-use super::perform::{Performed, Refused};
+use super::performed::Performed;
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 

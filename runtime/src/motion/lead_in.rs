@@ -8,9 +8,10 @@ use matterix_motion::plan;
 use matterix_motion::pose::pose;
 
 use super::exact::Exact;
-use super::perform::{Part, STRIDE, timed};
+use super::performed::Part;
 use super::postures::postures;
 use super::stage::Stage;
+use super::way::{STRIDE, timed};
 
 /// How far what is held tilts while a gripper takes another posture, rad.
 const TURNING: f64 = 0.1;

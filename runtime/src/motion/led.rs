@@ -5,7 +5,8 @@ use matterix_motion::placement;
 use matterix_solids::{Body, Isometry, isometry};
 
 use super::fixture::{Led, following};
-use super::perform::{Meeting, Part, Refused};
+use super::performed::Part;
+use super::refused::{Meeting, Refused};
 use super::stage::Stage;
 use super::swing::Near;
 

@@ -2,6 +2,7 @@
 
 mod approach;
 mod assembly;
+mod bring;
 mod drive;
 mod effort;
 pub mod exact;
@@ -15,11 +16,14 @@ mod hands;
 mod lead_in;
 mod led;
 mod load;
+mod moment;
 mod outline;
 pub mod perform;
+mod performed;
 mod perturb;
 mod postures;
 mod preflight;
+mod refused;
 mod regrip;
 pub mod stage;
 pub mod surroundings;
@@ -27,11 +31,14 @@ mod swing;
 mod tilt;
 mod together;
 mod turn;
+mod way;
 
 pub use assembly::Assembly;
 pub use fixture::Fixture;
-pub use perform::{Meeting, Moment, Part, Performed, Refused};
+pub use moment::Moment;
+pub use performed::{Part, Performed};
 pub use perturb::{Moved, Perturbation, perturb};
 pub use preflight::{Nowhere, Store, preflight, supported};
+pub use refused::{Meeting, Refused};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

@@ -7,8 +7,9 @@ use matterix_ir::scene::InstanceId;
 use super::fixture::Handle;
 use super::goal::targets;
 use super::lead_in::Lead;
-use super::perform::{Part, Performed, Refused};
+use super::performed::{Part, Performed};
 use super::postures::postures;
+use super::refused::Refused;
 use super::stage::Stage;
 
 /// How far a hand draws back from a handle that it takes anew, m.

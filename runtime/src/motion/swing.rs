@@ -7,7 +7,7 @@ use matterix_motion::placement;
 use matterix_solids::{Body, Isometry, isometry};
 
 use super::fixture::{Fixture, following};
-use super::perform::Meeting;
+use super::refused::Meeting;
 use super::stage::Stage;
 
 /// Greatest change of a joint between two moments that are looked at, rad or m.

@@ -9,7 +9,8 @@ use matterix_motion::inverse::Request;
 use matterix_motion::plan::Upright;
 use matterix_motion::pose::{distance, pose};
 
-use super::perform::{Part, Performed, Refused};
+use super::performed::{Part, Performed};
+use super::refused::Refused;
 use super::stage::{Carried, Stage};
 
 /// What tilts by less than this counts as upright, rad.

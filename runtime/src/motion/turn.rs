@@ -3,7 +3,8 @@
 use matterix_ir::scene::InstanceId;
 use matterix_motion::Variable;
 
-use super::perform::{Performed, Refused};
+use super::performed::Performed;
+use super::refused::Refused;
 use super::stage::Stage;
 
 impl Stage<'_> {

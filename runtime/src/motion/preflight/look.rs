@@ -10,7 +10,7 @@ use super::beside::Moved;
 use super::course::{Course, Refusal};
 use super::memory::{Memory, Outcome};
 use super::told;
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
 
 /// Looks at motions, each from the same moment only once.

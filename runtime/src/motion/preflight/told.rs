@@ -8,7 +8,7 @@ use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
 
 use crate::motion::goal::targets;
-use crate::motion::perform::{Meeting, Refused};
+use crate::motion::refused::{Meeting, Refused};
 use crate::motion::stage::{Carried, Stage};
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
