@@ -9,9 +9,13 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Checker;
 
-use super::perform::{Part, Performed, Refused, Way};
+use super::bring::Way;
+use super::effort::EFFORT;
+use super::performed::{Part, Performed};
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
+use super::tilt::LEVEL;
 
 /// Distances from the target at which the foot of the arm is tried, m.
 const DISTANCES: [f64; 5] = [0.65, 0.55, 0.75, 0.45, 0.85];
@@ -113,9 +117,11 @@ impl Stage<'_> {
         };
         let within = match way {
             Way::Upright(within) => Some(within),
-            _ => None,
+            // What stands upright in the hand stays so on the way.
+            Way::Free | Way::Straight => self.is_held_upright(robot).then_some(LEVEL),
         };
         for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
+            self.refresh(EFFORT / 2);
             let before = self.clone();
             let mut parts = Vec::new();
             // On the way the arm is where it is at home, if it gets there.
@@ -128,7 +134,7 @@ impl Stage<'_> {
                 parts.extend(reached);
                 return Some(parts);
             }
-            *self = before;
+            self.back_to(&before);
         }
         None
     }

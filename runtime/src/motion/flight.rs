@@ -13,7 +13,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Mover};
 use matterix_motion::spheres::{Figure, Other};
 
-use super::perform::{Performed, Refused};
+use super::performed::Performed;
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 
@@ -114,7 +115,12 @@ impl Stage<'_> {
 
     /// Whether it is another robot that is in the way of a motion: it may go away.
     pub fn is_by_a_robot(&self, refused: &Refused) -> bool {
-        matches!(refused, Refused::Collides(m) if m.part.is_some() || m.with.is_some_and(|w| self.held_by(w).is_some()))
+        let is_a_robot = |id: InstanceId| self.actors.contains_key(&id) || self.held_by(id).is_some();
+        match refused {
+            Refused::Collides(m) => m.part.is_some() || m.with.is_some_and(|w| self.held_by(w).is_some()),
+            Refused::Swings(_, m) => m.with.is_some_and(is_a_robot),
+            _ => false,
+        }
     }
 
     /// The robot that an instance is, is part of or is held by.

@@ -1,5 +1,6 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
@@ -58,7 +59,7 @@ pub struct Stage<'p> {
     /// By instance.
     pub carried: Vec<Carried>,
     /// Where things stood before they were picked up.
-    before: BTreeMap<InstanceId, Stand>,
+    pub(super) before: BTreeMap<InstanceId, Stand>,
     /// By instance.
     pub actors: BTreeMap<InstanceId, Actor>,
     /// Things with parts that move as the model says.
@@ -81,6 +82,8 @@ pub struct Stage<'p> {
     pub(super) hasty: bool,
     /// How often something was moved so far.
     pub(super) changes: u64,
+    /// How much may still be looked at for the motion that is being planned.
+    pub(super) effort: Cell<u64>,
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
     /// Shared by all copies of a stage.
@@ -138,6 +141,7 @@ impl<'p> Stage<'p> {
             around_sweeps: false,
             hasty: false,
             changes: 0,
+            effort: Cell::default(),
             unknown: Unknown::default(),
             bodies: Arc::default(),
         }

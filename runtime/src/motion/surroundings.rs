@@ -144,16 +144,20 @@ fn solid(shape: &Shape) -> (Solid, f64) {
     (solid, z / 2.0)
 }
 
-/// What a robot holds, as balls in the frame of its tip.
+/// What a robot holds and all that goes along with it, as balls in the frame of its tip.
 pub fn held(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Vec<Held> {
-    let Some(id) = stage.held(robot) else { return Vec::new() };
-    let instance = stage.scene.get(id);
-    let inner = stage.tip(robot).inverse().then(stage.pose(id));
-    let shapes = instance.hull().chain(instance.more());
-    let balls = shapes.flat_map(|(shape, at)| balls(shape, inner.then(at))).collect();
     // The whole tool may touch what it holds.
-    let touching = (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
-    vec![Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching }]
+    let touching: Vec<u32> =
+        (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
+    let tip = stage.tip(robot).inverse();
+    let one = |id: InstanceId| {
+        let instance = stage.scene.get(id);
+        let inner = tip.then(stage.pose(id));
+        let shapes = instance.hull().chain(instance.more());
+        let balls = shapes.flat_map(|(shape, at)| balls(shape, inner.then(at))).collect();
+        Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching: touching.clone() }
+    };
+    stage.in_hand(robot).into_iter().map(one).collect()
 }
 
 /// Balls along the edges and the wall of what is round, so that it does not count as rounded off: their radius, and how far

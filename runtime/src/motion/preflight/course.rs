@@ -60,6 +60,7 @@ impl Course<'_> {
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
             let value = self.values.assign(&program.model, *state, *value);
+            value.into_iter().for_each(|value| self.stage.follow_load(*state, value));
             let Some(state) = program.model.states.get(*state as usize) else { continue };
             let Some(id) = supported(&program.scene, &state.name, &state.domain) else { continue };
             match value {

@@ -12,7 +12,7 @@ use super::memory::{Memory, Outcome};
 use super::more::More;
 use super::offer::Missed;
 use super::told;
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
 
 /// Looks at motions, each from the same moment only once.
@@ -96,7 +96,7 @@ impl<'p, 's> Looker<'p, 's> {
             Outcome::Refused { why, more } => {
                 let sure = match &why {
                     Refused::OutOfReach(..) => true,
-                    Refused::Collides(m) => {
+                    Refused::Collides(m) | Refused::Swings(_, m) => {
                         !adrift && m.with.is_none_or(|w| !beside.robots.contains(&w) && !beside.items.contains(&w))
                     }
                     _ => !adrift && beside.is_empty(),

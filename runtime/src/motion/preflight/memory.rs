@@ -15,7 +15,7 @@ use siphasher::sip128::SipHasher13;
 
 use super::more::More;
 use super::seal::{self, MADE_BY, Store};
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::{Change, Stage};
 
 /// What became of a motion.

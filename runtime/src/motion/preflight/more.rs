@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::motion::exact::Exact;
 use crate::motion::goal::targets;
 use crate::motion::passage::Passage;
-use crate::motion::perform::{Meeting, Refused};
+use crate::motion::refused::{Meeting, Refused};
 use crate::motion::stage::Stage;
 use crate::motion::surroundings::Surroundings;
 

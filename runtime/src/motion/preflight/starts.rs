@@ -5,7 +5,7 @@ use matterix_ir::scene::InstanceId;
 
 use super::beside::Moved;
 use crate::motion::exact::Exact;
-use crate::motion::perform::{Meeting, Refused};
+use crate::motion::refused::{Meeting, Refused};
 use crate::motion::stage::Stage;
 use crate::motion::surroundings::Surroundings;
 

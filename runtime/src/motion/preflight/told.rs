@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::more::More;
 use crate::motion::passage::Passage;
-use crate::motion::perform::{Meeting, Refused};
+use crate::motion::refused::{Meeting, Refused};
 use crate::motion::stage::Stage;
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
@@ -56,6 +56,7 @@ pub fn finding(
             };
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
+        Refused::Swings(item, meeting) => return Some(swing(stage, *item, meeting, span)),
         Refused::Bound(item, other) => {
             let headline = format!("`{}` moves while `{}` holds `{}` as well", name(robot), name(*other), name(*item));
             Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")

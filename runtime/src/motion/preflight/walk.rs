@@ -15,7 +15,7 @@ use super::offer::{self, Missed};
 use super::starts::Starts;
 use super::told;
 use super::values::Values;
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::{Carried, Stage};
 
 /// How many courses are followed at a time.
@@ -295,9 +295,13 @@ impl<'p> Walk<'p, '_> {
         course.act(self.program, &operation.at_end);
         course.stage.let_go(operation.motion.as_ref());
         let moved = course.follow_joints(&self.program.model);
+        // Of what moves at the same time it is not known when.
+        let stays = |stage: &Stage<'_>, with: Option<InstanceId>| {
+            with.is_none_or(|with| !stage.actors.contains_key(&with) && !stage.fixtures.contains_key(&with))
+        };
         if course.lost.is_none()
-            && self.beside.is_empty()
             && let Some((id, meeting)) = course.stage.swing_meets(&moved)
+            && (self.beside.is_empty() || stays(&course.stage, meeting.with))
         {
             let site = self.sites.last().copied().unwrap_or(span);
             let finding = on_step(told::swing(&course.stage, id, &meeting, site), span);

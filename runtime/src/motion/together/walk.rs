@@ -177,6 +177,7 @@ impl<'p> Walk<'p, '_> {
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
             let value = self.values.assign(&self.program.model, *state, *value);
+            value.into_iter().for_each(|value| self.stage.follow_load(*state, value));
             let Some(state) = self.program.model.states.get(*state as usize) else { continue };
             if let (Some(value), Some(id)) = (value, supported(&self.program.scene, &state.name, &state.domain)) {
                 self.stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
