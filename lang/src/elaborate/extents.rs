@@ -64,7 +64,7 @@ impl<'a> Elaborator<'a> {
             self.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "changes while it runs"));
             return None;
         };
-        let unit = n.unit.clone().unwrap_or_else(|| self.shown(&n));
+        let unit = self.unit_of(&n);
         Some((value, unit.show(value)))
     }
 }
