@@ -4,13 +4,51 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// What a file holds, or in words why it cannot be read.
+/// Bytes of the largest text that is read.
+pub const LARGEST_TEXT: u64 = 16 << 20;
+/// The same of recordings.
+const LARGEST_RECORDING: u64 = 4 << 30;
+
+/// What a file of text holds, or in words why it cannot be read.
 pub fn read(path: &Path) -> Result<Vec<u8>, String> {
+    read_up_to(path, LARGEST_TEXT)
+}
+
+/// What a recording holds, or in words why it cannot be read.
+pub fn read_recording(path: &Path) -> Result<Vec<u8>, String> {
+    read_up_to(path, LARGEST_RECORDING)
+}
+
+fn read_up_to(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
     // Asked first, since what opening a folder says differs between systems.
     if path.is_dir() {
         return Err(format!("`{}` is a directory, not a file", path.display()));
     }
-    fs::read(path).map_err(|e| format!("cannot read `{}`: {}", path.display(), reason(&e)))
+    contents(path, largest).map_err(|why| format!("cannot read `{}`: {why}", path.display()))
+}
+
+/// What a file of at most so many bytes holds, or why not. A pipe or a device may never end, or never begin.
+pub fn contents(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
+    let about = fs::metadata(path).map_err(|e| reason(&e))?;
+    if about.is_dir() {
+        return Err("it is a directory".to_string());
+    }
+    if !about.is_file() {
+        return Err("it is a pipe or a device, not a file".to_string());
+    }
+    let file = File::open(path).map_err(|e| reason(&e))?;
+    up_to(file, largest)
+}
+
+/// All there is to read, of at most so many bytes.
+fn up_to(from: impl Read, largest: u64) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    // One byte more tells what is larger, whatever its length was said to be.
+    from.take(largest + 1).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    match bytes.len() as u64 > largest {
+        true => Err(format!("it is larger than {} MiB", largest >> 20)),
+        false => Ok(bytes),
+    }
 }
 
 /// Files that were found, and in words what was not.
@@ -61,11 +99,7 @@ fn search(dir: &Path, extension: &str, found: &mut Found) {
 
 /// What standard input holds, or in words why it cannot be read.
 pub fn read_stdin() -> Result<Vec<u8>, String> {
-    let mut bytes = Vec::new();
-    match io::stdin().lock().read_to_end(&mut bytes) {
-        Ok(_) => Ok(bytes),
-        Err(e) => Err(format!("cannot read standard input: {}", reason(&e))),
-    }
+    up_to(io::stdin().lock(), LARGEST_TEXT).map_err(|why| format!("cannot read standard input: {why}"))
 }
 
 /// Replaces what a file holds in one step, keeping its permissions; a link stays a link.

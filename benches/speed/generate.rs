@@ -83,7 +83,10 @@ fn lab(out: &mut String, bench: usize) {
 "
     );
     for v in 0..VESSELS {
-        let place = if v == 0 { "scale".to_string() } else { format!("table at ({}, 300) mm", 100 * v) };
+        // Around the arm, with room for its fingers.
+        let (sin, cos) = (75.0 + 35.0 * (v as f64 - 1.0)).to_radians().sin_cos();
+        let on_table = || format!("table at ({:.0}, {:.0}) mm", 400.0 * cos, 400.0 * sin);
+        let place = if v == 0 { "scale".to_string() } else { on_table() };
         let content = if v == 0 { "water".to_string() } else { format!("s{}", bench * VESSELS + v) };
         let _ = writeln!(out, "    b{v} = Beaker250mL on {place} holding {} g of {content}", 60 + v);
     }

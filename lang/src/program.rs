@@ -6,7 +6,7 @@ use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
-use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
@@ -605,7 +605,7 @@ fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
                     .collect(),
                 _ => continue,
             };
-            let changes = value.iter().any(|n| lab.graph.depends(*n, |op| matches!(op, matterix_ir::Op::State(_))));
+            let changes = value.iter().any(|n| lab.graph.leaves(*n).meets(Leaves::STATE));
             if !changes {
                 continue;
             }

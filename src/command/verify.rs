@@ -14,7 +14,7 @@ pub fn verify(args: &VerifyArgs) -> Exit {
 /// The verdict; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &VerifyArgs) -> Result<Exit, String> {
     let file = if args.recording.is_dir() { &args.recording.join("recording.mcap") } else { &args.recording };
-    let verdict = matterix_judge::judge(&files::read(file)?)
+    let verdict = matterix_judge::judge(&files::read_recording(file)?)
         .map_err(|why| format!("cannot judge `{}`: {why}", file.display()))?;
     let text = match args.format {
         RunFormat::Human => page(&verdict),

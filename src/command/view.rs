@@ -36,7 +36,7 @@ fn attempt(args: &ViewArgs, color: Color) -> Result<Exit, String> {
 fn document(args: &ViewArgs, color: Color) -> Result<Option<Document>, String> {
     let file = &args.subject.file;
     let file = if file.is_dir() { &file.join("recording.mcap") } else { file };
-    let bytes = files::read(file)?;
+    let bytes = files::read_recording(file)?;
     if from_recording::is_recording(&bytes) {
         let subject = &args.subject;
         if subject.workflow.is_some() || subject.lab.is_some() || !subject.set.is_empty() {

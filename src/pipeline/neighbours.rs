@@ -7,10 +7,7 @@ use matterix_lang::Loader;
 
 use crate::files;
 
-/// Bytes of the largest data file that is read; definitions of labware have some ten thousand.
-const LARGEST: u64 = 16 << 20;
-
-/// The same of meshes.
+/// Bytes of the largest mesh that is read.
 const LARGEST_MESH: u64 = 64 << 20;
 
 /// Loads `sn1` from `sn1.mtx` and `parts::racks` from `parts/racks.mtx` in one folder.
@@ -22,17 +19,6 @@ impl Neighbours {
     /// The modules in a folder.
     pub(super) fn of(dir: &Path) -> Self {
         Neighbours { dir: dir.to_path_buf() }
-    }
-
-    /// Where a data file is, if it is one of at most so many bytes.
-    fn data(&self, path: &str, largest: u64) -> Result<PathBuf, String> {
-        let path = self.dir.join(path);
-        match std::fs::metadata(&path) {
-            Ok(about) if about.is_dir() => Err("it is a directory".to_string()),
-            Ok(about) if about.len() > largest => Err(format!("it is larger than {} MiB", largest >> 20)),
-            Ok(_) => Ok(path),
-            Err(e) => Err(files::reason(&e)),
-        }
     }
 }
 
@@ -47,15 +33,16 @@ impl Loader for Neighbours {
             path.push(part);
         }
         path.set_extension("mtx");
-        let text = std::fs::read_to_string(&path).ok()?;
+        let text = String::from_utf8(files::contents(&path, files::LARGEST_TEXT).ok()?).ok()?;
         Some((path.display().to_string(), text))
     }
 
     fn bytes(&self, _: FileId, path: &str) -> Result<Vec<u8>, String> {
-        std::fs::read(self.data(path, LARGEST_MESH)?).map_err(|e| files::reason(&e))
+        files::contents(&self.dir.join(path), LARGEST_MESH)
     }
 
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
-        std::fs::read_to_string(self.data(path, LARGEST)?).map_err(|e| files::reason(&e))
+        let bytes = files::contents(&self.dir.join(path), files::LARGEST_TEXT)?;
+        String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_string())
     }
 }

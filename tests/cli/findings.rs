@@ -90,6 +90,117 @@ fn a_ring_is_reported_once() {
     }
 }
 
+/// Message and label of what is found.
+fn labels(name: &str, text: &str) -> Vec<(String, String)> {
+    let path = write(&folder(&format!("labels_{name}")), "bench.mtx", text);
+    let lines = matterixc(&["check", &path, "--format", "json"]).out_lines();
+    let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
+    lines.iter().map(|l| (text(&l["code"]), text(&l["labels"][0]["text"]))).collect()
+}
+
+#[test]
+fn a_need_that_does_not_hold_is_told_in_its_own_words() {
+    let text = "mtx 1
+
+use std::furniture::OpticalTable
+
+asset Box: Graspable {
+    mass: 50 g
+    shape: box(50 mm, 50 mm, 90 mm)
+}
+capability Press: Surface {
+    param gap: Length = 60 mm
+    state load: Graspable? = nothing
+
+    command crush(item: Graspable, times: Ratio)
+        needs all(h in measures(item, \"height\"): h <= gap) else jammed \"take a lower one\"
+            because \"`{item}` is {h as mm} tall, and `{self}` has {gap as mm :.1}\"
+        needs times < 3 else worn because \"{times} times wear it out\"
+        effect load = item
+        takes 1 s
+}
+asset Hand: Press {
+    mass: 1 kg
+    shape: box(50 mm, 50 mm, 50 mm)
+}
+lab bench {
+    ambient: 25 degC
+    table = OpticalTable
+    press = Hand on table at (0, 0) mm
+    brick = Box on table at (200, 0) mm
+}
+workflow flatten in bench {
+    crush (brick, 1) by press
+}
+";
+    let found = labels("words", text);
+    assert_eq!(found, [("need-unmet".into(), "`brick` is 90 mm tall, and `press` has 60 mm".into())]);
+    let worn = labels("worn", &text.replace("60 mm", "100 mm").replace("(brick, 1)", "(brick, 5)"));
+    assert_eq!(worn, [("need-unmet".into(), "5 times wear it out".into())]);
+    let wrong = findings("words_wrong", &text.replace("{h as mm}", "{hight as mm}"));
+    assert!(wrong.iter().any(|f| f.0 == "unknown-name"), "{wrong:?}");
+}
+
+#[test]
+fn what_would_follow_from_a_step_that_never_begins_is_not_judged() {
+    let text = "mtx 1
+
+use std::furniture::OpticalTable
+use std::glassware::Beaker50mL
+use std::robots::{FrankaHand, FrankaPanda}
+
+lab bench {
+    ambient: 25 degC
+    table = OpticalTable
+    arm = FrankaPanda { gripper: FrankaHand {} } on table at (0, 0) mm
+    a = Beaker50mL on table at (450, 100) mm
+    b = Beaker50mL on table at (450, -100) mm
+}
+workflow carry in bench {
+    pick a by arm
+    pick b by arm
+    put back a by arm
+}
+";
+    assert_eq!(only("hand_full", text).0, "hand-full");
+}
+
+#[test]
+fn what_a_lab_puts_where_nothing_bears_it() {
+    let lab = |lines: &str| {
+        let asset = "asset Step: Surface, Graspable {\n    mass: 1 kg\n    shape: box(50 mm, 50 mm, 50 mm)\n}";
+        format!(
+            "mtx 1\n\nuse std::furniture::OpticalTable\n\n{asset}\nlab bench {{\n    ambient: 25 degC\n    \
+             table = OpticalTable at (0, 0, 0) m\n{lines}\n}}\nworkflow rest in bench {{\n    wait 1 s\n}}\n"
+        )
+    };
+    let bad = [
+        ("beyond", "    a = Step on table at (0, 700) mm", "`a` stands beyond the edge of `table`"),
+        ("half", "    a = Step on table at (0, 460) mm", "`a` stands beyond the edge of `table`"),
+        ("on_another", "    b = Step on table\n    a = Step on b at (30, 0) mm", "`a` stands beyond the edge of `b`"),
+        ("each_other", "    a = Step on b\n    b = Step on a", "`a` stands on `b` and that on `a`"),
+        (
+            "three",
+            "    a = Step on b\n    b = Step on c\n    c = Step on a",
+            "`a` stands on `b`, that on `c` and that on `a`",
+        ),
+    ];
+    for (name, lines, headline) in bad {
+        let found = findings(&format!("standing_{name}"), &lab(lines));
+        assert!(found.iter().any(|f| f.1 == headline), "{name}: {found:?}");
+        assert!(found.iter().all(|f| f.1 == headline || f.0 == "unused"), "{name}: {found:?}");
+    }
+    let good = [
+        ("edge", "    a = Step on table at (0, 440) mm"),
+        ("higher", "    a = Step on table at (0, 700, 20) mm"),
+        ("side_by_side", "    next = OpticalTable at (0, 0.9, 0) m\n    a = Step on table at (0, 700) mm"),
+    ];
+    for (name, lines) in good {
+        let found = findings(&format!("standing_{name}"), &lab(lines));
+        assert!(found.iter().all(|f| f.0 == "unused"), "{name}: {found:?}");
+    }
+}
+
 #[test]
 fn a_capability_means_its_own_members() {
     let own = "mtx 1

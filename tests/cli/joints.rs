@@ -4,7 +4,7 @@ use crate::harness::{folder, matterixc, matterixc_in, write};
 
 #[test]
 fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
-    for name in ["faucet", "fume_hood", "kuka_transport"] {
+    for name in ["faucet", "fume_hood", "glove_box", "kuka_transport"] {
         let file = format!("examples/{name}.mtx");
         for fidelity in ["process", "motion"] {
             let dir = folder(&format!("joints_{name}_{fidelity}"));
@@ -17,7 +17,7 @@ fn examples_of_handles_and_of_driving_pass_at_both_fidelities() {
 
 #[test]
 fn what_is_moved_by_hand_and_where_a_base_drives_is_looked_at_beforehand() {
-    for name in ["faucet", "fume_hood", "kuka_transport"] {
+    for name in ["faucet", "fume_hood", "glove_box", "kuka_transport"] {
         let ended = matterixc(&["check", &format!("examples/{name}.mtx"), "--fidelity", "motion"]);
         assert!(ended.code == 0 && ended.out.contains("no findings"), "{name}: {}", ended.out);
     }
@@ -31,6 +31,28 @@ fn a_sash_too_far_away_is_out_of_reach_before_the_run() {
     let found = matterixc_in(&dir, &["check", "far.mtx", "--fidelity", "motion", "--format", "concise"]);
     assert_eq!(found.code, 1);
     assert!(found.out.contains("far.mtx:17:5: error[out-of-reach]"), "{}", found.out);
+}
+
+#[test]
+fn a_part_that_a_process_turns_stops_the_run_where_it_runs_into_something() {
+    let dir = folder("joints_turning");
+    let text = "mtx 1\nuse std::furniture::OpticalTable\nuse std::robots::{FrankaHand, FrankaPanda}\n\
+                asset Post: Body { mass: 5 kg, shape: box(40 mm, 40 mm, 200 mm) }\n\
+                capability Turning: Body {\n    state angle: Angle = 0 deg { unit: \"deg\" }\n    \
+                process turning while angle < 170 deg { angle' += 20 deg/s }\n}\n\
+                asset Disc: Turning {\n    mass: 2 kg\n    joint plate turns (0, 0, 1) at (0, 0, 60) mm by angle\n    \
+                solid box(300 mm, 40 mm, 20 mm) at (150, 0, 0) mm from plate\n}\n\
+                lab l {\n    ambient: 22 degC\n    table = OpticalTable at (0, 0, 0) m\n    \
+                arm = FrankaPanda { gripper: FrankaHand {} } on table at (-500, 0) mm\n    \
+                disc = Disc on table at (200, 0) mm\n    post = Post on table at (200, 200) mm\n}\n\
+                workflow w in l {\n    wait 20 s\n}\n";
+    write(&dir, "disc.mtx", text);
+    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
+    assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
+    assert!(ended.err.contains("`plate` of `disc` runs into `post`"), "{}", ended.err);
+    write(&dir, "disc.mtx", text.replace("(200, 200) mm", "(200, 400) mm"));
+    let ended = matterixc_in(&dir, &["run", "disc.mtx", "--fidelity", "motion"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
 }
 
 #[test]

@@ -24,6 +24,14 @@ fn examples_with_arms_are_within_reach_and_free_of_collisions() {
 }
 
 #[test]
+fn examples_end_as_expected_when_their_arms_take_the_time_they_need() {
+    for name in ["heat_network", "sn1", "sn1_earlier", "sn1_mild", "titration"] {
+        let ended = matterixc(&["run", &format!("examples/{name}.mtx"), "--fidelity", "motion"]);
+        assert_eq!(ended.code, 0, "{name}: {}", ended.err);
+    }
+}
+
+#[test]
 fn redox_reaches_the_same_ends_with_an_arm_that_moves() {
     let dir = folder("motion_redox");
     let args = ["run", "examples/redox.mtx", "--fidelity", "motion", "--out"];
@@ -60,7 +68,7 @@ fn a_thing_is_carried_in_the_time_that_the_joints_need() {
 #[test]
 fn what_is_out_of_reach_fails_in_a_run_and_is_found_before_it() {
     let dir = folder("motion_far");
-    write(&dir, "far.mtx", bench("(1200, -250)"));
+    write(&dir, "far.mtx", bench("(840, -250)"));
     let found = matterixc_in(&dir, &["check", "far.mtx", "--format", "concise"]);
     assert_eq!(found.code, 1);
     assert!(found.out.contains("far.mtx:17:5: error[out-of-reach]"), "{}", found.out);

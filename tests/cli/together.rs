@@ -212,3 +212,16 @@ fn a_tube_goes_from_hand_to_hand() {
     let (apart, _) = nearest(&text);
     assert!(apart > 0.0, "{apart} m");
 }
+
+#[test]
+fn arms_that_are_in_each_other_at_the_start_are_one_error() {
+    let dir = folder("together_start");
+    let text = lab("    parallel {\n        move left to west\n        move right to east\n    }");
+    write(&dir, "lab.mtx", text.replace("table at (500, 0) mm", "table at (400, 0) mm"));
+    let near = matterixc_in(&dir, &["check", "lab.mtx", "--format", "concise"]).out;
+    assert!(!near.contains("before it goes"), "{near}");
+    write(&dir, "lab.mtx", text.replace("table at (500, 0) mm", "table at (0, 0) mm"));
+    let found = matterixc_in(&dir, &["check", "lab.mtx", "--format", "concise"]).out;
+    assert!(found.contains("lab.mtx:17:9: error[collision]: `left` stands in `right` before it goes to"), "{found}");
+    assert_eq!(found.lines().count(), 2, "{found}");
+}

@@ -46,9 +46,10 @@ fn every_example_with_a_robot_is_judged() {
     assert_eq!(all, known, "examples with robots that are not judged, or are none");
 }
 
-const WITH_ARMS: [&str; 12] = [
+const WITH_ARMS: [&str; 13] = [
     "faucet",
     "fume_hood",
+    "glove_box",
     "handover",
     "heat_network",
     "kuka_transport",

@@ -139,12 +139,56 @@ impl Env<'_> {
     }
 }
 
+/// Kinds of leaves that a value rests on and that only the run knows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Leaves(u8);
+
+impl Leaves {
+    /// States.
+    pub const STATE: Leaves = Leaves(1);
+    /// The time.
+    pub const TIME: Leaves = Leaves(1 << 1);
+    /// Values that the plan keeps.
+    pub const LOCAL: Leaves = Leaves(1 << 2);
+    /// What devices report.
+    pub const READING: Leaves = Leaves(1 << 3);
+    /// All of them: without any, a value is known before the run.
+    pub const LIVE: Leaves = Leaves(0b1111);
+
+    /// Whether they have a kind in common.
+    pub fn meets(self, other: Leaves) -> bool {
+        self.0 & other.0 != 0
+    }
+}
+
 /// A list of operations in which every operand stands before its user.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(from = "Ops")]
 pub struct Graph {
     ops: Vec<Op>,
+    /// By operation, so that asking costs nothing.
+    #[serde(skip)]
+    leaves: Vec<Leaves>,
     #[serde(skip)]
     seen: HashMap<Key, NodeId, BuildHasherDefault<Mixer>>,
+}
+
+/// A graph as it is written.
+#[derive(Deserialize)]
+#[serde(rename = "Graph")]
+struct Ops {
+    ops: Vec<Op>,
+}
+
+impl From<Ops> for Graph {
+    fn from(Ops { ops }: Ops) -> Self {
+        let mut graph = Graph { leaves: Vec::with_capacity(ops.len()), ..Graph::default() };
+        for op in &ops {
+            let leaves = graph.leaves_of(*op);
+            graph.leaves.push(leaves);
+        }
+        Graph { ops, ..graph }
+    }
 }
 
 impl PartialEq for Graph {
@@ -240,9 +284,30 @@ impl Graph {
             return node;
         }
         let node = NodeId(self.ops.len() as u32);
+        self.leaves.push(self.leaves_of(op));
         self.ops.push(op);
         self.seen.insert(k, node);
         node
+    }
+
+    /// An operand that is not there has none.
+    fn leaves_of(&self, op: Op) -> Leaves {
+        match op {
+            Op::Const(_) | Op::Param(_) => Leaves::default(),
+            Op::Time => Leaves::TIME,
+            Op::State(_) => Leaves::STATE,
+            Op::Local(_) => Leaves::LOCAL,
+            Op::Reading(_) => Leaves::READING,
+            Op::Unary(..) | Op::Binary(..) | Op::Select(..) => {
+                let below = op.operands().filter_map(|n| self.leaves.get(n.0 as usize));
+                Leaves(below.fold(0, |all, leaves| all | leaves.0))
+            }
+        }
+    }
+
+    /// The kinds of leaves that a value rests on.
+    pub fn leaves(&self, node: NodeId) -> Leaves {
+        self.leaves[node.0 as usize]
     }
 
     /// A constant.
@@ -365,13 +430,12 @@ impl Graph {
     /// Visits what `roots` depend on, each once, in no particular order, until a visit gives true. Costs nothing for
     /// the rest of the graph: most questions are about a small part of a large one.
     fn below(&self, roots: impl IntoIterator<Item = NodeId>, mut visit: impl FnMut(NodeId) -> bool) -> bool {
-        let mut seen: Vec<u64> = Vec::new();
         let mut todo: Vec<NodeId> = roots.into_iter().collect();
+        // Operands stand before their user.
+        let Some(last) = todo.iter().max() else { return false };
+        let mut seen = vec![0u64; last.0 as usize / 64 + 1];
         while let Some(node) = todo.pop() {
             let (word, bit) = (node.0 as usize / 64, 1 << (node.0 % 64));
-            if seen.len() <= word {
-                seen.resize(word + 1, 0);
-            }
             if seen[word] & bit != 0 {
                 continue;
             }

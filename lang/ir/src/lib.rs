@@ -17,6 +17,7 @@ pub mod bodies;
 pub mod codes;
 pub mod diagnostic;
 pub mod extent;
+pub mod footing;
 pub mod graph;
 pub mod inertia;
 pub mod math;
@@ -39,7 +40,7 @@ pub mod wire;
 
 pub use codes::Code;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};
-pub use graph::{BinaryOp, Env, Graph, NodeId, Op, UnaryOp};
+pub use graph::{BinaryOp, Env, Graph, Leaves, NodeId, Op, UnaryOp};
 pub use program::Program;
 pub use quantity::Unit;
 pub use span::{FileId, Sources, Span};

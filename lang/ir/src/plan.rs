@@ -77,6 +77,18 @@ pub struct Refusal {
     pub failure: String,
     /// How to mend it.
     pub help: Option<String>,
+    /// What is so where it does not hold, in words: for all of it, or for each that it asks about.
+    #[serde(default)]
+    pub said: Vec<Said>,
+}
+
+/// Words for where something does not hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Said {
+    /// What does not hold there: not 0 if it does.
+    pub node: NodeId,
+    /// The words.
+    pub text: Text,
 }
 
 impl Refusal {

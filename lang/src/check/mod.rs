@@ -44,15 +44,17 @@ pub fn lab(tables: &Tables<'_>, id: DeclId) -> Vec<Diagnostic> {
         let next = Reach::compute(&lab);
         if next == reach {
             mixing::contents(&mut lab);
+            lab.judge_standing();
             return lab.diagnostics;
         }
         reach = next;
     }
 }
 
-/// Checks the flattened model.
+/// Checks the flattened model, and whether things stand where the lab puts them.
 pub fn model(lab: &mut Elaborator<'_>) {
     kinetics::rates(lab);
+    lab.judge_standing();
 }
 
 pub use kinetics::{Starts, never_starts, starts};

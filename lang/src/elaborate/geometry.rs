@@ -8,8 +8,9 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Elaborator;
 use super::coverings::is_place;
+use super::extents::LONGEST;
 use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
-use crate::eval::{Scope, Type, Value};
+use crate::eval::{Scope, Value};
 use crate::names::near::{nearest, question};
 
 /// The shapes and what they are given.
@@ -262,7 +263,7 @@ impl<'a> Elaborator<'a> {
             "mesh" => match args.as_slice() {
                 [file] => return self.mesh(id, e.span, &file.value, None),
                 [file, unit] => {
-                    let unit = self.extent(&unit.value, name, scope)?;
+                    let unit = self.extent(&unit.value, name, 0, scope)?;
                     return self.mesh(id, e.span, &file.value, Some(unit));
                 }
                 _ => None,
@@ -276,8 +277,8 @@ impl<'a> Elaborator<'a> {
             },
             _ => {
                 let mut lengths = Vec::new();
-                for arg in args {
-                    lengths.push(self.extent(&arg.value, name, scope)?);
+                for (index, arg) in args.into_iter().enumerate() {
+                    lengths.push(self.extent(&arg.value, name, index, scope)?);
                 }
                 match (name, lengths.as_slice()) {
                     ("box", [x, y, z]) => Some(Shape::Box([*x, *y, *z])),
@@ -331,7 +332,8 @@ impl<'a> Elaborator<'a> {
                 return None;
             }
         };
-        Some(Shape::Mesh(Arc::new(Mesh::clone(mesh).scaled([unit; 3]).grounded())))
+        let mesh = Mesh::clone(mesh).scaled([unit; 3]).grounded();
+        self.is_of_size(name, mesh.size(), span).then(|| Shape::Mesh(Arc::new(mesh)))
     }
 
     /// A straight beaker: an open cylinder with a wall and a floor.
@@ -367,6 +369,11 @@ impl<'a> Elaborator<'a> {
         for point in points {
             let Value::Tuple(items) = self.expr(point, scope) else { return None };
             let [r, z, _] = self.position(&items, point)?;
+            if r.abs().max(z.abs()) > LONGEST {
+                let headline = format!("a point of an outline is more than {LONGEST} m away");
+                self.report(Diagnostic::error(codes::OUT_OF_RANGE, point.span, headline, "no shape is so large"));
+                return None;
+            }
             if r < 0.0 || items.len() != 2 || out.last().is_some_and(|last| z < last[1]) {
                 self.report(Diagnostic::error(
                     codes::OUT_OF_RANGE,
@@ -379,38 +386,6 @@ impl<'a> Elaborator<'a> {
             out.push([r, z]);
         }
         Some(out)
-    }
-
-    /// A length above 0, m.
-    fn extent(&mut self, e: &'a Expr, what: &str, scope: &mut Scope) -> Option<f64> {
-        let value = self.figure(e, "Length", what, scope)?;
-        if value > 0.0 && value.is_finite() {
-            return Some(value);
-        }
-        let d = Diagnostic::error(codes::OUT_OF_RANGE, e.span, format!("`{what}` has no such extent"), "not above 0 m");
-        self.report(d);
-        None
-    }
-
-    /// A number of a dimension that is known before the run, in SI.
-    pub(super) fn figure(&mut self, e: &'a Expr, dimension: &str, what: &str, scope: &mut Scope) -> Option<f64> {
-        let ty = Type::Quantity { dimension: self.tables.units.named(dimension), point: false, optional: false };
-        let value = self.expr(e, scope);
-        match self.coerce(value, &ty, e.span, what) {
-            Value::Num(n) => match self.known(n.node) {
-                Some(value) => Some(value),
-                None => {
-                    self.report(Diagnostic::error(
-                        codes::TYPE_MISMATCH,
-                        e.span,
-                        "geometry must be known before the run",
-                        "changes while it runs",
-                    ));
-                    None
-                }
-            },
-            _ => None,
-        }
     }
 }
 

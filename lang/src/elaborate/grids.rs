@@ -143,7 +143,7 @@ impl<'a> Elaborator<'a> {
             settings.extend(line.literal.fields.iter().map(|field| Setting { module, field, lab: false, of }));
             let child = self.instantiate(name, vec![kind], settings, of, line.literal.span);
             self.instances[child.0 as usize].pose = layout.pose(corner, place);
-            self.instances[child.0 as usize].at = line.at.is_some();
+            self.instances[child.0 as usize].at = line.at.as_ref().map(|at| at.span);
             self.instances[child.0 as usize].one_of_many = many;
             if self.instances[id.0 as usize].grids[index].children.insert(place, child).is_some() {
                 twice = Some(place);

@@ -274,7 +274,7 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let show = |this: &Self, v: &Value, si: Option<f64>| match (v, si) {
-            (Value::Num(n), Some(si)) => n.unit.clone().unwrap_or_else(|| this.shown(n)).show(si),
+            (Value::Num(n), Some(si)) => this.unit_of(n).show(si),
             _ => "another value".to_string(),
         };
         let (a, b) = (show(self, first, a), show(self, second, b));
@@ -292,7 +292,7 @@ impl<'a> Elaborator<'a> {
             let free: Vec<usize> = (0..self.instances.len()).filter(|i| own(&self.instances[*i])).collect();
             // Where a lab stands that has no place of its own, is open to the one that includes it.
             let stands = relations.iter().any(|(label, _)| label.text != "with");
-            free.iter().filter(|_| !stands).for_each(|i| self.instances[*i].at = false);
+            free.iter().filter(|_| !stands).for_each(|i| self.instances[*i].at = None);
             for (label, operand) in relations {
                 let value = self
                     .within_lab(&outer, |this| this.expr(operand, &mut Scope { lab: true, ..Scope::module(module) }));

@@ -71,8 +71,8 @@ pub struct Instance<'a> {
     pub placed: Vec<(String, InstanceId)>,
     /// Where.
     pub pose: Pose,
-    /// Whether the text says where.
-    pub at: bool,
+    /// Where the text says that.
+    pub at: Option<Span>,
     /// Whether a line makes it together with others.
     pub one_of_many: bool,
     /// Its declaration.
@@ -113,6 +113,9 @@ impl<'a> Elaborator<'a> {
             }));
         }
         let within = self.within.clone();
+        if owner.is_none() && !self.top_level.contains_key(&name) {
+            self.top_level.insert(name.clone(), id);
+        }
         self.instances.push(Instance { name, kinds, within, owner, settings, span, ..Instance::default() });
         self.count_mixture(id);
         self.make_parts(id);
@@ -135,8 +138,8 @@ impl<'a> Elaborator<'a> {
             let (kinds, optional) = match self.resolve_type(ty, m.module) {
                 Type::Instance { kinds, optional } => (kinds, optional),
                 Type::List(inner) => {
-                    if let Type::Instance { kinds, .. } = *inner {
-                        wanted.push((name, kinds));
+                    if let Type::Instance { kinds, .. } = &*inner {
+                        wanted.push((name, kinds.clone()));
                     }
                     continue;
                 }
@@ -149,7 +152,7 @@ impl<'a> Elaborator<'a> {
                     vec![kind]
                 }
                 None if optional => continue,
-                None => kinds,
+                None => kinds.to_vec(),
             };
             let mut nested = Vec::new();
             for s in self.instances[id.0 as usize].settings.clone() {
@@ -259,6 +262,7 @@ impl<'a> Elaborator<'a> {
     pub fn prototype_of(&mut self, kinds: Vec<DeclId>, name: &str) -> InstanceId {
         let depth = name.matches('.').count();
         let id = InstanceId(self.instances.len() as u32);
+        self.top_level.entry(name.to_string()).or_insert(id);
         self.instances.push(Instance { name: name.to_string(), kinds: kinds.clone(), ..Instance::default() });
         self.count_mixture(id);
         if depth < 3 {
@@ -270,7 +274,7 @@ impl<'a> Elaborator<'a> {
 
     /// The top-level instance with this name.
     pub fn find_instance(&self, name: &str) -> Option<InstanceId> {
-        self.instances.iter().position(|i| i.owner.is_none() && i.name == name).map(|i| InstanceId(i as u32))
+        self.top_level.get(name).copied()
     }
 
     /// Whether there is an instance with this full name.

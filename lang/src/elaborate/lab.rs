@@ -164,7 +164,7 @@ impl<'a> Elaborator<'a> {
                 ("at", Value::Tuple(items)) => {
                     if let Some(position) = self.position(&items, operand) {
                         self.instances[id.0 as usize].pose.position = position;
-                        self.instances[id.0 as usize].at = true;
+                        self.instances[id.0 as usize].at = Some(operand.span);
                     }
                 }
                 ("at", other) => {

@@ -425,6 +425,24 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// Notes where `move(...)` goes, whatever amount it is; false where that takes a closer look.
+    pub fn note_move(&mut self, call: &'a Expr, scope: &mut Scope) -> bool {
+        let ExprKind::Call(callee, args) = &*call.kind else { return false };
+        if !matches!(&*callee.kind, ExprKind::Name(n) if n.text == "move") {
+            return false;
+        }
+        let mut end = |name: &str| {
+            let arg = args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == name))?;
+            match self.expr(&arg.value, scope) {
+                Value::Instance(i) => self.mixture_in(i, arg.value.span),
+                _ => None,
+            }
+        };
+        let (Some(from), Some(to)) = (end("from"), end("to")) else { return false };
+        self.moves.insert((from, to));
+        true
+    }
+
     /// `soil(a, from: b)`: the walls of `a` have touched what those of `b` have.
     fn soil_call(&mut self, call: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Vec<Action> {
         let [to, from] = args else {
@@ -656,7 +674,7 @@ impl<'a> Elaborator<'a> {
                 (Type::Quantity { dimension: n.dimension.clone(), point: n.point, optional: true }, n.node)
             }
             Value::Bool(n) => (Type::Bool, *n),
-            Value::InstanceNode(n) => (Type::Instance { kinds: Vec::new(), optional: true }, *n),
+            Value::InstanceNode(n) => (Type::Instance { kinds: [].into(), optional: true }, *n),
             Value::Enum(n, words) => (Type::Enum(words.clone()), *n),
             Value::Error => return None,
             other => {

@@ -4,6 +4,7 @@ pub mod articulation;
 pub mod balances;
 pub mod contents;
 mod coverings;
+mod extents;
 pub mod fields;
 pub mod geometry;
 pub mod grids;
@@ -21,6 +22,7 @@ pub mod reach;
 pub mod reactions;
 pub mod solutions;
 pub mod species;
+mod standing;
 pub mod states;
 pub mod tables;
 pub mod units;
@@ -32,7 +34,7 @@ use std::sync::RwLock;
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Graph, NodeId, Op, Span};
+use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
 use rustc_hash::FxHashMap;
 
 use crate::ast::{self, Expr, FieldValue};
@@ -142,6 +144,8 @@ pub struct Elaborator<'a> {
     types: FxHashMap<(usize, usize), Type>,
     /// Instances; parts after owners.
     pub instances: Vec<Instance<'a>>,
+    /// Those without an owner, by name.
+    pub top_level: FxHashMap<String, InstanceId>,
     /// Those of them that count amounts per species, in order.
     pub mixtures: Vec<InstanceId>,
     /// Where the lab's name stands.
@@ -223,6 +227,10 @@ pub struct Elaborator<'a> {
     pub looked_into: BTreeSet<Span>,
     /// What the expression evaluated last asks of each of several things.
     pub asked_of: Vec<Asked>,
+    /// What is bound wherever a condition is asked of something in turn is noted: it is named in words.
+    pub noting: bool,
+    /// What was noted: what is asked there, and what is bound.
+    pub noted: Vec<(NodeId, Vec<(String, Value)>)>,
     /// The species that the expression evaluated last asks for, and that can never get into the mixture asked.
     pub absent: Vec<(InstanceId, SpeciesId)>,
     /// The same by the place of the condition.
@@ -265,6 +273,7 @@ impl<'a> Elaborator<'a> {
             reported: 0,
             types: FxHashMap::default(),
             instances: Vec::new(),
+            top_level: FxHashMap::default(),
             mixtures: Vec::new(),
             lab_name: Span::default(),
             settings: BTreeMap::new(),
@@ -305,6 +314,8 @@ impl<'a> Elaborator<'a> {
             terms: Vec::new(),
             looked_into: BTreeSet::new(),
             asked_of: Vec::new(),
+            noting: false,
+            noted: Vec::new(),
             absent: Vec::new(),
             absent_in: BTreeMap::new(),
             initial_mode: false,
@@ -387,8 +398,7 @@ impl<'a> Elaborator<'a> {
 
     /// The same for what is only said or judged.
     pub fn glance(&self, node: NodeId) -> Option<f64> {
-        let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
-        if self.graph.depends(node, live) {
+        if self.graph.leaves(node).meets(Leaves::LIVE) {
             return None;
         }
         Some(self.graph.eval_on(node, |leaf| match leaf {

@@ -187,7 +187,7 @@ impl<'a> Elaborator<'a> {
                 _ => None,
             }
         });
-        let unit = stated.unit.clone().unwrap_or_else(|| self.shown(&stated));
+        let unit = self.unit_of(&stated);
         let ratio = stated_si / actual;
         let off = (ratio - 1.0).abs();
         let is_error = match allowed {

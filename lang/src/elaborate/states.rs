@@ -1,5 +1,7 @@
 //! States: allocated once all instances exist, before anything reads them.
 
+use std::sync::Arc;
+
 use matterix_ir::model::{Domain, State};
 use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
@@ -97,7 +99,13 @@ impl<'a> Elaborator<'a> {
             Type::Quantity { dimension, point, .. } => {
                 let Domain::Quantity(unit) = &self.states[index as usize].domain else { return Value::Error };
                 let unit = Some(unit.clone());
-                Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit, literal: false })
+                Value::Num(Num {
+                    node,
+                    dimension: dimension.clone(),
+                    point: *point,
+                    unit: unit.map(Arc::new),
+                    literal: false,
+                })
             }
             _ => Value::Error,
         }
@@ -125,7 +133,7 @@ impl<'a> Elaborator<'a> {
         let ExprKind::Text(text) = &*o.value.kind else { return None };
         let Type::Quantity { dimension, .. } = ty else { return None };
         match self.tables.unit(text) {
-            Ok(r) if r.dimension.agrees(dimension) => Some(r.unit),
+            Ok(r) if r.dimension.agrees(dimension) => Some(Arc::unwrap_or_clone(r.unit)),
             _ => {
                 let wanted = self.tables.type_name(ty);
                 self.report(Diagnostic::error(

@@ -86,7 +86,7 @@ pub struct Tables<'a> {
     /// Dimensions and units.
     pub units: Units,
     /// Units of the text that were read before: the same few stand in every law and step.
-    read: RwLock<BTreeMap<String, Resolved>>,
+    read: RwLock<FxHashMap<String, Resolved>>,
     /// SI units of dimensions that were asked for before.
     si: RwLock<BTreeMap<Dimension, Unit>>,
     /// Words of modules outside their labs, for the modules that were asked for.

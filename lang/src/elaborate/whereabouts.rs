@@ -14,12 +14,12 @@ impl Elaborator<'_> {
     pub fn whereabouts(&self) -> Vec<bool> {
         let carrier = |i: &super::Instance<'_>| i.placed.first().map(|p| p.1);
         let mut open: BTreeMap<Option<InstanceId>, usize> = BTreeMap::new();
-        for instance in self.instances.iter().filter(|i| i.owner.is_none() && !i.at) {
+        for instance in self.instances.iter().filter(|i| i.owner.is_none() && i.at.is_none()) {
             *open.entry(carrier(instance)).or_default() += 1;
         }
         let known = |i: &super::Instance<'_>| match i.owner {
-            Some(_) => i.at || !i.one_of_many,
-            None => i.at || open.get(&carrier(i)).is_none_or(|count| *count == 1),
+            Some(_) => i.at.is_some() || !i.one_of_many,
+            None => i.at.is_some() || open.get(&carrier(i)).is_none_or(|count| *count == 1),
         };
         self.instances.iter().map(known).collect()
     }

@@ -342,7 +342,7 @@ impl<'a> Elaborator<'a> {
                 Some(_) => Value::Frame(matterix_ir::scene::InstanceId(0), name.to_string()),
                 None => Value::Error,
             },
-            Type::Instance { kinds, .. } => Value::Instance(self.prototype_of(kinds.clone(), name)),
+            Type::Instance { kinds, .. } => Value::Instance(self.prototype_of(kinds.to_vec(), name)),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Comparisons, ranges, membership; each notes what it compared, for reports.
 
 use matterix_ir::plan::Comparison;
-use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, Unit, codes};
+use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Span, UnaryOp, Unit, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, UnitText};
@@ -87,20 +87,17 @@ impl<'a> Elaborator<'a> {
     }
 
     fn is_fixed(&self, node: NodeId) -> bool {
-        !self.graph.depends(node, |op| {
-            matches!(
-                op,
-                matterix_ir::Op::State(_)
-                    | matterix_ir::Op::Time
-                    | matterix_ir::Op::Reading(_)
-                    | matterix_ir::Op::Local(_)
-            )
-        })
+        !self.graph.leaves(node).meets(Leaves::LIVE)
     }
 
     fn compared(&mut self, value: &Num, low: Option<NodeId>, high: Option<NodeId>, limit: &Num, span: Span) {
-        let unit = limit.unit.clone().or_else(|| value.unit.clone()).unwrap_or_else(|| self.shown(value));
+        let unit = limit.unit.as_deref().cloned().unwrap_or_else(|| self.unit_of(value));
         self.comparisons.push((span, Comparison { text: String::new(), value: value.node, low, high, unit }));
+    }
+
+    /// The unit a quantity is shown in: the one it was written in, where there is one.
+    pub fn unit_of(&self, n: &Num) -> Unit {
+        n.unit.as_deref().cloned().unwrap_or_else(|| self.shown(n))
     }
 
     /// The unit a quantity is shown in where the user gave none.

@@ -447,7 +447,19 @@ impl<'a> Elaborator<'a> {
             let of = if single { self.spoken(&item) } else { None };
             let outer = of.is_some().then(|| (std::mem::take(&mut self.comparisons), std::mem::take(&mut self.terms)));
             scope.bind(var.text.clone(), item);
+            let noted = self.noted.len();
             let value = self.expr(body, scope);
+            // The innermost of several, as all is bound there.
+            if self.noting
+                && self.noted.len() == noted
+                && fold.text == "all"
+                && self.open_calls.is_empty()
+                && self.open_members.is_empty()
+                && let Value::Bool(node) = value
+                && self.graph.constant(node).is_none_or(|v| v == 0.0)
+            {
+                self.noted.push((node, scope.vars.clone()));
+            }
             scope.vars.pop();
             if let (Some(of), Some((mut compared, mut terms))) = (of, outer) {
                 std::mem::swap(&mut compared, &mut self.comparisons);

@@ -45,6 +45,8 @@ enum Bound {
     Grouped,
     /// Where a part of a thing is, seen from another part of it.
     Displacement,
+    /// How far the centre of mass of a thing is inside what bears it where it is put down.
+    Footing,
     /// How large an instance is in one way, if its shape is known.
     Measures,
     /// A number that a material states; without end where it states none.
@@ -71,6 +73,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("kelvin", Bound::Absolute),
     ("choose", Bound::Choose),
     ("displacement", Bound::Displacement),
+    ("footing", Bound::Footing),
     ("grouped", Bound::Grouped),
     ("having", Bound::Having),
     ("measures", Bound::Measures),
@@ -165,6 +168,7 @@ impl Elaborator<'_> {
             (Bound::Paired, [Value::List(a), Value::List(b)]) => self.paired(a, b, at),
             (Bound::Grouped, [Value::List(items), Value::Num(n)]) => self.grouped(items, n.node, at),
             (Bound::Displacement, [Value::Instance(a), Value::Instance(b)]) => self.displacement(*a, *b),
+            (Bound::Footing, [Value::Instance(thing), Value::Instance(on)]) => self.footings(*thing, *on),
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),

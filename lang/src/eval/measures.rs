@@ -46,6 +46,17 @@ impl Elaborator<'_> {
         Value::List(found.map(|value| self.number(value, dimension, false)).into_iter().collect())
     }
 
+    /// How far a thing put down on another is from tipping over, as a list of one length; an empty one where shapes do not tell.
+    pub(super) fn footings(&mut self, thing: InstanceId, on: InstanceId) -> Value {
+        let dimension = self.tables.units.named("Length");
+        if self.prototype {
+            let ty = Type::Quantity { dimension, point: false, optional: false };
+            return Value::List(vec![self.placeholder(&ty, "footing")]);
+        }
+        let found = self.footing(thing, on);
+        Value::List(found.map(|value| self.number(value, dimension, false)).into_iter().collect())
+    }
+
     /// How high the centre of mass of a body is above its base, m.
     fn centre(&self, geometry: &Geometry) -> Option<f64> {
         let named = geometry.frames.iter().find(|f| f.name == frame::CENTRE && !f.stand && f.link.is_none());
@@ -58,7 +69,16 @@ impl Elaborator<'_> {
     /// How far where things stand on an instance is from level in the lab as it is set up, rad; of what goes with a joint
     /// nothing is known.
     fn tilt(&mut self, id: InstanceId) -> Option<f64> {
-        let mut at = self.place_on(id)?;
+        let place = self.place_on(id)?;
+        let at = self.in_lab(id, place)?;
+        let up = at.point([0.0, 0.0, 1.0])[2] - at.position[2];
+        // Rounding does not make a level place slope.
+        Some(if up >= 1.0 - 1e-12 { 0.0 } else { acos(up.clamp(-1.0, 1.0)) })
+    }
+
+    /// A place of an instance in the lab as it is set up; nothing where it goes with a joint.
+    pub(crate) fn in_lab(&mut self, id: InstanceId, place: Pose) -> Option<Pose> {
+        let mut at = place;
         let mut next = id;
         for _ in 0..=self.instances.len() {
             let instance = &self.instances[next.0 as usize];
@@ -73,13 +93,11 @@ impl Elaborator<'_> {
                 (None, None) => break,
             };
         }
-        let up = at.point([0.0, 0.0, 1.0])[2] - at.position[2];
-        // Rounding does not make a level place slope.
-        Some(if up >= 1.0 - 1e-12 { 0.0 } else { acos(up.clamp(-1.0, 1.0)) })
+        Some(at)
     }
 
     /// Where things stand on an instance; nothing where that goes with a joint.
-    fn place_on(&mut self, id: InstanceId) -> Option<Pose> {
+    pub(crate) fn place_on(&mut self, id: InstanceId) -> Option<Pose> {
         let frames = self.geometry(id).frames;
         match frames.iter().find(|f| f.name == frame::PLACE) {
             Some(place) => place.link.is_none().then_some(place.pose),

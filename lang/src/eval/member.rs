@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use matterix_ir::model::{Domain, Reading};
 use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
+use matterix_ir::{BinaryOp, Diagnostic, Leaves, Op, Span, codes};
 
 use super::{Num, Scope, SpeciesId, Type, Value};
 use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
@@ -311,20 +311,23 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let MemberKind::Value { name, ty, options, .. } = &m.member.kind else { return };
-        let (node, domain) = match value {
-            Value::Num(n) => {
-                let ty = self.resolve_type(ty, m.module);
-                let unit = self.declared_unit(options, &ty).unwrap_or_else(|| self.type_unit(&ty));
-                (n.node, Domain::Quantity(unit))
-            }
-            Value::Bool(n) => (*n, Domain::Bool),
-            Value::InstanceNode(n) => (*n, Domain::Instance),
-            Value::Enum(n, words) => (*n, Domain::Enum(words.to_vec())),
-            _ => return,
+        let (Value::Num(Num { node, .. }) | Value::Bool(node) | Value::InstanceNode(node) | Value::Enum(node, _)) =
+            *value
+        else {
+            return;
         };
-        if self.terms.iter().any(|t| t.node == node) || !self.graph.depends(node, |op| matches!(op, Op::State(_))) {
+        if self.terms.iter().any(|t| t.node == node) || !self.graph.leaves(node).meets(Leaves::STATE) {
             return;
         }
+        let domain = match value {
+            Value::Num(_) => {
+                let ty = self.resolve_type(ty, m.module);
+                Domain::Quantity(self.declared_unit(options, &ty).unwrap_or_else(|| self.type_unit(&ty)))
+            }
+            Value::Bool(_) => Domain::Bool,
+            Value::Enum(_, words) => Domain::Enum(words.to_vec()),
+            _ => Domain::Instance,
+        };
         let name = format!("{}.{}", self.spoken_name(id), name.text);
         self.terms.push(Term { name, node, domain });
     }
@@ -401,7 +404,7 @@ impl<'a> Elaborator<'a> {
             if given > least || (!strict && given >= least) {
                 continue;
             }
-            let unit = n.unit.clone().unwrap_or_else(|| self.shown(n));
+            let unit = self.unit_of(n);
             let least = unit.show(least);
             self.report(
                 Diagnostic::error(
@@ -477,7 +480,7 @@ impl<'a> Elaborator<'a> {
         let index = match again {
             Some(known) => known.param,
             None => {
-                let unit = n.unit.clone().unwrap_or_else(|| self.shown(&n));
+                let unit = self.unit_of(&n);
                 let index = self.params.len() as u32;
                 self.params.push(matterix_ir::model::Param { name: name.to_string(), value, unit, span });
                 self.open.add(name, index, &n, span);
@@ -519,7 +522,7 @@ impl<'a> Elaborator<'a> {
             return Value::Num(n);
         }
         let full = format!("{}.{name}", self.instances[id.0 as usize].name);
-        let unit = self.declared_unit(options, ty).or_else(|| n.unit.clone()).unwrap_or_else(|| self.shown(&n));
+        let unit = self.declared_unit(options, ty).unwrap_or_else(|| self.unit_of(&n));
         let index = self.readings.len() as u32;
         let [resolution, noise, period] = found;
         self.readings.push(Reading {
@@ -532,7 +535,7 @@ impl<'a> Elaborator<'a> {
             unit: unit.clone(),
             span: m.member.span,
         });
-        Value::Num(Num { node: self.graph.add(Op::Reading(index)), unit: Some(unit), literal: false, ..n })
+        Value::Num(Num { node: self.graph.add(Op::Reading(index)), unit: Some(unit.into()), literal: false, ..n })
     }
 
     /// `x[word]`.

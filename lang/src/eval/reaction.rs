@@ -88,7 +88,7 @@ impl<'a> Elaborator<'a> {
             return Value::Range(Box::new(low), Box::new(high));
         };
         let v = self.expr(e, &mut Scope::module(module));
-        match self.coerce(v, &Type::Range(Box::new(ty)), e.span, "valid") {
+        match self.coerce(v, &Type::Range(ty.into()), e.span, "valid") {
             Value::Range(a, b) => {
                 let low = self.name_param(&format!("{name}.valid.min"), *a, e.span);
                 let high = self.name_param(&format!("{name}.valid.max"), *b, e.span);

@@ -44,15 +44,15 @@ pub enum Type {
     /// A named point of an instance.
     Frame,
     /// `Range<T>`.
-    Range(Box<Type>),
+    Range(Arc<Type>),
     /// `List<T>`.
-    List(Box<Type>),
+    List(Arc<Type>),
     /// Three plain numbers 0..1: red, green, blue.
     Color,
     /// An instance that has all of these capabilities (or is of this asset type).
     Instance {
         /// All of them.
-        kinds: Vec<DeclId>,
+        kinds: Arc<[DeclId]>,
         /// May be `nothing`.
         optional: bool,
     },
@@ -94,7 +94,7 @@ impl Tables<'_> {
         if ty.paths.len() == 1 && ty.paths[0].segments.len() == 1 {
             let name = &ty.paths[0].segments[0];
             let argument = |d: &mut Vec<Diagnostic>| {
-                Box::new(ty.argument.as_ref().map_or(Type::Any, |a| self.resolve_type(a, module, d)))
+                Arc::new(ty.argument.as_ref().map_or(Type::Any, |a| self.resolve_type(a, module, d)))
             };
             match name.text.as_str() {
                 "Bool" => return Type::Bool,
@@ -126,7 +126,7 @@ impl Tables<'_> {
                 }
             }
         }
-        Type::Instance { kinds, optional: ty.optional }
+        Type::Instance { kinds: kinds.into(), optional: ty.optional }
     }
 
     fn unknown_type(&self, name: &ast::Name, module: usize) -> Diagnostic {

@@ -26,7 +26,7 @@ pub struct Num {
     /// A point on a scale, not a difference.
     pub point: bool,
     /// The unit it was written in, for display.
-    pub unit: Option<Unit>,
+    pub unit: Option<Arc<Unit>>,
     /// Written as one literal, so that `353 K` may stand for a temperature.
     pub literal: bool,
 }

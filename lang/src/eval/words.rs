@@ -83,7 +83,7 @@ impl<'a> Elaborator<'a> {
     pub fn like(&mut self, e: &'a Expr, other: &Value, scope: &mut Scope) -> Value {
         match (other, &*e.kind) {
             (Value::Enum(_, words), ExprKind::List(_)) => {
-                let ty = Type::List(Box::new(Type::Enum(words.clone())));
+                let ty = Type::List(Type::Enum(words.clone()).into());
                 self.hinted(e, &ty, scope)
             }
             (Value::Enum(_, words), _) => self.word(e, &words.clone(), scope),

@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::{Planner, ResultSlot};
 use crate::ast::{Block, Call, Clause, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
 use crate::elaborate::tables::MemberRef;
-use crate::eval::{Num, Scope, Type, Value};
+use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near, verb_text};
 
 /// What a verb can mean.
@@ -584,18 +584,15 @@ impl<'a> Planner<'a, '_> {
 
     /// Arguments as a driver sees them.
     pub fn driver_arguments(&mut self, bound: &Bound) -> Vec<(String, Argument)> {
+        if self.draft {
+            return Vec::new();
+        }
         bound
             .values
             .iter()
             .filter_map(|(name, v)| {
                 let argument = match v {
-                    Value::Num(Num { node, unit, .. }) => {
-                        let unit = unit.clone().unwrap_or_else(|| match v {
-                            Value::Num(n) => self.lab.shown(n),
-                            _ => matterix_ir::Unit::one(),
-                        });
-                        Argument::Quantity(*node, unit)
-                    }
+                    Value::Num(n) => Argument::Quantity(n.node, self.lab.unit_of(n)),
                     Value::Instance(i) | Value::Qualified(i, _) => Argument::Instance(*i),
                     Value::Frame(i, frame) if frame.is_empty() => Argument::Instance(*i),
                     Value::Frame(i, frame) => {

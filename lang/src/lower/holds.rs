@@ -82,7 +82,7 @@ impl<'a> Planner<'a, '_> {
             [one] => format!("{} holds {}", one.text, name.text),
             _ => format!("every source holds {}", name.text),
         };
-        let refusal = Some(Refusal { failure: "wrong_reagent".into(), help: Some(help) });
+        let refusal = Some(Refusal { failure: "wrong_reagent".into(), help: Some(help), said: Vec::new() });
         let terms = match each.as_slice() {
             [one] => one.terms.clone(),
             _ => Vec::new(),

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::Op;
-use matterix_ir::plan::{Condition, Limit, Refusal, Step};
+use matterix_ir::plan::{Limit, Step};
 use matterix_ir::scene::InstanceId;
 
 use super::Planner;
@@ -18,16 +18,16 @@ impl Planner<'_, '_> {
         for i in 0..self.lab.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.lab.all_members(id) {
-                let MemberKind::Limit { at_end: when, cond, failure, help } = &m.member.kind else { continue };
+                let MemberKind::Limit { at_end: when, cond, refusal } = &m.member.kind else { continue };
                 if *when != at_end || self.is_drafted(cond.span) {
                     continue;
                 }
-                let Some(condition) = self.condition(cond, &mut Scope::of_member(id, m)) else { continue };
+                let scope = &mut Scope::of_member(id, m);
+                let Some(condition) = self.demanded(cond, refusal.as_ref(), scope) else { continue };
                 if self.lab.graph.constant(condition.node).is_some_and(|v| v != 0.0) {
                     continue;
                 }
-                let refusal = failure.as_ref().map(|f| Refusal { failure: f.text.clone(), help: help.clone() });
-                out.push(Limit { instance: id, condition: Condition { refusal, ..condition } });
+                out.push(Limit { instance: id, condition });
             }
         }
         out

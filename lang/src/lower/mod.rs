@@ -19,6 +19,7 @@ use std::collections::BTreeSet;
 use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::script::Wiring;
 use matterix_ir::{Sources, Span, Unit};
+use rustc_hash::FxHashSet;
 
 use self::clauses::Clauses;
 use crate::ast::{Block, Handlers, ItemKind};
@@ -63,7 +64,7 @@ pub struct Planner<'a, 'e> {
     pub wiring: Option<Wiring>,
     clauses: Clauses,
     /// Clauses and limits that a draft has looked at.
-    drafted: BTreeSet<Span>,
+    drafted: FxHashSet<Span>,
 }
 
 /// Where a skill's result goes.
@@ -105,7 +106,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             offers: matterix_ir::offer::Offers::default(),
             wiring: None,
             clauses: Clauses::default(),
-            drafted: BTreeSet::new(),
+            drafted: FxHashSet::default(),
         }
     }
 

@@ -1,6 +1,5 @@
 //! Leaves: commands of devices and primitive skills, with what they need, change and take.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use matterix_ir::model::Action;
@@ -187,7 +186,10 @@ impl<'a> Planner<'a, '_> {
 
     fn effect(&mut self, effect: &'a Effect, span: Span, inner: &mut Scope) -> Vec<Action> {
         match effect {
+            // A draft asks for what is moved where, not for values.
+            Effect::Assign(_, value) if self.is_drafted(value.span) => Vec::new(),
             Effect::Assign(target, value) => self.lab.assignment(target, value, None, inner).into_iter().collect(),
+            Effect::Call(call) if self.is_drafted(call.span) && self.lab.note_move(call, inner) => Vec::new(),
             Effect::Call(call) => self.lab.call_actions(call, span, inner),
             Effect::Each { var, set, effects } => {
                 let mut out = Vec::new();
@@ -216,7 +218,7 @@ impl<'a> Planner<'a, '_> {
             Some(e) => {
                 let v = self.lab.expr(e, inner);
                 let ty = Type::Quantity { dimension: self.lab.duration(), point: false, optional: false };
-                match self.lab.coerce(v, &Type::Range(Box::new(ty)), e.span, "takes") {
+                match self.lab.coerce(v, &Type::Range(ty.into()), e.span, "takes") {
                     Value::Range(a, b) => Some((a.node, b.node)),
                     _ => return None,
                 }
@@ -227,12 +229,10 @@ impl<'a> Planner<'a, '_> {
 
     /// The whole instances that actions write.
     fn claims(&self, actions: &[Action]) -> Vec<InstanceId> {
-        let mut out = BTreeSet::new();
+        let mut out = Vec::new();
         for action in actions {
             match action {
-                Action::Assign { state, .. } => {
-                    out.insert(self.top(self.lab.state_owner[*state as usize]));
-                }
+                Action::Assign { state, .. } => out.push(self.top(self.lab.state_owner[*state as usize])),
                 Action::Move { from, to, .. } => {
                     for mixture in [from, to] {
                         out.extend(self.lab.mixtures.get(*mixture as usize).map(|i| self.top(*i)));
@@ -240,7 +240,9 @@ impl<'a> Planner<'a, '_> {
                 }
             }
         }
-        out.into_iter().collect()
+        out.sort_unstable();
+        out.dedup();
+        out
     }
 
     fn top(&self, mut id: InstanceId) -> InstanceId {

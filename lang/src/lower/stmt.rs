@@ -1,7 +1,7 @@
 //! Statements, one construct at a time.
 
 use matterix_ir::plan::{Caught, Step, StepId};
-use matterix_ir::{Diagnostic, NodeId, Op, Span, Text, Unit, codes};
+use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
@@ -366,7 +366,7 @@ impl<'a> Planner<'a, '_> {
                 if !self.depends_on_run(n.node) {
                     return (Value::Num(n), Vec::new());
                 }
-                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                let unit = self.lab.unit_of(&n);
                 let (node, step) = self.keep_node(name, n.node, unit, span);
                 (Value::Num(Num { node, literal: false, ..n }), vec![step])
             }
@@ -406,8 +406,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn depends_on_run(&self, node: NodeId) -> bool {
-        let live = |op: &Op| matches!(op, Op::State(_) | Op::Time | Op::Reading(_) | Op::Local(_));
-        self.lab.graph.depends(node, live)
+        self.lab.graph.leaves(node).meets(Leaves::LIVE)
     }
 
     /// `return e`.
@@ -430,7 +429,7 @@ impl<'a> Planner<'a, '_> {
         };
         let node = self.lab.graph.add(Op::Local(slot.local));
         if let Some(unit) = &n.unit {
-            self.locals[slot.local as usize].unit = unit.clone();
+            self.locals[slot.local as usize].unit = Unit::clone(unit);
         }
         if let Some(Some(slot)) = self.results.last_mut() {
             slot.value = Some(Value::Num(Num { node, literal: false, ..n.clone() }));
@@ -444,7 +443,7 @@ impl<'a> Planner<'a, '_> {
         let every = self.duration_node(every, scope, "every")?;
         let (nodes, unit) = match v {
             Value::Num(n) => {
-                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                let unit = self.lab.unit_of(&n);
                 (vec![n.node], unit)
             }
             Value::Bool(n) => (vec![n], Unit::one()),

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::plan::{Comparison, Condition, Refusal};
+use matterix_ir::plan::{Comparison, Condition, Refusal, Said};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Span, Text, TextPart, codes};
+use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
@@ -23,7 +23,7 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
         for c in clauses {
             match &c.kind {
                 ClauseKind::Fails(names) => out.extend(names.iter().map(|n| n.text.clone())),
-                ClauseKind::Needs { failure, .. } => out.extend(failure.iter().map(|n| n.text.clone())),
+                ClauseKind::Needs { refusal, .. } => out.extend(refusal.iter().map(|r| r.failure.text.clone())),
                 _ => {}
             }
         }
@@ -39,8 +39,8 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
                 for m in members {
                     match &m.kind {
                         MemberKind::Command { clauses, .. } => add(clauses, &mut out),
-                        MemberKind::Limit { at_end: false, failure, .. } => {
-                            out.extend(failure.iter().map(|n| n.text.clone()))
+                        MemberKind::Limit { at_end: false, refusal, .. } => {
+                            out.extend(refusal.iter().map(|r| r.failure.text.clone()))
                         }
                         _ => {}
                     }
@@ -77,7 +77,7 @@ impl<'a> Planner<'a, '_> {
             let (_, value) = bound.values.iter().find(|(name, _)| *name == p.name.text)?;
             match value {
                 Value::Num(n) => {
-                    let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
+                    let unit = self.lab.unit_of(n);
                     Some(unit.show(self.lab.glance(n.node)?))
                 }
                 Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
@@ -136,13 +136,51 @@ impl<'a> Planner<'a, '_> {
 
     /// What a `needs` or `presumes` clause asks, with the failure and the help it names.
     pub fn need(&mut self, clause: &'a Clause, scope: &mut Scope) -> Option<Condition> {
-        let (ClauseKind::Needs { cond, failure, help } | ClauseKind::Presumes { cond, failure, help, .. }) =
-            &clause.kind
-        else {
+        let (ClauseKind::Needs { cond, refusal } | ClauseKind::Presumes { cond, refusal, .. }) = &clause.kind else {
             return None;
         };
-        let refusal = failure.as_ref().map(|f| Refusal { failure: f.text.clone(), help: help.clone() });
-        Some(Condition { refusal, ..self.condition(cond, scope)? })
+        self.demanded(cond, refusal.as_ref(), scope)
+    }
+
+    /// A condition with what is said where it does not hold.
+    pub fn demanded(
+        &mut self,
+        cond: &'a Expr,
+        refusal: Option<&'a ast::Refusal>,
+        scope: &mut Scope,
+    ) -> Option<Condition> {
+        let words = refusal.and_then(|r| r.because.as_ref()).filter(|_| !self.draft);
+        self.lab.noting = words.is_some();
+        let condition = self.condition(cond, scope);
+        self.lab.noting = false;
+        let (condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
+        let said = words.map(|words| self.said(words, &condition, bound, scope)).unwrap_or_default();
+        let refusal = refusal.map(|r| Refusal { failure: r.failure.text.clone(), help: r.help.clone(), said });
+        Some(Condition { refusal, ..condition })
+    }
+
+    /// Words for each that a condition asks about; for all of it where it asks about nothing in turn.
+    fn said(
+        &mut self,
+        words: &'a ast::Text,
+        condition: &Condition,
+        bound: Vec<(NodeId, Vec<(String, Value)>)>,
+        scope: &mut Scope,
+    ) -> Vec<Said> {
+        if bound.is_empty() {
+            // A list of nothing is asked about in vain, and its elements have no names here.
+            let holds = self.lab.graph.constant(condition.node).is_some_and(|v| v != 0.0);
+            let text = if holds { None } else { self.filled(words, scope) };
+            return text.map(|text| Said { node: condition.node, text }).into_iter().collect();
+        }
+        let mut out = Vec::new();
+        for (node, vars) in bound {
+            let outside = std::mem::replace(&mut scope.vars, vars);
+            let text = self.filled(words, scope);
+            scope.vars = outside;
+            out.extend(text.map(|text| Said { node, text }));
+        }
+        out
     }
 
     /// A text with its values as parts.
@@ -185,7 +223,7 @@ impl<'a> Planner<'a, '_> {
         match value {
             Value::Error => return false,
             Value::Num(n) => {
-                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(&n));
+                let unit = self.lab.unit_of(&n);
                 out.push(TextPart::Quantity { value: n.node, unit, digits });
             }
             Value::Bool(n) => out.push(TextPart::Bool(n)),

@@ -3,6 +3,7 @@
 pub mod near;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
 
@@ -48,8 +49,8 @@ pub struct Names<'a> {
     pub modules: &'a [Module],
     /// All named items.
     pub decls: Vec<Decl<'a>>,
-    scopes: Vec<BTreeMap<String, DeclId>>,
-    own: Vec<BTreeMap<String, DeclId>>,
+    scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
+    own: Vec<BTreeMap<Arc<str>, DeclId>>,
 }
 
 /// Parses the root file and everything it imports; the library comes first.
@@ -218,15 +219,15 @@ impl<'a> Names<'a> {
         index: usize,
         module: &'a Module,
         diagnostics: &mut Vec<Diagnostic>,
-    ) -> BTreeMap<String, DeclId> {
-        let mut own: BTreeMap<String, DeclId> = BTreeMap::new();
+    ) -> BTreeMap<Arc<str>, DeclId> {
+        let mut own: BTreeMap<Arc<str>, DeclId> = BTreeMap::new();
         for item in &module.tree.items {
             let Some((name, span)) = item_name(item) else { continue };
             let id = DeclId(self.decls.len() as u32);
             self.decls.push(Decl { module: index, item });
-            if let Some(first) = own.insert(name.clone(), id) {
+            if let Some(first) = own.insert(name.as_str().into(), id) {
                 let first_span = item_name(self.decl(first).item).map_or(span, |n| n.1);
-                own.insert(name.clone(), first);
+                own.insert(name.as_str().into(), first);
                 diagnostics.push(
                     Diagnostic::error(
                         codes::DUPLICATE_NAME,
@@ -246,7 +247,7 @@ impl<'a> Names<'a> {
         self.modules.iter().position(|m| m.name == name)
     }
 
-    fn prelude(&self) -> BTreeMap<String, DeclId> {
+    fn prelude(&self) -> BTreeMap<Arc<str>, DeclId> {
         let mut scope = BTreeMap::new();
         let Some(prelude) = self.module_index("std::prelude") else { return scope };
         for item in &self.modules[prelude].tree.items {
@@ -259,7 +260,7 @@ impl<'a> Names<'a> {
         scope
     }
 
-    fn import(&self, module: &Module, scope: &mut BTreeMap<String, DeclId>, diagnostics: &mut Vec<Diagnostic>) {
+    fn import(&self, module: &Module, scope: &mut BTreeMap<Arc<str>, DeclId>, diagnostics: &mut Vec<Diagnostic>) {
         for item in &module.tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
             let candidates = module_candidates(path, names.is_some());
@@ -285,9 +286,9 @@ impl<'a> Names<'a> {
                 }
             };
             for name in wanted {
-                match self.own[from].get(&name.text) {
+                match self.own[from].get(name.text.as_str()) {
                     Some(&id) => {
-                        scope.insert(name.text.clone(), id);
+                        scope.insert(name.text.as_str().into(), id);
                     }
                     None => diagnostics.push(self.not_in_module(name, from)),
                 }
@@ -325,7 +326,7 @@ impl<'a> Names<'a> {
 
     /// Everything a module sees.
     pub fn visible(&self, module: usize) -> impl Iterator<Item = (&str, DeclId)> {
-        self.scopes[module].iter().map(|(k, v)| (k.as_str(), *v))
+        self.scopes[module].iter().map(|(k, v)| (&**k, *v))
     }
 
     /// What a module itself declares, in the order of its text.

@@ -3,6 +3,8 @@
 
 mod units;
 
+use std::sync::Arc;
+
 use matterix_ir::model::{Domain, Observable};
 use matterix_ir::plan::{Plan, Step};
 use matterix_ir::points::{After, Fact, POINTS_VERSION, Point, Points, Reagent, Thing, Value};
@@ -71,7 +73,9 @@ impl Questions {
             let mut asked = ask(lab, name, state);
             if by_mass {
                 // Its amount is its mass in kg.
-                asked.domain = Domain::Quantity(lab.tables.unit("g").map_or(Unit::scaled("kg", 1.0), |u| u.unit));
+                asked.domain = Domain::Quantity(
+                    lab.tables.unit("g").map_or(Unit::scaled("kg", 1.0), |u| Arc::unwrap_or_clone(u.unit)),
+                );
             }
             things[key.instance.0 as usize].species.push(asked);
         }

@@ -14,7 +14,7 @@ impl Written {
     /// The units of the workflow's arguments and conditions and of the lab's contents and parameters.
     pub fn of(lab: &Elaborator<'_>, sources: &Sources, plan: &Plan) -> Self {
         let own = |span: Span| sources.get(span.file).is_some_and(|f| !f.name.contains("::"));
-        let mut units: Vec<Unit> = lab.held.iter().filter_map(|h| h.quantity.unit.clone()).collect();
+        let mut units: Vec<Unit> = lab.held.iter().filter_map(|h| h.quantity.unit.as_deref().cloned()).collect();
         units.extend(lab.params.iter().filter(|p| own(p.span)).map(|p| p.unit.clone()));
         for step in plan.steps.iter().filter(|s| own(s.span)) {
             let compared = |c: &Condition| c.compared.iter().map(|c| c.unit.clone()).collect::<Vec<_>>();

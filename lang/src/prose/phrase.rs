@@ -30,7 +30,7 @@ impl<'a> Prose<'a, '_> {
                 format!("value {at} of {}", self.say(base))
             }
             ExprKind::Call(callee, args) => self.function(callee, args, e),
-            ExprKind::Unary(Unary::Neg, inner) => format!("−{}", self.say(inner)),
+            ExprKind::Unary(Unary::Neg, inner) => format!("−{}", self.operand(inner, tightness(Binary::Mul))),
             ExprKind::Binary(
                 op @ (Binary::Add | Binary::Sub | Binary::Mul | Binary::Div | Binary::PlusMinus),
                 a,
@@ -43,7 +43,9 @@ impl<'a> Prose<'a, '_> {
                     Binary::Div => "/",
                     _ => "±",
                 };
-                format!("{} {sign} {}", self.say(a), self.say(b))
+                // Of equals the left one goes first.
+                let binds = tightness(*op);
+                format!("{} {sign} {}", self.operand(a, binds), self.operand(b, binds + 1))
             }
             ExprKind::Binary(..) | ExprKind::Unary(..) => self.condition(e),
             ExprKind::Of(amount, what) => format!("{} of {}", self.say(amount), what.text),
@@ -169,10 +171,28 @@ impl<'a> Prose<'a, '_> {
         }
     }
 
+    /// A part of a sum or product, in parentheses where it binds less tightly than what it stands in.
+    fn operand(&mut self, e: &'a Expr, within: u8) -> String {
+        let said = self.say(e);
+        match &*e.kind {
+            ExprKind::Binary(op, ..) if tightness(*op) < within => format!("({said})"),
+            _ => said,
+        }
+    }
+
+    /// A part of what must hold together, in parentheses where one of several is enough for it.
+    fn alternatives(&mut self, e: &'a Expr) -> String {
+        let said = self.condition(e);
+        match &*e.kind {
+            ExprKind::Binary(Binary::Or, ..) => format!("({said})"),
+            _ => said,
+        }
+    }
+
     /// A condition as a statement: `the temperature of the contents of beaker is at least 60 °C`.
     pub(super) fn condition(&mut self, e: &'a Expr) -> String {
         match &*e.kind {
-            ExprKind::Binary(Binary::And, a, b) => format!("{} and {}", self.condition(a), self.condition(b)),
+            ExprKind::Binary(Binary::And, a, b) => format!("{} and {}", self.alternatives(a), self.alternatives(b)),
             ExprKind::Binary(Binary::Or, a, b) => format!("{} or {}", self.condition(a), self.condition(b)),
             // `plate.active`: a truth value is an adjective.
             ExprKind::Member(thing, name) => format!("{} is {}", self.say(thing), words::plain(&name.text)),
@@ -246,5 +266,15 @@ fn passed(op: Binary) -> Option<&'static str> {
         Binary::Lt => Some("less than "),
         Binary::Le => Some("at most "),
         _ => None,
+    }
+}
+
+/// How tightly an operator binds, as the language reads it.
+fn tightness(op: Binary) -> u8 {
+    match op {
+        Binary::Pow => 3,
+        Binary::Mul | Binary::Div => 2,
+        Binary::Add | Binary::Sub | Binary::PlusMinus => 1,
+        _ => 0,
     }
 }

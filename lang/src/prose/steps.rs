@@ -203,7 +203,7 @@ impl<'a> Prose<'a, '_> {
     fn member_of_set(&self, value: &Value) -> Option<String> {
         match value {
             Value::Num(n) => {
-                let unit = n.unit.clone().unwrap_or_else(|| self.lab.shown(n));
+                let unit = self.lab.unit_of(n);
                 Some(words::quantity(&unit.show(self.lab.glance(n.node)?)))
             }
             Value::Tuple(items) => {

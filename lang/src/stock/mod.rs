@@ -65,7 +65,7 @@ pub fn stock(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], 
             mixture: mixture as u32,
             substance: term.substance.clone(),
             amount: term.quantity.node,
-            unit: term.quantity.unit.clone().unwrap_or_else(|| lab.shown(&term.quantity)),
+            unit: lab.unit_of(&term.quantity),
             mass,
             span: term.span,
         });

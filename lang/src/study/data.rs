@@ -1,6 +1,8 @@
 //! The table of a fit's data: comma-separated, a header, a column `time` and one for each match. Lines that begin with
 //! `#` are remarks; an empty cell is a value that was not taken.
 
+use std::sync::Arc;
+
 use matterix_ir::study::{DataRow, Fit};
 use matterix_ir::{Diagnostic, FileId, Sources, Span, Unit, codes};
 
@@ -125,7 +127,9 @@ impl Table<'_> {
         let Some(symbol) = columns[index].unit else { return Ok((index, Unit::scaled("s", 1.0))) };
         let duration = tables.units.dimension("Duration").map(|d| d.dimension.clone());
         match tables.unit(symbol) {
-            Ok(found) if !found.point && Some(&found.dimension) == duration.as_ref() => Ok((index, found.unit)),
+            Ok(found) if !found.point && Some(&found.dimension) == duration.as_ref() => {
+                Ok((index, Arc::unwrap_or_clone(found.unit)))
+            }
             _ => {
                 let headline = format!("`{symbol}` is not a unit of time");
                 Err(Box::new(self.at(header, index, &headline, "in brackets").help("write `time [s]` or `time [min]`")))

@@ -272,7 +272,7 @@ fn free<'a, 'f>(
         lab.expected("a range, such as `1 g .. 2 g`", &value, range.span);
         return None;
     }
-    let Value::Range(low, high) = lab.coerce(value, &Type::Range(Box::new(ty)), range.span, &text) else { return None };
+    let Value::Range(low, high) = lab.coerce(value, &Type::Range(ty.into()), range.span, &text) else { return None };
     let ends = lab.known(low.node).zip(lab.known(high.node)).filter(|(a, b)| a.is_finite() && b.is_finite());
     let Some((from, to)) = ends else {
         let headline = "both ends of this range must be known before the runs";
@@ -299,5 +299,8 @@ fn free<'a, 'f>(
 }
 
 fn unit(lab: &Elaborator<'_>, low: &Num, high: &Num) -> matterix_ir::Unit {
-    low.unit.clone().or_else(|| high.unit.clone()).unwrap_or_else(|| lab.shown(low))
+    match low.unit {
+        Some(_) => lab.unit_of(low),
+        None => high.unit.as_deref().cloned().unwrap_or_else(|| lab.shown(low)),
+    }
 }

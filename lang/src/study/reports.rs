@@ -48,7 +48,7 @@ impl<'a> Planner<'a, '_> {
         for line in lines {
             let StudyLine::Report { name, value } = line else { continue };
             let (node, unit) = match self.lab.expr(value, scope) {
-                Value::Num(n) => (n.node, n.unit.clone().unwrap_or_else(|| self.lab.shown(&n))),
+                Value::Num(n) => (n.node, self.lab.unit_of(&n)),
                 Value::Bool(node) => (node, Unit::one()),
                 Value::Concentration(..) => {
                     self.lab.kindless(value.span);
@@ -83,7 +83,7 @@ impl<'a> Planner<'a, '_> {
                 }
             };
             let in_unit = match (unit, &n.unit) {
-                (Some(_), Some(unit)) => unit.clone(),
+                (Some(_), Some(unit)) => Unit::clone(unit),
                 _ if n.dimension.is_one() => Unit::one(),
                 _ => {
                     let symbol = self.lab.shown(&n).symbol;

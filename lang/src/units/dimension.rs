@@ -1,6 +1,7 @@
 //! Dimensions: exact rational exponents over the base dimensions the library declares.
 
 use std::fmt::Write;
+use std::sync::Arc;
 
 /// A fraction in lowest terms with a positive denominator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -43,7 +44,8 @@ fn gcd(a: u32, b: u32) -> u32 {
 /// A product of powers of base dimensions; `any` stands for "unknown, reported already" and agrees with everything.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Dimension {
-    powers: Vec<(u16, Rational)>,
+    /// In the order of the bases; none for a plain number. Values are copied far more often than multiplied.
+    powers: Option<Arc<[(u16, Rational)]>>,
     any: bool,
 }
 
@@ -55,12 +57,20 @@ impl Dimension {
 
     /// Agrees with everything.
     pub fn any() -> Self {
-        Dimension { powers: Vec::new(), any: true }
+        Dimension { powers: None, any: true }
     }
 
     /// The base dimension with this index.
     pub fn base(index: u16) -> Self {
-        Dimension { powers: vec![(index, Rational::new(1, 1))], any: false }
+        Dimension::of(vec![(index, Rational::new(1, 1))])
+    }
+
+    fn of(powers: Vec<(u16, Rational)>) -> Self {
+        Dimension { powers: (!powers.is_empty()).then(|| powers.into()), any: false }
+    }
+
+    fn powers(&self) -> &[(u16, Rational)] {
+        self.powers.as_deref().unwrap_or(&[])
     }
 
     /// Whether it agrees with everything.
@@ -70,7 +80,7 @@ impl Dimension {
 
     /// Whether it is a plain number.
     pub fn is_one(&self) -> bool {
-        !self.any && self.powers.is_empty()
+        !self.any && self.powers.is_none()
     }
 
     /// Whether a value of one may stand where the other is expected.
@@ -83,8 +93,11 @@ impl Dimension {
         if self.any || other.any {
             return Dimension::any();
         }
-        let mut powers = self.powers.clone();
-        for &(base, exponent) in &other.powers {
+        if other.powers.is_none() {
+            return self.clone();
+        }
+        let mut powers = self.powers().to_vec();
+        for &(base, exponent) in other.powers() {
             match powers.binary_search_by_key(&base, |p| p.0) {
                 Ok(i) => {
                     powers[i].1 = powers[i].1.plus(exponent);
@@ -95,7 +108,7 @@ impl Dimension {
                 Err(i) => powers.insert(i, (base, exponent)),
             }
         }
-        Dimension { powers, any: false }
+        Dimension::of(powers)
     }
 
     /// The dimension of a quotient.
@@ -105,11 +118,13 @@ impl Dimension {
 
     /// The dimension of a power.
     pub fn power(&self, exponent: Rational) -> Self {
-        if exponent.num == 0 && !self.any {
+        if self.any {
+            return Dimension::any();
+        }
+        if exponent.num == 0 {
             return Dimension::one();
         }
-        let powers = self.powers.iter().map(|&(b, e)| (b, e.times(exponent))).collect();
-        Dimension { powers, any: self.any }
+        Dimension::of(self.powers().iter().map(|&(b, e)| (b, e.times(exponent))).collect())
     }
 
     /// Its bases, by index, with their exponents.
@@ -119,14 +134,14 @@ impl Dimension {
 
     /// Whether it contains none of the bases of another.
     pub fn is_free_of(&self, other: &Self) -> bool {
-        !self.any && !self.powers.iter().any(|(b, _)| other.powers.iter().any(|(o, _)| o == b))
+        !self.any && !self.powers().iter().any(|(b, _)| other.powers().iter().any(|(o, _)| o == b))
     }
 
     /// As a product of unit symbols, given the symbol of each base dimension: `kg*m^2/s^3`.
     pub fn show(&self, symbol: impl Fn(u16) -> String) -> String {
         let mut up = String::new();
         let mut down = String::new();
-        for &(base, e) in &self.powers {
+        for &(base, e) in self.powers() {
             let out = if e.num > 0 { &mut up } else { &mut down };
             if !out.is_empty() {
                 out.push('*');

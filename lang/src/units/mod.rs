@@ -4,6 +4,7 @@ pub mod dimension;
 pub mod text;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use matterix_ir::{Span, Unit};
 
@@ -43,7 +44,7 @@ pub struct Resolved {
     /// Whether a literal in this unit is a point.
     pub point: bool,
     /// For conversion and display.
-    pub unit: Unit,
+    pub unit: Arc<Unit>,
 }
 
 /// Every dimension and unit in scope; units have one name space.
@@ -229,7 +230,8 @@ impl Units {
             def.prefixes && def.dimension == unit.dimension && prefix.is_some_and(known)
         };
         let Some((name, _)) = self.units.iter().find(alike) else { return Vec::new() };
-        ["", "m", "u", "n"].iter().filter_map(|p| self.resolve(&format!("{p}{name}")).ok()).map(|r| r.unit).collect()
+        let known = ["", "m", "u", "n"].iter().filter_map(|p| self.resolve(&format!("{p}{name}")).ok());
+        known.map(|r| Arc::unwrap_or_clone(r.unit)).collect()
     }
 
     /// How a found dimension differs from the expected one, where one named quantity makes the difference.

@@ -31,14 +31,14 @@ impl Units {
         if let Some((def, factor)) = self.find(text) {
             let unit =
                 Unit { symbol: text.to_string(), factor: def.factor * factor, offset: def.offset.unwrap_or(0.0) };
-            return Ok(Resolved { dimension: def.dimension.clone(), point: def.offset.is_some(), unit });
+            return Ok(Resolved { dimension: def.dimension.clone(), point: def.offset.is_some(), unit: unit.into() });
         }
         let mut reader = Reader { units: self, text, at: 0 };
         let (dimension, factor) = reader.product()?;
         if reader.at != text.len() {
             return Err(UnitError::Malformed);
         }
-        Ok(Resolved { dimension, point: false, unit: Unit::scaled(text, factor) })
+        Ok(Resolved { dimension, point: false, unit: Unit::scaled(text, factor).into() })
     }
 
     fn unknown(&self, name: &str) -> UnitError {

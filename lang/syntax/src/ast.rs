@@ -509,9 +509,7 @@ pub enum MemberKind {
         /// What must hold.
         cond: Expr,
         /// The failure raised where it does not.
-        failure: Option<Name>,
-        /// How to mend it.
-        help: Option<String>,
+        refusal: Option<Refusal>,
     },
     /// `frame place at (0, 0, 1) mm`; `frame grasp` without `at` is one that every asset must give.
     Frame {
@@ -719,6 +717,17 @@ pub struct Clause {
     pub span: Span,
 }
 
+/// `else too_wide "take a wider one" because "{item} is {item.width} wide"`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Refusal {
+    /// The failure raised.
+    pub failure: Name,
+    /// How to mend it.
+    pub help: Option<String>,
+    /// What is so, in words with values; it may name what `all` goes through.
+    pub because: Option<Text>,
+}
+
 /// What a clause says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ClauseKind {
@@ -727,9 +736,7 @@ pub enum ClauseKind {
         /// What must hold.
         cond: Expr,
         /// The failure raised where it does not.
-        failure: Option<Name>,
-        /// How to mend it.
-        help: Option<String>,
+        refusal: Option<Refusal>,
     },
     /// `presumes ever active else never_started`: looked at before the run only.
     Presumes {
@@ -738,9 +745,7 @@ pub enum ClauseKind {
         /// What must hold on some way at least.
         cond: Expr,
         /// What its finding is called.
-        failure: Option<Name>,
-        /// How to mend it.
-        help: Option<String>,
+        refusal: Option<Refusal>,
     },
     /// `while v.temperature < 80 degC`.
     While(Expr),

@@ -52,6 +52,7 @@ fn describe(rule: Rule) -> Option<&'static str> {
         kw_with => "`with`",
         kw_over => "`over`",
         kw_when => "`when`",
+        kw_because => "`because`",
         kw_after => "`after`",
         kw_every => "`every`",
         kw_sends | sends => "`sends`",

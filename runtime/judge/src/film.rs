@@ -119,26 +119,6 @@ impl Film {
     }
 }
 
-impl Film {
-    /// Whether a robot took a thing along beside what it grips and left it in the open: a tip in a bin. No recording says
-    /// where such a thing comes to lie.
-    pub(crate) fn fell(&self, thing: usize, time: f64) -> bool {
-        let left = |robot: &Robot| {
-            let told = robot.loads.partition_point(|(t, _)| *t <= time);
-            let had = |(_, items): &(f64, Vec<usize>)| items.contains(&thing);
-            robot.loads[..told].iter().any(had) && !robot.loads[..told].last().is_some_and(had)
-        };
-        let away = |t: &Thing| {
-            let (first, now) = (t.way.first().map(|(_, at)| *at), t.at(time));
-            first.zip(now).is_some_and(|(a, b)| (a.translation - b.translation).length() > BACK)
-        };
-        self.robots.iter().any(left) && self.things.get(thing).is_some_and(away)
-    }
-}
-
-/// How far from where it stood at first a thing has to be to be away from there, m.
-const BACK: f64 = 2e-3;
-
 impl Thing {
     /// Where it was last said to be.
     pub(crate) fn at(&self, time: f64) -> Option<Isometry> {

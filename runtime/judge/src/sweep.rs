@@ -106,9 +106,7 @@ impl<'f> Sweep<'f> {
             robot.held(time).iter().filter_map(|(item, inner)| Some((*item, tip? * *inner))).collect();
         let others = self.others(time, &carried, &names);
         let near = robot.near_grips(time);
-        for other in
-            others.iter().filter(|o| !o.thing.is_some_and(|thing| robot.took(thing, time) || film.fell(thing, time)))
-        {
+        for other in others.iter().filter(|o| !o.thing.is_some_and(|thing| robot.took(thing, time))) {
             for (l, name) in own.iter().enumerate() {
                 let gripped = |g: &Grip| g.items.iter().any(|(item, _)| Some(*item) == other.thing);
                 if !self.moves[l] || self.fingers[l] && near.iter().any(gripped) {

@@ -348,6 +348,29 @@ fn a_held_vessel_stays_upright() {
 }
 
 #[test]
+fn a_search_gives_up_when_it_has_looked_at_so_much() {
+    let figure = figure("panda", &[]);
+    let mut goal = READY;
+    goal[0] = 1.5;
+    let pose = Pose::from_parts(Translation3::new(0.22, 0.22, 0.6), Default::default());
+    let world = World {
+        bodies: vec![Body { name: "post".into(), pose, shape: Shape::Capsule(0.05, 0.4) }],
+        ..World::default()
+    };
+    let found = |effort: u64| {
+        let mut checker = Checker::new(&figure, &world, 32.0);
+        let route = plan(&mut checker, &READY, &goal, &Settings { effort, ..Settings::default() });
+        (route.map(|route| route.iterations), checker.effort())
+    };
+    let (whole, enough) = found(u64::MAX);
+    assert!(whole.is_ok());
+    let (given_up, spent) = found(8);
+    assert!(matches!(given_up, Err(Failure::Unreached(_))), "{given_up:?}");
+    assert!(spent < 30 && spent < enough, "{spent} of {enough}");
+    assert_eq!(found(2 * enough).0, whole);
+}
+
+#[test]
 fn direct_motions_keep_every_limit() {
     use matterix_motion::time::{State, Untimed, direct};
     let limits = Limits { velocity: vec![2.0; 7], acceleration: vec![10.0; 7], jerk: vec![100.0; 7] };

@@ -33,6 +33,8 @@ pub struct Sim<'m> {
     seed: u64,
     running: BTreeMap<Ticket, Running>,
     started: u64,
+    /// What a part that moved by itself ran into, until an operation has failed of it.
+    swung: Option<String>,
     /// Readings each node depends on, found once.
     sampled: BTreeMap<NodeId, Vec<u32>>,
     /// When each reading was last told, s.
@@ -78,8 +80,8 @@ impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
         let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
-        let moves = Moves::default();
-        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, sampled, told }
+        let (moves, swung) = (Moves::default(), None);
+        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, swung, sampled, told }
     }
 
     /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
@@ -178,6 +180,7 @@ impl<'m> Sim<'m> {
         for action in actions {
             let Action::Assign { state, .. } = action else { continue };
             let Some(value) = self.engine.states().get(*state as usize).copied() else { continue };
+            stage.follow_load(*state, value);
             let Some(state) = self.prepared.model.states.get(*state as usize) else { continue };
             if let Some(id) = supported(stage.scene, &state.name, &state.domain) {
                 stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
@@ -326,6 +329,12 @@ impl Backend for Sim<'_> {
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         self.try_again(ticket, out)?;
+        // What moves by itself fails the first operation that is asked for.
+        if let Some(running) = self.running.get_mut(&ticket)
+            && let Some(text) = self.swung.take()
+        {
+            running.ends = Ends::Failed("collision".to_string(), text);
+        }
         if let Some(status) = self.pending(ticket, out) {
             return Ok(status);
         }
@@ -354,7 +363,14 @@ impl Backend for Sim<'_> {
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         let advance = self.engine.advance(until, watches, out)?;
-        self.follow_joints(0.0, out);
+        if let Some(text) = self.follow_joints(0.0, out) {
+            if self.running.is_empty() {
+                let help = vec!["move it out of the way, or end the motion before it gets there".to_string()];
+                let time = self.engine.time();
+                return Err(Fault { code: codes::COLLISION, span: None, time, message: text, help });
+            }
+            self.swung.get_or_insert(text);
+        }
         if let Advance::Watch(indices) = &advance {
             let fired = indices.iter().filter_map(|&i| watches.get(i)).filter(|w| w.value);
             fired.for_each(|w| self.end_when(w.node));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::graph::{Env, eval_op};
-use matterix_ir::{BinaryOp, Graph, NodeId, Op};
+use matterix_ir::{BinaryOp, Graph, Leaves, NodeId, Op};
 
 /// The leaves' values at one instant; `None` is not known.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +24,7 @@ pub(crate) fn eval(graph: &Graph, node: NodeId, known: Known<'_>) -> Option<f64>
         values.insert(n, value);
     }
     // A reading may stand before what it measures; it was not known then.
-    if values.get(&node).copied().flatten().is_none() && graph.depends(node, |op| matches!(op, Op::Reading(_))) {
+    if values.get(&node).copied().flatten().is_none() && graph.leaves(node).meets(Leaves::READING) {
         for n in graph.schedule([node]) {
             let value = one(graph.op(n), known, &values);
             values.insert(n, value);

@@ -128,7 +128,7 @@ impl<'p> Executor<'p, '_> {
     }
 
     /// A text with its values as they are now.
-    fn words(&mut self, text: &Text) -> Result<String, Fault> {
+    pub(super) fn words(&mut self, text: &Text) -> Result<String, Fault> {
         let instances = &self.scene.instances;
         let name = |v: f64| match instances.get(v as usize) {
             Some(instance) if v >= 0.0 => instance.name.clone(),

@@ -48,7 +48,7 @@ impl Executor<'_, '_> {
             if !self.judge(step, need)? {
                 let label = &self.plan.get(step).label;
                 let text = format!("`{label}` needs `{}`, which does not hold", need.text);
-                let raised = self.refused(need, text);
+                let raised = self.refused(need, label, text);
                 self.fail(id, raised);
                 return Ok(false);
             }
@@ -56,9 +56,24 @@ impl Executor<'_, '_> {
         Ok(true)
     }
 
-    /// What a need or limit that does not hold raises.
-    pub(super) fn refused(&mut self, condition: &Condition, text: String) -> Raised {
-        Raised { help: condition.advice(), ..self.unmet(condition, condition.failure(), condition.code(), text) }
+    /// What a need or limit of a step that does not hold raises: in its own words where it has them.
+    pub(super) fn refused(&mut self, condition: &Condition, label: &str, text: String) -> Raised {
+        let raised = self.unmet(condition, condition.failure(), condition.code(), text);
+        let raised = Raised { help: condition.advice(), ..raised };
+        match self.said(condition) {
+            Some(words) => {
+                Raised { text: format!("`{label}` cannot be done: {words}"), measured: Vec::new(), ..raised }
+            }
+            None => raised,
+        }
+    }
+
+    /// What is so where a condition does not hold, in its own words.
+    fn said(&mut self, condition: &Condition) -> Option<String> {
+        let all = condition.refusal.as_ref()?.said.iter();
+        let mut fails = all.filter(|said| self.backend.value(said.node, self.out).ok().flatten() == Some(0.0));
+        let said = fails.next()?;
+        self.words(&said.text).ok()
     }
 
     /// What a breach of an invariant raises.

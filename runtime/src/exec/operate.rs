@@ -150,8 +150,9 @@ impl<'p> Executor<'p, '_> {
         for limit in operation.limits.iter().filter_map(|i| plan.limits.get(*i as usize)) {
             let limit = &limit.condition;
             if !self.judge(step, limit)? {
-                let text = format!("`{}` does not keep `{}`", self.label(id), limit.text);
-                let raised = self.refused(limit, text);
+                let label = self.label(id).to_owned();
+                let text = format!("`{label}` does not keep `{}`", limit.text);
+                let raised = self.refused(limit, &label, text);
                 self.fail(id, raised);
                 return Ok(false);
             }

@@ -3,12 +3,14 @@
 
 use matterix_ir::scene::InstanceId;
 use matterix_motion::placement;
-use matterix_motion::spheres::{Checker, Figure, Other};
+use matterix_motion::spheres::{ASKED, Checker, Figure, Other};
 
 use super::exact::Exact;
-use super::perform::{Part, Refused, timed};
+use super::performed::Part;
+use super::refused::Refused;
 use super::stage::{Actor, Stage};
 use super::surroundings::Surroundings;
+use super::way::timed;
 
 /// How much less far than asked for is far enough, m.
 const LOOSE: f64 = 1e-3;
@@ -122,6 +124,7 @@ impl Stage<'_> {
             for step in 1..=steps {
                 let share = f64::from(step) / f64::from(steps);
                 let q: Vec<f64> = from.iter().zip(point).map(|(a, b)| a + share * (b - a)).collect();
+                self.spend(ASKED);
                 let met = exact.touches(&q, &spared);
                 if !met.is_empty() {
                     return Some(self.meeting(figure, &around, &met, false));

@@ -9,9 +9,13 @@ use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 use matterix_motion::spheres::Checker;
 
-use super::perform::{Part, Performed, Refused, Way};
+use super::bring::Way;
+use super::effort::EFFORT;
+use super::performed::{Part, Performed};
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
+use super::tilt::LEVEL;
 
 /// Distances from the target at which the foot of the arm is tried, m.
 const DISTANCES: [f64; 5] = [0.65, 0.55, 0.75, 0.45, 0.85];
@@ -24,9 +28,9 @@ const PLACES: usize = 6;
 const ROOM: f64 = 0.12;
 
 /// A place to stand.
-struct Place {
+pub(super) struct Place {
     /// What drives the robot about, rad or m.
-    drive: Vec<f64>,
+    pub(super) drive: Vec<f64>,
     /// How far it is from where it stands.
     far: f64,
 }
@@ -113,9 +117,11 @@ impl Stage<'_> {
         };
         let within = match way {
             Way::Upright(within) => Some(within),
-            _ => None,
+            // What stands upright in the hand stays so on the way.
+            Way::Free | Way::Straight => self.is_held_upright(robot).then_some(LEVEL),
         };
         for place in self.places(robot, to, &drive).into_iter().take(PLACES) {
+            self.refresh(EFFORT / 2);
             let before = self.clone();
             let mut parts = Vec::new();
             // On the way the arm is where it is at home, if it gets there.
@@ -128,13 +134,13 @@ impl Stage<'_> {
                 parts.extend(reached);
                 return Some(parts);
             }
-            *self = before;
+            self.back_to(&before);
         }
         None
     }
 
     /// Places where the robot is free to stand and from which its arm gets to one of some poses and on; the nearest first.
-    fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
+    pub(super) fn places(&self, robot: InstanceId, to: &[Pose], drive: &[usize]) -> Vec<Place> {
         let (Some(actor), [x, y, turn]) = (self.actors.get(&robot), drive) else { return Vec::new() };
         let around = Surroundings::of_driving(self, robot);
         let Ok(figure) = self.figure(robot, actor, drive) else { return Vec::new() };

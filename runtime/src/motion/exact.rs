@@ -52,8 +52,9 @@ impl<'s> Exact<'s> {
         let actor = stage.actors.get(&self.robot)?;
         let on_itself = |(l, body): (usize, &'s Option<Body>)| Some((l, Isometry::identity(), body.as_ref()?));
         let mut mine: Vec<_> = actor.bodies().iter().enumerate().map(on_itself).collect();
-        if let Some(held) = stage.held(self.robot) {
-            let inner = stage.tip(self.robot).inverse().then(stage.pose(held));
+        let tip = stage.tip(self.robot).inverse();
+        for held in stage.in_hand(self.robot) {
+            let inner = tip.then(stage.pose(held));
             let body = stage.bodies().get(held.0 as usize)?.as_ref();
             mine.push(body.map(|body| (actor.assembly.tip as usize, isometry(&inner), body)));
         }

@@ -12,8 +12,9 @@ use matterix_motion::world::{Body, Shape, World};
 use matterix_motion::{Tree, placement};
 
 use super::assembly::Assembly;
-use super::perform::{Part, acceleration, jerk};
+use super::performed::Part;
 use super::stage::Stage;
+use super::way::{acceleration, jerk};
 
 /// How exactly widths are met, m.
 const EXACT: f64 = 1e-6;

@@ -9,7 +9,10 @@ use matterix_ir::scene::{Articulation, Follow, InstanceId, Scene};
 use matterix_ir::{NodeId, Op, Program};
 use matterix_motion::Tree;
 
-use super::perform::{Moment, Performed, Refused};
+use super::moment::Moment;
+use super::performed::Performed;
+use super::refused::Refused;
+use super::regrip::may_help;
 use super::stage::Stage;
 
 /// Least change of a joint that is worth telling, rad or m.
@@ -30,17 +33,35 @@ pub struct Fixture {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Led {
     /// What it is a part of.
-    item: InstanceId,
+    pub(super) item: InstanceId,
     /// Which of its joints moves.
-    variable: usize,
+    pub(super) variable: usize,
     /// Where that was at first, rad or m.
-    from: f64,
+    pub(super) from: f64,
     /// Along its axis instead of about it.
     slides: bool,
     /// The axis in the lab.
     axis: [f64; 3],
     /// Where the hand was at first.
     hand: Pose,
+    /// When it is taken along, s since the motion began.
+    pub(super) since: f64,
+}
+
+/// A link of a thing by which a hand leads it, and the joint that carries the link.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Handle {
+    link: u32,
+    variable: usize,
+    slides: bool,
+    axis: [f64; 3],
+}
+
+impl Led {
+    /// The same, so much later, s.
+    pub(super) fn later(self, by: f64) -> Self {
+        Led { since: self.since + by, ..self }
+    }
 }
 
 /// The description of a thing whose joints follow the model.
@@ -156,13 +177,32 @@ impl Stage<'_> {
         let articulation = following(self.scene, item).ok_or(Refused::NoFrame)?;
         let link = place.link.ok_or(Refused::NoFrame)?;
         let (variable, joint) = Self::carrying(&articulation.robot, link).ok_or(Refused::NoFrame)?;
+        let handle = Handle { link, variable, slides: joint.kind == JointKind::Prismatic, axis: joint.axis };
+        let before = self.clone();
+        match self.lead_from(robot, item, &handle, to) {
+            Err(why) if may_help(&why) => {
+                self.back_to(&before);
+                self.lead_anew(robot, (item, frame), &handle, to).ok_or(why)
+            }
+            done => done,
+        }
+    }
+
+    /// As [`Stage::lead`], from where the hand is.
+    pub(super) fn lead_from(
+        &mut self,
+        robot: InstanceId,
+        item: InstanceId,
+        handle: &Handle,
+        to: f64,
+    ) -> Result<Performed, Refused> {
+        let Handle { link, variable, slides, axis } = *handle;
         let from = self.fixtures.get(&item).and_then(|f| f.joints.get(variable).copied()).ok_or(Refused::NoFrame)?;
         let hand = self.tip(robot);
         let start = self.pose(item).then(self.link(item, link));
         let inner = start.inverse().then(hand);
         let turned = Pose { position: [0.0; 3], ..start };
-        let slides = joint.kind == JointKind::Prismatic;
-        let led = Led { item, variable, from, slides, axis: turned.point(joint.axis), hand };
+        let led = Led { item, variable, from, slides, axis: turned.point(axis), hand, since: 0.0 };
         let pieces = if slides { 1 } else { ((to - from).abs() / PIECE).ceil().max(1.0) as u32 };
         let mut stage = self.clone();
         let way: Vec<Pose> = (1..=pieces)
@@ -171,7 +211,11 @@ impl Stage<'_> {
                 stage.pose(item).then(stage.link(item, link)).then(inner)
             })
             .collect();
+        let before = self.clone();
         let part = self.lines(robot, &way, &[item], false)?;
+        if let Some(refused) = before.lead_meets(robot, &led, to, &part) {
+            return Err(refused);
+        }
         self.set_joint(item, variable, to);
         self.led.insert(item);
         Ok(Performed { robot, parts: vec![part], led: Some(led) })
@@ -184,7 +228,7 @@ impl Stage<'_> {
         }
     }
 
-    fn set_joint(&mut self, item: InstanceId, variable: usize, to: f64) {
+    pub(super) fn set_joint(&mut self, item: InstanceId, variable: usize, to: f64) {
         if let Some(slot) = self.fixtures.get_mut(&item).and_then(|f| f.joints.get_mut(variable)) {
             *slot = to;
         }

@@ -13,7 +13,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Mover};
 use matterix_motion::spheres::{Figure, Other};
 
-use super::perform::{Performed, Refused};
+use super::performed::Performed;
+use super::refused::Refused;
 use super::stage::Stage;
 use super::surroundings::Surroundings;
 
@@ -109,12 +110,17 @@ impl Stage<'_> {
 
     /// How many samples are drawn for a way, where so many are as a rule.
     pub(super) fn samples(&self, many: usize) -> usize {
-        if self.around_sweeps { DETOUR } else { many }
+        if self.around_sweeps || self.hasty { DETOUR } else { many }
     }
 
     /// Whether it is another robot that is in the way of a motion: it may go away.
     pub fn is_by_a_robot(&self, refused: &Refused) -> bool {
-        matches!(refused, Refused::Collides(m) if m.part.is_some() || m.with.is_some_and(|w| self.held_by(w).is_some()))
+        let is_a_robot = |id: InstanceId| self.actors.contains_key(&id) || self.held_by(id).is_some();
+        match refused {
+            Refused::Collides(m) => m.part.is_some() || m.with.is_some_and(|w| self.held_by(w).is_some()),
+            Refused::Swings(_, m) => m.with.is_some_and(is_a_robot),
+            _ => false,
+        }
     }
 
     /// The robot that an instance is, is part of or is held by.

@@ -11,9 +11,12 @@ use matterix_motion::{Chain, Variable};
 
 use super::approach::is_clear;
 use super::exact::Exact;
-use super::perform::{Performed, Refused, TOLERANCE, timed};
+use super::perform::TOLERANCE;
+use super::performed::Performed;
+use super::refused::Refused;
 use super::stage::{Actor, Stage};
 use super::surroundings::{SLACK, Surroundings};
+use super::way::timed;
 
 /// Heights at which a crossing is tried are so far apart, m.
 const STEP: f64 = 0.01;

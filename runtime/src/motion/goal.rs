@@ -58,6 +58,8 @@ fn is_upright(stage: &Stage<'_>, id: InstanceId, frame: &Pose) -> bool {
 
 /// Distance of the places on a surface that are looked at, m.
 const RASTER: f64 = 0.02;
+/// How far from the frame `place` they are looked for, in steps of it: more than an arm reaches.
+const FARTHEST: i32 = 100;
 /// How many places on a surface are tried, and how far apart they are at least, m.
 const SPOTS: (usize, f64) = (40, 0.08);
 
@@ -98,7 +100,7 @@ pub fn spots(stage: &Stage<'_>, item: InstanceId, surface: InstanceId) -> Vec<Po
     if free(0.0, 0.0) {
         return vec![Pose::IDENTITY];
     }
-    let most = (top[0].max(top[1]) / RASTER) as i32;
+    let most = ((top[0].max(top[1]) / RASTER) as i32).min(FARTHEST);
     let mut places: Vec<(f64, f64)> = (-most..=most)
         .flat_map(|i| (-most..=most).map(move |j| (f64::from(i) * RASTER, f64::from(j) * RASTER)))
         .filter(|(x, y)| inside(*x, *y))

@@ -114,7 +114,7 @@ impl Outline {
     }
 
     /// How far two are apart along the line that parts them best, m; below 0 where none does.
-    fn apart(&self, other: &Outline) -> f64 {
+    pub fn apart(&self, other: &Outline) -> f64 {
         match (self.round, other.round) {
             (true, true) => {
                 let [x, y] = [other.middle[0] - self.middle[0], other.middle[1] - self.middle[1]];

@@ -9,7 +9,7 @@ use super::stage::{Carried, Stage};
 use crate::backend::noise::{key, mix, uniform};
 
 /// How far apart a place and the top of a shape may be for the thing to stand on that shape, m.
-const LEVEL: f64 = 1e-3;
+pub(super) const LEVEL: f64 = 1e-3;
 /// Places drawn for one thing before it counts as having no room.
 const ATTEMPTS: u64 = 2000;
 /// Sets these numbers apart from the noise of readings.
@@ -109,7 +109,7 @@ fn standing(stage: &Stage<'_>, thing: InstanceId) -> Option<Outline> {
 }
 
 /// What an instance is made of, parts left out.
-fn pieces(stage: &Stage<'_>, id: InstanceId) -> Vec<Outline> {
+pub(super) fn pieces(stage: &Stage<'_>, id: InstanceId) -> Vec<Outline> {
     let instance = stage.scene.get(id);
     let at = stage.pose(id);
     if let Some(actor) = stage.actors.get(&id) {
@@ -124,14 +124,14 @@ fn pieces(stage: &Stage<'_>, id: InstanceId) -> Vec<Outline> {
 }
 
 /// A thing with what is on it, parts inside a shape left out.
-fn with_load(stage: &Stage<'_>, thing: InstanceId) -> Vec<InstanceId> {
+pub(super) fn with_load(stage: &Stage<'_>, thing: InstanceId) -> Vec<InstanceId> {
     let ids = (0..stage.scene.instances.len() as u32).map(InstanceId);
     let moves = |id: &InstanceId| *id == thing || stage.carriers(*id).contains(&thing);
     ids.filter(moves).filter(|id| !stage.is_inside_a_shape(*id)).collect()
 }
 
 /// Pieces of everything else.
-fn others(stage: &Stage<'_>, thing: InstanceId) -> Vec<Outline> {
+pub(super) fn others(stage: &Stage<'_>, thing: InstanceId) -> Vec<Outline> {
     let mine = with_load(stage, thing);
     let ids = (0..stage.scene.instances.len() as u32).map(InstanceId);
     let apart = ids.filter(|id| !mine.contains(id) && !stage.is_inside_a_shape(*id));

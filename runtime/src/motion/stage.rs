@@ -1,5 +1,6 @@
 //! Where everything is while robots move: what stands on what, what is in hand, how joints stand.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::hash::Hasher;
 use std::sync::{Arc, OnceLock};
@@ -58,7 +59,7 @@ pub struct Stage<'p> {
     /// By instance.
     pub carried: Vec<Carried>,
     /// Where things stood before they were picked up.
-    before: BTreeMap<InstanceId, Stand>,
+    pub(super) before: BTreeMap<InstanceId, Stand>,
     /// By instance.
     pub actors: BTreeMap<InstanceId, Actor>,
     /// Things with parts that move as the model says.
@@ -77,8 +78,12 @@ pub struct Stage<'p> {
     pub(super) flights: BTreeMap<InstanceId, Flight>,
     /// Whether ways are planned around all that robots under way sweep.
     pub(super) around_sweeps: bool,
+    /// Whether ways count as not found after few samples: it is only tried what would be.
+    pub(super) hasty: bool,
     /// How often something was moved so far.
     pub(super) changes: u64,
+    /// How much may still be looked at for the motion that is being planned.
+    pub(super) effort: Cell<u64>,
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
     /// Shared by all copies of a stage.
@@ -134,7 +139,9 @@ impl<'p> Stage<'p> {
             now: 0.0,
             flights: BTreeMap::new(),
             around_sweeps: false,
+            hasty: false,
             changes: 0,
+            effort: Cell::default(),
             unknown: Unknown::default(),
             bodies: Arc::default(),
         }

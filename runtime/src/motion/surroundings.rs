@@ -144,16 +144,20 @@ fn solid(shape: &Shape) -> (Solid, f64) {
     (solid, z / 2.0)
 }
 
-/// What a robot holds, as balls in the frame of its tip.
+/// What a robot holds and all that goes along with it, as balls in the frame of its tip.
 pub fn held(stage: &Stage<'_>, robot: InstanceId, actor: &Actor) -> Vec<Held> {
-    let Some(id) = stage.held(robot) else { return Vec::new() };
-    let instance = stage.scene.get(id);
-    let inner = stage.tip(robot).inverse().then(stage.pose(id));
-    let shapes = instance.hull().chain(instance.more());
-    let balls = shapes.flat_map(|(shape, at)| balls(shape, inner.then(at))).collect();
     // The whole tool may touch what it holds.
-    let touching = (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
-    vec![Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching }]
+    let touching: Vec<u32> =
+        (0..actor.assembly.robot.links.len() as u32).filter(|l| *l >= actor.assembly.flange).collect();
+    let tip = stage.tip(robot).inverse();
+    let one = |id: InstanceId| {
+        let instance = stage.scene.get(id);
+        let inner = tip.then(stage.pose(id));
+        let shapes = instance.hull().chain(instance.more());
+        let balls = shapes.flat_map(|(shape, at)| balls(shape, inner.then(at))).collect();
+        Held { name: instance.name.clone(), link: actor.assembly.tip, balls, touching: touching.clone() }
+    };
+    stage.in_hand(robot).into_iter().map(one).collect()
 }
 
 /// Balls along the edges and the wall of what is round, so that it does not count as rounded off: their radius, and how far
@@ -168,11 +172,16 @@ const EDGE_SLACK: f64 = 5e-4;
 const RIM: f64 = 2e-3;
 const ALONG: f64 = 8e-3;
 
+/// What fills a body is at most so many balls: of a large thin one they are larger, and true shapes decide.
+const MOST_INSIDE: f64 = 4096.0;
+/// Balls along an edge or around a rim, and rings of them, at most: of what is larger they are farther apart.
+const MOST_ALONG: f64 = 256.0;
+
 /// Points along the edges of a block, in from them by [`RIM`].
 fn edges(size: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
     let half = size.map(|s| (s / 2.0 - RIM).max(0.0));
     (0..3usize).flat_map(move |axis| {
-        let steps = (2.0 * half[axis] / ALONG).ceil().max(1.0) as u32;
+        let steps = (2.0 * half[axis] / ALONG).ceil().clamp(1.0, MOST_ALONG) as u32;
         (0..4u8).flat_map(move |side| {
             (0..=steps).map(move |step| {
                 let mut place = [0.0; 3];
@@ -191,14 +200,18 @@ fn edges(size: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
 /// round, small ones along its wall.
 fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
     let size @ [x, y, z] = shape.size();
-    let radius = (x.min(y).min(z) / 2.0).max(1e-3);
+    let steps = |length: f64, radius: f64| ((length - 2.0 * radius) / (1.5 * radius)).ceil().max(0.0);
+    let mut radius = (x.min(y).min(z) / 2.0).max(1e-3);
+    while size.iter().map(|length| steps(*length, radius) + 1.0).product::<f64>() > MOST_INSIDE {
+        radius *= 1.1;
+    }
     let along = |length: f64| -> Vec<f64> {
-        let free = length - 2.0 * radius;
-        let steps = (free / (1.5 * radius)).ceil().max(0.0) as u32;
+        let free = (length - 2.0 * radius).max(0.0);
+        let steps = steps(length, radius) as u32;
         (0..=steps).map(|i| if steps == 0 { 0.0 } else { free * (f64::from(i) / f64::from(steps) - 0.5) }).collect()
     };
     let inside = |px: f64, py: f64| match shape.is_round() {
-        true => (px * px + py * py).sqrt() + radius <= x / 2.0 + 1e-9,
+        true => (px * px + py * py).sqrt() + radius.min(x / 2.0) <= x / 2.0 + 1e-9,
         false => true,
     };
     let mut out = Vec::new();
@@ -218,7 +231,8 @@ fn balls(shape: &Shape, at: Pose) -> Vec<([f64; 3], f64)> {
     let (small, apart) = EDGE;
     if shape.is_round() && !matches!(shape, Shape::Sphere(_)) && radius > small {
         let (ring, high) = (x / 2.0 - small, z - 2.0 * small);
-        let (turns, rings) = ((TAU * ring / (1.5 * small)).ceil() as u32, (high / apart).ceil().max(1.0) as u32);
+        let turns = (TAU * ring / (1.5 * small)).ceil().min(MOST_ALONG) as u32;
+        let rings = (high / apart).ceil().clamp(1.0, MOST_ALONG) as u32;
         for (turn, level) in (0..turns).flat_map(|turn| (0..=rings).map(move |level| (turn, level))) {
             let angle = TAU * f64::from(turn) / f64::from(turns);
             let up = small + high * f64::from(level) / f64::from(rings);

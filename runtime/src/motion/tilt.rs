@@ -9,11 +9,12 @@ use matterix_motion::inverse::Request;
 use matterix_motion::plan::Upright;
 use matterix_motion::pose::{distance, pose};
 
-use super::perform::{Part, Performed, Refused};
+use super::performed::{Part, Performed};
+use super::refused::Refused;
 use super::stage::{Carried, Stage};
 
 /// What tilts by less than this counts as upright, rad.
-const LEVEL: f64 = 0.1;
+pub(super) const LEVEL: f64 = 0.1;
 /// Greatest tilt between two poses on the way, rad.
 const STEP: f64 = 0.15;
 /// How many ways of tilting are tried, the nearest first.
@@ -59,6 +60,11 @@ impl Stage<'_> {
     pub(super) fn upright(&self, robot: InstanceId, tilt: f64) -> Option<Upright> {
         let (_, inner) = self.inner(robot)?;
         Some(Upright::of(&pose(&inner), &pose(&self.foot(robot).inverse()), tilt))
+    }
+
+    /// Whether a robot holds something that stands upright.
+    pub(super) fn is_held_upright(&self, robot: InstanceId) -> bool {
+        self.held(robot).is_some_and(|held| tilt_of(self.pose(held)) < LEVEL)
     }
 
     /// What a robot holds and where, relative to its tip.

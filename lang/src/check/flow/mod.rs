@@ -11,12 +11,14 @@ mod beside;
 mod eval;
 mod evolve;
 mod facts;
+mod history;
 mod otherwise;
 mod points;
 mod report;
 mod reported;
 mod value;
 mod walk;
+mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;

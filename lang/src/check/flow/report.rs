@@ -1,9 +1,9 @@
 //! Findings with their history.
 
-use matterix_ir::model::{Action, Domain};
-use matterix_ir::plan::{Condition, Limit, Step, Term};
+use matterix_ir::model::Domain;
+use matterix_ir::plan::{Condition, Limit};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Span, codes};
+use matterix_ir::{Code, Diagnostic, Severity, Span, codes};
 
 use super::facts::Facts;
 use super::value::Known;
@@ -42,7 +42,7 @@ impl Finding {
 const THINGS_SHOWN: usize = 8;
 
 /// So many steps of the history are shown for one quantity.
-const STEPS_SHOWN: usize = 3;
+pub(super) const STEPS_SHOWN: usize = 3;
 
 impl Flow<'_, '_> {
     /// All findings; one that was made several times says so.
@@ -98,7 +98,8 @@ impl Flow<'_, '_> {
         let headline = if some { format!("{what}, on some ways through the plan") } else { what };
         let failing = self.failing(need, facts);
         let asked = failing.first().copied().unwrap_or(need);
-        let measured = self.measured(asked, facts);
+        let words = self.worded(need, facts);
+        let measured = if words.is_empty() { self.measured(asked, facts) } else { words.clone() };
         let named = !failing.is_empty() && failing.len() < need.each.len();
         let said = match (named, measured.is_empty()) {
             (true, true) => format!("not for {}", listed(&failing)),
@@ -111,10 +112,11 @@ impl Flow<'_, '_> {
         if self.findings.iter().any(|f| f.is_error() && f.diagnostic.span() == d.span() && f.about != need.span) {
             return;
         }
-        if d.span() != need.span {
+        // Words say it without the library's formula.
+        if d.span() != need.span && (words.is_empty() || !self.in_library(need.span)) {
             d = d.because(need.span, format!("needed here: `{}`", need.text));
         }
-        d = self.with_history(d, asked.node, &asked.terms, facts);
+        d = self.history_of(d, asked, facts, !words.is_empty());
         d.help.extend(need.advice());
         self.found(d, need.span);
     }
@@ -136,9 +138,10 @@ impl Flow<'_, '_> {
         let about = owner.unwrap_or(limit.instance);
         let (name, span) = (self.lab.spoken_name(about), self.declared_at(about));
         let what = condition.refusal.as_ref().map_or(condition.text.clone(), |r| r.failure.replace('_', " "));
-        let said = self.measured(condition, facts).join(", ");
+        let words = self.worded(condition, facts);
+        let said = if words.is_empty() { self.measured(condition, facts) } else { words.clone() }.join(", ");
         let mut d = Diagnostic::error(code, span, format!("`{name}` cannot start like this: {what}"), said);
-        if span != condition.span {
+        if span != condition.span && (words.is_empty() || !self.in_library(condition.span)) {
             d = d.because(condition.span, format!("needed here: `{}`", condition.text));
         }
         d.help.extend(condition.advice());
@@ -174,7 +177,7 @@ impl Flow<'_, '_> {
         };
         let d = Diagnostic::error(code, condition.span, headline, said);
         let d = Diagnostic { severity: severity(code, some), ..d };
-        let d = self.with_history(d, condition.node, &condition.terms, facts);
+        let d = self.with_history(d, condition, facts);
         let d = if code == codes::NEVER_MADE { self.with_makers(d, condition) } else { d };
         self.found(d, condition.span);
     }
@@ -214,7 +217,7 @@ impl Flow<'_, '_> {
         let measured = self.measured(condition, after);
         let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
         let d = self.at_site(code, headline, said, self.doubt > 0);
-        let d = self.with_history(d, condition.node, &condition.terms, before);
+        let d = self.with_history(d, condition, before);
         let d = if absent.is_some() { self.with_makers(d, condition) } else { d };
         self.found(d, condition.span);
     }
@@ -300,117 +303,8 @@ impl Flow<'_, '_> {
         out
     }
 
-    /// Adds how the members a condition reads came to be what they are, in the order it happened.
-    fn with_history(&mut self, mut d: Diagnostic, node: NodeId, terms: &[Term], facts: &Facts) -> Diagnostic {
-        let mut said: Vec<(Span, String)> = Vec::new();
-        if terms.is_empty() {
-            said = self.changes_behind(node, facts);
-        }
-        for term in terms {
-            let mut steps = self.history(term, facts);
-            if steps.is_empty() {
-                let states = self.parts(term.node).states.clone();
-                let owner = states.first().map(|s| self.lab.state_owner[*s as usize]);
-                let value = self.eval(term.node, facts);
-                let span = owner.map(|o| self.declared_at(o)).unwrap_or_default();
-                if !span.is_empty() && value.why().is_none() {
-                    steps
-                        .push((span, format!("`{}` is {} from the start", term.name, self.show(&value, &term.domain))));
-                }
-            }
-            steps.reverse();
-            said.extend(steps);
-        }
-        said.dedup();
-        for (span, text) in said {
-            d = d.because(span, text);
-        }
-        d
-    }
-
-    /// The changes of states behind a condition that names no member itself, as one that calls a function.
-    fn changes_behind(&mut self, node: NodeId, facts: &Facts) -> Vec<(Span, String)> {
-        let mut order = self.parts(node).order.to_vec();
-        let mut said = Vec::new();
-        let mut at = 0;
-        while let Some(node) = order.get(at).copied() {
-            at += 1;
-            let Op::State(s) = self.lab.graph.op(node) else { continue };
-            let state = &self.lab.states[s as usize];
-            let term = Term { name: state.name.clone(), node, domain: state.domain.clone() };
-            let touched = self.lab.lineage.iter().find(|(_, state)| **state == s).map(|(key, _)| key.clone());
-            let latest: Vec<_> = self.history(&term, facts).into_iter().take(1).collect();
-            // What came from another thing has a story there.
-            if touched.is_some()
-                && let Some((span, _)) = latest.first()
-            {
-                let from = self.sources_of(s, *span);
-                order.extend(from.into_iter().filter(|n| !order.contains(n)).collect::<Vec<_>>());
-            }
-            let latest = latest.into_iter();
-            said.extend(latest.map(|(span, text)| match &touched {
-                Some((mixture, reagent)) => {
-                    (span, format!("`{}` has touched `{reagent}` after this", self.lab.spoken_name(*mixture)))
-                }
-                None => (span, text),
-            }));
-            if said.len() == STEPS_SHOWN {
-                break;
-            }
-        }
-        said.sort_by_key(|(span, _)| *span);
-        said
-    }
-
-    /// What a statement looked at when it changed a state, other than that state.
-    fn sources_of(&self, state: u32, statement: Span) -> Vec<NodeId> {
-        let graph = &self.lab.graph;
-        let mut out = Vec::new();
-        for step in self.plan.steps.iter().filter(|s| s.span == statement) {
-            let Step::Operation(operation) = &step.step else { continue };
-            for action in operation.at_start.iter().chain(&operation.at_end) {
-                if let Action::Assign { state: s, value, .. } = action
-                    && *s == state
-                {
-                    let looked_at = graph.schedule([*value]);
-                    out.extend(
-                        looked_at.into_iter().filter(|n| matches!(graph.op(*n), Op::State(from) if from != state)),
-                    );
-                }
-            }
-        }
-        out
-    }
-
-    /// The latest statements that changed a member, latest first, each once.
-    fn history(&mut self, term: &Term, facts: &Facts) -> Vec<(Span, String)> {
-        let states = self.parts(term.node).states.clone();
-        let mut then = facts.clone();
-        let mut at = facts.history.clone();
-        let mut steps: Vec<(Span, String)> = Vec::new();
-        while let Some(event) = at {
-            let concerned: Vec<_> = event.before.iter().filter(|(s, _)| states.contains(s)).cloned().collect();
-            if !concerned.is_empty() {
-                let after = self.eval(term.node, &then);
-                for (state, before) in concerned {
-                    then.states[state as usize] = before;
-                }
-                let told = event.span.is_empty() || steps.iter().any(|(s, _)| *s == event.span);
-                if self.eval(term.node, &then) != after && !told {
-                    if steps.len() == STEPS_SHOWN {
-                        break;
-                    }
-                    let text = format!("`{}` is {} after this", term.name, self.show(&after, &term.domain));
-                    steps.push((event.span, text));
-                }
-            }
-            at = event.earlier.clone();
-        }
-        steps
-    }
-
     /// Where the user declared an instance, or what it is a part of.
-    fn declared_at(&self, id: InstanceId) -> Span {
+    pub(super) fn declared_at(&self, id: InstanceId) -> Span {
         let mut inst = &self.lab.instances[id.0 as usize];
         while let Some(owner) = inst.owner
             && self.in_library(inst.span)
@@ -420,7 +314,7 @@ impl Flow<'_, '_> {
         inst.span
     }
 
-    fn show(&self, value: &Known, domain: &Domain) -> String {
+    pub(super) fn show(&self, value: &Known, domain: &Domain) -> String {
         shown(value, |v| match domain {
             Domain::Quantity(unit) => unit.show(v),
             Domain::Bool => (if v == 0.0 { "false" } else { "true" }).to_string(),
@@ -450,7 +344,7 @@ fn severity(code: Code, some: bool) -> Severity {
 }
 
 /// What is known, in words.
-fn shown(value: &Known, show: impl Fn(f64) -> String) -> String {
+pub(super) fn shown(value: &Known, show: impl Fn(f64) -> String) -> String {
     // What is left of a subtraction is not worth telling beside what it was taken from.
     let (low, high) = value.bounds();
     let largest = if high.is_finite() { low.abs().max(high.abs()) } else { low.abs() };

@@ -64,8 +64,12 @@ impl Flow<'_, '_> {
             Step::Skill { needs, body, .. } => {
                 let met = self.needs(&node.label, needs, &mut facts);
                 self.quiet += usize::from(!met);
-                let after = self.walk(*body, facts);
+                let mut after = self.walk(*body, facts);
                 self.quiet -= usize::from(!met);
+                // What never begins does nothing: of what it would have done nothing is known.
+                if let Some(after) = after.as_mut().filter(|_| !met) {
+                    self.widen(*body, after);
+                }
                 after
             }
             Step::Named { start, end, body, .. } => {

@@ -1,5 +1,7 @@
 //! What the lines of a driver say: texts with values in them, exchanges, readings.
 
+use std::sync::Arc;
+
 use matterix_ir::wire::{Exchange, Piece, Slot, Template, Told, Until};
 use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
 
@@ -47,7 +49,7 @@ impl<'a> Planner<'a, '_> {
                 Value::Error => return None,
                 Value::Num(n) if matches!(&*value.kind, ExprKind::As(..)) || n.dimension.is_one() => {
                     let unit = n.unit.filter(|_| matches!(&*value.kind, ExprKind::As(..)));
-                    Piece::Number { value: n.node, unit: unit.unwrap_or_else(Unit::one), digits }
+                    Piece::Number { value: n.node, unit: unit.map_or_else(Unit::one, Arc::unwrap_or_clone), digits }
                 }
                 Value::Num(n) => {
                     let unit = self.lab.shown(&n).symbol;

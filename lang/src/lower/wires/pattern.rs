@@ -1,5 +1,7 @@
 //! What replies look like: words with units where numbers stand.
 
+use std::sync::Arc;
+
 use matterix_ir::wire::{Pattern, Slot};
 use matterix_ir::{Diagnostic, Unit, codes};
 
@@ -45,7 +47,7 @@ impl Planner<'_, '_> {
                 unit => match self.lab.tables.unit(unit) {
                     Ok(resolved) => {
                         dimensions.push(resolved.dimension);
-                        Slot::Number(resolved.unit)
+                        Slot::Number(Arc::unwrap_or_clone(resolved.unit))
                     }
                     Err(error) => {
                         let d = unit_error(&UnitText { text: unit.to_owned(), span: of.span }, error);

@@ -9,7 +9,7 @@ use super::{
 use crate::ast::{
     AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Exchange, Expr, Field, FieldValue,
     FitLine, Goal, Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind,
-    Name, Pattern, Process, Role, StudyLine, Term, Wire, WireKind,
+    Name, Pattern, Process, Refusal, Role, StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -183,8 +183,8 @@ fn member(of: &Member) -> Sexp {
         MemberKind::View { param: index, ty: kind, value } => node("view").with([param(index), ty(kind), expr(value)]),
         MemberKind::Command { sig: of, clauses } => node("command").with([sig(of)]).with(clauses.iter().map(clause)),
         MemberKind::Process(of) => process(of),
-        MemberKind::Limit { at_end, cond, failure, help } => {
-            demand(if *at_end { "ends" } else { "keeps" }, cond, failure.as_ref(), help.as_deref())
+        MemberKind::Limit { at_end, cond, refusal } => {
+            demand(if *at_end { "ends" } else { "keeps" }, cond, refusal.as_ref())
         }
         MemberKind::Event(of) => event(of),
         MemberKind::Frame { name: word, at } => node("frame").with([name(word)]).with(at.iter().flat_map(place)),
@@ -204,8 +204,11 @@ fn role_word(role: Role) -> &'static str {
     }
 }
 
-fn demand(word: &str, cond: &Expr, failure: Option<&Name>, help: Option<&str>) -> Sexp {
-    let named = failure.map(|f| node("else").with([name(f)]).with(help.map(quoted)));
+fn demand(word: &str, cond: &Expr, refusal: Option<&Refusal>) -> Sexp {
+    let named = refusal.map(|r| {
+        let because = r.because.as_ref().map(|text| node("because").with([super::steps::filled(text)]));
+        node("else").with([name(&r.failure)]).with(r.help.as_deref().map(quoted)).with(because)
+    });
     node(word).with([expr(cond)]).with(named)
 }
 
@@ -226,10 +229,10 @@ fn effect(of: &Effect) -> Sexp {
 
 fn clause(clause: &Clause) -> Sexp {
     match &clause.kind {
-        ClauseKind::Needs { cond, failure, help } => demand("needs", cond, failure.as_ref(), help.as_deref()),
-        ClauseKind::Presumes { ever, cond, failure, help } => {
+        ClauseKind::Needs { cond, refusal } => demand("needs", cond, refusal.as_ref()),
+        ClauseKind::Presumes { ever, cond, refusal } => {
             let word = if *ever { "presumes ever" } else { "presumes" };
-            demand(word, cond, failure.as_ref(), help.as_deref())
+            demand(word, cond, refusal.as_ref())
         }
         ClauseKind::While(cond) => node("while").with([expr(cond)]),
         ClauseKind::Fails(all) => node("fails").with(names(all)),

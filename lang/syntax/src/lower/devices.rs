@@ -9,7 +9,7 @@ use super::{
 };
 use crate::ast::{
     AssetLine, AssetLiteral, At, Clause, ClauseKind, Effect, Expr, Field, FieldValue, Goal, Grid, ItemKind, Jointed,
-    Manner, Member, MemberKind, Name, Path, Role, Term, Way,
+    Manner, Member, MemberKind, Name, Path, Refusal, Role, Term, Way,
 };
 
 impl Lower<'_> {
@@ -63,8 +63,8 @@ impl Lower<'_> {
             Rule::limit => {
                 kids.has(Rule::kw_keeps);
                 let at_end = kids.has(Rule::kw_ends);
-                let (cond, failure, help) = self.demand(kids);
-                MemberKind::Limit { at_end, cond, failure, help }
+                let (cond, refusal) = self.demand(kids);
+                MemberKind::Limit { at_end, cond, refusal }
             }
             Rule::frame_member => {
                 MemberKind::Frame { name: self.name_in(kids), at: kids.eat(Rule::place_at).map(|n| self.at(n)) }
@@ -113,11 +113,17 @@ impl Lower<'_> {
         clauses
     }
 
-    /// `COND else NAME "help"`.
-    fn demand(&mut self, kids: &mut Kids) -> (Expr, Option<Name>, Option<String>) {
+    /// `COND else NAME "help" because "words"`.
+    fn demand(&mut self, kids: &mut Kids) -> (Expr, Option<Refusal>) {
         let cond = self.expr_in(kids);
-        let failure = kids.eat(Rule::word).map(|n| self.name(&n));
-        (cond, failure, kids.eat(Rule::string).map(|n| self.text(&n)))
+        let refusal = kids.eat(Rule::refusal).map(|node| {
+            let kids = &mut Kids::of(node);
+            let failure = self.name_in(kids);
+            let help = kids.eat(Rule::string).map(|n| self.text(&n));
+            let because = kids.has(Rule::kw_because).then(|| self.filled_in(kids)).flatten();
+            Refusal { failure, help, because }
+        });
+        (cond, refusal)
     }
 
     fn clause(&mut self, node: Node) -> Option<ClauseKind> {
@@ -126,13 +132,13 @@ impl Lower<'_> {
         let kids = &mut inner;
         Some(match rule {
             Rule::needs => {
-                let (cond, failure, help) = self.demand(kids);
-                ClauseKind::Needs { cond, failure, help }
+                let (cond, refusal) = self.demand(kids);
+                ClauseKind::Needs { cond, refusal }
             }
             Rule::presumes => {
                 let ever = kids.has(Rule::kw_ever);
-                let (cond, failure, help) = self.demand(kids);
-                ClauseKind::Presumes { ever, cond, failure, help }
+                let (cond, refusal) = self.demand(kids);
+                ClauseKind::Presumes { ever, cond, refusal }
             }
             Rule::while_ => {
                 kids.has(Rule::kw_while);

@@ -60,6 +60,7 @@ pub(crate) fn connect(checker: &mut Checker, start: &[f32], goal: &[f32], settin
         way.push(goal);
         return Search { way: Some(way), iterations: 0 };
     }
+    let last = checker.effort().saturating_add(settings.effort);
     let range = settings.range as f32;
     let mut halton = checker.figure().samples().draw();
     let mut trees = [Grown::new(start), Grown::new(goal)];
@@ -67,6 +68,9 @@ pub(crate) fn connect(checker: &mut Checker, start: &[f32], goal: &[f32], settin
     let mut grows = 1;
     let [mut sample, mut near, mut next, mut other] = [0; 4].map(|_| vec![0.0_f32; dims]);
     for iteration in 1..=settings.iterations {
+        if checker.effort() >= last {
+            return Search { way: None, iterations: iteration };
+        }
         let (a, b) = (trees[grows].cloud.len() as f32, trees[1 - grows].cloud.len() as f32);
         if (a - b).abs() < a {
             grows = 1 - grows;

@@ -21,6 +21,8 @@ pub struct Settings {
     pub range: f64,
     /// How many samples are drawn before the search gives up.
     pub iterations: usize,
+    /// How much is looked at before it gives up: blocks of eight configurations, as [`Checker::effort`] counts them.
+    pub effort: u64,
     /// How far around a node that failed once samples are still taken up; rad.
     pub domain: f64,
     /// By what share that distance shrinks with every further failure.
@@ -33,7 +35,15 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { range: 1.0, iterations: 1_000_000, domain: 4.0, shrink: 1e-4, least_domain: 1.0, rounds: 5 }
+        Self {
+            range: 1.0,
+            iterations: 1_000_000,
+            effort: u64::MAX,
+            domain: 4.0,
+            shrink: 1e-4,
+            least_domain: 1.0,
+            rounds: 5,
+        }
     }
 }
 
@@ -41,9 +51,14 @@ impl Default for Settings {
 const ASKING: usize = 500;
 
 impl Settings {
-    /// The same for a search in which a referee is asked.
-    fn asking(&self) -> Self {
-        Self { iterations: self.iterations.min(ASKING), ..*self }
+    /// The same for the first of two searches.
+    fn first(&self) -> Self {
+        Self { effort: self.effort.div_ceil(2), ..*self }
+    }
+
+    /// The same for a search in which a referee is asked, when so much has been looked at.
+    fn asking(&self, spent: u64) -> Self {
+        Self { iterations: self.iterations.min(ASKING), effort: self.effort.saturating_sub(spent), ..*self }
     }
 }
 
@@ -150,9 +165,11 @@ fn rounded(way: &path::Way, start: &[f64], goal: &[f64], iterations: usize) -> R
 /// Where there is none among balls and the checker has a referee, one is searched among true shapes.
 pub fn plan(checker: &mut Checker, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
     checker.ask(false);
-    let found = match search(checker, start, goal, settings) {
+    let before = checker.effort();
+    let found = match search(checker, start, goal, &settings.first()) {
         Err(Failure::Collision(..) | Failure::Unreached(_)) if checker.ask(true) => {
-            search(checker, start, goal, &settings.asking())
+            let spent = checker.effort() - before;
+            search(checker, start, goal, &settings.asking(spent))
         }
         found => found,
     };

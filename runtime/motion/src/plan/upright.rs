@@ -77,6 +77,7 @@ impl Level<'_, '_> {
             attempts: 1,
             ..Request::new(target, &start)
         };
+        self.checker.spend(RIGHTING);
         let Ok(solution) = self.solver.search(&request) else { return false };
         for (x, s) in q.iter_mut().zip(&solution.q) {
             *x = *s as f32;
@@ -111,6 +112,8 @@ impl Judge for Level<'_, '_> {
     }
 }
 
+/// How many blocks of configurations take as long as setting one upright.
+const RIGHTING: u64 = 20;
 /// Longest step of a tree; rad.
 const STEP: f32 = 0.15;
 
@@ -169,9 +172,11 @@ impl Grown {
 /// Where there is none among balls and the checker has a referee, one is searched among true shapes.
 pub fn plan_upright(level: &mut Level, start: &[f64], goal: &[f64], settings: &Settings) -> Result<Route, Failure> {
     level.checker.ask(false);
-    match search(level, start, goal, settings) {
+    let before = level.checker.effort();
+    match search(level, start, goal, &settings.first()) {
         Err(Failure::Collision(..) | Failure::Unreached(_)) if level.checker.ask(true) => {
-            search(level, start, goal, &settings.asking())
+            let spent = level.checker.effort() - before;
+            search(level, start, goal, &settings.asking(spent))
         }
         found => found,
     }
@@ -200,7 +205,11 @@ fn search(level: &mut Level, start: &[f64], goal: &[f64], settings: &Settings) -
     let mut halton = level.checker.figure().samples().draw();
     let mut visits = Vec::new();
     let mut sample = single[1].clone();
+    let last = level.checker.effort().saturating_add(settings.effort);
     for iteration in 0..settings.iterations {
+        if level.checker.effort() >= last {
+            return Err(Failure::Unreached(iteration));
+        }
         let grows = iteration % 2;
         let [a, b] = &mut trees;
         let (tree, aim) = if grows == 0 { (a, b) } else { (b, a) };

@@ -7,6 +7,9 @@ use crate::vector::{Axes, Placed, Vector};
 use crate::world::{Obstacle, World};
 use nalgebra::Point3;
 
+/// How many blocks of eight configurations among balls take as long as one among true shapes.
+pub const ASKED: u64 = 50;
+
 /// A robot in a world.
 ///
 /// Coordinates are 32-bit here: about a micrometre at the reach of an arm.
@@ -21,6 +24,8 @@ pub struct Checker<'a> {
     resolution: f32,
     scratch: Scratch,
     checks: u64,
+    asked: u64,
+    other: u64,
     referee: Option<&'a dyn Referee>,
     /// Whether the referee is asked.
     asks: bool,
@@ -74,6 +79,8 @@ impl<'a> Checker<'a> {
             resolution: resolution as f32,
             scratch,
             checks: 0,
+            asked: 0,
+            other: 0,
             referee: None,
             asks: false,
         };
@@ -119,6 +126,16 @@ impl<'a> Checker<'a> {
         self.checks
     }
 
+    /// How much has been looked at so far, in blocks of eight configurations among balls.
+    pub fn effort(&self) -> u64 {
+        self.checks + ASKED * self.asked + self.other
+    }
+
+    /// Something else was looked at that takes as long as so many blocks.
+    pub fn spend(&mut self, blocks: u64) {
+        self.other += blocks;
+    }
+
     /// Configurations checked for every unit of length.
     pub fn resolution(&self) -> f64 {
         f64::from(self.resolution)
@@ -127,8 +144,12 @@ impl<'a> Checker<'a> {
     /// Whether the robot is free in all of these configurations, which follow one another.
     pub fn are_free(&mut self, points: &[f32]) -> bool {
         let free = !self.stuck && dispatch(Batch { checker: self, points });
-        free || self.referee().is_some_and(|referee| {
-            points.chunks_exact(self.figure.limits().len().max(1)).all(|q| referee.is_free(&wide(q)))
+        let asked = &mut self.asked;
+        free || self.referee.filter(|_| self.asks).is_some_and(|referee| {
+            points.chunks_exact(self.figure.limits().len().max(1)).all(|q| {
+                *asked += 1;
+                referee.is_free(&wide(q))
+            })
         })
     }
 
@@ -141,7 +162,7 @@ impl<'a> Checker<'a> {
     pub fn is_clear(&mut self, from: &[f32], vector: &[f32], length: f32) -> bool {
         let blocks = (length * self.resolution / WIDTH as f32).ceil().max(1.0) as usize;
         let clear = !self.stuck && dispatch(Sweep { checker: self, from, vector, blocks });
-        clear || self.referee().is_some_and(|referee| is_clear_to(referee, from, vector, length))
+        clear || self.referee().is_some_and(|referee| is_clear_to(referee, from, vector, length, &mut self.asked))
     }
 }
 
@@ -150,9 +171,10 @@ fn wide(q: &[f32]) -> Vec<f64> {
 }
 
 /// Whether a referee finds nothing along `from + t * vector`; the middle is looked at first, where a way is blocked as a rule.
-fn is_clear_to(referee: &dyn Referee, from: &[f32], vector: &[f32], length: f32) -> bool {
+fn is_clear_to(referee: &dyn Referee, from: &[f32], vector: &[f32], length: f32, asked: &mut u64) -> bool {
     let steps = (f64::from(length) * referee.resolution()).ceil().max(1.0) as u32;
-    let free = |step: u32| {
+    let mut free = |step: u32| {
+        *asked += 1;
         let share = f64::from(step) / f64::from(steps);
         let q: Vec<f64> = from.iter().zip(vector).map(|(a, v)| f64::from(*a) + share * f64::from(*v)).collect();
         referee.is_free(&q)

@@ -10,7 +10,7 @@ mod frames;
 mod placed;
 mod referee;
 
-pub use check::Checker;
+pub use check::{ASKED, Checker};
 pub use contact::{Contact, Other};
 pub use placed::Placed;
 pub use referee::Referee;

@@ -1,5 +1,6 @@
 //! One way that things may have gone up to a step of a plan.
 
+use std::collections::BTreeSet;
 use std::hash::Hasher;
 
 use matterix_ir::model::{Action, Model};
@@ -8,6 +9,7 @@ use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, Program, Span};
 use siphasher::sip128::{Hasher128, SipHasher13};
 
+use super::offer::Missed;
 use super::values::Values;
 use crate::motion::stage::{Carried, Stage};
 use crate::motion::supported;
@@ -22,6 +24,19 @@ pub struct Refusal {
     pub failure: &'static str,
     /// What is said of it.
     pub finding: Diagnostic,
+    /// What it is about, by which the same cause is known again.
+    pub cause: Cause,
+    /// The goal, if it is out of reach of an arm that stands for good.
+    pub missed: Option<Missed>,
+}
+
+/// What a refusal comes from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cause {
+    /// Things that it depends on: where it was to go, what is in the way.
+    pub things: Vec<InstanceId>,
+    /// The robot, where its goal is, to the millimetre, and what is said first; nothing where no two are the same.
+    pub key: Option<(InstanceId, [i64; 3], String)>,
 }
 
 /// One way that things may have gone.
@@ -33,6 +48,8 @@ pub struct Course<'p> {
     pub values: Values,
     /// What was decided on the way here and might have been otherwise: where, and whether the condition held.
     pub choices: Vec<(Span, bool)>,
+    /// Things that stand where no statement was able to bring them: their states only say so.
+    pub assumed: BTreeSet<InstanceId>,
     /// The statement being followed cannot be done: its other motions are passed over.
     pub lost: Option<Box<Refusal>>,
 }
@@ -43,6 +60,7 @@ impl Course<'_> {
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
             let value = self.values.assign(&program.model, *state, *value);
+            value.into_iter().for_each(|value| self.stage.follow_load(*state, value));
             let Some(state) = program.model.states.get(*state as usize) else { continue };
             let Some(id) = supported(&program.scene, &state.name, &state.domain) else { continue };
             match value {
@@ -107,6 +125,7 @@ impl Course<'_> {
             hash.write_u32(state);
             hash.write_u64(value.to_bits());
         }
+        self.assumed.iter().for_each(|id| hash.write_u32(id.0));
         hash.write_u8(u8::from(self.lost.is_some()));
         hash.finish128().as_u128()
     }

@@ -7,10 +7,12 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Program, Span};
 
 use super::beside::Moved;
-use super::course::{Course, Refusal};
+use super::course::{Cause, Course, Refusal};
 use super::memory::{Memory, Outcome};
+use super::more::More;
+use super::offer::Missed;
 use super::told;
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
 
 /// Looks at motions, each from the same moment only once.
@@ -91,17 +93,21 @@ impl<'p, 's> Looker<'p, 's> {
         course.stage.unknown.postures.remove(&robot);
         match self.outcome(course, motion, &values) {
             Outcome::Done(_) => {}
-            Outcome::Refused { why, nearer } => {
+            Outcome::Refused { why, more } => {
                 let sure = match &why {
                     Refused::OutOfReach(..) => true,
-                    Refused::Collides(m) => {
+                    Refused::Collides(m) | Refused::Swings(_, m) => {
                         !adrift && m.with.is_none_or(|w| !beside.robots.contains(&w) && !beside.items.contains(&w))
                     }
                     _ => !adrift && beside.is_empty(),
                 };
-                let finding = told::finding(&course.stage, motion, &why, nearer, site).filter(|_| sure);
+                let finding = told::finding(&course.stage, motion, &values, &why, &more, site).filter(|_| sure);
+                let cause = cause(&course.stage, motion, &why);
                 course.drifts(robot);
-                course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
+                let goal = motion.goal().filter(|_| !more.targets.is_empty()).map(|(goal, _)| goal);
+                let missed = goal.map(|goal| Missed { robot, goal, targets: more.targets });
+                let failure = why.failure();
+                course.lost = finding.map(|finding| Box::new(Refusal { failure, finding, cause, missed }));
             }
         }
     }
@@ -126,7 +132,12 @@ impl<'p, 's> Looker<'p, 's> {
             stage.unknown.places.insert(item);
             return;
         }
-        if let Err(why) = stage.perform(motion, &[]) {
+        let gripped = stage.perform(motion, &[]);
+        if gripped.is_ok() {
+            course.assumed.remove(&item);
+        }
+        let stage = &mut course.stage;
+        if let Err(why) = gripped {
             stage.carry(item, Some(robot));
             stage.unknown.places.insert(item);
             self.refuse(course, motion, &why, site, beside.items.contains(&item));
@@ -170,9 +181,19 @@ impl<'p, 's> Looker<'p, 's> {
         }
     }
 
+    /// A motion that is refused before it is looked at.
+    pub fn cannot(&self, course: &mut Course<'p>, operation: &Operation, why: &Refused, site: Span) {
+        let Some(motion) = &operation.motion else { return };
+        self.refuse(course, motion, why, site, false);
+        if let Some(robot) = course.stage.actor_of(motion.mover()) {
+            course.drifts(robot);
+        }
+    }
+
     fn refuse(&self, course: &mut Course<'p>, motion: &Motion, why: &Refused, site: Span, unsure: bool) {
-        let finding = told::finding(&course.stage, motion, why, None, site).filter(|_| !unsure);
-        course.lost = finding.map(|finding| Box::new(Refusal { failure: why.failure(), finding }));
+        let finding = told::finding(&course.stage, motion, &[], why, &More::default(), site).filter(|_| !unsure);
+        let (failure, cause) = (why.failure(), cause(&course.stage, motion, why));
+        course.lost = finding.map(|finding| Box::new(Refusal { failure, finding, cause, missed: None }));
     }
 
     /// What becomes of a motion; the course is where it ends.
@@ -197,14 +218,28 @@ impl<'p, 's> Looker<'p, 's> {
             Ok(_) => Outcome::Done(course.stage.since(&before)),
             Err(why) => {
                 course.stage = before;
-                let far = matches!(why, Refused::OutOfReach(..));
-                let nearer = if far { told::nearer(&course.stage, motion) } else { None };
-                Outcome::Refused { why, nearer }
+                let more = More::of(&course.stage, motion, values, &why);
+                Outcome::Refused { why, more }
             }
         };
         self.memory.learn(key, outcome.clone());
         outcome
     }
+}
+
+/// What a refusal comes from.
+fn cause(stage: &Stage<'_>, motion: &Motion, why: &Refused) -> Cause {
+    let with = match why {
+        Refused::Collides(meeting) => meeting.with,
+        _ => None,
+    };
+    let goal = motion.goal().map(|(goal, _)| goal);
+    let things = with.into_iter().chain(goal).map(|id| stage.whole(id)).collect();
+    let key = stage.actor_of(motion.mover()).zip(goal).map(|(robot, goal)| {
+        let at = stage.pose(goal).position.map(|v| (v * 1e3).round() as i64);
+        (robot, at, format!("{} {goal:?} {with:?}", why.failure()))
+    });
+    Cause { things, key }
 }
 
 /// The finding of a refusal, with the step of the library it was found on.

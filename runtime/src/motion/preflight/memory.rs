@@ -13,8 +13,9 @@ use matterix_ir::scene::{InstanceId, Scene};
 use serde::{Deserialize, Serialize};
 use siphasher::sip128::SipHasher13;
 
+use super::more::More;
 use super::seal::{self, MADE_BY, Store};
-use crate::motion::perform::Refused;
+use crate::motion::refused::Refused;
 use crate::motion::stage::{Change, Stage};
 
 /// What became of a motion.
@@ -26,8 +27,8 @@ pub enum Outcome {
     Refused {
         /// Why.
         why: Refused,
-        /// For what is out of reach: how far its goal would have to be shifted, x and y in metres.
-        nearer: Option<[f64; 2]>,
+        /// What more is known of it.
+        more: More,
     },
 }
 
@@ -64,6 +65,7 @@ impl<'s> Memory<'s> {
     /// What a motion is known by.
     pub fn key(&self, stage: &Stage<'_>, motion: &Motion, values: &[f64]) -> String {
         let mut hash = SipHasher13::new();
+        hash.write_u8(u8::from(stage.hasty));
         stage.digest(None, &mut hash);
         let mut write = |kind: u8, ids: &[InstanceId], name: &str| {
             hash.write_u8(kind);

@@ -4,7 +4,10 @@ pub(super) mod beside;
 mod course;
 mod look;
 mod memory;
+mod more;
+mod offer;
 mod seal;
+mod starts;
 mod told;
 pub(super) mod values;
 mod verdicts;
@@ -33,8 +36,8 @@ fn look(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     if stage.actors.is_empty() {
         return Vec::new();
     }
-    let mut found = walk::follow(program, stage.clone(), memory::Memory::of(&program.scene, store));
-    found.extend(together(program, stage));
+    let (mut found, told) = walk::follow(program, stage.clone(), memory::Memory::of(&program.scene, store));
+    found.extend(together(program, stage, told));
     found
 }
 

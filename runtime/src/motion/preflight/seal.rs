@@ -12,6 +12,10 @@ pub trait Store {
     fn load(&self, name: &str) -> Option<Vec<u8>>;
     /// Keeps bytes under a name.
     fn save(&self, name: &str, bytes: &[u8]);
+    /// Whether it keeps anything at all.
+    fn keeps(&self) -> bool {
+        true
+    }
 }
 
 /// Keeps nothing.
@@ -23,6 +27,10 @@ impl Store for Nowhere {
     }
 
     fn save(&self, _: &str, _: &[u8]) {}
+
+    fn keeps(&self) -> bool {
+        false
+    }
 }
 
 /// Which code it was that planned: another one may plan otherwise.

@@ -1,22 +1,23 @@
 //! What is said of a motion that cannot be carried out.
 
-use matterix_ir::plan::Motion;
-use matterix_ir::pose::Pose;
-use matterix_ir::scene::{InstanceId, Scene, Stand};
-use matterix_ir::{Diagnostic, Span, codes};
-use matterix_motion::inverse::Request;
-use matterix_motion::pose::pose;
+use std::fmt;
 
-use crate::motion::goal::targets;
-use crate::motion::perform::{Meeting, Refused};
-use crate::motion::stage::{Carried, Stage};
+use matterix_ir::plan::Motion;
+use matterix_ir::scene::{InstanceId, Scene};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::more::More;
+use crate::motion::passage::Passage;
+use crate::motion::refused::{Meeting, Refused};
+use crate::motion::stage::Stage;
 
 /// The finding for a refused motion of the statement at `span`; none where another check says it.
 pub fn finding(
     stage: &Stage<'_>,
     motion: &Motion,
+    values: &[f64],
     refused: &Refused,
-    nearer: Option<[f64; 2]>,
+    more: &More,
     span: Span,
 ) -> Option<Diagnostic> {
     let scene = stage.scene;
@@ -25,40 +26,44 @@ pub fn finding(
         return gripping(scene, *item, *by, refused, span);
     }
     let (robot, goal) = (motion.mover(), motion.goal().map(|(goal, _)| goal));
-    let to = goal.map_or("there".to_string(), |g| format!("`{}`", name(g)));
+    let (arm, to) = (name(robot), Aim { scene, motion, values });
     let mut found = match refused {
+        Refused::OutOfReach(..) if more.passage.is_some() => {
+            let headline = format!("`{arm}` cannot drive to {}", to.what());
+            let label = more.passage.as_ref().map(|passage| closed(scene, arm, passage)).unwrap_or_default();
+            Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
+        }
         Refused::OutOfReach(far, _) => {
             let label = match far * 1e3 {
                 mm if mm >= 1.0 => format!("its gripper stays {mm:.0} mm away"),
                 _ => "it gets there, but not turned like this".to_string(),
             };
-            let headline = format!("`{}` does not reach {to}", name(robot));
+            let headline = match goal {
+                Some(goal) => format!("`{arm}` does not reach `{}`", name(goal)),
+                None => format!("`{arm}` does not get {to}"),
+            };
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
         Refused::Collides(meeting) => {
-            let [x, y, z] = meeting.at.map(|v| v * 1e3);
-            let headline = match meeting.before {
-                true => format!("`{}` stands in `{}` before it goes to {to}", name(robot), meeting.other),
-                false => format!("`{}` runs into `{}` on its way to {to}", name(robot), meeting.other),
-            };
-            let depth = (meeting.depth * 1e3).max(1.0);
-            let met = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
-            let label = format!("`{}` meets {met} at ({x:.0}, {y:.0}, {z:.0}) mm, {depth:.0} mm deep", meeting.mine);
+            let (headline, label) = met(stage, meeting, arm, goal, &to);
             Diagnostic::error(codes::COLLISION, span, headline, label)
         }
-        Refused::NoWay => Diagnostic::error(
-            codes::COLLISION,
-            span,
-            format!("no way was found for `{}` to {to}", name(robot)),
-            "nothing is in the way at its end, but between",
-        ),
+        Refused::NoWay => {
+            let headline = format!("no way was found for `{arm}` {}", to.exactly());
+            let label = match &more.between {
+                None => "nothing is in the way where it ends, but before".to_string(),
+                Some(m) => format!("straight there, `{}` meets {} at {}", m.mine, m.whom(), m.place()),
+            };
+            Diagnostic::error(codes::COLLISION, span, headline, label)
+        }
+        Refused::Swings(item, meeting) => return Some(swing(stage, *item, meeting, span)),
         Refused::Bound(item, other) => {
             let headline = format!("`{}` moves while `{}` holds `{}` as well", name(robot), name(*other), name(*item));
             Diagnostic::error(codes::IN_HAND, span, headline, "two arms hold one thing here")
                 .help("let one of them let go first")
         }
         Refused::Tilted(by) => {
-            let headline = format!("what `{}` holds tilts on its way to {to}", name(robot));
+            let headline = format!("what `{arm}` holds tilts on its way {to}");
             let label = format!("by {:.0} deg at one end of it, more than it may", by.to_degrees());
             Diagnostic::error(codes::OUT_OF_REACH, span, headline, label)
         }
@@ -78,12 +83,14 @@ pub fn finding(
         Refused::NoRobot | Refused::NoFrame | Refused::Misplaced(..) | Refused::NotHeld => return None,
         Refused::StandsOn | Refused::TooWide(..) => return None,
     };
-    let met = match refused {
+    let with = match refused {
         Refused::Collides(meeting) => meeting.with,
+        Refused::NoWay => more.between.as_ref().and_then(|m| m.with),
         _ => None,
     };
     let mut shown = Vec::new();
-    for id in met.into_iter().chain(goal) {
+    let gap = more.passage.iter().flat_map(|p| p.gap.iter().flat_map(|(pair, _)| *pair).chain(p.by));
+    for id in with.into_iter().chain(gap).chain(goal) {
         let at = scene.get(id).span;
         if at == span || shown.contains(&at) {
             continue;
@@ -94,10 +101,77 @@ pub fn finding(
             found = found.because(at, format!("`{}` stands here", name(id)));
         }
     }
-    if let (Some(goal), Some([x, y])) = (goal, nearer) {
-        found = found.help(within_reach(stage, goal, [x, y]));
-    }
     Some(found)
+}
+
+/// What meets what, and where on the way: headline and label.
+fn met(stage: &Stage<'_>, meeting: &Meeting, arm: &str, goal: Option<InstanceId>, to: &Aim<'_>) -> (String, String) {
+    let (mine, other) = (&meeting.mine, &meeting.other);
+    let is_goal = meeting.with.zip(goal).is_some_and(|(with, goal)| stage.whole(with) == stage.whole(goal));
+    let headline = match (meeting.before, meeting.end, is_goal) {
+        (true, ..) => format!("`{arm}` stands in `{other}` before it goes {to}"),
+        (_, true, true) => format!("`{mine}` of `{arm}` does not fit at `{other}`"),
+        (_, true, false) => format!("`{arm}` runs into `{other}` at the end of its way {to}"),
+        (_, false, true) => format!("`{arm}` runs into `{other}` as it comes up to it"),
+        (_, false, false) => format!("`{arm}` runs into `{other}` on its way {to}"),
+    };
+    let part = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
+    let depth = (meeting.depth * 1e3).max(1.0);
+    (headline, format!("`{mine}` meets {part} at {}, {depth:.0} mm deep", meeting.place()))
+}
+
+/// What closes the way of a robot that drives.
+fn closed(scene: &Scene, arm: &str, passage: &Passage) -> String {
+    let name = |id: &InstanceId| scene.get(*id).name.as_str();
+    let needs = passage.needs * 1e3;
+    match (&passage.gap, &passage.by) {
+        (Some(([a, b], wide)), _) => {
+            let wide = wide.max(0.0) * 1e3;
+            format!("between `{}` and `{}` are {wide:.0} mm, and `{arm}` needs {needs:.0} mm", name(a), name(b))
+        }
+        (None, Some(by)) => format!("`{}` is in the way; `{arm}` needs {needs:.0} mm to pass", name(by)),
+        (None, None) => format!("no gap on the way is as wide as the {needs:.0} mm that `{arm}` needs"),
+    }
+}
+
+/// Where a motion goes, in words.
+struct Aim<'m> {
+    scene: &'m Scene,
+    motion: &'m Motion,
+    values: &'m [f64],
+}
+
+impl Aim<'_> {
+    /// What it goes to.
+    fn what(&self) -> String {
+        self.motion.goal().map_or("there".to_string(), |(goal, _)| format!("`{}`", self.scene.get(goal).name))
+    }
+
+    /// With the frame it goes to.
+    fn exactly(&self) -> String {
+        match self.motion.goal() {
+            Some((goal, frame)) if !frame.is_empty() => format!("to `{frame}` of `{}`", self.scene.get(goal).name),
+            _ => self.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Aim<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mm = |v: &f64| format!("{:.0}", v * 1e3);
+        match (self.motion, self.motion.goal()) {
+            (_, Some((goal, _))) => write!(f, "to `{}`", self.scene.get(goal).name),
+            (Motion::Home { .. }, _) => f.write_str("home"),
+            (Motion::Joints { .. }, _) => f.write_str("to these positions of its joints"),
+            (Motion::By { .. }, _) => match self.values {
+                [x, y, z] if *x == 0.0 && *y == 0.0 && *z >= 0.0 => write!(f, "{} mm up", mm(z)),
+                [x, y, z] if *x == 0.0 && *y == 0.0 => write!(f, "{} mm down", mm(&-z)),
+                [x, y, z] => write!(f, "by ({}, {}, {}) mm", mm(x), mm(y), mm(z)),
+                _ => f.write_str("there"),
+            },
+            _ => f.write_str("there"),
+        }
+    }
 }
 
 /// The finding for a part of a thing that runs into something as it moves by itself.
@@ -114,20 +188,6 @@ pub fn swing(stage: &Stage<'_>, id: InstanceId, meeting: &Meeting, span: Span) -
             found.because(stage.scene.get(with).span, format!("`{name}` stands here"))
         }
         _ => found,
-    }
-}
-
-/// Where a goal could be reached, if it is shifted by x and y, m: as its line says it, or from where it is.
-fn within_reach(stage: &Stage<'_>, goal: InstanceId, [x, y]: [f64; 2]) -> String {
-    let name = &stage.scene.get(goal).name;
-    match stage.carried.get(goal.0 as usize) {
-        Some(Carried::Stands(Stand::On(on, at))) if stage.is_where_it_was(goal) => {
-            let turned = Pose { position: [0.0; 3], ..stage.surface(*on) }.inverse();
-            let [dx, dy, _] = turned.point([x, y, 0.0]);
-            let [x, y] = [at.position[0] + dx, at.position[1] + dy].map(|v| v * 1e3);
-            format!("`{name}` is within reach at ({x:.0}, {y:.0}) mm on `{}`", stage.scene.get(*on).name)
-        }
-        _ => format!("`{name}` is within reach if it stands ({:.0}, {:.0}) mm from there", x * 1e3, y * 1e3),
     }
 }
 
@@ -151,30 +211,4 @@ fn gripping(scene: &Scene, item: InstanceId, by: InstanceId, refused: &Refused, 
         }
         _ => None,
     }
-}
-
-/// How much of the way to the robot a goal is shifted at a time.
-const STEP: f64 = 0.05;
-
-/// How far a goal out of reach would have to be shifted to be reached, x and y in metres: the nearest place on the line to
-/// the robot.
-pub fn nearer(stage: &Stage<'_>, motion: &Motion) -> Option<[f64; 2]> {
-    let (goal, frame) = motion.goal()?;
-    let robot = stage.actor_of(motion.mover())?;
-    let base = stage.foot(robot);
-    let actor = stage.actors.get(&robot)?;
-    let mut solver = actor.solver();
-    let now = actor.configuration();
-    let targets = targets(stage, robot, goal, frame);
-    let mut shifted = |share: f64| {
-        targets.iter().find_map(|target| {
-            let mut at: Pose = *target;
-            (0..2).for_each(|k| at.position[k] += share * (base.position[k] - at.position[k]));
-            let request = Request { attempts: 20, ..Request::new(pose(&base.inverse().then(at)), &now) };
-            solver.solve(&request).ok().map(|_| [0, 1].map(|k| at.position[k] - target.position[k]))
-        })
-    };
-    let first = (1..20).find(|k| shifted(f64::from(*k) * STEP).is_some())?;
-    // A step further in leaves room for what comes after.
-    shifted(f64::from(first + 1) * STEP).or_else(|| shifted(f64::from(first) * STEP))
 }

@@ -5,9 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::seal::{self, MADE_BY, Store};
 
-/// What they are kept under.
-const NAME: &str = "programs";
-/// How many programs are kept, the last ones looked at.
+/// What they are kept under, with the first digits of a key: a file may have thousands of workflows, and no check should
+/// have to read what is known of all.
+const NAME: &str = "programs-";
+/// How many digits.
+const DIGITS: usize = 2;
+/// How many programs are kept under a name, the last ones looked at.
 const MOST: usize = 64;
 
 #[derive(Serialize, Deserialize)]
@@ -16,13 +19,27 @@ struct Kept {
     verdicts: Vec<(String, Vec<Diagnostic>)>,
 }
 
+/// What a program is known by; its plan, which is half of it, is looked at by another thread.
+fn key(program: &Program) -> Option<String> {
+    let Program { version, files, scene, model, plan, stock, drivers } = program;
+    let sum = |bytes: postcard::Result<Vec<u8>>| bytes.ok().map(|bytes| seal::sum(&bytes));
+    let of_plan = || sum(postcard::to_allocvec(plan));
+    let (plan, rest) = std::thread::scope(|scope| {
+        let aside = std::thread::Builder::new().spawn_scoped(scope, of_plan);
+        let rest = sum(postcard::to_allocvec(&(version, files, scene, model, stock, drivers)));
+        // Where there is no thread to be had, this one does the work.
+        (aside.ok().and_then(|aside| aside.join().ok()).unwrap_or_else(of_plan), rest)
+    });
+    Some(plan? + &rest?)
+}
+
 /// The findings of a program: those that are kept, or else what `look` finds, which is kept.
 ///
 /// A program is known by all of it, texts and their places included, as findings quote them.
 pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagnostic>) -> Vec<Diagnostic> {
-    let Ok(bytes) = postcard::to_allocvec(program) else { return look() };
-    let key = seal::sum(&bytes);
-    let kept = store.load(NAME).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
+    let Some(key) = store.keeps().then(|| key(program)).flatten() else { return look() };
+    let name = format!("{NAME}{}", &key[..DIGITS]);
+    let kept = store.load(&name).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
     let mut verdicts = kept.map(|k| k.verdicts).unwrap_or_default();
     if let Some((_, found)) = verdicts.iter().find(|(k, _)| *k == key) {
         return found.clone();
@@ -31,7 +48,7 @@ pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagn
     verdicts.insert(0, (key, found.clone()));
     verdicts.truncate(MOST);
     if let Some(bytes) = seal::closed(&Kept { made_by: MADE_BY.to_string(), verdicts }) {
-        store.save(NAME, &bytes);
+        store.save(&name, &bytes);
     }
     found
 }

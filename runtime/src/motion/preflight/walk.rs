@@ -8,20 +8,29 @@ use matterix_ir::scene::{InstanceId, Stand};
 use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span};
 
 use super::beside::{Job, Moved};
-use super::course::{Course, Refusal};
+use super::course::{Cause, Course, Refusal};
 use super::look::{Looker, on_step};
 use super::memory::Memory;
+use super::offer::{self, Missed};
+use super::starts::Starts;
 use super::told;
 use super::values::Values;
+use crate::motion::refused::Refused;
 use crate::motion::stage::{Carried, Stage};
 
 /// How many courses are followed at a time.
 const COURSES: usize = 6;
+/// How many other places for a goal out of reach are tried.
+const TRIES: usize = 6;
 /// How many turns of a loop are followed.
 const TURNS: u32 = 4;
 
-/// What would go wrong with the motions of a program in a lab.
-pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) -> Vec<Diagnostic> {
+/// What would go wrong with the motions of a program in a lab, and which robots are in each other before they move.
+pub fn follow<'p>(
+    program: &'p Program,
+    stage: Stage<'p>,
+    memory: Memory<'_>,
+) -> (Vec<Diagnostic>, Vec<[InstanceId; 2]>) {
     let mut stage = stage;
     let ids = (0..program.scene.instances.len() as u32).map(InstanceId);
     stage.unknown.places = ids.filter(|id| !program.scene.get(*id).placed).collect();
@@ -34,12 +43,18 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, memory: Memory<'_>) ->
         sites: Vec::new(),
         raised: Vec::new(),
         beside: Moved::default(),
+        starts: Starts::default(),
+        causes: Vec::new(),
+        trying: false,
         unsure: 0,
     };
-    walk.step(program.plan.root, vec![Course { stage, values, choices: Vec::new(), lost: None }]);
-    let Walk { looker, found, .. } = walk;
+    walk.step(
+        program.plan.root,
+        vec![Course { stage, values, choices: Vec::new(), assumed: BTreeSet::new(), lost: None }],
+    );
+    let Walk { looker, found, starts, .. } = walk;
     looker.keep();
-    found.into_iter().map(|f| f.finding).collect()
+    (found.into_iter().map(|f| f.finding).collect(), starts.told())
 }
 
 /// What was found at a statement reached by a call.
@@ -66,6 +81,12 @@ struct Walk<'p, 's> {
     raised: Vec<Raised<'p>>,
     /// What moves at the same time.
     beside: Moved,
+    /// What robots are in where lines that run beside each other begin.
+    starts: Starts,
+    /// What has been said to be wrong for certain.
+    causes: Vec<Cause>,
+    /// Whether a statement is followed to see if it could be done with something elsewhere.
+    trying: bool,
     /// How many steps around may be left out without a condition of the plan's own.
     unsure: usize,
 }
@@ -96,17 +117,26 @@ impl<'p> Walk<'p, '_> {
         let (count, mut refused) = (courses.len(), Vec::new());
         let mut after = Vec::new();
         for course in courses {
-            let before = course.stage.clone();
+            let start = course.clone();
             let mut ends = self.inside(id, vec![course]);
             let all_lost = !ends.is_empty() && ends.iter().all(|c| c.lost.is_some());
             let mut first = None;
             for end in &mut ends {
                 let Some(lost) = end.lost.take() else { continue };
-                recover(end, &before);
+                recover(end, &start.stage);
                 let handled = self.raise(lost.failure, end);
-                first.get_or_insert((lost, handled, end.choices.clone()));
+                // What never came to where it counts as being is judged there no more.
+                let follows = lost.cause.things.iter().any(|thing| start.assumed.contains(thing));
+                if !follows {
+                    first.get_or_insert((lost, handled, end.choices.clone()));
+                }
             }
-            if let Some((lost, handled, choices)) = first {
+            if let Some((mut lost, handled, choices)) = first {
+                if refused.is_empty()
+                    && let Some(place) = lost.missed.as_ref().and_then(|missed| self.offer(id, &start, missed))
+                {
+                    lost.finding = lost.finding.help(place);
+                }
                 // The rest of what is guarded is not reached.
                 if handled && all_lost {
                     ends.clear();
@@ -116,14 +146,59 @@ impl<'p> Walk<'p, '_> {
             after.extend(ends);
         }
         let must = refused.len() == count && refused.iter().all(|r| r.1) && self.unsure == 0;
-        if let Some((lost, _, choices)) = refused.into_iter().next() {
+        if let Some((lost, _, choices)) = refused.into_iter().next()
+            && !(lost.cause.key.is_some() && self.causes.contains(&lost.cause))
+        {
+            self.causes.extend(must.then(|| lost.cause.clone()));
             self.tell(lost.finding, must, if must { Vec::new() } else { choices });
         }
         merge(after)
     }
 
+    /// Where something would have to stand for a statement to be done from here, in words; the nearest such place. Where
+    /// something else is in the way of that as well, at least so that the thing itself is reached.
+    fn offer(&mut self, id: StepId, start: &Course<'p>, missed: &Missed) -> Option<String> {
+        if self.trying || !self.beside.is_empty() {
+            return None;
+        }
+        self.trying = true;
+        let raised = std::mem::take(&mut self.raised);
+        let mut places = offer::places(&start.stage, &self.program.plan, id, missed);
+        let (mut whole, mut partly) = (None, None);
+        for _ in 0..TRIES {
+            if places.is_empty() || whole.is_some() {
+                break;
+            }
+            let place = places.remove(0);
+            // What fails here fails close to it as well.
+            places.retain(|other| other.is_apart(&place));
+            let mut course = start.clone();
+            course.stage.hasty = true;
+            if let Some(carried) = course.stage.carried.get_mut(place.thing.0 as usize) {
+                *carried = place.stand;
+            }
+            let ends = self.inside(id, vec![course]);
+            let fails =
+                |lost: &Option<Box<Refusal>>| lost.as_ref().is_some_and(|l| l.cause.things.contains(&place.thing));
+            if !ends.is_empty() && ends.iter().all(|end| end.lost.is_none()) {
+                whole = Some(place.words);
+            } else if partly.is_none()
+                && place.thing == start.stage.whole(missed.goal)
+                && ends.iter().all(|end| !fails(&end.lost))
+            {
+                partly = Some(place.words);
+            }
+        }
+        self.raised = raised;
+        self.trying = false;
+        whole.or(partly)
+    }
+
     /// Each statement is reported once for each call that leads to it: an error where no course gets past it.
     fn tell(&mut self, mut finding: Diagnostic, must: bool, choices: Vec<(Span, bool)>) {
+        if self.trying {
+            return;
+        }
         let site = self.sites.last().copied().unwrap_or_default();
         let around = |outer: &&Span| outer.file != site.file || outer.start > site.start || outer.end < site.end;
         let call = self.sites.iter().rev().find(around).copied();
@@ -207,7 +282,10 @@ impl<'p> Walk<'p, '_> {
         if operation.motion.is_some() && course.lost.is_none() {
             let site = self.sites.last().copied().unwrap_or(span);
             let beside = std::mem::take(&mut self.beside);
-            self.looker.motion(&mut course, operation, site, &beside);
+            match self.overlap(&course, operation) {
+                Some(why) => self.looker.cannot(&mut course, operation, &why, site),
+                None => self.looker.motion(&mut course, operation, site, &beside),
+            }
             self.beside = beside;
             if let Some(lost) = &mut course.lost {
                 lost.finding = on_step(lost.finding.clone(), span);
@@ -217,19 +295,30 @@ impl<'p> Walk<'p, '_> {
         course.act(self.program, &operation.at_end);
         course.stage.let_go(operation.motion.as_ref());
         let moved = course.follow_joints(&self.program.model);
+        // Of what moves at the same time it is not known when.
+        let stays = |stage: &Stage<'_>, with: Option<InstanceId>| {
+            with.is_none_or(|with| !stage.actors.contains_key(&with) && !stage.fixtures.contains_key(&with))
+        };
         if course.lost.is_none()
-            && self.beside.is_empty()
             && let Some((id, meeting)) = course.stage.swing_meets(&moved)
+            && (self.beside.is_empty() || stays(&course.stage, meeting.with))
         {
             let site = self.sites.last().copied().unwrap_or(span);
             let finding = on_step(told::swing(&course.stage, id, &meeting, site), span);
-            course.lost = Some(Box::new(Refusal { failure: "collision", finding }));
+            course.lost =
+                Some(Box::new(Refusal { failure: "collision", finding, cause: Cause::default(), missed: None }));
             // Where it has been pushed to nobody knows.
             if let Some(robot) = meeting.with.filter(|with| course.stage.actors.contains_key(with)) {
                 course.drifts(robot);
             }
         }
         course
+    }
+
+    /// What the robot of an operation was in when the lines began that run beside each other.
+    fn overlap(&mut self, course: &Course<'p>, operation: &Operation) -> Option<Refused> {
+        let motion = operation.motion.as_ref()?;
+        self.starts.take(motion, course.stage.actor_of(motion.mover())?)
     }
 
     /// One after the other; a job runs beside what follows it, until it is awaited.
@@ -270,6 +359,9 @@ impl<'p> Walk<'p, '_> {
     ) -> Courses<'p> {
         if own.is_empty() || others.is_empty() {
             return follow(self, courses);
+        }
+        if let Some(course) = courses.first() {
+            self.starts.look(&course.stage, own, others);
         }
         let blurred = courses.iter_mut().map(|course| others.blur(course)).reduce(Moved::common).unwrap_or_default();
         let before = self.beside.clone();
@@ -428,7 +520,11 @@ fn recover<'p>(course: &mut Course<'p>, before: &Stage<'p>) {
     course.stage.fixtures.clone_from(&after.fixtures);
     for (index, carried) in after.carried.iter().enumerate() {
         let (Carried::Stands(Stand::On(below, _)) | Carried::Held(below, _)) = carried else { continue };
-        course.follow(InstanceId(index as u32), Some(*below));
+        let id = InstanceId(index as u32);
+        if before.below(id) != Some(*below) {
+            course.assumed.insert(id);
+        }
+        course.follow(id, Some(*below));
     }
     let moved = after.actors.iter().filter(|(id, a)| {
         after.unknown.postures.contains(id) || before.actors.get(id).is_none_or(|b| a.joints != b.joints)

@@ -6,7 +6,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Gap, Mover};
 use matterix_motion::spheres::{Figure, Placed};
 
-use crate::motion::perform::Performed;
+use crate::motion::performed::Performed;
 use crate::motion::stage::Stage;
 
 /// Distance of the places at which a sweep is looked at, m.

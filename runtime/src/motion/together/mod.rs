@@ -11,11 +11,12 @@ mod leg;
 mod pair;
 mod walk;
 
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Program};
 
 use super::stage::Stage;
 
-/// Robots of a program that may meet, or must; `stage` is its lab when the run begins.
-pub fn together<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
-    if stage.actors.len() > 1 { walk::follow(program, stage) } else { Vec::new() }
+/// Robots of a program that may meet, or must, but for pairs that have been told of; `stage` is its lab when the run begins.
+pub fn together<'p>(program: &'p Program, stage: Stage<'p>, told: Vec<[InstanceId; 2]>) -> Vec<Diagnostic> {
+    if stage.actors.len() > 1 { walk::follow(program, stage, told) } else { Vec::new() }
 }

@@ -20,8 +20,8 @@ const MOST: usize = 2000;
 /// How many turns of a loop are followed.
 const TURNS: u32 = 2;
 
-/// Robots that may meet, or must, in a plan.
-pub fn follow<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
+/// Robots that may meet, or must, in a plan, but for pairs that have been told of.
+pub fn follow<'p>(program: &'p Program, stage: Stage<'p>, told: Vec<[InstanceId; 2]>) -> Vec<Diagnostic> {
     let is_beside = |s: &Step| matches!(s, Step::Parallel(_) | Step::Start { .. });
     if !program.plan.steps.iter().any(|s| is_beside(&s.step)) {
         return Vec::new();
@@ -38,6 +38,7 @@ pub fn follow<'p>(program: &'p Program, stage: Stage<'p>) -> Vec<Diagnostic> {
         blocked: false,
         left: MOST,
         found: Vec::new(),
+        told,
     };
     walk.step(program.plan.root);
     walk.found
@@ -59,6 +60,8 @@ struct Walk<'p, 't> {
     blocked: bool,
     left: usize,
     found: Vec<Diagnostic>,
+    /// Robots that are in each other before they move.
+    told: Vec<[InstanceId; 2]>,
 }
 
 impl<'p> Walk<'p, '_> {
@@ -174,6 +177,7 @@ impl<'p> Walk<'p, '_> {
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
             let value = self.values.assign(&self.program.model, *state, *value);
+            value.into_iter().for_each(|value| self.stage.follow_load(*state, value));
             let Some(state) = self.program.model.states.get(*state as usize) else { continue };
             if let (Some(value), Some(id)) = (value, supported(&self.program.scene, &state.name, &state.domain)) {
                 self.stage.follow(id, (value >= 0.0).then_some(InstanceId(value as u32)));
@@ -208,7 +212,11 @@ impl<'p> Walk<'p, '_> {
         for (k, (i, a)) in moving.iter().zip(&alone).enumerate() {
             for (j, b) in moving.iter().zip(&alone).skip(k + 1) {
                 // One robot in two lines is said elsewhere.
-                if !robots[*i].is_disjoint(&robots[*j]) {
+                let told = |[x, y]: &[InstanceId; 2]| {
+                    let has = |r: &InstanceId| robots[*i].contains(r) || robots[*j].contains(r);
+                    has(x) && has(y)
+                };
+                if !robots[*i].is_disjoint(&robots[*j]) || self.told.iter().any(told) {
                     continue;
                 }
                 let must = deadlock(a, b).filter(|_| {

@@ -27,6 +27,8 @@ pub(super) struct Replay<'p> {
     untold: BTreeSet<InstanceId>,
     /// Where things stood that carriers took.
     taken: BTreeMap<InstanceId, Carried>,
+    /// What carriers dropped.
+    dropped: BTreeSet<InstanceId>,
     /// What robots have let go and no state yet says where it stands.
     freed: BTreeSet<InstanceId>,
     /// Whether robots move in this run.
@@ -51,6 +53,7 @@ impl<'p> Replay<'p> {
             coming: Vec::new(),
             untold: BTreeSet::new(),
             taken: BTreeMap::new(),
+            dropped: BTreeSet::new(),
             freed: BTreeSet::new(),
             moves: !run.recording.moments.is_empty(),
             riders: BTreeMap::new(),
@@ -111,7 +114,7 @@ impl<'p> Replay<'p> {
             let last = self.coming.iter().rev().find(|c| c.1 == index).map_or(self.loads[index].2, |c| c.2);
             if now != last {
                 // Who takes a thing, or leaves it, goes there first.
-                let there = self.stage.actor_of(by).map_or(time, |robot| arrival(run, robot, time));
+                let there = self.robot_of(by).map_or(time, |robot| arrival(run, robot, time));
                 self.coming.push((there, index, now));
             }
         }
@@ -135,7 +138,7 @@ impl<'p> Replay<'p> {
             if let Some(id) = now {
                 self.take(id, by);
             }
-            self.untold.extend(self.stage.actor_of(by));
+            self.untold.extend(self.robot_of(by));
         }
         !due.is_empty()
     }
@@ -143,12 +146,17 @@ impl<'p> Replay<'p> {
     /// Robots whose loads have changed, each with all that it takes along.
     pub(super) fn loads(&mut self) -> Vec<(InstanceId, Vec<InstanceId>)> {
         let loads = |robot: InstanceId| {
-            let own = self.loads.iter().filter(|(by, ..)| self.stage.actor_of(*by) == Some(robot));
+            let own = self.loads.iter().filter(|(by, ..)| self.robot_of(*by) == Some(robot));
             (robot, own.filter_map(|(.., load)| *load).collect())
         };
         let told = self.untold.iter().map(|robot| loads(*robot)).collect();
         self.untold.clear();
         told
+    }
+
+    /// The robot that a carrier is part of, or that holds what it is part of.
+    fn robot_of(&self, carrier: InstanceId) -> Option<InstanceId> {
+        self.stage.actor_of(carrier).or_else(|| self.stage.held_by(carrier))
     }
 
     /// A carrier takes a thing along.
@@ -158,10 +166,11 @@ impl<'p> Replay<'p> {
         if let Some(stood) = self.stage.carried.get(id.0 as usize).copied() {
             self.taken.insert(id, stood);
         }
+        self.dropped.remove(&id);
         self.set(id, Carried::Stands(Stand::PartOf(by, mount.inverse())));
     }
 
-    /// A carrier lets a thing go: it stays there, or is back in its place where that is there, or where nothing moved.
+    /// A carrier lets a thing go: it falls from there, or is back in its place where that is there, or where nothing moved.
     fn let_go(&mut self, id: InstanceId) {
         let at = self.stage.pose(id);
         if let Some(stood) = self.taken.remove(&id) {
@@ -171,6 +180,10 @@ impl<'p> Replay<'p> {
         let far = (0..3).map(|k| (home[k] - at.position[k]).powi(2)).sum::<f64>().sqrt();
         if self.moves && far > THERE {
             self.set(id, Carried::Stands(Stand::Lab(at)));
+            // What lies there already makes way: nobody knows how a heap of tips lies.
+            let lies = self.stage.fallen(id, &self.dropped);
+            self.set(id, Carried::Stands(Stand::Lab(lies)));
+            self.dropped.insert(id);
         }
     }
 

@@ -1,0 +1,49 @@
+//! What is so where a condition does not hold, in the words that its text gives.
+
+use matterix_ir::model::Domain;
+use matterix_ir::plan::{Condition, Said};
+use matterix_ir::{TextPart, Unit};
+
+use super::Flow;
+use super::facts::Facts;
+use super::report::shown;
+
+impl Flow<'_, '_> {
+    /// What is so where a condition does not hold, in its own words; nothing where it has none.
+    pub(super) fn worded(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
+        let all = condition.refusal.as_ref().map(|r| r.said.as_slice()).unwrap_or_default();
+        let fails = all.iter().find(|said| self.eval(said.node, facts).truth() == Some(false));
+        let open = fails.or_else(|| all.iter().find(|said| self.eval(said.node, facts).truth().is_none()));
+        let Some(Said { text, .. }) = open else { return Vec::new() };
+        let mut out = String::new();
+        for part in &text.parts {
+            let (TextPart::Quantity { value: node, .. }
+            | TextPart::Bool(node)
+            | TextPart::Instance(node)
+            | TextPart::Word(node, _)) = part
+            else {
+                if let TextPart::Plain(text) = part {
+                    out.push_str(text);
+                }
+                continue;
+            };
+            let known = self.eval(*node, facts);
+            let text = match part {
+                TextPart::Quantity { unit, digits, .. } => {
+                    shown(&known, |v| unit.show(digits.map_or(v, |digits| rounded(unit, v, digits))))
+                }
+                TextPart::Bool(_) => self.show(&known, &Domain::Bool),
+                TextPart::Word(_, words) => self.show(&known, &Domain::Enum(words.clone())),
+                _ => self.show(&known, &Domain::Instance),
+            };
+            out.push_str(&text.replace('`', ""));
+        }
+        vec![out]
+    }
+}
+
+/// A value in SI that has so many digits after the point in a unit.
+fn rounded(unit: &Unit, si: f64, digits: u8) -> f64 {
+    let step = 10f64.powi(i32::from(digits));
+    unit.to_si((unit.of_si(si) * step).round() / step)
+}
