@@ -113,7 +113,11 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
-    let status = if well { "ended" } else { "failed" };
+    let status = match (well, plan.cancel.load(Ordering::Relaxed)) {
+        (_, true) => "stopped by a person",
+        (true, false) => "ended",
+        (false, false) => "failed",
+    };
     found.extend(hardware.end_journal(status).err().map(of_fault));
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];

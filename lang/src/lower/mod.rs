@@ -55,6 +55,8 @@ pub struct Planner<'a, 'e> {
     pub draft: bool,
     /// What is asked of drivers.
     pub wires: wires::Wires,
+    /// What is to be sent may be missing: then a driver has nothing to do with the device.
+    lenient: bool,
     /// Drivers of the lab, with their declarations.
     drivers: Vec<(DeclId, matterix_ir::wire::Driver)>,
     /// What is said over a wire, where that is asked for.
@@ -99,6 +101,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             said: Vec::new(),
             draft: false,
             wires: wires::Wires::Off,
+            lenient: false,
             drivers: Vec::new(),
             wiring: None,
             clauses: Clauses::default(),

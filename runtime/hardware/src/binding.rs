@@ -13,7 +13,7 @@ use toml::de::{DeTable, DeValue};
 use crate::deploy::{Binding, Carrier};
 use crate::port::Place;
 
-const KEYS: [&str; 6] = ["port", "address", "driver", "unit", "by", "tolerance"];
+const KEYS: [&str; 7] = ["port", "address", "http", "driver", "unit", "by", "tolerance"];
 const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
@@ -27,7 +27,11 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
             return (Vec::new(), reader.found);
         }
     };
-    let bindings = table.get_ref().iter().filter_map(|(name, value)| reader.device(name, value)).collect();
+    let mut bindings = Vec::new();
+    for (name, value) in table.get_ref() {
+        bindings.extend(reader.device(name, value).map(|binding| (binding, name.span())));
+    }
+    let bindings = reader.with_shared(bindings);
     (bindings, reader.found)
 }
 
@@ -86,7 +90,7 @@ impl Reader<'_> {
                 }
             }
         };
-        let (port, address) = (text(self, "port"), text(self, "address"));
+        let (port, address, http) = (text(self, "port"), text(self, "address"), text(self, "http"));
         let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
         if let Some((by, at)) = &by {
             if by != HAND {
@@ -97,7 +101,7 @@ impl Reader<'_> {
                     Some("write `by = \"hand\"`".into()),
                 );
             }
-            if port.is_some() || address.is_some() || driver.is_some() {
+            if port.is_some() || address.is_some() || http.is_some() || driver.is_some() {
                 self.wrong(
                     at.clone(),
                     &format!("`{key}` is done by hand and bound to a line"),
@@ -108,20 +112,37 @@ impl Reader<'_> {
             let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
             return (self.found.len() == before).then_some(binding);
         }
-        let place = match (port, address) {
-            (Some((port, _)), None) => Place::Serial(port),
-            (None, Some((address, _))) => Place::Tcp(address),
-            (Some(_), Some((_, at))) => {
-                self.wrong(at, &format!("`{key}` has two lines"), "a port and an address", None);
+        let place = match (port, address, http) {
+            (Some((port, at)), None, None) => (Place::Serial(port), at),
+            (None, Some((address, at)), None) => (Place::Tcp(address), at),
+            (None, None, Some((address, at))) => (Place::Http(address), at),
+            (_, Some((_, at)), _) | (_, _, Some((_, at))) => {
+                let label = "only one of `port`, `address` and `http`";
+                self.wrong(at, &format!("`{key}` has two lines"), label, None);
                 return None;
             }
-            (None, None) => {
-                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"` or `by = \"hand\"`";
+            (None, None, None) => {
+                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `http = \"HOST:PORT\"` or \
+                            `by = \"hand\"`";
                 self.wrong(name.span(), &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
                 return None;
             }
         };
         let driver = self.driver(key, instance, driver, name.span())?;
+        let (place, at) = place;
+        let (is_http, wants_http) = (
+            matches!(place, Place::Http(_)),
+            matches!(self.program.drivers[driver].transport, matterix_ir::wire::Transport::Http { .. }),
+        );
+        if is_http != wants_http {
+            let name = &self.program.drivers[driver].name;
+            let (headline, help) = if wants_http {
+                (format!("`{name}` speaks over HTTP"), format!("write `http = \"{place}\"`"))
+            } else {
+                (format!("`{name}` does not speak over HTTP"), "write `port = ...` or `address = ...`".to_owned())
+            };
+            self.wrong(at, &headline, "another kind of line", Some(help));
+        }
         if let Some((unit, at)) = &unit
             && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
         {
@@ -139,7 +160,8 @@ impl Reader<'_> {
         wanted: Option<(String, Range)>,
         at: Range,
     ) -> Option<usize> {
-        let drivers = self.program.drivers.iter().enumerate().filter(|(_, d)| d.instance == instance);
+        let own = |d: &matterix_ir::wire::Driver| d.instance == instance && d.host.is_none();
+        let drivers = self.program.drivers.iter().enumerate().filter(|(_, d)| own(d));
         let all: Vec<(usize, &str)> = drivers.map(|(i, d)| (i, d.name.as_str())).collect();
         let list = all.iter().map(|(_, n)| format!("`{n}`")).collect::<Vec<_>>().join(", ");
         match (&wanted, all.as_slice()) {
@@ -164,6 +186,34 @@ impl Reader<'_> {
                 None
             }
         }
+    }
+
+    /// All that is bound, and after each device what speaks over its line, is not bound itself and has one driver for it.
+    fn with_shared(&mut self, bound: Vec<(Binding, Range)>) -> Vec<Binding> {
+        let program = self.program;
+        let mut all: Vec<Binding> = bound.iter().map(|(binding, _)| binding.clone()).collect();
+        for (host, (binding, at)) in bound.iter().enumerate() {
+            let Carrier::Line { driver, .. } = &binding.carrier else { continue };
+            let is_its = |d: &matterix_ir::wire::Driver| {
+                let name = &program.drivers[*driver].name;
+                d.host.as_ref().is_some_and(|h| h.instance == binding.instance && h.driver == *name)
+            };
+            for (index, d) in program.drivers.iter().enumerate().filter(|(_, d)| is_its(d)) {
+                if bound.iter().any(|(b, _)| b.instance == d.instance) {
+                    continue;
+                }
+                let other = program.drivers[..index].iter().find(|o| is_its(o) && o.instance == d.instance);
+                if let Some(other) = other {
+                    let name = &program.scene.get(d.instance).name;
+                    let headline = format!("`{name}` has several drivers over the line of `{}`", program.scene.get(binding.instance).name);
+                    let help = format!("keep one of `{}` and `{}`", other.name, d.name);
+                    self.wrong(at.clone(), &headline, "bound here", Some(help));
+                }
+                let carrier = Carrier::Shared { driver: index, host };
+                all.push(Binding { instance: d.instance, carrier, tolerances: Vec::new() });
+            }
+        }
+        all
     }
 
     /// `tolerance = { temperature = "5 K" }`.

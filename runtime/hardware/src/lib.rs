@@ -7,6 +7,7 @@ pub mod binding;
 pub mod codec;
 pub mod deploy;
 pub mod emulate;
+pub mod http;
 pub mod link;
 pub mod pattern;
 pub mod port;

@@ -7,6 +7,8 @@ use std::time::Duration;
 use matterix_ir::wire::Transport;
 use serial2::{CharSize, Parity, SerialPort, Settings, StopBits};
 
+use crate::http;
+
 /// Bytes out and in.
 pub trait Port {
     /// Sends all of it.
@@ -22,11 +24,13 @@ pub enum Place {
     Serial(String),
     /// `HOST:PORT`.
     Tcp(String),
+    /// A server at `HOST:PORT`.
+    Http(String),
 }
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Place::Serial(text) | Place::Tcp(text)) = self;
+        let (Place::Serial(text) | Place::Tcp(text) | Place::Http(text)) = self;
         f.write_str(text)
     }
 }
@@ -42,6 +46,7 @@ pub fn open(place: &Place, transport: &Transport) -> io::Result<Box<dyn Port>> {
     match place {
         Place::Serial(path) => Ok(Box::new(Serial(serial(path, transport)?))),
         Place::Tcp(address) => Ok(Box::new(Tcp(connect(address)?))),
+        Place::Http(address) => Ok(Box::new(http::open(address, transport)?)),
     }
 }
 
@@ -73,7 +78,7 @@ fn serial(path: &str, transport: &Transport) -> io::Result<SerialPort> {
     })
 }
 
-fn connect(address: &str) -> io::Result<TcpStream> {
+pub(crate) fn connect(address: &str) -> io::Result<TcpStream> {
     let all: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let mut last = io::Error::new(ErrorKind::NotFound, "there is no such host");
     for one in all {

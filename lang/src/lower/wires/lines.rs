@@ -57,6 +57,11 @@ impl<'a> Planner<'a, '_> {
                     return None;
                 }
                 Value::Enum(node, words) => Piece::Word(node, words.to_vec()),
+                Value::Text(text) => Piece::Plain(text),
+                Value::Instance(i) | Value::Qualified(i, _) => {
+                    Piece::Plain(self.lab.instances[i.0 as usize].name.clone())
+                }
+                Value::Nothing if self.lenient => return None,
                 Value::Nothing | Value::Unlimited => {
                     let headline = "what a device is to be sent is not given in this lab";
                     let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "not given");

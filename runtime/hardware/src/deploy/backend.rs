@@ -82,6 +82,8 @@ pub struct Hardware<'m, 't> {
     pub(super) resuming: bool,
     /// When it was cut off, s since 1970.
     pub(super) left_at: f64,
+    /// What answers to an earlier process said: the device whose line it was, the word, the text.
+    pub(super) kept: Vec<(usize, String, String)>,
     /// States that devices were told.
     pub(super) commanded: BTreeSet<u32>,
     running: BTreeMap<Ticket, Running<'m>>,
@@ -128,6 +130,7 @@ impl<'m, 't> Hardware<'m, 't> {
             replay: VecDeque::new(),
             resuming: false,
             left_at: 0.0,
+            kept: Vec::new(),
             commanded: BTreeSet::new(),
             origin: (0.0, Instant::now()),
             running: BTreeMap::new(),
@@ -157,6 +160,11 @@ impl<'m, 't> Hardware<'m, 't> {
         self.running.values().any(|r| r.device == device)
     }
 
+    /// The device whose line a device speaks over: itself, as a rule.
+    pub(super) fn line_of(&self, device: usize) -> usize {
+        self.devices[device].host.unwrap_or(device)
+    }
+
     /// Whether what an earlier process wrote has been gone through, and devices have been asked since.
     fn is_live(&self) -> bool {
         self.replay.is_empty() && !self.resuming
@@ -178,8 +186,11 @@ impl<'m, 't> Hardware<'m, 't> {
             Trouble::Refused { .. } => codes::DEVICE_REFUSED,
         };
         if matches!(trouble, Trouble::Lost(_)) {
-            self.devices[device].lost = Some(trouble.text().to_owned());
-            self.devices[device].link = None;
+            let line = self.line_of(device);
+            self.devices[line].lost = Some(trouble.text().to_owned());
+            if let Some(link) = self.devices[line].link.take() {
+                self.kept.extend(link.kept().into_iter().map(|(word, text)| (line, word, text)));
+            }
         }
         let message = format!("`{}`: {}", self.devices[device].name, trouble.text());
         self.fault(code, span, message)
@@ -204,21 +215,22 @@ impl<'m, 't> Hardware<'m, 't> {
     fn try_say(&mut self, index: usize, texts: &[String], expects: Option<&Pattern>) -> Result<Vec<f64>, Trouble> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
-        let device = &mut self.devices[index];
-        let Some(driver) = device.driver else { return Ok(Vec::new()) };
-        if let Some(why) = &device.lost {
+        let Some(driver) = self.devices[index].driver else { return Ok(Vec::new()) };
+        if let Some(why) = &self.devices[self.line_of(index)].lost {
             return Err(Trouble::Lost(format!("nothing more can be said to it: {why}")));
         }
+        let device = &mut self.devices[index];
         if is_dry {
             for frame in device.codec.iter_mut().flat_map(|codec| codec.say(texts)) {
                 (self.trace)(time, device.name, true, &frame);
             }
             return Ok(Vec::new());
         }
-        let Some(link) = device.link.as_mut() else {
+        let (name, line) = (device.name, self.line_of(index));
+        let Some(link) = self.devices[line].link.as_mut() else {
             return Err(Trouble::Lost("its line is not open".to_owned()));
         };
-        let mut ear = Ear { time, device: device.name, journal: &mut self.journal, trace: &mut *self.trace };
+        let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
         link.say(texts, expects, driver, &mut ear)
     }
 
@@ -242,9 +254,10 @@ impl<'m, 't> Hardware<'m, 't> {
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let asked = match device.link.as_mut() {
+        let (name, host) = (device.name, self.line_of(index));
+        let asked = match self.devices[host].link.as_mut() {
             Some(link) => {
-                let mut ear = Ear { time, device: device.name, journal: &mut self.journal, trace: &mut *self.trace };
+                let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
                 link.ask(&text, &told.expects, driver, &mut ear)
             }
             None => Err(Trouble::Lost("its line is not open".to_owned())),
@@ -327,7 +340,7 @@ impl<'m, 't> Hardware<'m, 't> {
                     while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
                     self.replay.pop_front();
                 }
-                Entry::Out { .. } | Entry::Back { .. } | Entry::Begin { .. } | Entry::End { .. } => {
+                Entry::Kept { .. } | Entry::Out { .. } | Entry::Back { .. } | Entry::Begin { .. } | Entry::End { .. } => {
                     self.replay.pop_front();
                 }
                 other => return Some(other.clone()),
@@ -355,11 +368,11 @@ impl<'m, 't> Hardware<'m, 't> {
         &mut self,
         device: usize,
         exchange: &'m Exchange,
+        texts: Vec<String>,
         operation: &Operation,
         step: StepId,
         ticket: u64,
     ) -> Result<Option<(String, String)>, Fault> {
-        let texts = self.texts(&exchange.sends);
         let t = self.twin.now();
         let node = self.program.plan.get(step);
         let starting = Entry::Starting {
@@ -539,6 +552,8 @@ impl Backend for Hardware<'_, '_> {
                 return Err(self.fault(codes::RUN_FAILED, program.plan.get(step).span, message));
             }
         }
+        // What is said goes by what was before: which tip is next, how much is in a syringe.
+        let texts = exchange.map(|e| self.texts(&e.sends)).unwrap_or_default();
         let twin = self.twin.start(operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
@@ -547,7 +562,7 @@ impl Backend for Hardware<'_, '_> {
                 None => {
                     self.go_live(out)?;
                     self.beat(false, out)?;
-                    failed = self.begin(device, exchange, operation, step, number)?;
+                    failed = self.begin(device, exchange, texts, operation, step, number)?;
                     self.beat(true, out)?;
                 }
             }
@@ -601,11 +616,11 @@ impl Backend for Hardware<'_, '_> {
                     self.go_live(out)?;
                     let text = self.texts(std::slice::from_ref(&until.asks)).concat();
                     let asked = {
-                        let d = &mut self.devices[device];
-                        let name = d.name;
+                        let (name, driver, line) =
+                            (self.devices[device].name, self.devices[device].driver, self.line_of(device));
                         let mut ear =
                             Ear { time: now, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-                        match (d.link.as_mut(), d.driver) {
+                        match (self.devices[line].link.as_mut(), driver) {
                             (Some(link), Some(driver)) => link.is_ready(&text, until, driver, &mut ear),
                             _ => Err(Trouble::Lost("its line is not open".to_owned())),
                         }

@@ -96,6 +96,17 @@ pub enum Entry {
         /// As shown.
         bytes: String,
     },
+    /// What an answer said that is put into later messages.
+    Kept {
+        /// s.
+        t: f64,
+        /// Whose answer it was.
+        device: String,
+        /// The word that its driver keeps it under.
+        word: String,
+        /// What it said.
+        text: String,
+    },
     /// From here on another process has gone on.
     Resumed {
         /// s.
