@@ -11,8 +11,10 @@ written down, without definitions of labware.
 
 import asyncio
 import collections
+import dataclasses
 import http.server
 import json
+import logging
 import os
 import pathlib
 import re
@@ -26,12 +28,15 @@ from opentrons.hardware_control.types import HardwareFeatureFlags
 from opentrons.protocol_engine import Config, DeckType, ProtocolEngine, commands, error_recovery_policy
 from opentrons.protocol_engine.create_protocol_engine import create_protocol_engine
 from opentrons.protocol_engine.errors import ProtocolEngineError
+from opentrons.protocol_runner import RunOrchestrator
 from pydantic import TypeAdapter, ValidationError
 
 SPEED = "200"
 VERSION = "4"
 CREATE = TypeAdapter(commands.CommandCreate)
 BAD = []
+# What the engine refuses here it is meant to refuse.
+logging.disable(logging.CRITICAL)
 LOOP = asyncio.new_event_loop()
 threading.Thread(target=LOOP.run_forever, daemon=True).start()
 
@@ -46,7 +51,18 @@ def verdict(what, good, said=""):
         BAD.append(what)
 
 
-async def engine():
+@dataclasses.dataclass
+class Run:
+    """A run of the robot: the engine, and what the server steers it by."""
+
+    engine: ProtocolEngine
+    steered: RunOrchestrator
+
+    def command(self, name):
+        return shown(self.engine.state_view.commands.get(name))
+
+
+async def begun():
     hardware = await API.build_hardware_simulator(feature_flags=HardwareFeatureFlags())
     await hardware.home()
     config = Config(
@@ -56,14 +72,15 @@ async def engine():
         use_virtual_modules=True,
         use_simulated_deck_config=True,
     )
-    return await create_protocol_engine(hardware, config, error_recovery_policy.never_recover)
+    made = await create_protocol_engine(hardware, config, error_recovery_policy.never_recover)
+    return Run(made, RunOrchestrator.build_orchestrator(hardware_api=hardware, protocol_engine=made))
 
 
 class Robot:
     """One robot with its runs."""
 
     def __init__(self):
-        self.runs: dict[str, ProtocolEngine] = {}
+        self.runs: dict[str, Run] = {}
         self.commands = []
         self.exchanges = []
         self.spoil = None
@@ -74,7 +91,7 @@ class Robot:
         parts = path.strip("/").split("/")
         if method == "POST" and parts == ["runs"]:
             run = str(uuid.uuid4())
-            self.runs[run] = wait_for(engine())
+            self.runs[run] = wait_for(begun())
             return 201, {"data": {"id": run, "status": "idle", "current": True}}
         if len(parts) < 2 or parts[0] != "runs" or parts[1] not in self.runs:
             return 404, {"errors": [{"id": "RunNotFound", "title": "Run Not Found", "detail": path}]}
@@ -83,9 +100,9 @@ class Robot:
             case ("POST", ["commands"]):
                 return self.command(run, body, "waitUntilComplete=true" in query)
             case ("GET", ["commands", name]):
-                return 200, {"data": shown(run.state_view.commands.get(name))}
+                return 200, {"data": run.command(name)}
             case ("POST", ["actions"]) if body["data"]["actionType"] == "stop":
-                wait_for(stopped(run))
+                wait_for(run.steered.stop())
                 return 201, {"data": {"id": str(uuid.uuid4()), "actionType": "stop"}}
         return 405, {"errors": [{"id": "NotAllowed", "detail": f"{method} {path}"}]}
 
@@ -93,28 +110,17 @@ class Robot:
         if self.spoil:
             self.spoil(body["data"])
         if self.stop_at == body["data"]["commandType"]:
-            wait_for(stopped(run))
+            wait_for(run.steered.stop())
         try:
             create = CREATE.validate_python(body["data"])
         except ValidationError as e:
             return 422, {"errors": [{"id": "InvalidRequest", "title": "Invalid Request", "detail": str(e)}]}
         try:
-            command = wait_for(queued(run, create, waits))
+            command = wait_for(run.steered.add_command_and_wait_for_interval(create, waits, 60000))
         except ProtocolEngineError as e:
             return 409, {"errors": [{"id": "RunStopped", "title": "Run Stopped", "detail": str(e)}]}
         self.commands.append((run, command.id))
-        return 201, {"data": shown(command)}
-
-
-async def queued(run, create, waits):
-    command = run.add_command(create)
-    if waits:
-        await run.wait_for_command(command.id)
-    return run.state_view.commands.get(command.id)
-
-
-async def stopped(run):
-    await run.request_stop()
+        return 201, {"data": run.command(command.id) if waits else shown(command)}
 
 
 def shown(command):
@@ -179,11 +185,11 @@ def deploy(command, folder, name, text, address):
     (place / "lab.mtx").write_text(text)
     (place / "lab.toml").write_text(f'[ot2]\nhttp = "{address}"\n')
     arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SPEED]
-    return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True)
+    return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True, timeout=120)
 
 
 def told(robot):
-    return [shown(run.state_view.commands.get(i)) for run, i in robot.commands]
+    return [run.command(i) for run, i in robot.commands]
 
 
 def whole(command, folder, file, recording):

@@ -2,6 +2,7 @@
 
 mod bindings;
 mod faulty;
+mod server;
 mod whole;
 
 use std::io::{BufRead, BufReader, Read, Write};
