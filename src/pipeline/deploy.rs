@@ -92,12 +92,15 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     if !found.is_empty() {
         return Ok(Deployed::not_begun(found));
     }
-    let resumes = !before.is_empty();
-    let opened = if resumes {
+    let is_open = before.iter().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
+    let opened = if is_open {
         hardware.follow_journal(before);
         Ok(())
-    } else {
+    } else if before.is_empty() {
         hardware.begin_journal(&digest).and_then(|()| hardware.open(false))
+    } else {
+        // It was cut off before anything of the plan was begun.
+        hardware.open(false)
     };
     if let Err(fault) = opened {
         let mut found = vec![of_fault(fault)];

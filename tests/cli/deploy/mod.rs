@@ -2,6 +2,7 @@
 
 mod bindings;
 mod faulty;
+mod kills;
 mod server;
 mod whole;
 

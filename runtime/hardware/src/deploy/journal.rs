@@ -27,6 +27,11 @@ pub enum Entry {
         /// Seconds of lab time per second.
         speed: f64,
     },
+    /// All lines are open, and what drivers say then has been said.
+    Opened {
+        /// s.
+        t: f64,
+    },
     /// The lab has come to this time.
     Time {
         /// s.

@@ -56,6 +56,10 @@ impl Hardware<'_, '_> {
             }
         }
         self.set_clock();
+        if !again {
+            let t = self.twin.now();
+            self.keep(&Entry::Opened { t })?;
+        }
         Ok(())
     }
 
