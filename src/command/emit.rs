@@ -31,6 +31,14 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     }
     show(&sources, found, color);
     let Some(bytes) = written else { return Ok(Exit::Findings) };
+    if let Some(bindings) = &args.play {
+        let name = match args.target {
+            pipeline::Target::OpentronsPython => "protocol.py",
+            pipeline::Target::Urscript => "program.script",
+            _ => "protocol.json",
+        };
+        return super::play::play(&input, &args.subject.options(), bindings, name, bytes, color);
+    }
     match &args.out {
         Some(path) => files::write(path, bytes)?,
         None => terminal::pour(&bytes),

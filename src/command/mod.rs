@@ -10,6 +10,7 @@ mod explain;
 mod fit;
 mod fmt;
 mod new;
+mod play;
 mod plan;
 mod run;
 mod study;

@@ -20,6 +20,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 import threading
 import uuid
 
@@ -28,6 +29,7 @@ from opentrons.hardware_control.types import HardwareFeatureFlags
 from opentrons.protocol_engine import Config, DeckType, ProtocolEngine, commands, error_recovery_policy
 from opentrons.protocol_engine.create_protocol_engine import create_protocol_engine
 from opentrons.protocol_engine.errors import ProtocolEngineError
+from opentrons.protocol_reader import ProtocolReader
 from opentrons.protocol_runner import RunOrchestrator
 from pydantic import TypeAdapter, ValidationError
 
@@ -57,12 +59,21 @@ class Run:
 
     engine: ProtocolEngine
     steered: RunOrchestrator
+    source: object = None
+
+    async def play(self):
+        return await self.steered.run(deck_configuration=[], protocol_source=self.source)
+
+    def summary(self):
+        state = self.engine.state_view.get_summary()
+        errors = [{"errorType": e.errorType, "detail": e.detail} for e in state.errors]
+        return {"status": state.status.value, "errors": errors}
 
     def command(self, name):
         return shown(self.engine.state_view.commands.get(name))
 
 
-async def begun():
+async def begun(file):
     hardware = await API.build_hardware_simulator(feature_flags=HardwareFeatureFlags())
     await hardware.home()
     config = Config(
@@ -73,7 +84,10 @@ async def begun():
         use_simulated_deck_config=True,
     )
     made = await create_protocol_engine(hardware, config, error_recovery_policy.never_recover)
-    return Run(made, RunOrchestrator.build_orchestrator(hardware_api=hardware, protocol_engine=made))
+    source = await ProtocolReader().read_saved(files=[file], directory=None) if file else None
+    config = source.config if source else None
+    steered = RunOrchestrator.build_orchestrator(hardware_api=hardware, protocol_engine=made, protocol_config=config)
+    return Run(made, steered, source)
 
 
 class Robot:
@@ -81,6 +95,7 @@ class Robot:
 
     def __init__(self):
         self.runs: dict[str, Run] = {}
+        self.protocols = {}
         self.commands = []
         self.exchanges = []
         self.spoil = None
@@ -89,9 +104,11 @@ class Robot:
     def ask(self, method, path, body):
         path, _, query = path.partition("?")
         parts = path.strip("/").split("/")
+        if parts[0] == "protocols":
+            return self.protocol(method, parts[1:], body)
         if method == "POST" and parts == ["runs"]:
             run = str(uuid.uuid4())
-            self.runs[run] = wait_for(begun())
+            self.runs[run] = wait_for(begun(self.protocols.get(body["data"].get("protocolId"))))
             return 201, {"data": {"id": run, "status": "idle", "current": True}}
         if len(parts) < 2 or parts[0] != "runs" or parts[1] not in self.runs:
             return 404, {"errors": [{"id": "RunNotFound", "title": "Run Not Found", "detail": path}]}
@@ -101,10 +118,35 @@ class Robot:
                 return self.command(run, body, "waitUntilComplete=true" in query)
             case ("GET", ["commands", name]):
                 return 200, {"data": run.command(name)}
+            case ("POST", ["actions"]) if body["data"]["actionType"] == "play":
+                run.steered_to_end = asyncio.run_coroutine_threadsafe(run.play(), LOOP)
+                return 201, {"data": {"id": str(uuid.uuid4()), "actionType": "play"}}
+            case ("GET", []):
+                return 200, {"data": run.summary()}
             case ("POST", ["actions"]) if body["data"]["actionType"] == "stop":
                 wait_for(run.steered.stop())
                 return 201, {"data": {"id": str(uuid.uuid4()), "actionType": "stop"}}
         return 405, {"errors": [{"id": "NotAllowed", "detail": f"{method} {path}"}]}
+
+    def protocol(self, method, parts, body):
+        """A protocol in a form, and its analysis."""
+        if method == "POST" and not parts:
+            head, content = body.split(b"\r\n\r\n", 1)
+            mark = head.split(b"\r\n", 1)[0]
+            name = re.search(rb'name="files"; filename="([^"]+)"', head)[1].decode()
+            content = content[: content.rindex(b"\r\n" + mark + b"--")]
+            protocol = str(uuid.uuid4())
+            file = pathlib.Path(tempfile.mkdtemp()) / name
+            file.write_bytes(content)
+            self.protocols[protocol] = file
+            return 201, {"data": {"id": protocol, "analysisSummaries": [{"id": "1", "status": "pending"}]}}
+        file = self.protocols[parts[0]]
+        out = file.with_suffix(".analysis")
+        arguments = ["-m", "opentrons.cli", "analyze", "--json-output", str(out), str(file)]
+        subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
+        analysis = json.loads(out.read_text())
+        errors = [{k: e[k] for k in ("errorType", "detail")} for e in analysis["errors"]]
+        return 200, {"data": {"id": "1", "status": "completed", "result": analysis["result"], "errors": errors}}
 
     def command(self, run, body, waits):
         if self.spoil:
@@ -138,13 +180,15 @@ def serve(robot):
 
         def handle_any(self):
             length = int(self.headers.get("Content-Length", 0))
-            body = json.loads(self.rfile.read(length)) if length else None
+            body = self.rfile.read(length) if length else None
+            if body and self.headers.get("Content-Type") == "application/json":
+                body = json.loads(body)
             if self.headers.get("Opentrons-Version") != VERSION:
                 detail = {"id": "InvalidRequest", "detail": "header.opentrons-version: field required"}
                 status, answer = 422, {"errors": [detail]}
             else:
                 status, answer = robot.ask(self.command, self.path, body)
-            robot.exchanges.append({"method": self.command, "path": self.path, "body": body, "status": status, "answer": answer})
+            robot.exchanges.append({"method": self.command, "path": self.path, "body": body if isinstance(body, dict) else None, "status": status, "answer": answer})
             data = json.dumps(answer).encode()
             self.send_response(status)
             self.send_header("Content-Type", "application/json")
@@ -219,6 +263,21 @@ def whole(command, folder, file, recording):
     verdict(f"{pathlib.Path(file).stem} over HTTP", good, said if good else ended.stderr[-1500:])
 
 
+def uploaded(command, folder, file):
+    """A protocol that the robot runs by itself."""
+    robot = Robot()
+    bindings = os.path.join(folder, "robot.toml")
+    pathlib.Path(bindings).write_text(f'[ot2]\nhttp = "{serve(robot)}"\n')
+    for target in ("opentrons-json", "opentrons-python"):
+        arguments = ["emit", file, "--target", target, "--play", bindings]
+        ended = subprocess.run([command, *arguments], capture_output=True, text=True, timeout=300)
+        run = list(robot.runs.values())[-1]
+        done = run.engine.state_view.commands.get_all()
+        good = ended.returncode == 0 and run.summary()["status"] == "succeeded"
+        verdict(f"{target}, uploaded and played", good, f"{len(done)} commands" if good else ended.stderr[-1500:])
+
+
+
 def spoiled(command, folder, file):
     """Commands that the engine refuses."""
     text = pathlib.Path(file).read_text()
@@ -270,6 +329,7 @@ def main():
     command = os.path.abspath(command)
     for number, file in enumerate(files):
         whole(command, folder, file, recording if number == 0 else None)
+    uploaded(command, folder, files[0])
     spoiled(command, folder, files[0])
     sys.exit(1 if BAD else 0)
 

@@ -1,17 +1,17 @@
 //! Messages over HTTP as drivers write them: a method, a path, and the members of a JSON body by their pointers (RFC 6901),
-//! `POST /runs/<run>/commands /data/commandType=home /data/intent='set up'`; of an answer its status, and members.
+//! `POST /runs/<run>/commands /data/commandType=home intent='set up'`; of an answer its status, and members.
 //!
-//! A value is JSON where it reads as such, else a text; in single quotes it is always a text. A word in angle brackets stands
-//! for what an answer said there before.
+//! A pointer without `/` at its start stands beside the member before it. A value is JSON where it reads as such, else a text;
+//! in single quotes it is always a text. A word in angle brackets stands for what an answer said there before.
 
 /// Methods that a message may begin with.
 pub const METHODS: &[&str] = &["GET", "POST", "PUT", "PATCH", "DELETE"];
 
 /// A member of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field<'t> {
     /// Where it stands: `/data/id`.
-    pub pointer: &'t str,
+    pub pointer: String,
     /// What stands there, without quotes.
     pub value: &'t str,
     /// It was quoted: a text, whatever it reads as.
@@ -25,6 +25,8 @@ pub struct Request<'t> {
     pub method: &'t str,
     /// The path with its query.
     pub target: &'t str,
+    /// The field of a form in which the file goes that is to be played: `files=@`. Such a request has no other body.
+    pub file: Option<&'t str>,
     /// Of the body; empty where there is none.
     pub fields: Vec<Field<'t>>,
 }
@@ -50,7 +52,13 @@ pub fn request(text: &str) -> Result<Request<'_>, String> {
     if !target.starts_with('/') || target.contains('=') && !target.contains('?') {
         return Err(format!("`{target}` is no path, which begins with `/`"));
     }
-    Ok(Request { method, target, fields: fields(words.get(2..).unwrap_or_default())? })
+    let rest = words.get(2..).unwrap_or_default();
+    if let [only] = rest
+        && let Some(file) = only.strip_suffix("=@").filter(|f| f.bytes().all(|b| b.is_ascii_alphanumeric()))
+    {
+        return Ok(Request { method, target, file: Some(file), fields: Vec::new() });
+    }
+    Ok(Request { method, target, file: None, fields: fields(rest)? })
 }
 
 /// Takes an answer apart, or says what is wrong with it.
@@ -69,12 +77,22 @@ fn status(word: &str) -> Result<u16, String> {
 }
 
 fn fields<'t>(words: &[&'t str]) -> Result<Vec<Field<'t>>, String> {
-    words.iter().map(|w| field(w)).collect()
+    let mut out: Vec<Field<'t>> = Vec::with_capacity(words.len());
+    for word in words {
+        let before = out.last().map(|f| f.pointer.as_str());
+        let field = field(word, before)?;
+        out.push(field);
+    }
+    Ok(out)
 }
 
-fn field(word: &str) -> Result<Field<'_>, String> {
+/// A member; `before` is the pointer of the one before it.
+fn field<'t>(word: &'t str, before: Option<&str>) -> Result<Field<'t>, String> {
     let wrong = || format!("`{word}` is no member of a body, as in `/data/volume=100`");
-    let (pointer, value) = word.split_once('=').filter(|(p, _)| p.starts_with('/')).ok_or_else(wrong)?;
+    let (own, value) = word.split_once('=').filter(|(p, _)| !p.is_empty()).ok_or_else(wrong)?;
+    let beside = before.and_then(|b| b.rsplit_once('/')).map(|(above, _)| format!("{above}/{own}"));
+    let whole = own.starts_with('/').then(|| own.to_owned());
+    let pointer = whole.or(beside).ok_or_else(wrong)?;
     let inner = value.strip_prefix('\'').and_then(|v| v.strip_suffix('\''));
     Ok(Field { pointer, value: inner.unwrap_or(value), quoted: inner.is_some() })
 }
@@ -110,8 +128,11 @@ mod tests {
     fn a_request_has_a_method_a_path_and_members() {
         let r = request("POST /runs?a=1 /data/x=100 /data/y='two words'").expect("a request");
         assert_eq!((r.method, r.target), ("POST", "/runs?a=1"));
-        let fields: Vec<_> = r.fields.iter().map(|f| (f.pointer, f.value, f.quoted)).collect();
+        let fields: Vec<_> = r.fields.iter().map(|f| (f.pointer.as_str(), f.value, f.quoted)).collect();
         assert_eq!(fields, [("/data/x", "100", false), ("/data/y", "two words", true)]);
+        let r = request("POST /a /data/x=1 y=2 params/z=3 w=4").expect("a request");
+        let pointers: Vec<_> = r.fields.iter().map(|f| f.pointer.as_str()).collect();
+        assert_eq!(pointers, ["/data/x", "/data/y", "/data/params/z", "/data/params/w"]);
     }
 
     #[test]

@@ -198,6 +198,8 @@ pub struct Driver {
     pub halt: Vec<Exchange>,
     /// To leave it safe after a run that did not end well.
     pub safe: Vec<Exchange>,
+    /// To let it run a file by itself, from giving it the file to its end.
+    pub play: Vec<Exchange>,
     /// What keeps its watchdog quiet.
     pub alive: Vec<Alive>,
     /// What it tells.

@@ -18,6 +18,8 @@ pub struct Http {
     header: Option<(String, String)>,
     /// What is to be asked.
     next: Option<Vec<u8>>,
+    /// A file that may go with it, with its name.
+    file: Option<(String, Vec<u8>)>,
 }
 
 /// Opens a line to the server at `HOST:PORT`.
@@ -29,7 +31,7 @@ pub fn open(address: &str, transport: &Transport) -> io::Result<Http> {
     drop(port::connect(address)?);
     let config = Agent::config_builder().http_status_as_error(false).max_redirects(0).proxy(None);
     let agent = config.build().new_agent();
-    Ok(Http { agent, base: format!("http://{address}"), header: header.clone(), next: None })
+    Ok(Http { agent, base: format!("http://{address}"), header: header.clone(), next: None, file: None })
 }
 
 impl Http {
@@ -44,7 +46,11 @@ impl Http {
             let request = request.body(()).map_err(|_| unclear(line))?;
             self.agent.run(self.agent.configure_request(request).timeout_global(Some(within)).build())
         } else {
-            let request = request.header("Content-Type", "application/json").body(body.to_owned());
+            let (kind, body) = match body.strip_prefix('@') {
+                Some(field) => self.form(field).ok_or_else(|| unclear(line))?,
+                None => ("application/json".to_owned(), body.as_bytes().to_vec()),
+            };
+            let request = request.header("Content-Type", kind).body(body);
             let request = request.map_err(|_| unclear(line))?;
             self.agent.run(self.agent.configure_request(request).timeout_global(Some(within)).build())
         };
@@ -69,7 +75,28 @@ fn broken(e: ureq::Error) -> io::Error {
     }
 }
 
+impl Http {
+    /// The file in a form with one field (RFC 7578): content type and body.
+    fn form(&self, field: &str) -> Option<(String, Vec<u8>)> {
+        let (name, bytes) = self.file.as_ref()?;
+        let is_in = |mark: &str| bytes.windows(mark.len()).any(|w| w == mark.as_bytes());
+        let mark = (0_u64..).map(|n| format!("matterixc-{n}")).find(|mark| !is_in(mark))?;
+        let name: String = name.chars().map(|c| if c.is_ascii_alphanumeric() || c == '.' { c } else { '_' }).collect();
+        let head = format!(
+            "--{mark}\r\nContent-Disposition: form-data; name=\"{field}\"; filename=\"{name}\"\r\n\
+             Content-Type: application/octet-stream\r\n\r\n"
+        );
+        let body = [head.as_bytes(), bytes, format!("\r\n--{mark}--\r\n").as_bytes()].concat();
+        Some((format!("multipart/form-data; boundary={mark}"), body))
+    }
+}
+
 impl Port for Http {
+    fn attach(&mut self, name: &str, bytes: Vec<u8>) -> io::Result<()> {
+        self.file = Some((name.to_owned(), bytes));
+        Ok(())
+    }
+
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.next = Some(bytes.to_vec());
         Ok(())

@@ -10,5 +10,6 @@ pub mod emulate;
 pub mod http;
 pub mod link;
 pub mod pattern;
+pub mod play;
 pub mod port;
 pub mod template;

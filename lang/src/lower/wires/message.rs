@@ -21,10 +21,18 @@ impl<'a> Planner<'a, '_> {
         }
         let known: BTreeSet<String> =
             wires.iter().chain(under.map_or(&[][..], |u| u.wires)).flat_map(kept_by).collect();
-        let exchanges = [&driver.open, &driver.close, &driver.halt, &driver.safe].into_iter().flatten();
+        let exchanges = [&driver.open, &driver.close, &driver.halt, &driver.safe, &driver.play].into_iter().flatten();
         let served = driver.served.iter().chain(driver.alive.iter().map(|a| &a.repeated)).map(|s| &s.exchange);
         for exchange in exchanges.chain(served) {
             self.check_exchange(exchange, &known);
+        }
+        for exchange in &driver.play {
+            let asks = exchange.until.iter().map(|until| &until.asks);
+            for sent in exchange.sends.iter().chain(asks) {
+                if sent.pieces.iter().any(|p| !matches!(p, Piece::Plain(_))) {
+                    self.no_message(sent.span, "what plays a file has no values in it");
+                }
+            }
         }
         for told in &driver.told {
             self.check_request(&told.asks, &known);

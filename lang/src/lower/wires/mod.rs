@@ -139,6 +139,7 @@ impl<'a> Planner<'a, '_> {
             close: Vec::new(),
             halt: Vec::new(),
             safe: Vec::new(),
+            play: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),
             answers: Vec::new(),
@@ -177,6 +178,7 @@ impl<'a> Planner<'a, '_> {
                     "open" => driver.open.push(exchange),
                     "close" => driver.close.push(exchange),
                     "halt" => driver.halt.push(exchange),
+                    "play" => driver.play.push(exchange),
                     _ => driver.safe.push(exchange),
                 }
             }

@@ -45,7 +45,10 @@ impl Json {
         let line = match message::request(text) {
             Ok(request) => {
                 let target = self.filled(request.target);
-                let body = self.body(&request.fields).map_or(String::new(), |body| format!(" {body}"));
+                let body = match request.file {
+                    Some(file) => format!(" @{file}"),
+                    None => self.body(&request.fields).map_or(String::new(), |body| format!(" {body}")),
+                };
                 format!("{} {target}{body}\n", request.method)
             }
             Err(_) => format!("{text}\n"),
@@ -94,7 +97,7 @@ impl Json {
         let members = pattern.zip(parts(reply)).map(|(pattern, (_, body))| {
             let text = marked_pattern(pattern);
             let fields = message::answer(&text).map(|a| a.fields).unwrap_or_default();
-            let member = |f: Field<'_>| body.pointer(f.pointer).map(|v| format!(" {}={}", f.pointer, plain(v)));
+            let member = |f: Field<'_>| body.pointer(&f.pointer).map(|v| format!(" {}={}", f.pointer, plain(v)));
             fields.into_iter().filter_map(member).collect::<String>()
         });
         match members {
@@ -124,7 +127,7 @@ impl Json {
             out.extend(self.value(wanted, is, &mut values)?);
         }
         for field in &wanted.fields {
-            let is = body.pointer(field.pointer)?;
+            let is = body.pointer(&field.pointer)?;
             let is_empty = is.as_object().is_some_and(Map::is_empty);
             match field.value {
                 "{}" if is_empty || is.is_object() => {}
@@ -205,7 +208,7 @@ impl Json {
                 (None, true) => Value::from(field.value),
                 (None, false) => serde_json::from_str(field.value).unwrap_or_else(|_| Value::from(field.value)),
             };
-            put(&mut body, field.pointer, value);
+            put(&mut body, &field.pointer, value);
         }
         (!body.is_null()).then_some(body)
     }
@@ -278,7 +281,7 @@ fn look(pattern: &Pattern, reply: &str) -> Option<(Vec<f64>, Kept)> {
     let mut values = pattern.slots.iter().filter(|s| !matches!(s, Slot::Plain(_)));
     let (mut numbers, mut kept) = (Vec::new(), Vec::new());
     for field in &answer.fields {
-        let is = plain(body.pointer(field.pointer)?);
+        let is = plain(body.pointer(&field.pointer)?);
         if let Some(word) = message::kept(field.value) {
             kept.push((word.to_owned(), is));
             continue;
