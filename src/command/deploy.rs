@@ -8,9 +8,9 @@ use matterix_ir::quantity::show_number;
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
+use crate::keys::Keys;
 use crate::pipeline::{self, Choices, DeployPlan, Input, Options, Wires};
 use crate::progress::{Kind, Progress};
-use crate::keys::Keys;
 use crate::terminal::{Stream, print};
 use crate::{Exit, cancel, files};
 

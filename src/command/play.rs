@@ -1,6 +1,7 @@
 //! `matterixc emit --play`: a file is given to a device that runs it by itself.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::binding;
 use matterix_hardware::deploy::Carrier;
@@ -12,20 +13,19 @@ use super::bill::show;
 use crate::args::Color;
 use crate::pipeline::{self, Input, Options, Wires};
 use crate::terminal::{Stream, print};
-use crate::{Exit, cancel, files};
+use crate::{Exit, files};
 
 /// Gives the file to the one device of the bindings whose driver says how.
 pub fn play(
     input: &Input,
     options: &Options,
     path: &Path,
-    name: &str,
-    bytes: Vec<u8>,
+    (name, bytes): (&str, Vec<u8>),
+    cancel: &AtomicBool,
     color: Color,
 ) -> Result<Exit, String> {
     let text = String::from_utf8(files::read(path)?).map_err(|_| format!("`{}` is not UTF-8", path.display()))?;
-    let (mut sources, program, found) =
-        pipeline::compile(input, &Options { wires: Wires::Called, ..options.clone() });
+    let (mut sources, program, found) = pipeline::compile(input, &Options { wires: Wires::Called, ..options.clone() });
     let Some(program) = program.filter(|_| found.iter().all(|d| d.severity != Severity::Error)) else {
         show(&sources, found, color);
         return Ok(Exit::Findings);
@@ -49,7 +49,6 @@ pub fn play(
         return Err(format!("{several} has a driver that says how a file is played"));
     };
     let device = &program.scene.get(driver.instance).name;
-    let cancel = cancel::on_interrupt()?;
     print(Stream::Err, &format!("`{device}` is given `{name}`, {} bytes\n", bytes.len()));
     let code = match played(&program, driver, place, Sheet { name: name.to_owned(), bytes }, cancel, &mut Silent) {
         Ok(()) => {

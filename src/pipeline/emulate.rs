@@ -44,9 +44,7 @@ pub fn emulate(
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
     let engine = engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)).map_err(|f| f.message)?;
-    let is_its = |d: &&Driver| {
-        d.host.as_ref().is_some_and(|h| h.instance == instance && h.driver == chosen.name)
-    };
+    let is_its = |d: &&Driver| d.host.as_ref().is_some_and(|h| h.instance == instance && h.driver == chosen.name);
     let drivers = std::iter::once(chosen).chain(program.drivers.iter().filter(is_its)).collect();
     let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), drivers, None)?;
     let stop = Stop { cancel, speed };

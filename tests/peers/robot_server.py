@@ -271,9 +271,9 @@ def uploaded(command, folder, file):
     for target in ("opentrons-json", "opentrons-python"):
         arguments = ["emit", file, "--target", target, "--play", bindings]
         ended = subprocess.run([command, *arguments], capture_output=True, text=True, timeout=300)
-        run = list(robot.runs.values())[-1]
-        done = run.engine.state_view.commands.get_all()
-        good = ended.returncode == 0 and run.summary()["status"] == "succeeded"
+        runs = list(robot.runs.values())[-1:]
+        done = [c for run in runs for c in run.engine.state_view.commands.get_all()]
+        good = ended.returncode == 0 and [run.summary()["status"] for run in runs] == ["succeeded"]
         verdict(f"{target}, uploaded and played", good, f"{len(done)} commands" if good else ended.stderr[-1500:])
 
 

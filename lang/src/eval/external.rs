@@ -176,7 +176,9 @@ impl Elaborator<'_> {
                     None => Value::Nothing,
                 }
             }
-            (Bound::OfKind, [Value::Instance(i), Value::Kind(kind)]) if self.instance_is(*i, *kind) => values[0].clone(),
+            (Bound::OfKind, [Value::Instance(i), Value::Kind(kind)]) if self.instance_is(*i, *kind) => {
+                values[0].clone()
+            }
             (Bound::OfKind, [Value::Instance(_) | Value::Nothing, Value::Kind(kind)]) if self.prototype => {
                 let kind = *kind;
                 let name = self.tables.kind_name(kind);

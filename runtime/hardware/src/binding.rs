@@ -205,7 +205,10 @@ impl Reader<'_> {
                 let other = program.drivers[..index].iter().find(|o| is_its(o) && o.instance == d.instance);
                 if let Some(other) = other {
                     let name = &program.scene.get(d.instance).name;
-                    let headline = format!("`{name}` has several drivers over the line of `{}`", program.scene.get(binding.instance).name);
+                    let headline = format!(
+                        "`{name}` has several drivers over the line of `{}`",
+                        program.scene.get(binding.instance).name
+                    );
                     let help = format!("keep one of `{}` and `{}`", other.name, d.name);
                     self.wrong(at.clone(), &headline, "bound here", Some(help));
                 }

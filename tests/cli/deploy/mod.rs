@@ -4,6 +4,7 @@ mod bindings;
 mod faulty;
 mod kills;
 mod server;
+mod stop;
 mod whole;
 
 use std::io::{BufRead, BufReader, Read, Write};

@@ -68,9 +68,7 @@ fn serve(
             (Some(e), Some((at, how))) if same(e) && *at == name => match how {
                 Spoiled::Cut => return,
                 Spoiled::Says(status, answer) => (*status, answer.clone()),
-                Spoiled::Fails(error) => {
-                    (201, json!({ "data": { "id": "x", "status": "failed", "error": error } }))
-                }
+                Spoiled::Fails(error) => (201, json!({ "data": { "id": "x", "status": "failed", "error": error } })),
             },
             (Some(e), _) if same(e) => {
                 *next += 1;
@@ -85,7 +83,8 @@ fn serve(
             }
         };
         let text = answer.to_string();
-        let head = format!("HTTP/1.1 {status} x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n", text.len());
+        let head =
+            format!("HTTP/1.1 {status} x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n", text.len());
         if out.write_all((head + &text).as_bytes()).is_err() {
             return;
         }
@@ -230,7 +229,11 @@ fn what_no_server_understands_is_found_before_anything_is_sent() {
         let flat = ended.out.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(flat.contains("driver-line") && flat.contains(said), "{line}: {}", ended.out);
     }
-    write(&dir, "lab.mtx", text("open sends \"POST /jobs\" expects \"201 /id=<job>\"\nclose sends \"DELETE /jobs/<job>\""));
+    write(
+        &dir,
+        "lab.mtx",
+        text("open sends \"POST /jobs\" expects \"201 /id=<job>\"\nclose sends \"DELETE /jobs/<job>\""),
+    );
     let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
     assert_eq!(ended.code, 0, "{}", ended.out);
 }

@@ -100,9 +100,7 @@ fn kept_by(wire: &Wire) -> Vec<String> {
         _ => return Vec::new(),
     };
     let Some(expects) = &exchange.expects else { return Vec::new() };
-    message::answer(&expects.text)
-        .map(|answer| put_in(&answer.fields).map(str::to_owned).collect())
-        .unwrap_or_default()
+    message::answer(&expects.text).map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
 }
 
 /// A message with something in place of its values.

@@ -31,7 +31,12 @@ impl<'a> Planner<'a, '_> {
             "http" => HTTP,
             _ => {
                 let headline = format!("there is no transport `{}`", name.text);
-                self.wrong(name.span, &headline, "not a kind of line", "a driver speaks over `serial`, `tcp` or `http`, or over the line of another driver");
+                self.wrong(
+                    name.span,
+                    &headline,
+                    "not a kind of line",
+                    "a driver speaks over `serial`, `tcp` or `http`, or over the line of another driver",
+                );
                 return None;
             }
         };
@@ -58,7 +63,8 @@ impl<'a> Planner<'a, '_> {
             }
         }
         let given = |key: &str| args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == key)).map(|a| &a.value);
-        let missing: Vec<&str> = known.iter().copied().filter(|k| !OPTIONAL.contains(k) && given(k).is_none()).collect();
+        let missing: Vec<&str> =
+            known.iter().copied().filter(|k| !OPTIONAL.contains(k) && given(k).is_none()).collect();
         if !missing.is_empty() {
             let headline = format!("the line of this driver lacks {}", list(&missing));
             let help = match name.text.as_str() {
@@ -123,7 +129,12 @@ impl<'a> Planner<'a, '_> {
         let is_value = |v: &str| v.bytes().all(|b| (0x20..0x7f).contains(&b));
         let good = named.filter(|(n, v)| is_token(n) && is_value(v));
         if good.is_none() {
-            self.wrong(e.span, "this is no header", "not understood", "a name and a value, as in `\"Accept: text/json\"`");
+            self.wrong(
+                e.span,
+                "this is no header",
+                "not understood",
+                "a name and a value, as in `\"Accept: text/json\"`",
+            );
         }
         good.map(Some)
     }

@@ -148,12 +148,7 @@ impl Json {
         template.is_some_and(|template| self.found(&template, request).is_some())
     }
 
-    fn value<'t>(
-        &self,
-        wanted: &str,
-        is: &str,
-        values: &mut impl Iterator<Item = &'t Piece>,
-    ) -> Option<Vec<Found>> {
+    fn value<'t>(&self, wanted: &str, is: &str, values: &mut impl Iterator<Item = &'t Piece>) -> Option<Vec<Found>> {
         if let Some(word) = message::kept(wanted) {
             return self.issued.contains(&(word.to_owned(), is.to_owned())).then(Vec::new);
         }

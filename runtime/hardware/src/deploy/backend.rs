@@ -340,7 +340,12 @@ impl<'m, 't> Hardware<'m, 't> {
                     while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
                     self.replay.pop_front();
                 }
-                Entry::Opened { .. } | Entry::Kept { .. } | Entry::Out { .. } | Entry::Back { .. } | Entry::Begin { .. } | Entry::End { .. } => {
+                Entry::Opened { .. }
+                | Entry::Kept { .. }
+                | Entry::Out { .. }
+                | Entry::Back { .. }
+                | Entry::Begin { .. }
+                | Entry::End { .. } => {
                     self.replay.pop_front();
                 }
                 other => return Some(other.clone()),

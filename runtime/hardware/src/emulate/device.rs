@@ -205,9 +205,10 @@ impl<'m> Emulator<'m> {
     /// Carries out the command that a message completes; nothing where it belongs to none.
     fn command(&mut self, word: &str) -> Result<Option<Option<Reply>>, Fault> {
         let (mut part, mut complete) = (None, Vec::new());
-        let served = self.drivers.iter().enumerate().flat_map(|(d, driver)| {
-            driver.served.iter().enumerate().map(move |(index, served)| (d, index, served))
-        });
+        let served =
+            self.drivers.iter().enumerate().flat_map(|(d, driver)| {
+                driver.served.iter().enumerate().map(move |(index, served)| (d, index, served))
+            });
         for (driver, index, served) in served {
             for (place, template) in served.exchange.sends.iter().enumerate() {
                 let Some(found) = self.codec.found(template, word) else { continue };

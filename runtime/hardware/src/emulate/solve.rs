@@ -11,8 +11,7 @@ pub fn solve(served: &Served, found: &[Found], engine: &mut Engine<'_>) -> bool 
     let mut open: Vec<u32> = served.arguments.iter().map(|(_, local)| *local).collect();
     let mut rest: Vec<&Found> = found.iter().collect();
     while !rest.is_empty() {
-        let free =
-            |f: &Found| locals(f.node, engine).into_iter().filter(|l| open.contains(l)).collect();
+        let free = |f: &Found| locals(f.node, engine).into_iter().filter(|l| open.contains(l)).collect();
         let next = rest.iter().position(|f| {
             let free: Vec<u32> = free(f);
             free.len() <= 1
