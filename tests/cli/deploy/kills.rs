@@ -165,6 +165,7 @@ fn next(seed: &mut u64) -> f64 {
     (*seed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+#[allow(clippy::disallowed_methods, reason = "it is killed by the clock")]
 fn what_a_killed_deployment_did(lab: &Lab) {
     let kills = std::env::var("MATTERIX_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(FEW);
     let dir = folder(&format!("deploy_kills_{}", lab.name));

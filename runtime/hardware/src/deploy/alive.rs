@@ -5,7 +5,7 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
-use super::backend::Hardware;
+use super::hardware::Hardware;
 
 impl Hardware<'_, '_> {
     /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.

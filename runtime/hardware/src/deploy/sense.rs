@@ -6,8 +6,8 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
-use super::backend::{Hardware, Mode, wall};
 use super::device::{Carrier, Ear};
+use super::hardware::{Hardware, Mode, wall};
 use super::journal::Entry;
 use crate::link::{Link, Trouble};
 use crate::port::{self, Place};
