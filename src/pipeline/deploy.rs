@@ -159,7 +159,9 @@ fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
     let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
     let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
     found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
-    let others = execution.suppressed.iter().map(exec::diagnostic);
+    // That nothing more was said after it was refused to go on follows from that.
+    let others = execution.suppressed.iter().filter(|trace| trace.code != codes::JOURNAL_MISMATCH);
+    let others = others.map(exec::diagnostic);
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
 }

@@ -95,7 +95,7 @@ struct Lab {
 
 /// Strings of a pump that move its plunger.
 fn strokes(heard: &str) -> Vec<String> {
-    heard.split('\r').filter(|s| s.contains('A')).map(str::to_owned).collect()
+    heard.split('\r').filter(|s| s.starts_with('/') && s.contains('A')).map(str::to_owned).collect()
 }
 
 /// Commands of a robot that move liquids or tips.

@@ -58,6 +58,10 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        if self.refused.get() {
+            let message = format!("`{}` is not said: it was refused to go on", operation.verb);
+            return Err(self.fault(codes::JOURNAL_MISMATCH, Span::default(), message));
+        }
         let step = self.steps.get(&address(operation)).copied();
         let step =
             step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;

@@ -68,6 +68,8 @@ pub struct Hardware<'m, 't> {
     pub(super) origin: (f64, Instant),
     /// An earlier process is followed, and devices have not been asked yet.
     pub(super) resuming: bool,
+    /// It was refused to go on: what is there is not known well enough for anything but making it safe.
+    pub(super) refused: std::cell::Cell<bool>,
     /// When it was cut off, s since 1970.
     pub(super) left_at: f64,
     /// What answers to an earlier process said: the device whose line it was, the word, the text.
@@ -117,6 +119,7 @@ impl<'m, 't> Hardware<'m, 't> {
             trace,
             replay: VecDeque::new(),
             resuming: false,
+            refused: std::cell::Cell::new(false),
             left_at: 0.0,
             kept: Vec::new(),
             commanded: BTreeSet::new(),

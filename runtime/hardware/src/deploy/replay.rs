@@ -34,6 +34,7 @@ impl Hardware<'_, '_> {
     }
 
     pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
+        self.refused.set(true);
         let before = serde_json::to_string(before).unwrap_or_default();
         let message = format!("the journal does not fit the plan: {now}, but it says `{before}`");
         let mut fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), message);
@@ -81,6 +82,7 @@ impl Hardware<'_, '_> {
                 if self.is_repeatable(operation, step) {
                     return Ok(None);
                 }
+                self.refused.set(true);
                 let message = format!(
                     "it is not known whether `{device}` was told `{}` for `{label}` before the journal broke off",
                     sends.join("`, `")

@@ -100,6 +100,14 @@ impl Hardware<'_, '_> {
         if !std::mem::take(&mut self.resuming) {
             return Ok(());
         }
+        self.catch_up(out).map_err(|fault| {
+            self.refused.set(true);
+            let code = if fault.code == codes::DIVERGED { codes::JOURNAL_MISMATCH } else { fault.code };
+            Fault { code, ..fault }
+        })
+    }
+
+    fn catch_up(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
         let away = (wall() - self.left_at).max(0.0) * self.settings.speed;
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
