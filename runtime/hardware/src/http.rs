@@ -71,6 +71,7 @@ fn unclear(line: &str) -> io::Error {
 fn broken(e: ureq::Error) -> io::Error {
     match e {
         ureq::Error::Io(e) => e,
+        ureq::Error::Timeout(_) => io::Error::from(ErrorKind::TimedOut),
         other => io::Error::other(other),
     }
 }
