@@ -457,6 +457,9 @@ pub struct EmitArgs {
     /// Where to write it; to standard output without it.
     #[arg(long, short, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Give it to the device that these bindings say, and wait until that has run it.
+    #[arg(long, value_name = "BINDINGS", conflicts_with = "out")]
+    pub play: Option<PathBuf>,
     /// Where all randomness of the performance starts that is written down.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,

@@ -20,6 +20,13 @@ pub fn on_interrupt_quietly() -> Result<&'static AtomicBool, String> {
     listen("\n")
 }
 
+/// Asks for it as Ctrl-C does; one more Ctrl-C ends at once.
+pub fn ask(said: &str) {
+    PRESSED.store(true, Ordering::SeqCst);
+    print(Stream::Err, said);
+    ASKED.store(true, Ordering::SeqCst);
+}
+
 fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
     let handler = move || {
         if PRESSED.swap(true, Ordering::SeqCst) {

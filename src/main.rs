@@ -9,6 +9,7 @@ mod cache;
 mod cancel;
 mod command;
 mod files;
+mod keys;
 mod pipeline;
 mod progress;
 mod report;

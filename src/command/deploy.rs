@@ -1,6 +1,6 @@
 //! `matterixc deploy`.
 
-use std::io::{BufRead, IsTerminal};
+use std::cell::RefCell;
 
 use matterix_hardware::deploy::{Journal, Mode};
 use matterix_ir::Severity;
@@ -8,6 +8,7 @@ use matterix_ir::quantity::show_number;
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
+use crate::keys::Keys;
 use crate::pipeline::{self, Choices, DeployPlan, Input, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::terminal::{Stream, print};
@@ -64,7 +65,8 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         DeployMode::Real | DeployMode::SimFirst => Mode::Real,
     };
     let yes = args.yes || mode == Mode::Dry;
-    let person = move |text: &str| confirmed(text, yes);
+    let keys = RefCell::new((mode != Mode::Dry).then(Keys::listen).flatten());
+    let person = |text: &str| confirmed(text, yes, keys.borrow_mut().as_mut());
     let plan = DeployPlan {
         bindings: (file, &bindings),
         mode,
@@ -92,16 +94,15 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
 }
 
 /// Whether a person agrees; nobody does where nobody can be asked.
-fn confirmed(text: &str, yes: bool) -> bool {
+fn confirmed(text: &str, yes: bool, keys: Option<&mut Keys>) -> bool {
     print(Stream::Err, &format!("{text}\n"));
     if yes {
         return true;
     }
-    if !std::io::stdin().is_terminal() {
+    let Some(keys) = keys else {
         print(Stream::Err, "nobody is there to confirm: run it on a terminal, or with `--yes`\n");
         return false;
-    }
+    };
     print(Stream::Err, "type y and Enter to confirm: ");
-    let mut line = String::new();
-    std::io::stdin().lock().read_line(&mut line).is_ok() && line.trim().eq_ignore_ascii_case("y")
+    keys.ask().is_some_and(|line| line.trim().eq_ignore_ascii_case("y"))
 }

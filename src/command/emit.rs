@@ -19,11 +19,11 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let (sources, wired, mut found) = pipeline::wire(&input, &args.subject.options(), args.target.wire());
     let is_wrong = |found: &[Diagnostic]| found.iter().any(|d| d.severity == Severity::Error);
+    let cancel = cancel::on_interrupt()?;
     let mut written = None;
     if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {
         found.extend(pipeline::motions(&program, &*cache::of(args.no_cache)));
         if !is_wrong(&found) {
-            let cancel = cancel::on_interrupt()?;
             let (bytes, more) = pipeline::emit(&program, &wiring, &sources, args.target, args.seed, cancel);
             found.extend(more);
             written = bytes;
@@ -31,6 +31,14 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     }
     show(&sources, found, color);
     let Some(bytes) = written else { return Ok(Exit::Findings) };
+    if let Some(bindings) = &args.play {
+        let name = match args.target {
+            pipeline::Target::OpentronsPython => "protocol.py",
+            pipeline::Target::Urscript => "program.script",
+            _ => "protocol.json",
+        };
+        return super::play::play(&input, &args.subject.options(), bindings, (name, bytes), cancel, color);
+    }
     match &args.out {
         Some(path) => files::write(path, bytes)?,
         None => terminal::pour(&bytes),

@@ -11,6 +11,7 @@ mod fit;
 mod fmt;
 mod new;
 mod plan;
+mod play;
 mod run;
 #[cfg(feature = "sila")]
 mod serve;

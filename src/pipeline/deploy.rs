@@ -92,12 +92,15 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     if !found.is_empty() {
         return Ok(Deployed::not_begun(found));
     }
-    let resumes = !before.is_empty();
-    let opened = if resumes {
+    let is_open = before.iter().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
+    let opened = if is_open {
         hardware.follow_journal(before);
         Ok(())
-    } else {
+    } else if before.is_empty() {
         hardware.begin_journal(&digest).and_then(|()| hardware.open(false))
+    } else {
+        // It was cut off before anything of the plan was begun.
+        hardware.open(false)
     };
     if let Err(fault) = opened {
         let mut found = vec![of_fault(fault)];
@@ -113,7 +116,11 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
-    let status = if well { "ended" } else { "failed" };
+    let status = match (well, plan.cancel.load(Ordering::Relaxed)) {
+        (_, true) => "stopped by a person",
+        (true, false) => "ended",
+        (false, false) => "failed",
+    };
     found.extend(hardware.end_journal(status).err().map(of_fault));
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
@@ -152,7 +159,9 @@ fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
     let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
     let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
     found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
-    let others = execution.suppressed.iter().map(exec::diagnostic);
+    // That nothing more was said after it was refused to go on follows from that.
+    let others = execution.suppressed.iter().filter(|trace| trace.code != codes::JOURNAL_MISMATCH);
+    let others = others.map(exec::diagnostic);
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
 }

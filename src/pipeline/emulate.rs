@@ -6,9 +6,9 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::emulate::{Emulator, Stop, serve_pty, serve_tcp};
+use matterix_hardware::emulate::{Emulator, Stop, serve_http, serve_pty, serve_tcp};
 use matterix_ir::Program;
-use matterix_ir::wire::Transport;
+use matterix_ir::wire::{Driver, Transport};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::process::{Engine, Options};
 
@@ -31,7 +31,7 @@ pub fn emulate(
     ready: &mut dyn FnMut(&str),
 ) -> Result<(), String> {
     let instance = program.scene.find(device).ok_or_else(|| format!("the lab has no `{device}`"))?;
-    let all: Vec<_> = program.drivers.iter().filter(|d| d.instance == instance).collect();
+    let all: Vec<_> = program.drivers.iter().filter(|d| d.instance == instance && d.host.is_none()).collect();
     let list = all.iter().map(|d| format!("`{}`", d.name)).collect::<Vec<_>>().join(", ");
     let chosen = match (driver, all.as_slice()) {
         (Some(name), _) => all.iter().find(|d| d.name == name).copied(),
@@ -48,8 +48,16 @@ pub fn emulate(
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
     let engine = engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)).map_err(|f| f.message)?;
-    let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), chosen, None)?;
+    let is_its = |d: &&Driver| d.host.as_ref().is_some_and(|h| h.instance == instance && h.driver == chosen.name);
+    let drivers = std::iter::once(chosen).chain(program.drivers.iter().filter(is_its)).collect();
+    let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), drivers, None)?;
     let stop = Stop { cancel, speed };
+    if let Transport::Http { header } = &chosen.transport {
+        let Line::Tcp(port) = line else {
+            return Err(format!("`{}` speaks over HTTP: say at which port with `--tcp`", chosen.name));
+        };
+        return serve_http(&mut emulator, *port, header.as_ref(), stop, ready);
+    }
     match line {
         Line::Pty(link) => serve_pty(&mut emulator, *link, stop, ready),
         Line::Tcp(port) => serve_tcp(&mut emulator, *port, stop, ready),

@@ -122,6 +122,7 @@ def deployments():
 
 def drivers():
     from matterlab_hotplates import IKAHotplate
+    from matterlab_pumps import TecanXCPump
     from mettler_toledo_device import MettlerToledoDevice
 
     process, address = emulator("IkaRetControl", "--tcp", "0", "--speed", str(SPEED))
@@ -140,6 +141,20 @@ def drivers():
         balance = MettlerToledoDevice(port=path)
         weight = balance.get_weight_stable()
         verdict("mettler_toledo_device on an emulator", abs(weight[0]) < 0.1 and weight[1] == "g", f"{weight}")
+    finally:
+        process.kill()
+
+    file = os.path.join(FOLDER, "pump.mtx")
+    with open(file, "w") as out:
+        out.write(DOSE)
+    process, path = emulator("pump", "--file", file, "--driver", "CavroDt", "--pty", "--speed", str(SPEED))
+    try:
+        # Its other resolution is not one of the emulated pump.
+        pump = TecanXCPump(com_port=path, address=0, syringe_volume=5e-3, num_valve_port=9, fine_pos=False)
+        drawn = (pump.draw(2, valve_port=1), pump.volume, pump.port)[1:]
+        pushed = (pump.dispense(1, valve_port=3), pump.volume, pump.port)[1:]
+        good = drawn == (2.0, 1) and pushed == (1.0, 3)
+        verdict("matterlab_pumps on an emulator", good, f"{drawn[0]} mL from port 1, then {pushed[0]} mL left at port 3")
     finally:
         process.kill()
 

@@ -99,7 +99,16 @@ fn program() -> (Program, Sources) {
     let scene = Scene { lab: "l".into(), instances, ..Scene::default() };
     let files = vec!["lab.mtx".into()];
     (
-        Program { version: PROGRAM_VERSION, files, scene, model, plan, stock: Default::default(), drivers: Vec::new() },
+        Program {
+            version: PROGRAM_VERSION,
+            files,
+            scene,
+            model,
+            plan,
+            stock: Default::default(),
+            drivers: Vec::new(),
+            offers: Default::default(),
+        },
         sources,
     )
 }

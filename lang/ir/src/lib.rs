@@ -22,6 +22,7 @@ pub mod graph;
 pub mod inertia;
 pub mod math;
 pub mod mesh;
+pub mod message;
 pub mod model;
 pub mod offer;
 pub mod plan;

@@ -27,6 +27,23 @@ pub enum Transport {
         /// Full identifier of the feature that is meant where a text names none.
         feature: String,
     },
+    /// Requests to a server, bodies in JSON; see [`crate::message`].
+    Http {
+        /// Name and value of a header that every request has.
+        header: Option<(String, String)>,
+    },
+}
+
+/// The framing of what goes over HTTP.
+pub const JSON: &str = "json";
+
+/// The driver over whose line another one speaks.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Host {
+    /// Its device.
+    pub instance: InstanceId,
+    /// Its name.
+    pub driver: String,
 }
 
 /// Names of the codecs that put a text on a line and take it off again.
@@ -173,7 +190,9 @@ pub struct Driver {
     pub instance: InstanceId,
     /// What it speaks over.
     pub transport: Transport,
-    /// One of [`FRAMINGS`].
+    /// Whose line that is, where it is not its own.
+    pub host: Option<Host>,
+    /// One of [`FRAMINGS`], or [`JSON`].
     pub framing: String,
     /// The device's own on a line that several share.
     pub address: Option<String>,
@@ -187,6 +206,8 @@ pub struct Driver {
     pub halt: Vec<Exchange>,
     /// To leave it safe after a run that did not end well.
     pub safe: Vec<Exchange>,
+    /// To let it run a file by itself, from giving it the file to its end.
+    pub play: Vec<Exchange>,
     /// What keeps its watchdog quiet.
     pub alive: Vec<Alive>,
     /// What it tells.

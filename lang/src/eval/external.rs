@@ -39,6 +39,12 @@ enum Bound {
     Position,
     /// The element of a list with a number from 1 that may be known only when running.
     Nth,
+    /// How a thing is called in the grid that it is in.
+    Label,
+    /// One of the parts of a text between signs, by its number.
+    Parted,
+    /// A thing if it is of a kind.
+    OfKind,
     /// Each of one list with each of another.
     Paired,
     /// A list in groups of a number.
@@ -78,7 +84,10 @@ const TABLE: &[(&str, Bound)] = &[
     ("having", Bound::Having),
     ("measures", Bound::Measures),
     ("nth", Bound::Nth),
+    ("label", Bound::Label),
+    ("of_kind", Bound::OfKind),
     ("owner", Bound::Owner),
+    ("parted", Bound::Parted),
     ("paired", Bound::Paired),
     ("parts", Bound::Parts),
     ("position", Bound::Position),
@@ -88,6 +97,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("max_over_time", Bound::OverTime(Keep::Largest)),
     ("min_over_time", Bound::OverTime(Keep::Smallest)),
     ("mean_over_time", Bound::OverTime(Keep::Mean)),
+    ("whole", Bound::Owner),
     ("wholes", Bound::Wholes),
 ];
 
@@ -157,8 +167,28 @@ impl Elaborator<'_> {
             }
             (Bound::Owner, [Value::Instance(i)]) => match (self.instances[i.0 as usize].owner, &result) {
                 (None, Some(ty)) if self.prototype => self.placeholder(ty, name),
+                (None, None) if self.prototype => Value::Instance(*i),
                 (owner, _) => owner.map_or(Value::Nothing, Value::Instance),
             },
+            (Bound::Label, [thing]) => self.label(thing, at),
+            (Bound::Parted, [Value::Text(text), Value::Text(sign), Value::Num(n)]) => {
+                let number = self.known(n.node).filter(|n| *n >= 1.0).map(|n| n as usize - 1);
+                match number.and_then(|n| text.split(sign.as_str()).nth(n)) {
+                    Some(part) => Value::Text(part.to_owned()),
+                    None if self.prototype => Value::Text("1".to_owned()),
+                    None => Value::Nothing,
+                }
+            }
+            (Bound::OfKind, [Value::Instance(i), Value::Kind(kind)]) if self.instance_is(*i, *kind) => {
+                values[0].clone()
+            }
+            (Bound::OfKind, [Value::Instance(_) | Value::Nothing, Value::Kind(kind)]) if self.prototype => {
+                let kind = *kind;
+                let name = self.tables.kind_name(kind);
+                Value::Instance(self.prototype_of(vec![kind], name))
+            }
+            (Bound::OfKind, [Value::Instance(_) | Value::Nothing, Value::Kind(_)]) => Value::Nothing,
+            (Bound::Parted, [Value::Nothing, ..]) => Value::Nothing,
             (Bound::Position, [Value::List(items), item]) => match items.iter().position(|i| i == item) {
                 Some(at) => self.number(at as f64 + 1.0, Dimension::one(), false),
                 None if self.prototype => self.number(1.0, Dimension::one(), false),
@@ -242,6 +272,28 @@ impl Elaborator<'_> {
                 out.push(*part);
             }
             self.parts_below(*part, kind, out);
+        }
+    }
+
+    /// `A1` of `plate[A1]`; of one of several, known only when running, as a word.
+    fn label(&mut self, thing: &Value, at: Span) -> Value {
+        let of = |this: &Self, id: InstanceId| {
+            let name = &this.instances[id.0 as usize].name;
+            name.rsplit_once('[').map(|(_, label)| label.trim_end_matches(']').to_owned())
+        };
+        match thing {
+            Value::Nothing | Value::Instance(_) if self.prototype => Value::Text("1".to_owned()),
+            Value::Nothing => Value::Nothing,
+            Value::Instance(id) => of(self, *id).map_or(Value::Nothing, Value::Text),
+            Value::InstanceNode(node) => {
+                let picked = self.picks.get(node);
+                let last = picked.map_or(self.instances.len() as u32, |p| p.iter().max().map_or(0, |id| id.0 + 1));
+                let may_be = |i: InstanceId| picked.is_none_or(|p| p.contains(&i));
+                let word = |i: InstanceId| of(self, i).filter(|_| may_be(i)).unwrap_or_default();
+                Value::Enum(*node, (0..last).map(InstanceId).map(word).collect())
+            }
+            Value::Error => Value::Error,
+            other => self.expected("an instance", other, at),
         }
     }
 

@@ -56,6 +56,8 @@ pub struct Planner<'a, 'e> {
     pub draft: bool,
     /// What is asked of drivers.
     pub wires: wires::Wires,
+    /// What is to be sent may be missing: then a driver has nothing to do with the device.
+    lenient: bool,
     /// Drivers of the lab, with their declarations.
     drivers: Vec<(DeclId, matterix_ir::wire::Driver)>,
     /// What the lab offers to others.
@@ -102,6 +104,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             said: Vec::new(),
             draft: false,
             wires: wires::Wires::Off,
+            lenient: false,
             drivers: Vec::new(),
             offers: matterix_ir::offer::Offers::default(),
             wiring: None,

@@ -42,7 +42,7 @@ impl<'a> Planner<'a, '_> {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        let step = self.during(label, span, operation, invariants, &bound);
+        let step = self.during(sig, label, span, operation, invariants, &bound);
         self.say(device, sig, &bound, step);
         self.note_call(sig, &bound, Some((device, object_is_device)), step);
         Some(step)
@@ -51,15 +51,16 @@ impl<'a> Planner<'a, '_> {
     /// An operation with what must hold while it lasts.
     fn during(
         &mut self,
+        sig: &Sig,
         label: String,
         span: Span,
         operation: Operation,
         invariants: Vec<Condition>,
         bound: &Bound,
     ) -> StepId {
-        let (verb, device) = (operation.verb.clone(), operation.device);
+        let device = operation.device;
         let body = self.add(label.clone(), span, Step::Operation(Box::new(operation)));
-        self.call_wires(body, &verb, bound, device);
+        self.call_wires(body, sig, bound, device);
         if invariants.is_empty() { body } else { self.add(label, span, Step::During { invariants, body }) }
     }
 
@@ -78,7 +79,7 @@ impl<'a> Planner<'a, '_> {
             Value::Instance(i) => Some(*i),
             _ => None,
         });
-        let step = self.during(label.to_string(), span, operation, invariants, bound);
+        let step = self.during(sig, label.to_string(), span, operation, invariants, bound);
         self.note_call(sig, bound, None, step);
         Some(step)
     }

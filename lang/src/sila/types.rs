@@ -143,7 +143,7 @@ impl<'f> Types<'f> {
         let ty = self.units.dimension_name(&si.dimension, point).or(self.units.dimension_name(&si.dimension, false));
         let ty = ty.ok_or_else(|| format!("is counted in `{}`, of which there is no quantity", of.label))?.to_owned();
         if let Some(found) = found {
-            return Ok(Counted { ty, unit: found.unit.symbol });
+            return Ok(Counted { ty, unit: found.unit.symbol.clone() });
         }
         if of.offset != 0.0 {
             return Err(format!("is counted in `{}`, of which there is no such scale", of.label));

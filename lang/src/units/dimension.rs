@@ -69,7 +69,8 @@ impl Dimension {
         Dimension { powers: (!powers.is_empty()).then(|| powers.into()), any: false }
     }
 
-    fn powers(&self) -> &[(u16, Rational)] {
+    /// Its bases, by index, with their exponents.
+    pub fn powers(&self) -> &[(u16, Rational)] {
         self.powers.as_deref().unwrap_or(&[])
     }
 
@@ -125,11 +126,6 @@ impl Dimension {
             return Dimension::one();
         }
         Dimension::of(self.powers().iter().map(|&(b, e)| (b, e.times(exponent))).collect())
-    }
-
-    /// Its bases, by index, with their exponents.
-    pub fn powers(&self) -> impl Iterator<Item = (u16, Rational)> {
-        self.powers.iter().copied()
     }
 
     /// Whether it contains none of the bases of another.

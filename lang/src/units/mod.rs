@@ -197,7 +197,7 @@ impl Units {
             let symbol = self.base_units.get(&base)?.clone();
             (exponent.den == 1).then_some((symbol, exponent.num))
         };
-        if dimension.is_any() { None } else { dimension.powers().map(power).collect() }
+        if dimension.is_any() { None } else { dimension.powers().iter().copied().map(power).collect() }
     }
 
     /// The percent unit of a fraction, in which fractions are shown.

@@ -14,7 +14,7 @@ use toml::de::{DeTable, DeValue};
 use crate::deploy::{Binding, Carrier};
 use crate::port::Place;
 
-const KEYS: [&str; 7] = ["port", "address", "sila", "driver", "unit", "by", "tolerance"];
+const KEYS: [&str; 8] = ["port", "address", "http", "sila", "driver", "unit", "by", "tolerance"];
 const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
@@ -28,7 +28,11 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
             return (Vec::new(), reader.found);
         }
     };
-    let bindings = table.get_ref().iter().filter_map(|(name, value)| reader.device(name, value)).collect();
+    let mut bindings = Vec::new();
+    for (name, value) in table.get_ref() {
+        bindings.extend(reader.device(name, value).map(|binding| (binding, name.span())));
+    }
+    let bindings = reader.with_shared(bindings);
     (bindings, reader.found)
 }
 
@@ -87,7 +91,8 @@ impl Reader<'_> {
                 }
             }
         };
-        let (port, address, sila) = (text(self, "port"), text(self, "address"), text(self, "sila"));
+        let (port, address) = (text(self, "port"), text(self, "address"));
+        let (http, sila) = (text(self, "http"), text(self, "sila"));
         let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
         if let Some((by, at)) = &by {
             if by != HAND {
@@ -98,7 +103,7 @@ impl Reader<'_> {
                     Some("write `by = \"hand\"`".into()),
                 );
             }
-            if port.is_some() || address.is_some() || sila.is_some() || driver.is_some() {
+            if [&port, &address, &http, &sila, &driver].into_iter().any(Option::is_some) {
                 self.wrong(
                     at.clone(),
                     &format!("`{key}` is done by hand and bound to a line"),
@@ -109,37 +114,49 @@ impl Reader<'_> {
             let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
             return (self.found.len() == before).then_some(binding);
         }
-        let (place, said) = match (port, address, sila) {
-            (Some((port, at)), None, None) => (Place::Serial(port), at),
-            (None, Some((address, at)), None) => (Place::Tcp(address), at),
-            (None, None, Some((server, at))) => (Place::Sila(server), at),
-            (Some(_), Some((_, at)), _) => {
-                self.wrong(at, &format!("`{key}` has two lines"), "a port and an address", None);
+        let places = [
+            port.map(|(path, at)| (Place::Serial(path), at)),
+            address.map(|(address, at)| (Place::Tcp(address), at)),
+            http.map(|(server, at)| (Place::Http(server), at)),
+            sila.map(|(server, at)| (Place::Sila(server), at)),
+        ];
+        let mut places = places.into_iter().flatten();
+        let (place, said) = match (places.next(), places.next()) {
+            (Some(place), None) => place,
+            (_, Some((_, at))) => {
+                let label = "only one of `port`, `address`, `http` and `sila`";
+                self.wrong(at, &format!("`{key}` has two lines"), label, None);
                 return None;
             }
-            (_, _, Some((_, at))) => {
-                self.wrong(at, &format!("`{key}` has two lines"), "a line and a server", None);
-                return None;
-            }
-            (None, None, None) => {
-                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `sila = \"HOST:PORT\"` or \
+            (None, None) => {
+                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `http = \"HOST:PORT\"`, \
+                            `sila = \"HOST:PORT\"` or \
                             `by = \"hand\"`";
                 self.wrong(name.span(), &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
                 return None;
             }
         };
         let driver = self.driver(key, instance, driver, name.span())?;
-        let calls = matches!(self.program.drivers[driver].transport, Transport::Sila { .. });
-        if calls != matches!(place, Place::Sila(_)) {
+        let transport = &self.program.drivers[driver].transport;
+        let fits = match (transport, &place) {
+            (Transport::Sila { .. }, _) => matches!(place, Place::Sila(_)),
+            (Transport::Http { .. }, _) => matches!(place, Place::Http(_)),
+            (_, Place::Sila(_) | Place::Http(_)) => false,
+            _ => true,
+        };
+        if !fits {
             let name = &self.program.drivers[driver].name;
-            let (headline, help) = match calls {
-                true => (format!("`{name}` speaks to a server of SiLA 2"), "write `sila = \"HOST:PORT\"`"),
-                false => (
+            let (headline, help) = match transport {
+                Transport::Sila { .. } => {
+                    (format!("`{name}` speaks to a server of SiLA 2"), format!("write `sila = \"{place}\"`"))
+                }
+                Transport::Http { .. } => (format!("`{name}` speaks over HTTP"), format!("write `http = \"{place}\"`")),
+                _ => (
                     format!("`{name}` speaks over a line"),
-                    "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`",
+                    "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`".to_owned(),
                 ),
             };
-            self.wrong(said, &headline, "another kind of place", Some(help.into()));
+            self.wrong(said, &headline, "another kind of place", Some(help));
         }
         if let Some((unit, at)) = &unit
             && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
@@ -158,7 +175,8 @@ impl Reader<'_> {
         wanted: Option<(String, Range)>,
         at: Range,
     ) -> Option<usize> {
-        let drivers = self.program.drivers.iter().enumerate().filter(|(_, d)| d.instance == instance);
+        let own = |d: &matterix_ir::wire::Driver| d.instance == instance && d.host.is_none();
+        let drivers = self.program.drivers.iter().enumerate().filter(|(_, d)| own(d));
         let all: Vec<(usize, &str)> = drivers.map(|(i, d)| (i, d.name.as_str())).collect();
         let list = all.iter().map(|(_, n)| format!("`{n}`")).collect::<Vec<_>>().join(", ");
         match (&wanted, all.as_slice()) {
@@ -183,6 +201,37 @@ impl Reader<'_> {
                 None
             }
         }
+    }
+
+    /// All that is bound, and after each device what speaks over its line, is not bound itself and has one driver for it.
+    fn with_shared(&mut self, bound: Vec<(Binding, Range)>) -> Vec<Binding> {
+        let program = self.program;
+        let mut all: Vec<Binding> = bound.iter().map(|(binding, _)| binding.clone()).collect();
+        for (host, (binding, at)) in bound.iter().enumerate() {
+            let Carrier::Line { driver, .. } = &binding.carrier else { continue };
+            let is_its = |d: &matterix_ir::wire::Driver| {
+                let name = &program.drivers[*driver].name;
+                d.host.as_ref().is_some_and(|h| h.instance == binding.instance && h.driver == *name)
+            };
+            for (index, d) in program.drivers.iter().enumerate().filter(|(_, d)| is_its(d)) {
+                if bound.iter().any(|(b, _)| b.instance == d.instance) {
+                    continue;
+                }
+                let other = program.drivers[..index].iter().find(|o| is_its(o) && o.instance == d.instance);
+                if let Some(other) = other {
+                    let name = &program.scene.get(d.instance).name;
+                    let headline = format!(
+                        "`{name}` has several drivers over the line of `{}`",
+                        program.scene.get(binding.instance).name
+                    );
+                    let help = format!("keep one of `{}` and `{}`", other.name, d.name);
+                    self.wrong(at.clone(), &headline, "bound here", Some(help));
+                }
+                let carrier = Carrier::Shared { driver: index, host };
+                all.push(Binding { instance: d.instance, carrier, tolerances: Vec::new() });
+            }
+        }
+        all
     }
 
     /// `tolerance = { temperature = "5 K" }`.

@@ -7,8 +7,10 @@ pub mod binding;
 pub mod codec;
 pub mod deploy;
 pub mod emulate;
+pub mod http;
 pub mod link;
 pub mod pattern;
+pub mod play;
 pub mod port;
 #[cfg(feature = "sila")]
 pub mod serve;

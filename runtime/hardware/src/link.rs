@@ -1,11 +1,12 @@
 //! A device at the other end of a line: exchanges as its driver declares them.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
-use crate::pattern::{matched, written};
+use crate::pattern::written;
 use crate::port::{self, Place, Port};
 
 /// Why a device did not do what it was told.
@@ -39,6 +40,8 @@ pub trait Overhear {
     fn out(&mut self, bytes: &[u8]);
     /// These bytes have come in.
     fn back(&mut self, bytes: &[u8]);
+    /// This is what an answer said that is put in later, under its word.
+    fn kept(&mut self, word: &str, text: &str);
 }
 
 /// A device that is spoken to.
@@ -64,6 +67,19 @@ pub trait Line {
     /// Whether the device is ready.
     fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
     -> Result<bool, Trouble>;
+
+    /// What answers said that is put in later, by its word.
+    fn kept(&self) -> BTreeMap<String, String> {
+        BTreeMap::new()
+    }
+
+    /// Whether something is to be put in that no answer has said: what it is about has never begun.
+    fn lacks(&self, _texts: &[String]) -> bool {
+        false
+    }
+
+    /// Puts back what an answer said to an earlier process.
+    fn keep(&mut self, _word: String, _text: String) {}
 }
 
 /// Opens the line to a device.
@@ -147,20 +163,32 @@ impl Link {
 
     /// The numbers of an answer, unless it is a refusal or says something else.
     fn judged(
-        &self,
+        &mut self,
         frame: &[u8],
         reply: &Reply,
         expects: Option<&Pattern>,
         driver: &Driver,
     ) -> Result<Vec<f64>, Trouble> {
-        if let Some(refused) = refusal(driver, reply) {
+        if let Some(refused) = self.refusal(driver, reply) {
             return Err(refused);
         }
         let Some(pattern) = expects else { return Ok(Vec::new()) };
-        matched(pattern, &reply.text).ok_or_else(|| {
+        self.codec.matched(pattern, &reply.text).ok_or_else(|| {
             let (to, expected) = (shown(frame), written(pattern));
-            Trouble::Garbled(format!("to `{to}` it answered `{}`, not `{expected}`", reply.text))
+            let is = self.codec.shown_reply(None, &reply.text);
+            Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
         })
+    }
+
+    /// The failure that an answer means.
+    fn refusal(&mut self, driver: &Driver, reply: &Reply) -> Option<Trouble> {
+        let named = driver.refusals.iter().find(|r| self.codec.matched(&r.reply, &reply.text).is_some());
+        let text = format!("it answered `{}`", self.codec.shown_reply(named.map(|n| &n.reply), &reply.text));
+        match named {
+            Some(named) => Some(Trouble::Refused { failure: named.failure.clone(), text }),
+            None if reply.is_error => Some(Trouble::Refused { failure: "refused".to_owned(), text }),
+            None => None,
+        }
     }
 }
 
@@ -179,7 +207,11 @@ impl Line for Link {
                 continue;
             }
             let reply = self.reply(&frame, ear)?;
+            let before = self.kept();
             numbers = self.judged(&frame, &reply, expects, driver)?;
+            for (word, text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
+                ear.kept(word, text);
+            }
         }
         Ok(numbers)
     }
@@ -207,23 +239,29 @@ impl Line for Link {
         let frame = self.codec.ask(text);
         self.send(&frame, ear)?;
         let reply = self.reply(&frame, ear)?;
-        if let Some(refused) = refusal(driver, &reply) {
+        if let Some(refused) = self.refusal(driver, &reply) {
             return Err(refused);
         }
         Ok(match &until.expects {
-            Some(pattern) => matched(pattern, &reply.text).is_some(),
+            Some(pattern) => self.codec.matched(pattern, &reply.text).is_some(),
             None => !reply.busy,
         })
     }
-}
 
-/// The failure that an answer means.
-pub(crate) fn refusal(driver: &Driver, reply: &Reply) -> Option<Trouble> {
-    let named = driver.refusals.iter().find(|r| matched(&r.reply, &reply.text).is_some());
-    let text = format!("it answered `{}`", reply.text);
-    match named {
-        Some(named) => Some(Trouble::Refused { failure: named.failure.clone(), text }),
-        None if reply.is_error => Some(Trouble::Refused { failure: "refused".to_owned(), text }),
-        None => None,
+    fn kept(&self) -> BTreeMap<String, String> {
+        match &self.codec {
+            Codec::Json(json) => json.kept().clone(),
+            _ => BTreeMap::new(),
+        }
+    }
+
+    fn lacks(&self, texts: &[String]) -> bool {
+        matches!(&self.codec, Codec::Json(json) if texts.iter().any(|t| json.lacks(t)))
+    }
+
+    fn keep(&mut self, word: String, text: String) {
+        if let Codec::Json(json) = &mut self.codec {
+            json.keep(word, text);
+        }
     }
 }

@@ -7,12 +7,18 @@ use std::time::Duration;
 use matterix_ir::wire::Transport;
 use serial2::{CharSize, Parity, SerialPort, Settings, StopBits};
 
+use crate::http;
+
 /// Bytes out and in.
 pub trait Port {
     /// Sends all of it.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
     /// What has come in, waiting at most so long for the first of it: none where nothing came in time.
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>>;
+    /// Has a file ready that a message may say is to go with it.
+    fn attach(&mut self, _name: &str, _bytes: Vec<u8>) -> io::Result<()> {
+        Err(io::Error::new(ErrorKind::Unsupported, "files do not go over this line"))
+    }
 }
 
 /// Where a device is to be found.
@@ -24,11 +30,13 @@ pub enum Place {
     Tcp(String),
     /// A server of SiLA 2, `HOST:PORT`.
     Sila(String),
+    /// A server at `HOST:PORT`.
+    Http(String),
 }
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text)) = self;
+        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text) | Place::Http(text)) = self;
         f.write_str(text)
     }
 }
@@ -45,6 +53,7 @@ pub fn open(place: &Place, transport: &Transport) -> io::Result<Box<dyn Port>> {
         Place::Serial(path) => Ok(Box::new(Serial(serial(path, transport)?))),
         Place::Tcp(address) => Ok(Box::new(Tcp(connect(address)?))),
         Place::Sila(_) => Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
+        Place::Http(address) => Ok(Box::new(http::open(address, transport)?)),
     }
 }
 
@@ -76,7 +85,7 @@ fn serial(path: &str, transport: &Transport) -> io::Result<SerialPort> {
     })
 }
 
-fn connect(address: &str) -> io::Result<TcpStream> {
+pub(crate) fn connect(address: &str) -> io::Result<TcpStream> {
     let all: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let mut last = io::Error::new(ErrorKind::NotFound, "there is no such host");
     for one in all {

@@ -5,8 +5,7 @@ use std::time::Duration;
 use matterix_ir::wire::{Driver, Pattern, Until};
 use matterix_sila_wire::{Client, Failure, is_of};
 
-use crate::codec::Reply;
-use crate::link::{Line, Overhear, Trouble, refusal};
+use crate::link::{Line, Overhear, Trouble};
 use crate::pattern::{matched, written};
 use crate::template;
 
@@ -38,11 +37,8 @@ fn trouble(failure: Failure, driver: &Driver, ear: &mut dyn Overhear) -> Trouble
         Failure::Garbled(why) => Trouble::Garbled(why),
         Failure::Refused { name, message } => {
             ear.back(format!("{name}: {message}").as_bytes());
-            let reply = Reply { is_error: true, ..Reply::of(name.as_str()) };
-            let failure = match refusal(driver, &reply) {
-                Some(Trouble::Refused { failure, .. }) => failure,
-                _ => name.clone(),
-            };
+            let named = driver.refusals.iter().find(|r| matched(&r.reply, &name).is_some());
+            let failure = named.map_or_else(|| "refused".to_owned(), |named| named.failure.clone());
             Trouble::Refused { failure, text: format!("it answered `{name}`: {message}") }
         }
     }

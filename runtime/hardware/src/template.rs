@@ -51,6 +51,16 @@ pub struct Found {
     pub value: f64,
     /// Half of the last digit, SI.
     pub precision: f64,
+    /// Other values that are written alike.
+    pub alike: Vec<f64>,
+}
+
+impl Found {
+    /// Whether a value is written like this.
+    pub fn fits(&self, value: f64) -> bool {
+        (value - self.value).abs() <= self.precision * (1.0 + 1e-9) + 1e-12 * self.value.abs()
+            || self.alike.contains(&value)
+    }
 }
 
 /// The values of a message of this form; nothing where it has another.
@@ -66,13 +76,15 @@ pub fn found(template: &Template, message: &str) -> Option<Vec<Found>> {
                 let number: f64 = rest[..end].parse().ok().filter(|n: &f64| n.is_finite())?;
                 let digits = rest[..end].split_once('.').map_or(0, |(_, d)| d.len());
                 let precision = 0.5 * 10f64.powi(-(digits.min(15) as i32)) * unit.factor.abs();
-                out.push(Found { node: *value, value: unit.to_si(number), precision });
+                out.push(Found { node: *value, value: unit.to_si(number), precision, alike: Vec::new() });
                 rest = &rest[end..];
             }
             Piece::Word(node, words) => {
                 let longest = words.iter().enumerate().filter(|(_, w)| rest.starts_with(w.as_str()));
-                let (index, word) = longest.max_by_key(|(_, w)| w.len())?;
-                out.push(Found { node: *node, value: index as f64, precision: 0.0 });
+                let (index, word) = longest.min_by_key(|(i, w)| (std::cmp::Reverse(w.len()), *i))?;
+                let same = words.iter().enumerate().skip(index + 1).filter(|(_, w)| *w == word);
+                let alike = same.map(|(i, _)| i as f64).collect();
+                out.push(Found { node: *node, value: index as f64, precision: 0.0, alike });
                 rest = &rest[word.len()..];
             }
         }

@@ -2,6 +2,9 @@
 
 mod bindings;
 mod faulty;
+mod kills;
+mod server;
+mod stop;
 mod whole;
 
 use std::io::{BufRead, BufReader, Read, Write};

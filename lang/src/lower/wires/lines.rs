@@ -61,6 +61,10 @@ impl<'a> Planner<'a, '_> {
                 Value::Enum(node, words) => Piece::Word(node, words.to_vec()),
                 Value::Bool(node) => Piece::Word(node, vec!["false".to_string(), "true".to_string()]),
                 Value::Text(text) => Piece::Plain(text),
+                Value::Instance(i) | Value::Qualified(i, _) => {
+                    Piece::Plain(self.lab.instances[i.0 as usize].name.clone())
+                }
+                Value::Nothing if self.lenient => return None,
                 Value::Nothing | Value::Unlimited => {
                     let headline = "what a device is to be sent is not given in this lab";
                     let d = Diagnostic::error(codes::DRIVER_LINE, value.span, headline, "not given");

@@ -4,7 +4,9 @@
 //! checked is what runs. A line maps a command of the device, or a primitive skill of whose parameters one, `self`, is the
 //! device. What is sent is an expression of the command's arguments and the device's members.
 
+mod hosted;
 mod lines;
+mod message;
 mod offers;
 mod pattern;
 mod served;
@@ -63,7 +65,11 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             let Some(kind) = self.lab.kind_named(device, names.decl(id).module) else { continue };
+            let under = self.under(transport, names.decl(id).module);
             for instance in self.lab.instances_of(kind) {
+                if under.is_some_and(|under| self.host(under, instance).is_none()) {
+                    continue;
+                }
                 if let Some(driver) = self.driver(id, instance) {
                     self.drivers.push((id, driver));
                 }
@@ -72,13 +78,13 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// Notes what is said for an operation.
-    pub(super) fn call_wires(&mut self, step: StepId, verb: &str, bound: &Bound, device: Option<InstanceId>) {
+    pub(super) fn call_wires(&mut self, step: StepId, of: &Sig, bound: &Bound, device: Option<InstanceId>) {
         if self.wires == Wires::Off || self.draft {
             return;
         }
         for at in 0..self.drivers.len() {
             let (id, instance) = (self.drivers[at].0, self.drivers[at].1.instance);
-            let Some((line, sig)) = self.line_for(id, verb, bound, device, instance) else { continue };
+            let Some((line, sig)) = self.line_for(id, of, bound, device, instance) else { continue };
             let module = self.lab.tables.names.decl(id).module;
             let mut scope = Scope::of(instance, module);
             bind(sig, &bound.values, &mut scope);
@@ -93,7 +99,7 @@ impl<'a> Planner<'a, '_> {
     fn line_for(
         &self,
         driver: DeclId,
-        verb: &str,
+        of: &Sig,
         bound: &Bound,
         device: Option<InstanceId>,
         instance: InstanceId,
@@ -101,7 +107,7 @@ impl<'a> Planner<'a, '_> {
         let ItemKind::Driver { wires, .. } = &self.lab.tables.names.decl(driver).item.kind else { return None };
         wires.iter().find_map(|w| {
             let WireKind::Command { sig, exchange } = &w.kind else { return None };
-            if verb_text(&sig.verb) != verb || sig.all_params().count() > bound.values.len() {
+            if verb_text(&sig.verb) != verb_text(&of.verb) || !sig.has_form_of(of) {
                 return None;
             }
             let is_it = match self_of(sig) {
@@ -119,11 +125,17 @@ impl<'a> Planner<'a, '_> {
         let decl = self.lab.tables.names.decl(id);
         let ItemKind::Driver { name, transport, args, wires, .. } = &decl.item.kind else { return None };
         let module = decl.module;
-        let line = self.transport(transport, args, name.span, module)?;
+        let under = self.under(transport, module);
+        let line = match under {
+            Some(under) => self.line_of(under, transport, args)?,
+            None => self.transport(transport, args, name.span, module)?,
+        };
+        let host = under.and_then(|under| self.host(under, instance));
         let mut driver = Driver {
             name: name.text.clone(),
             instance,
             transport: line.transport,
+            host,
             framing: line.framing,
             address: line.address,
             timeout: line.timeout,
@@ -131,6 +143,7 @@ impl<'a> Planner<'a, '_> {
             close: Vec::new(),
             halt: Vec::new(),
             safe: Vec::new(),
+            play: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),
             answers: Vec::new(),
@@ -140,9 +153,22 @@ impl<'a> Planner<'a, '_> {
             span: name.span,
         };
         self.repeated(wires);
+        // What stands where a message has no word for it is not on this line.
+        let lenient = std::mem::replace(&mut self.lenient, driver.host.is_some());
         for w in wires {
             self.line(w, instance, module, &mut driver);
         }
+        self.lenient = lenient;
+        let opens = wires.iter().filter(|w| matches!(&w.kind, WireKind::Fixed { when, .. } if when.text == "open"));
+        if driver.host.is_some() && driver.open.len() < opens.count() {
+            return None;
+        }
+        for w in under.map_or(&[][..], |u| u.wires) {
+            if let WireKind::Reply { .. } = &w.kind {
+                self.line(w, instance, module, &mut driver);
+            }
+        }
+        self.check_messages(&driver, wires, under);
         Some(driver)
     }
 
@@ -156,6 +182,7 @@ impl<'a> Planner<'a, '_> {
                     "open" => driver.open.push(exchange),
                     "close" => driver.close.push(exchange),
                     "halt" => driver.halt.push(exchange),
+                    "play" => driver.play.push(exchange),
                     _ => driver.safe.push(exchange),
                 }
             }
@@ -186,7 +213,8 @@ impl<'a> Planner<'a, '_> {
             WireKind::Command { sig, exchange } => {
                 let Some(mapped) = self.mapped(sig, instance, module) else { return };
                 if self.lab.prototype || self.wires == Wires::Served {
-                    driver.served.extend(self.served(mapped, sig, exchange, w.span, instance, module));
+                    let host = driver.host.as_ref().map(|h| h.instance);
+                    driver.served.extend(self.served(mapped, (sig, exchange, w.span), instance, module, host));
                 }
             }
         }

@@ -40,7 +40,7 @@ impl<'a> Planner<'a, '_> {
 
     fn offer(&mut self, id: InstanceId, m: MemberRef<'a>) {
         let MemberKind::Command { sig, clauses } = &m.member.kind else { return };
-        let arrangements = self.arrangements(sig, clauses, "", id, m.module);
+        let arrangements = self.arrangements(sig, clauses, "", id, m.module, None);
         if arrangements.len() > MOST {
             return;
         }
@@ -68,7 +68,7 @@ impl<'a> Planner<'a, '_> {
             let label = format!("{verb} {}", self.lab.instances[id.0 as usize].name);
             let span = sig.span;
             let step = self.add(label, span, Step::Operation(Box::new(operation)));
-            self.call_wires(step, &verb, &Bound { values }, Some(id));
+            self.call_wires(step, sig, &Bound { values }, Some(id));
             // A device may also take its time.
             lasts |= self.drivers.iter().any(|(_, d)| d.call(step).is_some_and(|e| e.until.is_some()));
             let step = match invariants.is_empty() {
@@ -102,7 +102,7 @@ impl<'a> Planner<'a, '_> {
         for id in names.declared_by(module).collect::<Vec<_>>() {
             let item = names.decl(id).item;
             let ItemKind::Skill { sig, clauses, body: Some(body), handlers, .. } = &item.kind else { continue };
-            let arrangements = self.arrangements(sig, clauses, "", InstanceId(0), module);
+            let arrangements = self.arrangements(sig, clauses, "", InstanceId(0), module, None);
             if arrangements.len() > MOST {
                 continue;
             }
@@ -111,7 +111,7 @@ impl<'a> Planner<'a, '_> {
             for clause in clauses {
                 match &clause.kind {
                     ClauseKind::Fails(names) => fails.extend(names.iter().map(|n| n.text.clone())),
-                    ClauseKind::Needs { failure: Some(failure), .. } => fails.push(failure.text.clone()),
+                    ClauseKind::Needs { refusal: Some(refusal), .. } => fails.push(refusal.failure.text.clone()),
                     _ => {}
                 }
             }

@@ -10,7 +10,7 @@ use crate::ast::{self, Clause, ItemKind, MemberKind, Name, Sig, WireKind};
 use crate::eval::{Num, Scope, Type, Value};
 use crate::lower::Planner;
 use crate::lower::call::Bound;
-use crate::names::verb_text;
+use crate::names::{DeclId, verb_text};
 
 /// Values of parameters, and the locals among them.
 #[derive(Clone, Default)]
@@ -27,11 +27,10 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn served(
         &mut self,
         mapped: Mapped<'a>,
-        line: &'a Sig,
-        exchange: &'a ast::Exchange,
-        span: Span,
+        (line, exchange, span): (&'a Sig, &'a ast::Exchange, Span),
         instance: InstanceId,
         module: usize,
+        host: Option<InstanceId>,
     ) -> Vec<Served> {
         let (sig, clauses, of, own): (&'a Sig, &'a [Clause], usize, &str) = match mapped {
             Mapped::Command(m) => match &m.member.kind {
@@ -43,7 +42,7 @@ impl<'a> Planner<'a, '_> {
                 _ => return Vec::new(),
             },
         };
-        let arrangements = self.arrangements(sig, clauses, own, instance, of);
+        let arrangements = self.arrangements(sig, clauses, own, instance, of, host);
         let mut out = Vec::new();
         for Arrangement { values, locals: arguments } in arrangements {
             let mut scope = Scope::of(instance, module);
@@ -70,6 +69,7 @@ impl<'a> Planner<'a, '_> {
         own: &str,
         instance: InstanceId,
         of: usize,
+        host: Option<InstanceId>,
     ) -> Vec<Arrangement> {
         let mut arrangements = vec![Arrangement::default()];
         let options = clauses.iter().filter_map(|clause| match &clause.kind {
@@ -90,9 +90,13 @@ impl<'a> Planner<'a, '_> {
                     (vec![value.unwrap_or(Value::Error)], None)
                 }
                 Some(Type::Instance { kinds, .. }) if !self.lab.prototype => {
-                    let all = 0..self.lab.instances.len() as u32;
-                    let fits = |i: &InstanceId| kinds.iter().all(|k| self.lab.instance_is(*i, *k));
-                    (all.map(InstanceId).filter(fits).map(Value::Instance).collect(), None)
+                    let all = self.all_of(&kinds, instance, host);
+                    (all.into_iter().map(Value::Instance).collect(), None)
+                }
+                Some(Type::List(of)) if !self.lab.prototype && matches!(*of, Type::Instance { .. }) => {
+                    let Type::Instance { kinds, .. } = &*of else { return Vec::new() };
+                    let all = self.all_of(kinds, instance, host);
+                    (self.one_or_a_column(&all).into_iter().map(Value::List).collect(), None)
                 }
                 Some(ty) => self.open_value(&ty, &name),
                 None => (vec![Value::Error], None),
@@ -112,6 +116,34 @@ impl<'a> Planner<'a, '_> {
                 .collect();
         }
         arrangements
+    }
+
+    /// The things of these kinds that a command of a device can be about: over the line of another device only what belongs
+    /// to that.
+    fn all_of(&self, kinds: &[DeclId], device: InstanceId, host: Option<InstanceId>) -> Vec<InstanceId> {
+        let all = (0..self.lab.instances.len() as u32).map(InstanceId);
+        let fits = |i: &InstanceId| {
+            kinds.iter().all(|k| self.lab.instance_is(*i, *k)) && host.is_none_or(|h| self.reaches(h, device, *i))
+        };
+        all.filter(fits).collect()
+    }
+
+    /// Lists that a command can be about: each thing by itself, and each column of a grid of them.
+    fn one_or_a_column(&self, all: &[InstanceId]) -> Vec<Vec<Value>> {
+        let mut columns: Vec<Vec<InstanceId>> = Vec::new();
+        for grid in self.lab.instances.iter().flat_map(|i| &i.grids) {
+            let mut last = None;
+            for (place, child) in grid.children.iter().filter(|(_, child)| all.contains(child)) {
+                match columns.last_mut() {
+                    Some(column) if last == Some(place.column) => column.push(*child),
+                    _ => columns.push(vec![*child]),
+                }
+                last = Some(place.column);
+            }
+        }
+        let ones = all.iter().map(|i| vec![*i]);
+        let lists = ones.chain(columns.into_iter().filter(|c| c.len() > 1));
+        lists.map(|list| list.into_iter().map(Value::Instance).collect()).collect()
     }
 
     /// A value that is known only when it comes over the line.
@@ -196,7 +228,7 @@ impl<'a> Planner<'a, '_> {
             self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, "how is it said?"));
             return None;
         };
-        self.served(Mapped::Command(m), sig, exchange, at, instance, module).into_iter().next()
+        self.served(Mapped::Command(m), (sig, exchange, at), instance, module, None).into_iter().next()
     }
 
     /// The lines of the driver that a place in the text belongs to.

@@ -1,6 +1,6 @@
 //! The line of a driver: `serial(baud: 9600, frame: "7E1", framing: line, timeout: 1 s)`.
 
-use matterix_ir::wire::{CALLS, FRAMINGS, Transport};
+use matterix_ir::wire::{CALLS, FRAMINGS, JSON, Transport};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Arg, Expr, ExprKind, Name};
@@ -19,6 +19,9 @@ pub(super) struct Line {
 const SERIAL: &[&str] = &["baud", "frame", "framing", "address", "timeout"];
 const TCP: &[&str] = &["framing", "address", "timeout"];
 const SILA: &[&str] = &["feature", "timeout"];
+const HTTP: &[&str] = &["header", "timeout"];
+/// What a line may go without.
+const OPTIONAL: &[&str] = &["address", "header"];
 const BAUDS: std::ops::RangeInclusive<f64> = 50.0..=4_000_000.0;
 
 impl<'a> Planner<'a, '_> {
@@ -27,13 +30,14 @@ impl<'a> Planner<'a, '_> {
             "serial" => SERIAL,
             "tcp" => TCP,
             "sila" => SILA,
+            "http" => HTTP,
             _ => {
                 let headline = format!("there is no transport `{}`", name.text);
                 self.wrong(
                     name.span,
                     &headline,
                     "not a kind of line",
-                    "a driver speaks over `serial`, `tcp` or `sila`",
+                    "a driver speaks over `serial`, `tcp`, `http` or `sila`, or over the line of another driver",
                 );
                 return None;
             }
@@ -61,11 +65,13 @@ impl<'a> Planner<'a, '_> {
             }
         }
         let given = |key: &str| args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == key)).map(|a| &a.value);
-        let missing: Vec<&str> = known.iter().copied().filter(|k| *k != "address" && given(k).is_none()).collect();
+        let missing: Vec<&str> =
+            known.iter().copied().filter(|k| !OPTIONAL.contains(k) && given(k).is_none()).collect();
         if !missing.is_empty() {
             let headline = format!("the line of this driver lacks {}", list(&missing));
             let help = match name.text.as_str() {
                 "sila" => "as in `over sila(feature: \"org.example/heating/Hotplate/v1\", timeout: 5 s)`",
+                "http" => "as in `over http(timeout: 1 min)`",
                 _ => "as in `over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 1 s)`",
             };
             self.wrong(at, &headline, "nothing is taken for granted here", help);
@@ -78,9 +84,13 @@ impl<'a> Planner<'a, '_> {
         }
         let transport = match name.text.as_str() {
             "serial" => self.serial(given("baud")?, given("frame")?, module)?,
+            "http" => Transport::Http { header: self.header(given("header"))? },
             _ => Transport::Tcp,
         };
-        let framing = self.framing(given("framing")?)?;
+        let framing = match transport {
+            Transport::Http { .. } => JSON.to_owned(),
+            _ => self.framing(given("framing")?)?,
+        };
         let address = match given("address") {
             Some(e) => Some(self.address(e, module)?),
             None => None,
@@ -139,6 +149,27 @@ impl<'a> Planner<'a, '_> {
         Some(Transport::Serial { baud: rate as u32, data_bits: data - b'0', parity, stop_bits: stop - b'0' })
     }
 
+    /// `header: "Name: value"`; the outer nothing where it is no header.
+    fn header(&mut self, given: Option<&'a Expr>) -> Option<Option<(String, String)>> {
+        let Some(e) = given else { return Some(None) };
+        let named = match &*e.kind {
+            ExprKind::Text(text) => text.split_once(':').map(|(n, v)| (n.trim().to_owned(), v.trim().to_owned())),
+            _ => None,
+        };
+        let is_token = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_".contains(&b));
+        let is_value = |v: &str| v.bytes().all(|b| (0x20..0x7f).contains(&b));
+        let good = named.filter(|(n, v)| is_token(n) && is_value(v));
+        if good.is_none() {
+            self.wrong(
+                e.span,
+                "this is no header",
+                "not understood",
+                "a name and a value, as in `\"Accept: text/json\"`",
+            );
+        }
+        good.map(Some)
+    }
+
     fn framing(&mut self, e: &'a Expr) -> Option<String> {
         let word = match &*e.kind {
             ExprKind::Name(n) => n.text.as_str(),
@@ -171,7 +202,7 @@ impl<'a> Planner<'a, '_> {
         }
     }
 
-    fn wrong(&mut self, span: Span, headline: &str, label: &str, help: &str) {
+    pub(super) fn wrong(&mut self, span: Span, headline: &str, label: &str, help: &str) {
         self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, headline, label).help(help));
     }
 }

@@ -1,10 +1,17 @@
 //! Framings: how a text is put on a line and taken off again, from both ends.
 
 mod cavro;
+mod json;
 mod line;
 
 use cavro::Cavro;
+pub use json::{Json, LONGEST as LONGEST_JSON};
 use line::Line;
+use matterix_ir::Unit;
+use matterix_ir::wire::{JSON, Pattern, Template};
+
+use crate::pattern;
+use crate::template::{self, Found};
 
 /// Longest frame that is taken for one, bytes.
 pub const LONGEST: usize = 4096;
@@ -58,6 +65,8 @@ pub enum Codec {
     Line(Line),
     /// Tecan Cavro pumps.
     Cavro(Cavro),
+    /// Requests to a server, with bodies in JSON.
+    Json(Json),
 }
 
 impl Codec {
@@ -72,13 +81,14 @@ impl Codec {
             matterix_ir::wire::CALLS => Codec::Line(Line::new("", "")),
             "cavro_dt" => Codec::Cavro(Cavro::new(false, address)?),
             "cavro_oem" => Codec::Cavro(Cavro::new(true, address)?),
+            JSON => Codec::Json(Json::default()),
             other => return Err(format!("there is no framing `{other}`")),
         })
     }
 
     /// Whether every frame is answered.
     pub fn acknowledges(&self) -> bool {
-        matches!(self, Codec::Cavro(_))
+        matches!(self, Codec::Cavro(_) | Codec::Json(_))
     }
 
     /// Commands as frames.
@@ -86,6 +96,7 @@ impl Codec {
         match self {
             Codec::Line(line) => texts.iter().map(|t| line.request(t)).collect(),
             Codec::Cavro(cavro) => vec![cavro.request(&format!("{}R", texts.concat()))],
+            Codec::Json(json) => texts.iter().map(|t| json.request(t)).collect(),
         }
     }
 
@@ -94,6 +105,7 @@ impl Codec {
         match self {
             Codec::Line(line) => line.request(text),
             Codec::Cavro(cavro) => cavro.request(text),
+            Codec::Json(json) => json.request(text),
         }
     }
 
@@ -102,6 +114,7 @@ impl Codec {
         match self {
             Codec::Line(line) => line.take(buffer, false).map(|text| text.map(Reply::of)),
             Codec::Cavro(cavro) => cavro.take_reply(buffer),
+            Codec::Json(json) => json.take_reply(buffer),
         }
     }
 
@@ -110,6 +123,7 @@ impl Codec {
         match self {
             Codec::Line(line) => line.take(buffer, true).map(|text| text.map(|t| Request::Says(vec![t]))),
             Codec::Cavro(cavro) => cavro.take_request(buffer),
+            Codec::Json(json) => json.take_request(buffer),
         }
     }
 
@@ -118,6 +132,47 @@ impl Codec {
         match self {
             Codec::Line(line) => line.reply(&reply.text),
             Codec::Cavro(cavro) => cavro.reply(reply),
+            Codec::Json(json) => json.reply(&reply.text),
+        }
+    }
+
+    /// The numbers of an answer that looks like this, SI, in order; nothing where it looks otherwise.
+    pub fn matched(&mut self, pattern: &Pattern, reply: &str) -> Option<Vec<f64>> {
+        match self {
+            Codec::Json(json) => json.matched(pattern, reply),
+            _ => pattern::matched(pattern, reply),
+        }
+    }
+
+    /// An answer for messages: where it is long, what a pattern looks at.
+    pub fn shown_reply(&self, pattern: Option<&Pattern>, reply: &str) -> String {
+        match self {
+            Codec::Json(json) => json.shown(pattern, reply),
+            _ => reply.to_owned(),
+        }
+    }
+
+    /// The device's end: the values of a request of this form; nothing where it has another.
+    pub fn found(&self, template: &Template, request: &str) -> Option<Vec<Found>> {
+        match self {
+            Codec::Json(json) => json.found(template, request),
+            _ => template::found(template, request),
+        }
+    }
+
+    /// The device's end: whether a request is this one.
+    pub fn asked(&self, known: &Pattern, request: &str) -> bool {
+        match self {
+            Codec::Json(json) => json.asked(known, request),
+            _ => pattern::matched(known, request).is_some(),
+        }
+    }
+
+    /// The device's end: an answer that looks like this; `number` says what its numbers are, in their units.
+    pub fn rendered(&mut self, pattern: &Pattern, number: impl FnMut(&Unit) -> String) -> String {
+        match self {
+            Codec::Json(json) => json.rendered(pattern, number),
+            _ => pattern::rendered(pattern, number),
         }
     }
 

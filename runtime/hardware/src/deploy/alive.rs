@@ -5,7 +5,7 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
-use super::backend::Hardware;
+use super::hardware::Hardware;
 
 impl Hardware<'_, '_> {
     /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.
@@ -56,9 +56,9 @@ impl Hardware<'_, '_> {
 
     /// A command apart from the plan.
     fn serve(&mut self, device: usize, served: &Served, out: &mut dyn Listener) -> Result<(), Fault> {
+        let texts = self.texts(&served.exchange.sends);
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
-        let texts = self.texts(&served.exchange.sends);
         self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
     }
 }

@@ -22,6 +22,13 @@ pub enum Carrier {
         /// The device's address on it, where it is another than the driver's.
         address: Option<String>,
     },
+    /// A device over the line of another one.
+    Shared {
+        /// Index of the driver in the program.
+        driver: usize,
+        /// Place of the other among the devices.
+        host: usize,
+    },
     /// A person, who confirms.
     Hand,
 }
@@ -45,7 +52,9 @@ pub struct Device<'m> {
     pub binding: Binding,
     /// How it is spoken to; none where hands do it.
     pub driver: Option<&'m Driver>,
-    /// The open line.
+    /// Place of the device whose line it is, where it has none of its own.
+    pub host: Option<usize>,
+    /// The open line, where it has one of its own.
     pub link: Option<Box<dyn Line>>,
     /// Frames for a dry run.
     pub codec: Option<Codec>,
@@ -60,15 +69,23 @@ impl<'m> Device<'m> {
     pub fn new(program: &'m Program, binding: Binding) -> Result<Self, String> {
         let (driver, codec) = match &binding.carrier {
             Carrier::Hand => (None, None),
+            Carrier::Shared { driver, .. } => {
+                let driver = program.drivers.get(*driver).ok_or("the program has no such driver")?;
+                (Some(driver), Some(Codec::new(&driver.framing, None)?))
+            }
             Carrier::Line { driver, address, .. } => {
                 let driver = program.drivers.get(*driver).ok_or("the program has no such driver")?;
                 let address = address.as_deref().or(driver.address.as_deref());
                 (Some(driver), Some(Codec::new(&driver.framing, address)?))
             }
         };
+        let host = match &binding.carrier {
+            Carrier::Shared { host, .. } => Some(*host),
+            _ => None,
+        };
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
-        Ok(Device { name, binding, driver, link: None, codec, lost: None, beats })
+        Ok(Device { name, binding, driver, host, link: None, codec, lost: None, beats })
     }
 }
 
@@ -89,5 +106,10 @@ impl Overhear for Ear<'_, '_> {
     fn back(&mut self, bytes: &[u8]) {
         (self.trace)(self.time, self.device, false, bytes);
         self.journal.note(&Entry::Back { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
+    }
+
+    fn kept(&mut self, word: &str, text: &str) {
+        let (word, text) = (word.to_owned(), text.to_owned());
+        self.journal.note(&Entry::Kept { t: self.time, device: self.device.to_owned(), word, text });
     }
 }

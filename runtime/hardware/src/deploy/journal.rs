@@ -27,6 +27,11 @@ pub enum Entry {
         /// Seconds of lab time per second.
         speed: f64,
     },
+    /// All lines are open, and what drivers say then has been said.
+    Opened {
+        /// s.
+        t: f64,
+    },
     /// The lab has come to this time.
     Time {
         /// s.
@@ -95,6 +100,17 @@ pub enum Entry {
         device: String,
         /// As shown.
         bytes: String,
+    },
+    /// What an answer said that is put into later messages.
+    Kept {
+        /// s.
+        t: f64,
+        /// Whose answer it was.
+        device: String,
+        /// The word that its driver keeps it under.
+        word: String,
+        /// What it said.
+        text: String,
     },
     /// From here on another process has gone on.
     Resumed {

@@ -3,13 +3,17 @@
 mod alive;
 mod backend;
 mod device;
+mod hardware;
 mod journal;
 mod observe;
 mod preflight;
+mod replay;
 mod sense;
+mod speak;
+mod values;
 
-pub use backend::{Hardware, Mode, Settings};
 pub use device::{Binding, Carrier, Device};
+pub use hardware::{Hardware, Mode, Settings};
 pub use journal::{Entry, Journal, JournalError, digest};
 pub use preflight::preflight;
 

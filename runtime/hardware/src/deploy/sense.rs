@@ -1,14 +1,16 @@
 //! Opening lines, holding what devices tell against the twin, going on after a journal, and leaving devices safe.
 
 use matterix_ir::codes;
+use matterix_ir::wire::Driver;
 use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
-use super::backend::{Hardware, Mode, wall};
 use super::device::{Carrier, Ear};
+use super::hardware::{Hardware, Mode, wall};
 use super::journal::Entry;
-use crate::link::{self, Trouble};
+use crate::link::{self, Line, Trouble};
+use crate::port::Place;
 
 /// Rounding, in units of the last digit that a device tells.
 const ROUNDING: f64 = 0.51;
@@ -18,12 +20,9 @@ impl Hardware<'_, '_> {
     pub fn open(&mut self, again: bool) -> Result<(), Fault> {
         for index in 0..self.devices.len() {
             let device = &self.devices[index];
-            let (Some(driver), Carrier::Line { place, address, .. }) = (device.driver, &device.binding.carrier) else {
-                continue;
-            };
-            let (place, address, name) = (place.clone(), address.clone(), device.name);
-            if !self.is_dry() {
-                match link::open(&place, driver, address.as_deref()) {
+            let (Some(driver), name) = (device.driver, device.name) else { continue };
+            if let (Carrier::Line { place, address, .. }, false) = (device.binding.carrier.clone(), self.is_dry()) {
+                match self.linked(index, driver, &place, address.as_deref()) {
                     Ok(link) => self.devices[index].link = Some(link),
                     Err(trouble) => return Err(self.trouble(index, &trouble, driver.span)),
                 }
@@ -36,10 +35,9 @@ impl Hardware<'_, '_> {
                 let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
                 let mut ready = false;
                 for _ in 0..tries {
-                    let time = self.twin.now();
-                    let device = &mut self.devices[index];
+                    let (time, line) = (self.twin.now(), self.line_of(index));
                     let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-                    let asked = match device.link.as_mut() {
+                    let asked = match self.devices[line].link.as_mut() {
                         Some(link) => link.is_ready(&text, until, driver, &mut ear),
                         None => Err(Trouble::Lost("its line is not open".to_owned())),
                     };
@@ -56,7 +54,26 @@ impl Hardware<'_, '_> {
             }
         }
         self.set_clock();
+        if !again {
+            let t = self.twin.now();
+            self.keep(&Entry::Opened { t })?;
+        }
         Ok(())
+    }
+
+    /// A new line to a device, with what answers over an earlier one said.
+    fn linked(
+        &self,
+        index: usize,
+        driver: &Driver,
+        place: &Place,
+        address: Option<&str>,
+    ) -> Result<Box<dyn Line>, Trouble> {
+        let mut link = link::open(place, driver, address)?;
+        for (_, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
+            link.keep(word.clone(), text.clone());
+        }
+        Ok(link)
     }
 
     #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
@@ -70,6 +87,12 @@ impl Hardware<'_, '_> {
             Entry::Time { wall, .. } | Entry::Resumed { wall, .. } | Entry::Begin { wall, .. } => Some(*wall),
             _ => None,
         });
+        for entry in &entries {
+            let Entry::Kept { device, word, text, .. } = entry else { continue };
+            if let Some(index) = self.devices.iter().position(|d| d.name == device) {
+                self.kept.push((self.line_of(index), word.clone(), text.clone()));
+            }
+        }
         self.left_at = last.unwrap_or_else(wall);
         self.replay = entries.into();
         self.resuming = true;
@@ -80,6 +103,14 @@ impl Hardware<'_, '_> {
         if !std::mem::take(&mut self.resuming) {
             return Ok(());
         }
+        self.catch_up(out).map_err(|fault| {
+            self.refused.set(true);
+            let code = if fault.code == codes::DIVERGED { codes::JOURNAL_MISMATCH } else { fault.code };
+            Fault { code, ..fault }
+        })
+    }
+
+    fn catch_up(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
         let away = (wall() - self.left_at).max(0.0) * self.settings.speed;
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
@@ -195,14 +226,18 @@ impl Hardware<'_, '_> {
             if self.devices[index].link.is_none() && !self.is_dry() && !driver.safe.is_empty() {
                 // A line that was lost may be there again.
                 if let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() {
-                    self.devices[index].link = link::open(&place, driver, address.as_deref()).ok();
+                    self.devices[index].link = self.linked(index, driver, &place, address.as_deref()).ok();
                     if self.devices[index].link.is_some() {
                         self.devices[index].lost = None;
                     }
                 }
             }
+            let line = self.line_of(index);
             for exchange in &driver.safe {
                 let texts = self.texts(&exchange.sends);
+                if self.devices[line].link.as_ref().is_some_and(|link| link.lacks(&texts)) {
+                    continue;
+                }
                 if let Err(fault) = self.say(index, &texts, exchange.expects.as_ref(), exchange.span) {
                     troubles.push(fault.message);
                     break;

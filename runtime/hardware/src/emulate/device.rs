@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 
 use matterix_ir::Unit;
 use matterix_ir::plan::Operation;
-use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Told};
+use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Template, Told};
 use matterix_runtime::backend::{Backend, Sim, Status, Ticket};
 use matterix_runtime::fault::Fault;
 
 use super::solve::solve;
 use crate::codec::{Codec, Reply, Request};
-use crate::pattern;
 use crate::template::{self, Found};
 
 /// The failure that a driver gives to what its device does not understand.
@@ -21,23 +20,25 @@ const BUSY: &str = "busy";
 /// A device in its lab.
 pub struct Emulator<'m> {
     sim: Sim<'m>,
-    driver: &'m Driver,
+    /// The device's, then those over its line.
+    drivers: Vec<&'m Driver>,
     codec: Codec,
     running: Vec<(Ticket, &'m Operation)>,
-    /// The last message of each form, by command and by its place among what that sends.
-    heard: BTreeMap<(usize, usize), Vec<Found>>,
+    /// The last message of each form, by driver, command and its place among what that sends.
+    heard: BTreeMap<(usize, usize, usize), Vec<Found>>,
     /// What was answered last.
     last: Vec<u8>,
     input: Vec<u8>,
 }
 
 impl<'m> Emulator<'m> {
-    /// The device of a driver in a lab that has been started.
-    pub fn new(sim: Sim<'m>, driver: &'m Driver, address: Option<&str>) -> Result<Self, String> {
-        let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
+    /// The device of the first of these drivers in a lab that has been started; the others speak over its line.
+    pub fn new(sim: Sim<'m>, drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
+        let first = drivers.first().ok_or("no driver says how it is spoken to")?;
+        let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
         Ok(Emulator {
             sim,
-            driver,
+            drivers,
             codec,
             running: Vec::new(),
             heard: BTreeMap::new(),
@@ -121,45 +122,64 @@ impl<'m> Emulator<'m> {
     }
 
     fn word(&mut self, word: &str) -> Result<Option<Reply>, Fault> {
-        let driver = self.driver;
         if let Some(told) = self.asked(word) {
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
-        let endings = driver.served.iter().map(|s| &s.exchange).chain(&driver.open).filter_map(|e| e.until.as_ref());
-        for until in endings.collect::<Vec<_>>() {
-            if template::found(&until.asks, word).is_some() {
+        let endings = self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open));
+        let endings: Vec<_> = endings.filter_map(|e| e.until.as_ref()).collect();
+        let answer = self.answer(word);
+        for until in endings {
+            if self.codec.found(&until.asks, word).is_some() {
                 let text = match &until.expects {
-                    Some(pattern) if self.running.is_empty() => pattern::rendered(pattern, |_| "0".to_owned()),
-                    Some(_) => "BUSY".to_owned(),
+                    Some(pattern) if self.running.is_empty() => self.plain(pattern),
+                    Some(_) => answer.unwrap_or_else(|| "BUSY".to_owned()),
                     None => String::new(),
                 };
                 return Ok(Some(Reply::of(text)));
             }
         }
-        if let Some((_, with)) = driver.answers.iter().find(|(asked, _)| pattern::matched(asked, word).is_some()) {
-            let engine = self.sim.engine();
-            let text = template::filled(with, |n| Some(engine.eval(n)));
-            return Ok(text.filter(|t| !t.is_empty()).map(Reply::of));
+        if let Some(text) = answer {
+            return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
         }
         if let Some(reply) = self.command(word)? {
             return Ok(reply);
         }
-        for (exchange, halts) in fixed(driver) {
-            let is_it = exchange.sends.iter().any(|t| self.codec.is_word(&template::written(t), word));
-            if is_it {
+        for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<_>>() {
+            let mut is_it = |t: &Template| self.codec.is_word(&template::written(t), word) || self.says(t, word);
+            if exchange.sends.iter().any(&mut is_it) {
                 if halts {
                     self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
                 }
-                return Ok(exchange.expects.as_ref().map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned()))));
+                return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p))));
             }
         }
         Ok(self.refuse(NOT_UNDERSTOOD))
     }
 
+    /// An answer without numbers of its own.
+    fn plain(&mut self, pattern: &Pattern) -> String {
+        self.codec.rendered(pattern, |_| "0".to_owned())
+    }
+
+    /// Whether a message is this one with the values that it has now.
+    fn says(&mut self, template: &Template, word: &str) -> bool {
+        let Some(found) = self.codec.found(template, word) else { return false };
+        let engine = self.sim.engine();
+        found.iter().all(|f| f.fits(engine.eval(f.node)))
+    }
+
+    /// What is answered apart from commands and readings.
+    fn answer(&mut self, word: &str) -> Option<String> {
+        let answers = self.drivers.iter().flat_map(|d| &d.answers);
+        let (_, with) = answers.into_iter().find(|(asked, _)| self.codec.asked(asked, word))?;
+        let engine = self.sim.engine();
+        template::filled(with, |n| Some(engine.eval(n)))
+    }
+
     /// The quantity a message asks for.
     fn asked(&mut self, word: &str) -> Option<&'m Told> {
-        let driver = self.driver;
-        let asked = driver.told.iter().filter(|t| template::found(&t.asks, word).is_some());
+        let told = self.drivers.iter().flat_map(|d| &d.told);
+        let asked = told.filter(|t| self.codec.found(&t.asks, word).is_some());
         let all: Vec<&Told> = asked.collect();
         let holds = |sim: &mut Sim<'m>, t: &Told| t.condition.is_none_or(|c| sim.engine().eval(c) != 0.0);
         all.iter().find(|t| t.condition.is_some() && holds(&mut self.sim, t)).or_else(|| all.first()).copied()
@@ -168,7 +188,7 @@ impl<'m> Emulator<'m> {
     fn tells(&mut self, told: &'m Told) -> Result<String, Fault> {
         let value = self.sim.value(told.value, &mut ())?.unwrap_or(0.0);
         let digits = self.digits(told);
-        Ok(pattern::rendered(&told.expects, |unit| number(unit, value, digits)))
+        Ok(self.codec.rendered(&told.expects, |unit| number(unit, value, digits)))
     }
 
     /// Digits after the point of what a reading shows, in the unit it is told in.
@@ -184,16 +204,19 @@ impl<'m> Emulator<'m> {
 
     /// Carries out the command that a message completes; nothing where it belongs to none.
     fn command(&mut self, word: &str) -> Result<Option<Option<Reply>>, Fault> {
-        let driver = self.driver;
-        let (mut known, mut complete) = (false, Vec::new());
-        for (index, served) in driver.served.iter().enumerate() {
+        let (mut part, mut complete) = (None, Vec::new());
+        let served =
+            self.drivers.iter().enumerate().flat_map(|(d, driver)| {
+                driver.served.iter().enumerate().map(move |(index, served)| (d, index, served))
+            });
+        for (driver, index, served) in served {
             for (place, template) in served.exchange.sends.iter().enumerate() {
-                let Some(found) = template::found(template, word) else { continue };
-                known = true;
-                self.heard.insert((index, place), found);
+                let Some(found) = self.codec.found(template, word) else { continue };
+                part = part.or(Some(served));
+                self.heard.insert((driver, index, place), found);
                 let whole = place + 1 == served.exchange.sends.len();
                 let all: Option<Vec<Found>> = (0..served.exchange.sends.len())
-                    .map(|p| self.heard.get(&(index, p)).cloned())
+                    .map(|p| self.heard.get(&(driver, index, p)).cloned())
                     .collect::<Option<Vec<_>>>()
                     .map(|all| all.concat());
                 if let (true, Some(all)) = (whole, all) {
@@ -201,15 +224,11 @@ impl<'m> Emulator<'m> {
                 }
             }
         }
-        if !known {
-            return Ok(None);
-        }
+        let Some(part) = part else { return Ok(None) };
         if complete.is_empty() {
             // The first part of something.
-            let part =
-                driver.served.iter().find(|s| s.exchange.sends.iter().any(|t| template::found(t, word).is_some()));
-            let expects = part.and_then(|s| s.exchange.expects.as_ref());
-            return Ok(Some(expects.map(|p| Reply::of(pattern::rendered(p, |_| "0".to_owned())))));
+            let expects = part.exchange.expects.as_ref();
+            return Ok(Some(expects.map(|p| Reply::of(self.plain(p)))));
         }
         let mut why = NOT_UNDERSTOOD;
         for (served, all) in complete {
@@ -243,7 +262,6 @@ impl<'m> Emulator<'m> {
 
     /// An answer that says numbers as they were sent, or else as they are told.
     fn echo(&mut self, pattern: &Pattern, found: &[Found]) -> Result<String, Fault> {
-        let driver = self.driver;
         let numbers: Vec<&Unit> = pattern
             .slots
             .iter()
@@ -254,8 +272,8 @@ impl<'m> Emulator<'m> {
             .collect();
         let mut texts = BTreeMap::new();
         for unit in numbers {
-            let told =
-                driver.told.iter().find(|t| t.expects.slots.contains(&matterix_ir::wire::Slot::Number(unit.clone())));
+            let slot = matterix_ir::wire::Slot::Number(unit.clone());
+            let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(&slot));
             let text = match (found.first(), told) {
                 (Some(sent), _) => number(unit, sent.value, None),
                 (None, Some(told)) => {
@@ -266,14 +284,14 @@ impl<'m> Emulator<'m> {
             };
             texts.insert(unit.symbol.clone(), text);
         }
-        Ok(pattern::rendered(pattern, |unit| texts.get(&unit.symbol).cloned().unwrap_or_default()))
+        Ok(self.codec.rendered(pattern, |unit| texts.get(&unit.symbol).cloned().unwrap_or_default()))
     }
 
     /// The answer that means a failure; none where the driver knows none, as devices do that ignore what they do not understand.
-    fn refuse(&self, failure: &str) -> Option<Reply> {
-        let named = |name: &str| self.driver.refusals.iter().find(|r| r.failure == name);
+    fn refuse(&mut self, failure: &str) -> Option<Reply> {
+        let named = |name: &str| self.drivers.iter().flat_map(|d| &d.refusals).find(|r| r.failure == name);
         let refusal = named(failure).or_else(|| named(NOT_UNDERSTOOD))?;
-        let text = pattern::rendered(&refusal.reply, |_| "0".to_owned());
+        let text = self.plain(&refusal.reply);
         Some(Reply { is_error: self.codec.acknowledges(), ..Reply::of(text) })
     }
 }

@@ -1,8 +1,10 @@
 //! A device that answers as a real one would: the model of the library behind the wire of its driver, read the other way round.
 
 mod device;
+mod http;
 mod serve;
 mod solve;
 
 pub use device::Emulator;
+pub use http::serve_http;
 pub use serve::{Stop, serve_pty, serve_tcp};

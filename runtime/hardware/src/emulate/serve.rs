@@ -14,7 +14,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use super::Emulator;
 
 /// How often the twin moves on where nothing comes in.
-const TICK: Duration = Duration::from_millis(5);
+pub(super) const TICK: Duration = Duration::from_millis(5);
 
 /// When to end, and how fast lab time passes.
 #[derive(Clone, Copy, Debug)]
@@ -25,18 +25,18 @@ pub struct Stop<'c> {
     pub speed: f64,
 }
 
-struct Clock {
+pub(super) struct Clock {
     begun: Instant,
     speed: f64,
 }
 
 impl Clock {
     #[allow(clippy::disallowed_methods, reason = "an emulator answers by the wall clock")]
-    fn new(speed: f64) -> Self {
+    pub(super) fn new(speed: f64) -> Self {
         Clock { begun: Instant::now(), speed }
     }
 
-    fn now(&self) -> f64 {
+    pub(super) fn now(&self) -> f64 {
         self.begun.elapsed().as_secs_f64() * self.speed
     }
 }
@@ -152,7 +152,7 @@ pub fn serve_tcp(
 }
 
 /// Lets time pass to now and answers.
-fn turn(emulator: &mut Emulator<'_>, clock: &Clock, came: &[u8]) -> Result<Vec<u8>, String> {
+pub(super) fn turn(emulator: &mut Emulator<'_>, clock: &Clock, came: &[u8]) -> Result<Vec<u8>, String> {
     emulator.pass(clock.now()).map_err(|f| f.message)?;
     if came.is_empty() { Ok(Vec::new()) } else { emulator.receive(came).map_err(|f| f.message) }
 }

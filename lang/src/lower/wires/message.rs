@@ -1,0 +1,122 @@
+//! Messages over HTTP, looked at before anything is sent: their form, and whether something tells what they put in.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::message::{self, Field};
+use matterix_ir::wire::{Driver, Exchange, JSON, Pattern, Piece, Slot, Template};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use super::hosted::Under;
+use crate::ast::{Wire, WireKind};
+use crate::lower::Planner;
+
+/// Stands for a value.
+const VALUE: &str = "0";
+
+impl<'a> Planner<'a, '_> {
+    /// Reports what no server understands.
+    pub(super) fn check_messages(&mut self, driver: &Driver, wires: &'a [Wire], under: Option<Under<'a>>) {
+        if driver.framing != JSON || !self.lab.prototype {
+            return;
+        }
+        let known: BTreeSet<String> =
+            wires.iter().chain(under.map_or(&[][..], |u| u.wires)).flat_map(kept_by).collect();
+        let exchanges = [&driver.open, &driver.close, &driver.halt, &driver.safe, &driver.play].into_iter().flatten();
+        let served = driver.served.iter().chain(driver.alive.iter().map(|a| &a.repeated)).map(|s| &s.exchange);
+        for exchange in exchanges.chain(served) {
+            self.check_exchange(exchange, &known);
+        }
+        for exchange in &driver.play {
+            let asks = exchange.until.iter().map(|until| &until.asks);
+            for sent in exchange.sends.iter().chain(asks) {
+                if sent.pieces.iter().any(|p| !matches!(p, Piece::Plain(_))) {
+                    self.no_message(sent.span, "what plays a file has no values in it");
+                }
+            }
+        }
+        for told in &driver.told {
+            self.check_request(&told.asks, &known);
+            self.check_answer(&told.expects);
+        }
+        for (asked, with) in &driver.answers {
+            if let Err(why) = message::request(&seen(asked)) {
+                self.no_message(asked.span, &why);
+            }
+            if let Err(why) = message::answer(&said(with)) {
+                self.no_message(with.span, &why);
+            }
+        }
+        for refusal in &driver.refusals {
+            self.check_answer(&refusal.reply);
+        }
+    }
+
+    fn check_exchange(&mut self, exchange: &Exchange, known: &BTreeSet<String>) {
+        exchange.sends.iter().for_each(|sent| self.check_request(sent, known));
+        exchange.expects.iter().for_each(|expected| self.check_answer(expected));
+        if let Some(until) = &exchange.until {
+            self.check_request(&until.asks, known);
+            match &until.expects {
+                Some(expected) => self.check_answer(expected),
+                None => self.no_message(until.asks.span, "over HTTP nothing but an answer says that a device is ready"),
+            }
+        }
+    }
+
+    fn check_request(&mut self, template: &Template, known: &BTreeSet<String>) {
+        let text = said(template);
+        let request = match message::request(&text) {
+            Ok(request) => request,
+            Err(why) => return self.no_message(template.span, &why),
+        };
+        let path = request.target.split(['/', '?', '&', '=']).filter_map(message::kept);
+        let missing = path.chain(put_in(&request.fields)).find(|word| !known.contains(*word));
+        if let Some(word) = missing {
+            let headline = format!("nothing says what `<{word}>` is");
+            let d = Diagnostic::error(codes::DRIVER_LINE, template.span, headline, "put in here");
+            self.lab.report(d.help(format!("an answer does, as in `expects \"201 /data/id=<{word}>\"`")));
+        }
+    }
+
+    fn check_answer(&mut self, pattern: &Pattern) {
+        if let Err(why) = message::answer(&seen(pattern)) {
+            self.no_message(pattern.span, &why);
+        }
+    }
+
+    fn no_message(&mut self, span: Span, why: &str) {
+        self.lab.report(Diagnostic::error(codes::DRIVER_LINE, span, why.to_owned(), "not understood"));
+    }
+}
+
+fn put_in<'t>(fields: &[Field<'t>]) -> impl Iterator<Item = &'t str> {
+    fields.iter().filter_map(|f| message::kept(f.value)).collect::<Vec<_>>().into_iter()
+}
+
+/// The words that the answers of a line are kept under.
+fn kept_by(wire: &Wire) -> Vec<String> {
+    let exchange = match &wire.kind {
+        WireKind::Fixed { exchange, .. } | WireKind::Command { exchange, .. } => exchange,
+        _ => return Vec::new(),
+    };
+    let Some(expects) = &exchange.expects else { return Vec::new() };
+    message::answer(&expects.text).map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
+}
+
+/// A message with something in place of its values.
+fn said(template: &Template) -> String {
+    let piece = |piece: &Piece| match piece {
+        Piece::Plain(text) => text.clone(),
+        Piece::Number { .. } | Piece::Word(..) => VALUE.to_owned(),
+    };
+    template.pieces.iter().map(piece).collect()
+}
+
+/// An answer with something in place of its values.
+fn seen(pattern: &Pattern) -> String {
+    let slot = |slot: &Slot| match slot {
+        Slot::Plain(text) => text.clone(),
+        Slot::Number(_) | Slot::Any => VALUE.to_owned(),
+    };
+    pattern.slots.iter().map(slot).collect()
+}

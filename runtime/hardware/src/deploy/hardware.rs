@@ -1,0 +1,209 @@
+//! Devices, their twin and the clock, as they are while a plan is carried out.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::atomic::AtomicBool;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::wire::Exchange;
+use matterix_ir::{Code, NodeId, Program, Sources, Span, codes};
+use matterix_runtime::backend::{Backend, Sim, Ticket};
+use matterix_runtime::fault::Fault;
+
+use super::Trace;
+use super::device::Device;
+use super::journal::{Entry, Journal};
+use super::observe::Observed;
+use crate::link::Trouble;
+
+/// What a deployment does with devices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Nothing is sent; what would be is shown.
+    Dry,
+    /// Devices do it.
+    Real,
+    /// Devices do it, and what they tell is held against the twin.
+    Shadow,
+}
+
+/// What a deployment is given.
+pub struct Settings<'t> {
+    /// What is done with devices.
+    pub mode: Mode,
+    /// Seconds of lab time per second: 1, unless all devices are emulators as fast.
+    pub speed: f64,
+    /// Set to end it early.
+    pub cancel: &'t AtomicBool,
+    /// Asks a person; false where they say no.
+    pub person: &'t dyn Fn(&str) -> bool,
+}
+
+/// An operation that goes on.
+pub(super) struct Running<'m> {
+    pub(super) device: usize,
+    pub(super) twin: Ticket,
+    pub(super) exchange: Option<&'m Exchange>,
+    /// When it must be ready at the latest, s.
+    pub(super) deadline: f64,
+    pub(super) ready: bool,
+    pub(super) failed: Option<(String, String)>,
+    /// What it sets, for reading it back.
+    pub(super) changed: bool,
+}
+
+/// Devices, their twin and the clock.
+pub struct Hardware<'m, 't> {
+    pub(super) program: &'m Program,
+    pub(super) sources: &'m Sources,
+    pub(super) twin: Sim<'m>,
+    pub(super) devices: Vec<Device<'m>>,
+    pub(super) observed: Observed,
+    pub(super) settings: Settings<'t>,
+    pub(super) journal: Journal,
+    pub(super) trace: Box<Trace<'t>>,
+    /// What an earlier process wrote, as far as it has not been gone through again.
+    pub(super) replay: VecDeque<Entry>,
+    /// Lab time and the clock at one moment.
+    pub(super) origin: (f64, Instant),
+    /// An earlier process is followed, and devices have not been asked yet.
+    pub(super) resuming: bool,
+    /// It was refused to go on: what is there is not known well enough for anything but making it safe.
+    pub(super) refused: std::cell::Cell<bool>,
+    /// When it was cut off, s since 1970.
+    pub(super) left_at: f64,
+    /// What answers to an earlier process said: the device whose line it was, the word, the text.
+    pub(super) kept: Vec<(usize, String, String)>,
+    /// States that devices were told.
+    pub(super) commanded: BTreeSet<u32>,
+    pub(super) running: BTreeMap<Ticket, Running<'m>>,
+    pub(super) tickets: u64,
+    /// What was told at this instant.
+    pub(super) fresh: BTreeMap<NodeId, (f64, f64)>,
+    pub(super) cancelled: bool,
+    /// The step of each operation, by where it stands in memory.
+    pub(super) steps: BTreeMap<usize, StepId>,
+}
+
+impl<'m, 't> Hardware<'m, 't> {
+    /// Devices whose lines are not open yet, with a twin that has been started.
+    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+    pub fn new(
+        program: &'m Program,
+        sources: &'m Sources,
+        twin: Sim<'m>,
+        devices: Vec<Device<'m>>,
+        settings: Settings<'t>,
+        journal: Journal,
+        trace: Box<Trace<'t>>,
+    ) -> Self {
+        let mut told = BTreeMap::new();
+        for (d, device) in devices.iter().enumerate() {
+            for (t, line) in device.driver.iter().flat_map(|driver| driver.told.iter().enumerate()) {
+                told.entry(line.value).or_insert((d, t));
+            }
+        }
+        let steps = program.plan.steps.iter().enumerate().filter_map(|(i, s)| match &s.step {
+            Step::Operation(operation) => Some((address(operation), StepId(i as u32))),
+            _ => None,
+        });
+        Hardware {
+            observed: Observed::new(&program.model, told),
+            steps: steps.collect(),
+            program,
+            sources,
+            twin,
+            devices,
+            settings,
+            journal,
+            trace,
+            replay: VecDeque::new(),
+            resuming: false,
+            refused: std::cell::Cell::new(false),
+            left_at: 0.0,
+            kept: Vec::new(),
+            commanded: BTreeSet::new(),
+            origin: (0.0, Instant::now()),
+            running: BTreeMap::new(),
+            tickets: 0,
+            fresh: BTreeMap::new(),
+            cancelled: false,
+        }
+    }
+
+    /// What devices tell, and the devices.
+    pub fn view(&self) -> (&Observed, &[Device<'m>]) {
+        (&self.observed, &self.devices)
+    }
+
+    /// The twin.
+    pub fn twin(&mut self) -> &mut Sim<'m> {
+        &mut self.twin
+    }
+
+    /// The journal.
+    pub fn journal(&mut self) -> &mut Journal {
+        &mut self.journal
+    }
+
+    /// Whether an operation of a device goes on, on it or in the twin.
+    pub(super) fn is_busy(&self, device: usize) -> bool {
+        self.running.values().any(|r| r.device == device)
+    }
+
+    /// The device whose line a device speaks over: itself, as a rule.
+    pub(super) fn line_of(&self, device: usize) -> usize {
+        self.devices[device].host.unwrap_or(device)
+    }
+
+    /// Whether what an earlier process wrote has been gone through, and devices have been asked since.
+    pub(super) fn is_live(&self) -> bool {
+        self.replay.is_empty() && !self.resuming
+    }
+
+    pub(super) fn is_dry(&self) -> bool {
+        self.settings.mode == Mode::Dry
+    }
+
+    pub(super) fn fault(&self, code: Code, span: Span, message: String) -> Fault {
+        Fault { code, span: Some(span), time: self.twin.now(), message, help: Vec::new() }
+    }
+
+    /// A trouble as the fault of a device.
+    pub(super) fn trouble(&mut self, device: usize, trouble: &Trouble, span: Span) -> Fault {
+        let code = match trouble {
+            Trouble::Lost(_) => codes::DEVICE_LOST,
+            Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+            Trouble::Refused { .. } => codes::DEVICE_REFUSED,
+        };
+        if matches!(trouble, Trouble::Lost(_)) {
+            let line = self.line_of(device);
+            self.devices[line].lost = Some(trouble.text().to_owned());
+            if let Some(link) = self.devices[line].link.take() {
+                self.kept.extend(link.kept().into_iter().map(|(word, text)| (line, word, text)));
+            }
+        }
+        let message = format!("`{}`: {}", self.devices[device].name, trouble.text());
+        self.fault(code, span, message)
+    }
+
+    pub(super) fn keep(&mut self, entry: &Entry) -> Result<(), Fault> {
+        self.journal.keep(entry).map_err(|why| self.fault(codes::JOURNAL_MISMATCH, Span::default(), why))
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+    pub(super) fn clock(&self) -> f64 {
+        self.origin.0 + self.origin.1.elapsed().as_secs_f64() * self.settings.speed
+    }
+}
+
+/// Where an operation stands in memory.
+pub(super) fn address(operation: &Operation) -> usize {
+    std::ptr::from_ref(operation) as usize
+}
+
+/// s since 1970.
+#[allow(clippy::disallowed_methods, reason = "a journal says when things were done")]
+pub(super) fn wall() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
+}

@@ -1,0 +1,104 @@
+//! What an earlier process wrote, gone through again.
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::{Span, codes};
+use matterix_runtime::backend::Backend;
+use matterix_runtime::fault::Fault;
+
+use super::hardware::Hardware;
+use super::journal::Entry;
+
+impl Hardware<'_, '_> {
+    /// The next line of the earlier process that says what came from outside.
+    pub(super) fn next_entry(&mut self) -> Option<Entry> {
+        while let Some(entry) = self.replay.front() {
+            match entry {
+                Entry::Resumed { t, .. } => {
+                    let t = *t;
+                    while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
+                    self.replay.pop_front();
+                }
+                Entry::Opened { .. }
+                | Entry::Kept { .. }
+                | Entry::Out { .. }
+                | Entry::Back { .. }
+                | Entry::Begin { .. }
+                | Entry::End { .. } => {
+                    self.replay.pop_front();
+                }
+                other => return Some(other.clone()),
+            }
+        }
+        None
+    }
+
+    pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
+        self.refused.set(true);
+        let before = serde_json::to_string(before).unwrap_or_default();
+        let message = format!("the journal does not fit the plan: {now}, but it says `{before}`");
+        let mut fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), message);
+        fault.help.push("begin anew, with a journal of its own".to_owned());
+        fault
+    }
+
+    pub(super) fn span_text(&self, span: Span) -> String {
+        let file = self.sources.get(span.file).map_or("", |f| f.name.as_str());
+        let (line, column) = self.sources.line_column(span);
+        format!("{file}:{line}:{column}")
+    }
+
+    /// What an operation's device did, as the earlier process has it.
+    pub(super) fn replayed_start(
+        &mut self,
+        ticket: u64,
+        step: StepId,
+        label: &str,
+    ) -> Result<Option<Option<(String, String)>>, Fault> {
+        let Some(entry) = self.next_entry() else { return Ok(None) };
+        let Entry::Starting { ticket: before, step: at, sends, device, .. } = &entry else {
+            return Err(self.mismatch(&format!("`{label}` begins"), &entry));
+        };
+        if *before != ticket || *at != step.0 {
+            return Err(self.mismatch(&format!("`{label}` begins"), &entry));
+        }
+        let (sends, device) = (sends.clone(), device.clone());
+        self.replay.pop_front();
+        match self.next_entry() {
+            Some(Entry::Started { ticket: t, .. }) if t == ticket => {
+                self.replay.pop_front();
+                Ok(Some(None))
+            }
+            Some(Entry::Ended { ticket: t, failed, .. }) if t == ticket => {
+                self.replay.pop_front();
+                Ok(Some(failed))
+            }
+            None => {
+                // It was cut off while this was being said: said once more only where that changes nothing.
+                let operation = match &self.program.plan.get(step).step {
+                    Step::Operation(operation) => operation,
+                    _ => return Ok(None),
+                };
+                if self.is_repeatable(operation, step) {
+                    return Ok(None);
+                }
+                self.refused.set(true);
+                let message = format!(
+                    "it is not known whether `{device}` was told `{}` for `{label}` before the journal broke off",
+                    sends.join("`, `")
+                );
+                let mut fault = self.fault(codes::JOURNAL_MISMATCH, self.program.plan.get(step).span, message);
+                fault.help.push("it may have moved something: look, and begin anew from there".to_owned());
+                Err(fault)
+            }
+            Some(other) => Err(self.mismatch(&format!("`{label}` has begun"), &other)),
+        }
+    }
+
+    /// Whether saying it twice does what saying it once does: it only sets what does not depend on itself, at once.
+    pub(super) fn is_repeatable(&self, operation: &Operation, step: StepId) -> bool {
+        let lasts = self.devices.iter().filter_map(|d| d.driver?.call(step)).any(|e| e.until.is_some());
+        let moves = |a: &Action| matches!(a, Action::Move { .. });
+        !lasts && operation.until.is_none() && !operation.at_start.iter().chain(&operation.at_end).any(moves)
+    }
+}

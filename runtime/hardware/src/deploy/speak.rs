@@ -1,0 +1,148 @@
+//! What is said to devices and asked of them, operation by operation.
+
+use matterix_ir::plan::{Operation, StepId};
+use matterix_ir::wire::{Exchange, Pattern, Template};
+use matterix_ir::{Span, codes};
+use matterix_runtime::backend::Backend;
+use matterix_runtime::fault::Fault;
+
+use super::device::Ear;
+use super::hardware::Hardware;
+use super::journal::Entry;
+use crate::link::Trouble;
+use crate::template;
+
+impl<'m> Hardware<'m, '_> {
+    pub(super) fn texts(&mut self, sends: &[Template]) -> Vec<String> {
+        let engine = self.twin.engine();
+        sends.iter().map(|t| template::filled(t, |n| Some(engine.eval(n))).unwrap_or_default()).collect()
+    }
+
+    /// Says commands to a device.
+    pub(super) fn say(
+        &mut self,
+        device: usize,
+        texts: &[String],
+        expects: Option<&Pattern>,
+        span: Span,
+    ) -> Result<Vec<f64>, Fault> {
+        self.try_say(device, texts, expects).map_err(|trouble| self.trouble(device, &trouble, span))
+    }
+
+    pub(super) fn try_say(
+        &mut self,
+        index: usize,
+        texts: &[String],
+        expects: Option<&Pattern>,
+    ) -> Result<Vec<f64>, Trouble> {
+        let time = self.twin.now();
+        let is_dry = self.is_dry();
+        let Some(driver) = self.devices[index].driver else { return Ok(Vec::new()) };
+        if let Some(why) = &self.devices[self.line_of(index)].lost {
+            return Err(Trouble::Lost(format!("nothing more can be said to it: {why}")));
+        }
+        let device = &mut self.devices[index];
+        if is_dry {
+            for frame in device.codec.iter_mut().flat_map(|codec| codec.say(texts)) {
+                (self.trace)(time, device.name, true, &frame);
+            }
+            return Ok(Vec::new());
+        }
+        let (name, line) = (device.name, self.line_of(index));
+        let Some(link) = self.devices[line].link.as_mut() else {
+            return Err(Trouble::Lost("its line is not open".to_owned()));
+        };
+        let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
+        link.say(texts, expects, driver, &mut ear)
+    }
+
+    /// Asks a device for a quantity, SI.
+    pub(super) fn tell(&mut self, index: usize, line: usize) -> Result<f64, Fault> {
+        let Some(told) = self.devices[index].driver.and_then(|d| d.told.get(line)) else { return Ok(f64::NAN) };
+        if let Some(condition) = told.condition
+            && self.twin.engine().eval(condition) == 0.0
+        {
+            let message = format!("`{}` cannot be told now: its driver says so", told.name);
+            return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
+        }
+        let text = self.texts(std::slice::from_ref(&told.asks)).concat();
+        let (time, is_dry) = (self.twin.now(), self.is_dry());
+        let device = &mut self.devices[index];
+        let Some(driver) = device.driver else { return Ok(f64::NAN) };
+        if is_dry {
+            if let Some(codec) = &mut device.codec {
+                let frame = codec.ask(&text);
+                (self.trace)(time, device.name, true, &frame);
+            }
+            return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
+        }
+        let (name, host) = (device.name, self.line_of(index));
+        let asked = match self.devices[host].link.as_mut() {
+            Some(link) => {
+                let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
+                link.ask(&text, &told.expects, driver, &mut ear)
+            }
+            None => Err(Trouble::Lost("its line is not open".to_owned())),
+        };
+        let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
+        numbers
+            .first()
+            .copied()
+            .ok_or_else(|| self.fault(codes::DEVICE_GARBLED, told.span, "no number was told".into()))
+    }
+
+    /// Tells an operation to its device.
+    pub(super) fn begin(
+        &mut self,
+        device: usize,
+        exchange: &'m Exchange,
+        texts: Vec<String>,
+        operation: &Operation,
+        step: StepId,
+        ticket: u64,
+    ) -> Result<Option<(String, String)>, Fault> {
+        let t = self.twin.now();
+        let node = self.program.plan.get(step);
+        let starting = Entry::Starting {
+            t,
+            ticket,
+            step: step.0,
+            label: node.label.clone(),
+            span: self.span_text(node.span),
+            device: self.devices[device].name.to_owned(),
+            sends: texts.clone(),
+        };
+        self.keep(&starting)?;
+        match self.try_say(device, &texts, exchange.expects.as_ref()) {
+            Ok(_) => {
+                self.keep(&Entry::Started { t, ticket })?;
+                Ok(None)
+            }
+            Err(Trouble::Refused { failure, text }) => {
+                let text = format!("`{}` refuses `{}`: {text}", self.devices[device].name, operation.verb);
+                self.keep(&Entry::Ended { t, ticket, failed: Some((failure.clone(), text.clone())) })?;
+                Ok(Some((failure, text)))
+            }
+            Err(trouble) => Err(self.trouble(device, &trouble, exchange.span)),
+        }
+    }
+
+    /// Reads back what an operation has set, or what has come of what it moved, where its device tells it.
+    pub(super) fn read_back(&mut self, device: usize, set: &[u32], moved: bool) -> Result<(), Fault> {
+        let Some(driver) = self.devices[device].driver.filter(|_| !self.is_dry()) else { return Ok(()) };
+        for (line, told) in driver.told.iter().enumerate() {
+            let applies = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
+            let concerned = told.state.map_or(moved, |s| set.contains(&s));
+            if told.reading.is_some()
+                || !applies
+                || !concerned
+                || !self.observed.is_settled(&self.program.model, told.value)
+            {
+                continue;
+            }
+            let value = self.tell(device, line)?;
+            self.settled(device, line, value)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! Values that a plan depends on: what devices tell in place of what the twin supposes.
+
+use std::collections::BTreeMap;
+
+use matterix_ir::{NodeId, Op};
+use matterix_runtime::backend::Backend;
+use matterix_runtime::exec::Listener;
+use matterix_runtime::fault::Fault;
+
+use super::hardware::Hardware;
+use super::journal::Entry;
+
+impl Hardware<'_, '_> {
+    /// What is told of a node now, asked once an instant.
+    pub(super) fn told(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<f64, Fault> {
+        let now = self.twin.now();
+        if let Some((_, value)) = self.fresh.get(&node).filter(|(t, _)| *t == now) {
+            return Ok(*value);
+        }
+        let (device, line) = self.observed.told[&node];
+        let told = self.devices[device].driver.map(|d| &d.told[line]);
+        let name = told.map(|t| t.name.clone()).unwrap_or_default();
+        let value = match self.next_entry() {
+            Some(Entry::Told { name: before, value, .. }) if before == name => {
+                self.replay.pop_front();
+                value
+            }
+            Some(other) => return Err(self.mismatch(&format!("`{name}` is asked for"), &other)),
+            None => {
+                self.go_live(out)?;
+                let (now, value) = (self.twin.now(), self.tell(device, line)?);
+                self.journal.note(&Entry::Told { t: now, name: name.clone(), value });
+                self.compared(device, line, value)?;
+                value
+            }
+        };
+        if let (Op::Reading(r), Some(slot)) = (self.program.model.graph.op(node), told.and_then(|t| t.reading)) {
+            out.reading(now, slot as usize, value);
+            if let Some(slot) = self.twin.engine().readings_mut().get_mut(r as usize) {
+                *slot = value;
+            }
+        }
+        self.fresh.insert(node, (now, value));
+        Ok(value)
+    }
+
+    /// The value of a node with what devices tell in place of what the twin supposes.
+    pub(super) fn eval(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<f64, Fault> {
+        let (asked, _) = self.observed.asks(&self.program.model, node);
+        let mut values: BTreeMap<NodeId, f64> = BTreeMap::new();
+        for told in asked {
+            let value = self.told(told, out)?;
+            values.insert(told, value);
+        }
+        let graph = &self.program.model.graph;
+        if values.is_empty() {
+            return Ok(self.twin.value(node, out)?.unwrap_or(f64::NAN));
+        }
+        let engine = self.twin.engine();
+        for n in graph.schedule([node]) {
+            if values.contains_key(&n) {
+                continue;
+            }
+            let op = graph.op(n);
+            let is_leaf = op.operands().next().is_none();
+            let value = if is_leaf {
+                engine.eval(n)
+            } else {
+                matterix_ir::graph::apply(op, |_| f64::NAN, |o| values.get(&o).copied().unwrap_or(f64::NAN))
+            };
+            values.insert(n, value);
+        }
+        Ok(values.get(&node).copied().unwrap_or(f64::NAN))
+    }
+}

@@ -1,0 +1,107 @@
+//! A file given to a device that runs it by itself: what its driver says for that, from uploading it to its end.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use matterix_ir::wire::{Driver, Exchange, Template};
+use matterix_ir::{NodeId, Program};
+
+use crate::link::{Line, Link, Overhear, Trouble};
+use crate::port::{self, Place};
+use crate::template;
+
+/// How often a device is asked whether it has come to the end.
+const POLL: Duration = Duration::from_millis(200);
+
+/// Why a file was not played to its end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unplayed {
+    /// The device or its line.
+    Trouble(Trouble),
+    /// It was ended early, and the device was told.
+    Stopped,
+}
+
+/// A file with its name.
+pub struct Sheet {
+    /// As the device is told.
+    pub name: String,
+    /// What is in it.
+    pub bytes: Vec<u8>,
+}
+
+/// Gives a file to the device at a place and waits until it has run it. Ended early or in trouble, what its driver calls `safe`
+/// is said.
+pub fn play(
+    program: &Program,
+    driver: &Driver,
+    place: &Place,
+    sheet: Sheet,
+    cancel: &AtomicBool,
+    ear: &mut dyn Overhear,
+) -> Result<(), Unplayed> {
+    let opened = port::open(place, &driver.transport).and_then(|mut port| {
+        port.attach(&sheet.name, sheet.bytes)?;
+        Ok(port)
+    });
+    let lost = |why: String| Unplayed::Trouble(Trouble::Lost(why));
+    let port = opened.map_err(|e| lost(format!("cannot open `{place}`: {e}")))?;
+    let link = Link::new(port, driver, None).map_err(lost)?;
+    let mut player = Player { program, driver, link, cancel };
+    let played = driver.play.iter().try_for_each(|exchange| player.exchange(exchange, ear));
+    if played.is_err() {
+        for exchange in &driver.safe {
+            let texts = texts(&exchange.sends);
+            if !player.link.lacks(&texts) {
+                // What goes wrong here ends what is ending already.
+                let _ = player.link.say(&texts, exchange.expects.as_ref(), driver, ear);
+            }
+        }
+    }
+    played
+}
+
+struct Player<'p> {
+    program: &'p Program,
+    driver: &'p Driver,
+    link: Link,
+    cancel: &'p AtomicBool,
+}
+
+impl Player<'_> {
+    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+    fn exchange(&mut self, exchange: &Exchange, ear: &mut dyn Overhear) -> Result<(), Unplayed> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Unplayed::Stopped);
+        }
+        let said = self.link.say(&texts(&exchange.sends), exchange.expects.as_ref(), self.driver, ear);
+        said.map_err(Unplayed::Trouble)?;
+        let Some(until) = &exchange.until else { return Ok(()) };
+        let most = Duration::try_from_secs_f64(self.number(until.timeout)).unwrap_or(Duration::MAX);
+        let begun = Instant::now();
+        let question = texts(std::slice::from_ref(&until.asks)).concat();
+        loop {
+            match self.link.is_ready(&question, until, self.driver, ear) {
+                Ok(true) => return Ok(()),
+                Ok(false) if begun.elapsed() > most => {
+                    return Err(Unplayed::Trouble(Trouble::Lost("it was not ready in time".to_owned())));
+                }
+                Ok(false) => {}
+                Err(trouble) => return Err(Unplayed::Trouble(trouble)),
+            }
+            if self.cancel.load(Ordering::Relaxed) {
+                return Err(Unplayed::Stopped);
+            }
+            std::thread::sleep(POLL);
+        }
+    }
+
+    fn number(&self, node: NodeId) -> f64 {
+        self.program.model.graph.constant(node).unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Texts that have no values in them.
+fn texts(sends: &[Template]) -> Vec<String> {
+    sends.iter().map(|t| template::filled(t, |_| None).unwrap_or_else(|| template::written(t))).collect()
+}

@@ -1,0 +1,81 @@
+//! `matterixc emit --play`: a file is given to a device that runs it by itself.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use matterix_hardware::binding;
+use matterix_hardware::deploy::Carrier;
+use matterix_hardware::link::{Overhear, Trouble};
+use matterix_hardware::play::{Sheet, Unplayed, play as played};
+use matterix_ir::{Diagnostic, Severity, Span, codes};
+
+use super::bill::show;
+use crate::args::Color;
+use crate::pipeline::{self, Input, Options, Wires};
+use crate::terminal::{Stream, print};
+use crate::{Exit, files};
+
+/// Gives the file to the one device of the bindings whose driver says how.
+pub fn play(
+    input: &Input,
+    options: &Options,
+    path: &Path,
+    (name, bytes): (&str, Vec<u8>),
+    cancel: &AtomicBool,
+    color: Color,
+) -> Result<Exit, String> {
+    let text = String::from_utf8(files::read(path)?).map_err(|_| format!("`{}` is not UTF-8", path.display()))?;
+    let (mut sources, program, found) = pipeline::compile(input, &Options { wires: Wires::Called, ..options.clone() });
+    let Some(program) = program.filter(|_| found.iter().all(|d| d.severity != Severity::Error)) else {
+        show(&sources, found, color);
+        return Ok(Exit::Findings);
+    };
+    let file = sources.add(path.display().to_string(), text.clone());
+    let (bindings, found) = binding::read(&program, file, &text);
+    if !found.is_empty() {
+        show(&sources, found, color);
+        return Ok(Exit::Findings);
+    }
+    let players: Vec<_> = bindings
+        .iter()
+        .filter_map(|b| match &b.carrier {
+            Carrier::Line { driver, place, .. } => Some((&program.drivers[*driver], place)),
+            _ => None,
+        })
+        .filter(|(driver, _)| !driver.play.is_empty())
+        .collect();
+    let [(driver, place)] = players.as_slice() else {
+        let several = if players.is_empty() { "no device of these bindings" } else { "more than one device" };
+        return Err(format!("{several} has a driver that says how a file is played"));
+    };
+    let device = &program.scene.get(driver.instance).name;
+    print(Stream::Err, &format!("`{device}` is given `{name}`, {} bytes\n", bytes.len()));
+    let code = match played(&program, driver, place, Sheet { name: name.to_owned(), bytes }, cancel, &mut Silent) {
+        Ok(()) => {
+            print(Stream::Err, &format!("`{device}` has run it to its end\n"));
+            return Ok(Exit::Fine);
+        }
+        Err(Unplayed::Stopped) => {
+            print(Stream::Err, "it was stopped\n");
+            return Ok(Exit::Findings);
+        }
+        Err(Unplayed::Trouble(trouble)) => trouble,
+    };
+    let (headline, code) = match &code {
+        Trouble::Lost(why) => (why.clone(), codes::DEVICE_LOST),
+        Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
+        Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
+    };
+    let d = Diagnostic::error(code, Span::default(), format!("`{device}`: {headline}"), "not run to its end");
+    show(&sources, vec![d], color);
+    Ok(Exit::Findings)
+}
+
+/// Nothing of it is shown.
+struct Silent;
+
+impl Overhear for Silent {
+    fn out(&mut self, _: &[u8]) {}
+    fn back(&mut self, _: &[u8]) {}
+    fn kept(&mut self, _: &str, _: &str) {}
+}

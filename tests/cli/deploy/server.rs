@@ -1,0 +1,239 @@
+//! Devices behind a server: a recorded exchange is replayed, strictly, and what servers refuse becomes the right failure.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+
+use serde_json::{Value, json};
+
+use super::{Emulated, deploy};
+use crate::harness::{Ended, folder, matterixc_in, write};
+
+/// A transfer on an OT-2, and what its server was asked and answered: recorded by `tests/peers/robot_server.py`, where the run
+/// engine of Opentrons 8.8.2 answers.
+const TRANSFER: &str = include_str!("../../deploy/transfer.mtx");
+const RECORDED: &str = include_str!("../../deploy/transfer.jsonl");
+
+/// What becomes of one command.
+#[derive(Clone)]
+enum Spoiled {
+    /// It is answered with this status and body.
+    Says(u16, Value),
+    /// It is taken, and fails so.
+    Fails(Value),
+    /// Nobody answers any more.
+    Cut,
+}
+
+/// A server that knows one exchange: everything else is noted as wrong. Asking again for the same is allowed.
+struct Replay {
+    address: String,
+    wrong: Arc<Mutex<Vec<String>>>,
+    left: Arc<Mutex<usize>>,
+}
+
+fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
+    let recorded: Vec<Value> = RECORDED.lines().map(|l| serde_json::from_str(l).expect("recorded")).collect();
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let (wrong, left) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(recorded.len())));
+    let (told, rest) = (Arc::clone(&wrong), Arc::clone(&left));
+    std::thread::spawn(move || {
+        let mut next = 0;
+        for stream in listener.incoming().flatten() {
+            serve(stream, &recorded, &mut next, spoiled.as_ref(), &told);
+            *rest.lock().expect("not poisoned") = recorded.len() - next;
+        }
+    });
+    Replay { address, wrong, left }
+}
+
+/// Serves one connection.
+fn serve(
+    stream: TcpStream,
+    recorded: &[Value],
+    next: &mut usize,
+    spoiled: Option<&(&str, Spoiled)>,
+    wrong: &Mutex<Vec<String>>,
+) {
+    let mut out = stream.try_clone().expect("a stream");
+    let mut reader = BufReader::new(stream);
+    while let Some((method, path, version, body)) = request(&mut reader) {
+        let name = body["data"]["commandType"].as_str().unwrap_or_default().to_owned();
+        let expected = recorded.get(*next);
+        let same = |e: &Value| e["method"] == method.as_str() && e["path"] == path.as_str() && e["body"] == body;
+        let (status, answer) = match (expected, spoiled) {
+            _ if version != "4" => (422, json!({ "errors": [{ "id": "InvalidRequest", "detail": "no version" }] })),
+            (Some(e), Some((at, how))) if same(e) && *at == name => match how {
+                Spoiled::Cut => return,
+                Spoiled::Says(status, answer) => (*status, answer.clone()),
+                Spoiled::Fails(error) => (201, json!({ "data": { "id": "x", "status": "failed", "error": error } })),
+            },
+            (Some(e), _) if same(e) => {
+                *next += 1;
+                (e["status"].as_u64().expect("a status") as u16, e["answer"].clone())
+            }
+            // After what was spoiled only what leaves the robot safe is of interest.
+            (_, Some(_)) => (201, json!({ "data": { "id": "y", "status": "succeeded" } })),
+            _ => {
+                let wanted = expected.map(Value::to_string).unwrap_or_default();
+                wrong.lock().expect("not poisoned").push(format!("{method} {path} {body}, not {wanted}"));
+                (500, json!({}))
+            }
+        };
+        let text = answer.to_string();
+        let head =
+            format!("HTTP/1.1 {status} x\r\nContent-Type: application/json\r\nContent-Length: {}\r\n\r\n", text.len());
+        if out.write_all((head + &text).as_bytes()).is_err() {
+            return;
+        }
+    }
+}
+
+/// Method, path, version header and body of the next request.
+fn request(reader: &mut BufReader<TcpStream>) -> Option<(String, String, String, Value)> {
+    let mut line = String::new();
+    reader.read_line(&mut line).ok().filter(|n| *n > 0)?;
+    let mut words = line.split_whitespace().map(str::to_owned);
+    let (method, path) = (words.next()?, words.next()?);
+    let (mut version, mut length) = (String::new(), 0);
+    loop {
+        let mut header = String::new();
+        reader.read_line(&mut header).ok().filter(|n| *n > 0)?;
+        let Some((name, value)) = header.trim().split_once(':') else { break };
+        match name.to_ascii_lowercase().as_str() {
+            "opentrons-version" => version = value.trim().to_owned(),
+            "content-length" => length = value.trim().parse().ok()?,
+            _ => {}
+        }
+    }
+    let mut body = vec![0; length];
+    reader.read_exact(&mut body).ok()?;
+    let body = if body.is_empty() { Value::Null } else { serde_json::from_slice(&body).ok()? };
+    Some((method, path, version, body))
+}
+
+fn bench(name: &str, address: &str) -> PathBuf {
+    let dir = folder(&format!("deploy_{name}"));
+    write(&dir, "lab.mtx", TRANSFER);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{address}\"\n"));
+    dir
+}
+
+#[test]
+fn a_plan_completes_against_the_recorded_exchange() {
+    let server = replay(None);
+    let dir = bench("replay", &server.address);
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(*server.wrong.lock().expect("not poisoned"), Vec::<String>::new());
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    // The connection is closed with the command.
+    std::thread::sleep(std::time::Duration::from_millis(100));
+    assert_eq!(*server.left.lock().expect("not poisoned"), 0, "nothing of it is left out");
+}
+
+fn spoil(name: &str, at: &'static str, how: Spoiled) -> Ended {
+    let server = replay(Some((at, how)));
+    deploy(&bench(name, &server.address), &["--mode", "real"])
+}
+
+#[test]
+fn what_the_server_refuses_is_the_right_failure_on_its_line() {
+    let error = |kind: &str, detail: &str| json!({ "errorType": kind, "detail": detail });
+    let cases: [(&str, &str, Spoiled, &str, &str); 4] = [
+        (
+            "tip",
+            "aspirate",
+            Spoiled::Fails(error("TipNotAttachedError", "Pipette should have a tip attached, but does not.")),
+            "no_tip",
+            "lab.mtx:16",
+        ),
+        (
+            "volume",
+            "aspirate",
+            Spoiled::Fails(error("InvalidAspirateVolumeError", "Cannot aspirate 400 µL when only 300 is available")),
+            "tip_overflow",
+            "lab.mtx:16",
+        ),
+        (
+            "stopped",
+            "dispense",
+            Spoiled::Says(409, json!({ "errors": [{ "id": "RunStopped", "detail": "The run was stopped." }] })),
+            "run_stopped",
+            "lab.mtx:17",
+        ),
+        ("cut", "dispense", Spoiled::Cut, "device-lost", "lab.mtx:17"),
+    ];
+    for (name, at, how, said, line) in cases {
+        let ended = spoil(&format!("server_{name}"), at, how);
+        assert_eq!(ended.code, 1, "{name}: {}", ended.err);
+        assert!(ended.err.contains(said) && ended.err.contains(line), "{name}: {}", ended.err);
+    }
+}
+
+#[test]
+fn a_plan_completes_on_the_emulated_robot_as_in_the_recording() {
+    let dir = bench("robot", "");
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let journal = std::fs::read_to_string(dir.join("journal")).expect("a journal");
+    let sent = journal.matches("\"event\":\"out\"").count();
+    assert!(sent >= RECORDED.lines().count() && journal.contains("/runs/run-1/commands"), "{journal}");
+}
+
+#[test]
+fn what_a_robot_cannot_do_its_emulator_refuses() {
+    // The file of the emulated lab has no liquid.
+    let dir = bench("empty", "");
+    let lab = TRANSFER.split("workflow").next().expect("a lab").replace(" holding { A1: 6 mL of buffer }", "");
+    write(&dir, "empty.mtx", lab + "workflow idle in deck { wait 1 s }\n");
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "empty.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
+    assert!(ended.err.contains("lab.mtx:16"), "{}", ended.err);
+}
+
+#[test]
+fn a_line_of_another_kind_is_refused() {
+    let dir = bench("kind", "127.0.0.1:1");
+    write(&dir, "lab.toml", "[ot2]\naddress = \"127.0.0.1:1\"\n");
+    let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
+    assert_eq!(ended.code, 1);
+    assert!(ended.err.contains("speaks over HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
+}
+
+#[test]
+fn what_no_server_understands_is_found_before_anything_is_sent() {
+    let dir = folder("deploy_messages");
+    let text = |lines: &str| {
+        format!(
+            "mtx 1\nuse std::heating::IkaRetControl\ndriver Server for IkaRetControl over http(timeout: 1 s) {{\n{lines}\n}}\n"
+        )
+    };
+    let cases = [
+        ("open sends \"FETCH /state\"", "is no method"),
+        ("open sends \"GET state\"", "is no path"),
+        ("open sends \"POST /state on=1\"", "is no member of a body"),
+        ("open sends \"GET /jobs/<job>\"", "nothing says what `<job>` is"),
+        ("open sends \"GET /state\" expects \"fine\"", "is neither a status"),
+        ("stop heating sends \"POST /off\" until asks \"GET /state\" timeout 1 s", "nothing but an answer says"),
+    ];
+    for (line, said) in cases {
+        write(&dir, "lab.mtx", text(line));
+        let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
+        assert_eq!(ended.code, 1, "{line}");
+        let flat = ended.out.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(flat.contains("driver-line") && flat.contains(said), "{line}: {}", ended.out);
+    }
+    write(
+        &dir,
+        "lab.mtx",
+        text("open sends \"POST /jobs\" expects \"201 /id=<job>\"\nclose sends \"DELETE /jobs/<job>\""),
+    );
+    let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
+    assert_eq!(ended.code, 0, "{}", ended.out);
+}
