@@ -23,7 +23,7 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\nport = 3", "is a text"),
         ("[plate]\nport = \"x\"\naddress = \"y\"", "two lines"),
         ("[plate]\nport = \"x\"\nhttp = \"y\"", "two lines"),
-        ("[plate]\nhttp = \"127.0.0.1:1\"", "does not speak over HTTP"),
+        ("[plate]\nhttp = \"127.0.0.1:1\"", "speaks over a line"),
         ("[plate]\nport = \"x\"\ndriver = \"Cavro\"", "no driver `Cavro`"),
         ("[plate]\nby = \"feet\"", "hands"),
         ("[plate]\nport = \"x\"\ntolerance = { temperature = \"5 g\" }", "a number of K"),
