@@ -106,7 +106,12 @@ pub fn read_stdin() -> Result<Vec<u8>, String> {
 pub fn replace(path: &Path, text: impl AsRef<[u8]>) -> Result<(), String> {
     let failed = |e: io::Error| format!("cannot write `{}`: {}", path.display(), reason(&e));
     let target = fs::canonicalize(path).map_err(failed)?;
-    let permissions = fs::metadata(&target).map_err(failed)?.permissions();
+    let there = fs::metadata(&target).map_err(failed)?;
+    // A pipe or a device in its place is not to be lost.
+    if !there.is_file() {
+        return Err(format!("cannot write `{}`: it is no regular file", path.display()));
+    }
+    let permissions = there.permissions();
     if permissions.readonly() {
         return Err(format!("cannot write `{}`: it is read-only", path.display()));
     }

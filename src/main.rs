@@ -54,7 +54,13 @@ fn main() -> ExitCode {
     // Every pass over a text goes as deep as its brackets; the deepest that are read need more than a thread's usual stack.
     let worker = std::thread::Builder::new().stack_size(STACK).spawn(move || obey(cli));
     match worker.map(std::thread::JoinHandle::join) {
-        Ok(Ok(exit)) => exit.into(),
+        Ok(Ok(exit)) => match terminal::lost() {
+            None => exit.into(),
+            Some(why) => {
+                terminal::complain(&format!("cannot write to standard output: {why}"));
+                Exit::Usage.into()
+            }
+        },
         _ => ExitCode::from(101),
     }
 }

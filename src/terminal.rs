@@ -1,6 +1,7 @@
 //! Standard output and standard error: written as far as somebody reads, coloured only for people.
 
 use std::io::{self, IsTerminal, Write};
+use std::sync::OnceLock;
 
 use crate::args::Color;
 use crate::report::Look;
@@ -20,17 +21,30 @@ pub enum Stream {
     Err,
 }
 
+/// Why a result could not be written, the first time.
+static LOST: OnceLock<String> = OnceLock::new();
+
+/// Why results could not be written to standard output, if they could not.
+pub fn lost() -> Option<&'static str> {
+    LOST.get().map(String::as_str)
+}
+
 /// Writes text; a reader that has gone away ends the writing, not the command.
 pub fn print(stream: Stream, text: &str) {
-    let _ = match stream {
-        Stream::Out => write(io::stdout().lock(), text.as_bytes()),
-        Stream::Err => write(io::stderr().lock(), text.as_bytes()),
-    };
+    match stream {
+        Stream::Out => pour(text.as_bytes()),
+        // There is nowhere left to say that this failed.
+        Stream::Err => drop(write(io::stderr().lock(), text.as_bytes())),
+    }
 }
 
 /// Writes a result that may not be text.
 pub fn pour(bytes: &[u8]) {
-    let _ = write(io::stdout().lock(), bytes);
+    if let Err(why) = write(io::stdout().lock(), bytes)
+        && why.kind() != io::ErrorKind::BrokenPipe
+    {
+        LOST.get_or_init(|| crate::files::reason(&why));
+    }
 }
 
 /// Writes one `error: ` line to standard error.

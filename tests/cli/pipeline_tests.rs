@@ -185,6 +185,29 @@ mod unix {
         assert_eq!(matterixc_in(&dir, &["fmt", "--check", "warm.mtx"]).code, 0);
     }
 
+    /// A disk that is full stands in for one; Linux has it as a device.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn results_that_cannot_be_written_are_no_success() {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let ended = command().arg("version").stdout(full).output().expect("the command starts");
+        assert_eq!(ended.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(said.contains("cannot write to standard output: no space left on device"), "{said}");
+    }
+
+    #[test]
+    fn a_pipe_is_not_replaced_by_a_file() {
+        let dir = project("pipe");
+        let made = Command::new("mkfifo").arg(dir.join("out")).status().expect("there is `mkfifo`");
+        assert!(made.success());
+        let ended = matterixc_in(&dir, &["plan", "warm.mtx", "--svg", "out"]);
+        assert_eq!(ended.code, 2, "{}", ended.err);
+        assert!(ended.err.contains("it is no regular file"), "{}", ended.err);
+        let kind = fs::symlink_metadata(dir.join("out")).expect("it is there").file_type();
+        assert!(!kind.is_file());
+    }
+
     #[test]
     fn a_read_only_file_is_not_rewritten() {
         let dir = project("read_only");
