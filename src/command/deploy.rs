@@ -1,6 +1,7 @@
 //! `matterixc deploy`.
 
 use std::cell::RefCell;
+use std::path::Path;
 
 use matterix_hardware::deploy::{Journal, Mode};
 use matterix_ir::Severity;
@@ -81,7 +82,11 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         let speed = show_number(args.speed);
         print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
     }
-    let deployed = pipeline::deploy(&program, &sources, plan)?;
+    let deployed = pipeline::deploy(&program, &sources, plan);
+    if let (Some(path), false) = (&args.journal, args.resume) {
+        forget_empty(path);
+    }
+    let deployed = deployed?;
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     if let Some(end) = deployed.end {
@@ -91,6 +96,14 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         print(Stream::Err, &format!("the deployment {how} after {} s; {seen}\n", show_number(end)));
     }
     Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
+}
+
+/// Removes a new journal into which nothing was written: what was refused beforehand may be tried again with it.
+fn forget_empty(journal: &Path) {
+    if std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() == 0) {
+        // It stays where it cannot be removed, which the next attempt says.
+        let _ = std::fs::remove_file(journal);
+    }
 }
 
 /// Whether a person agrees; nobody does where nobody can be asked.

@@ -14,6 +14,19 @@ fn found(name: &str, text: &str, bindings: &str) -> String {
 }
 
 #[test]
+fn refused_bindings_leave_no_journal_behind() {
+    let dir = bench("no_journal", HEAT, "plate", "");
+    write(&dir, "lab.toml", "[plat]\nport = \"x\"");
+    let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "j.jsonl", "--yes"];
+    assert_eq!(matterixc_in(&dir, &args).code, 1);
+    assert!(!dir.join("j.jsonl").exists());
+    write(&dir, "j.jsonl", "something else\n");
+    let ended = matterixc_in(&dir, &args);
+    assert_eq!(ended.code, 2, "{}", ended.err);
+    assert!(ended.err.contains("give the journal another name"), "{}", ended.err);
+}
+
+#[test]
 fn what_is_wrong_with_bindings_is_said_where_it_stands() {
     let cases = [
         ("[plat]\nport = \"x\"", "has no `plat`"),

@@ -1,7 +1,7 @@
 //! The journal of a deployment: one JSON object a line, only ever appended to, on disk before what it says is done.
 
 use std::fs::{File, OpenOptions};
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::path::Path;
 
 use matterix_ir::Program;
@@ -148,7 +148,13 @@ impl Journal {
     /// A new one; an error where there is one already.
     pub fn create(path: &Path) -> Result<Self, JournalError> {
         let file = OpenOptions::new().append(true).create_new(true).open(path);
-        let file = file.map_err(|e| format!("cannot create the journal `{}`: {e}", path.display()))?;
+        let file = file.map_err(|e| match e.kind() {
+            ErrorKind::AlreadyExists => {
+                let there = format!("there is a file `{}` already", path.display());
+                format!("{there}: give the journal another name, or go on after it with `--resume`")
+            }
+            _ => format!("cannot create the journal `{}`: {e}", path.display()),
+        })?;
         Ok(Journal { file: Some(file), broken: None })
     }
 
