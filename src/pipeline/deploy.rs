@@ -75,14 +75,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     };
     let twin = Sim::new(engine, &prepared, plan.seed);
     let shows = plan.trace || plan.mode == Mode::Dry;
-    let trace = move |time: f64, device: &str, out: bool, bytes: &[u8]| {
-        if shows {
-            print(
-                Stream::Out,
-                &format!("{time:10.3} s  {device} {} {}\n", if out { "<-" } else { "->" }, shown(bytes)),
-            );
-        }
-    };
+    let trace = traced(shows);
     let settings = Settings { mode: plan.mode, speed: plan.speed, cancel: plan.cancel, person: plan.person };
     let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
     let found = {
@@ -146,7 +139,17 @@ fn unfit(before: &[Entry], digest: &str, speed: f64) -> Option<Diagnostic> {
     }
 }
 
-fn of_fault(fault: Fault) -> Diagnostic {
+/// Shows what goes over lines, where that is wanted.
+pub(super) fn traced(shows: bool) -> impl Fn(f64, &str, bool, &[u8]) {
+    move |time, device, out, bytes| {
+        if shows {
+            let way = if out { "<-" } else { "->" };
+            print(Stream::Out, &format!("{time:10.3} s  {device} {way} {}\n", shown(bytes)));
+        }
+    }
+}
+
+pub(super) fn of_fault(fault: Fault) -> Diagnostic {
     exec::diagnostic(&FailureTrace::of_fault(fault))
 }
 

@@ -7,17 +7,17 @@ use std::net::SocketAddr;
 use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::binding;
-use matterix_hardware::codec::shown;
 use matterix_hardware::deploy::{Device, Hardware, Journal, Mode, Settings};
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
 use matterix_ir::offer::{Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources};
 use matterix_runtime::backend::{Backend, Prepared, Sim};
-use matterix_runtime::exec::{self, FailureTrace, Limits, RunStatus};
+use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
 use matterix_sila_wire::serve as answer;
 
+use super::deploy::{of_fault, traced, unsafe_left};
 use crate::terminal::{Stream, print};
 
 /// What a server is given beside a program.
@@ -56,13 +56,7 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
         return Ok(found);
     }
     let devices: Vec<Device<'_>> = bindings.into_iter().map(|b| Device::new(program, b)).collect::<Result<_, _>>()?;
-    let trace = service.trace;
-    let over = move |time: f64, device: &str, out: bool, bytes: &[u8]| {
-        if trace {
-            let way = if out { "<-" } else { "->" };
-            print(Stream::Out, &format!("{time:10.3} s  {device} {way} {}\n", shown(bytes)));
-        }
-    };
+    let over = traced(service.trace);
     let nobody = |_: &str| false;
     let settings = Settings { mode: Mode::Real, speed: service.speed, cancel: service.cancel, person: &nobody };
     let mut hardware = Hardware::new(program, sources, twin, devices, settings, Journal::none(), Box::new(over));
@@ -91,12 +85,12 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
     };
     if let Err(fault) = hardware.open(false) {
         let mut found = vec![of_fault(fault)];
-        found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
+        found.extend(hardware.secure().into_iter().map(unsafe_left));
         return Ok(found);
     }
     let (mut found, well) = attend(program, sources, &mut hardware, offers.iter().collect(), shown, service)?;
     if !well {
-        found.extend(hardware.secure().into_iter().map(super::deploy::unsafe_left));
+        found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
     Ok(found)
@@ -143,8 +137,4 @@ fn operations(plan: &Plan, step: StepId) -> Vec<StepId> {
         open.extend(plan.get(step).step.children());
     }
     found
-}
-
-fn of_fault(fault: matterix_runtime::fault::Fault) -> Diagnostic {
-    exec::diagnostic(&FailureTrace::of_fault(fault))
 }

@@ -40,7 +40,7 @@ pub fn reach<'s>(level: f64, pieces: impl Iterator<Item = (&'s Shape, Pose)>) ->
 }
 
 /// Where the centre of mass of a thing is, in its own frame, m.
-fn centre(thing: &Body<'_>) -> Option<[f64; 3]> {
+pub fn centre(thing: &Body<'_>) -> Option<[f64; 3]> {
     let named = thing.frames.iter().find(|f| f.name == frame::CENTRE && !f.stand && f.link.is_none());
     let main = thing.shape.iter().map(|shape| (*shape, Pose::IDENTITY));
     let shapes = main.chain(thing.solids.iter().map(|solid| (&solid.shape, solid.pose)));

@@ -42,27 +42,27 @@ impl Text {
         mut value: impl FnMut(NodeId) -> Result<Option<f64>, E>,
         instance: impl Fn(f64) -> String,
     ) -> Result<String, E> {
+        self.filled(|part, node| {
+            let Some(v) = value(node)? else { return Ok("?".to_owned()) };
+            Ok(match part {
+                TextPart::Quantity { unit, digits, .. } => quantity(unit, v, *digits),
+                TextPart::Bool(_) => if v == 0.0 { "false" } else { "true" }.to_owned(),
+                TextPart::Word(_, words) => words.get(v as usize).cloned().unwrap_or_else(|| "?".to_owned()),
+                _ => instance(v),
+            })
+        })
+    }
+
+    /// The text with what `show` makes of its values, each a part and its node.
+    pub fn filled<E>(&self, mut show: impl FnMut(&TextPart, NodeId) -> Result<String, E>) -> Result<String, E> {
         let mut out = String::new();
         for part in &self.parts {
-            let (TextPart::Quantity { value: node, .. }
-            | TextPart::Bool(node)
-            | TextPart::Instance(node)
-            | TextPart::Word(node, _)) = part
-            else {
-                if let TextPart::Plain(text) = part {
-                    out.push_str(text);
-                }
-                continue;
-            };
-            let Some(v) = value(*node)? else {
-                out.push('?');
-                continue;
-            };
             match part {
-                TextPart::Quantity { unit, digits, .. } => out.push_str(&quantity(unit, v, *digits)),
-                TextPart::Bool(_) => out.push_str(if v == 0.0 { "false" } else { "true" }),
-                TextPart::Word(_, words) => out.push_str(words.get(v as usize).map_or("?", String::as_str)),
-                _ => out.push_str(&instance(v)),
+                TextPart::Plain(text) => out.push_str(text),
+                TextPart::Quantity { value: node, .. }
+                | TextPart::Bool(node)
+                | TextPart::Instance(node)
+                | TextPart::Word(node, _) => out.push_str(&show(part, *node)?),
             }
         }
         Ok(out)

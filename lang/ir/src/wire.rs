@@ -79,6 +79,17 @@ pub struct Template {
     pub span: Span,
 }
 
+impl Template {
+    /// The text with the same in place of every value.
+    pub fn with(&self, value: &str) -> String {
+        let piece = |piece: &Piece| match piece {
+            Piece::Plain(text) => text.clone(),
+            Piece::Number { .. } | Piece::Word(..) => value.to_owned(),
+        };
+        self.pieces.iter().map(piece).collect()
+    }
+}
+
 /// A piece of what a reply looks like. A blank stands for any number of blanks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Slot {
@@ -97,6 +108,17 @@ pub struct Pattern {
     pub slots: Vec<Slot>,
     /// Where it is declared.
     pub span: Span,
+}
+
+impl Pattern {
+    /// The text with the same in place of all that may differ.
+    pub fn with(&self, value: &str) -> String {
+        let slot = |slot: &Slot| match slot {
+            Slot::Plain(text) => text.clone(),
+            Slot::Number(_) | Slot::Any => value.to_owned(),
+        };
+        self.slots.iter().map(slot).collect()
+    }
 }
 
 /// What is said to a device at one time.

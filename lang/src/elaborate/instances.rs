@@ -113,8 +113,8 @@ impl<'a> Elaborator<'a> {
             }));
         }
         let within = self.within.clone();
-        if owner.is_none() && !self.top_level.contains_key(&name) {
-            self.top_level.insert(name.clone(), id);
+        if owner.is_none() {
+            self.top_level.entry(name.clone()).or_insert(id);
         }
         self.instances.push(Instance { name, kinds, within, owner, settings, span, ..Instance::default() });
         self.count_mixture(id);

@@ -98,14 +98,8 @@ impl<'a> Elaborator<'a> {
             Type::Enum(words) => Value::Enum(node, words.clone()),
             Type::Quantity { dimension, point, .. } => {
                 let Domain::Quantity(unit) = &self.states[index as usize].domain else { return Value::Error };
-                let unit = Some(unit.clone());
-                Value::Num(Num {
-                    node,
-                    dimension: dimension.clone(),
-                    point: *point,
-                    unit: unit.map(Arc::new),
-                    literal: false,
-                })
+                let unit = Some(Arc::new(unit.clone()));
+                Value::Num(Num { node, dimension: dimension.clone(), point: *point, unit, literal: false })
             }
             _ => Value::Error,
         }

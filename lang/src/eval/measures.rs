@@ -1,7 +1,7 @@
 //! How large things are, for what grips them and what they stand on or under.
 
 use matterix_ir::extent::Body;
-use matterix_ir::inertia::of_shapes;
+use matterix_ir::footing::centre;
 use matterix_ir::math::acos;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, frame};
@@ -9,7 +9,6 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{Type, Value};
 use crate::elaborate::Elaborator;
-use crate::elaborate::geometry::Geometry;
 
 /// What can be measured.
 const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise", "centre", "tilt"];
@@ -38,7 +37,7 @@ impl Elaborator<'_> {
                     "grasp" | "offer" => body.across(what),
                     "height" => body.height(),
                     "foot" => body.foot(),
-                    "centre" => self.centre(&geometry),
+                    "centre" => centre(&body).map(|at| at[2]),
                     _ => body.top(),
                 }
             }
@@ -55,15 +54,6 @@ impl Elaborator<'_> {
         }
         let found = self.footing(thing, on);
         Value::List(found.map(|value| self.number(value, dimension, false)).into_iter().collect())
-    }
-
-    /// How high the centre of mass of a body is above its base, m.
-    fn centre(&self, geometry: &Geometry) -> Option<f64> {
-        let named = geometry.frames.iter().find(|f| f.name == frame::CENTRE && !f.stand && f.link.is_none());
-        let main = geometry.shape.iter().map(|shape| (shape, Pose::IDENTITY));
-        let shapes = main.chain(geometry.solids.iter().map(|solid| (&solid.shape, solid.pose)));
-        let middle = named.map(|f| f.pose.position).or_else(|| Some(of_shapes(1.0, shapes)?.placement.position));
-        middle.map(|at| at[2])
     }
 
     /// How far where things stand on an instance is from level in the lab as it is set up, rad; of what goes with a joint

@@ -1,5 +1,7 @@
 //! What is so where a condition does not hold, in the words that its text gives.
 
+use std::convert::Infallible;
+
 use matterix_ir::model::Domain;
 use matterix_ir::plan::{Condition, Said};
 use matterix_ir::{TextPart, Unit};
@@ -15,19 +17,8 @@ impl Flow<'_, '_> {
         let fails = all.iter().find(|said| self.eval(said.node, facts).truth() == Some(false));
         let open = fails.or_else(|| all.iter().find(|said| self.eval(said.node, facts).truth().is_none()));
         let Some(Said { text, .. }) = open else { return Vec::new() };
-        let mut out = String::new();
-        for part in &text.parts {
-            let (TextPart::Quantity { value: node, .. }
-            | TextPart::Bool(node)
-            | TextPart::Instance(node)
-            | TextPart::Word(node, _)) = part
-            else {
-                if let TextPart::Plain(text) = part {
-                    out.push_str(text);
-                }
-                continue;
-            };
-            let known = self.eval(*node, facts);
+        let said = text.filled(|part, node| {
+            let known = self.eval(node, facts);
             let text = match part {
                 TextPart::Quantity { unit, digits, .. } => {
                     shown(&known, |v| unit.show(digits.map_or(v, |digits| rounded(unit, v, digits))))
@@ -36,9 +27,9 @@ impl Flow<'_, '_> {
                 TextPart::Word(_, words) => self.show(&known, &Domain::Enum(words.clone())),
                 _ => self.show(&known, &Domain::Instance),
             };
-            out.push_str(&text.replace('`', ""));
-        }
-        vec![out]
+            Ok::<_, Infallible>(text.replace('`', ""))
+        });
+        said.into_iter().collect()
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::message::{self, Field};
-use matterix_ir::wire::{Driver, Exchange, JSON, Pattern, Piece, Slot, Template};
+use matterix_ir::wire::{Driver, Exchange, JSON, Pattern, Piece, Template};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::hosted::Under;
@@ -39,10 +39,10 @@ impl<'a> Planner<'a, '_> {
             self.check_answer(&told.expects);
         }
         for (asked, with) in &driver.answers {
-            if let Err(why) = message::request(&seen(asked)) {
+            if let Err(why) = message::request(&asked.with(VALUE)) {
                 self.no_message(asked.span, &why);
             }
-            if let Err(why) = message::answer(&said(with)) {
+            if let Err(why) = message::answer(&with.with(VALUE)) {
                 self.no_message(with.span, &why);
             }
         }
@@ -64,7 +64,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn check_request(&mut self, template: &Template, known: &BTreeSet<String>) {
-        let text = said(template);
+        let text = template.with(VALUE);
         let request = match message::request(&text) {
             Ok(request) => request,
             Err(why) => return self.no_message(template.span, &why),
@@ -79,7 +79,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn check_answer(&mut self, pattern: &Pattern) {
-        if let Err(why) = message::answer(&seen(pattern)) {
+        if let Err(why) = message::answer(&pattern.with(VALUE)) {
             self.no_message(pattern.span, &why);
         }
     }
@@ -90,7 +90,7 @@ impl<'a> Planner<'a, '_> {
 }
 
 fn put_in<'t>(fields: &[Field<'t>]) -> impl Iterator<Item = &'t str> {
-    fields.iter().filter_map(|f| message::kept(f.value)).collect::<Vec<_>>().into_iter()
+    fields.iter().filter_map(|f| message::kept(f.value))
 }
 
 /// The words that the answers of a line are kept under.
@@ -101,22 +101,4 @@ fn kept_by(wire: &Wire) -> Vec<String> {
     };
     let Some(expects) = &exchange.expects else { return Vec::new() };
     message::answer(&expects.text).map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
-}
-
-/// A message with something in place of its values.
-fn said(template: &Template) -> String {
-    let piece = |piece: &Piece| match piece {
-        Piece::Plain(text) => text.clone(),
-        Piece::Number { .. } | Piece::Word(..) => VALUE.to_owned(),
-    };
-    template.pieces.iter().map(piece).collect()
-}
-
-/// An answer with something in place of its values.
-fn seen(pattern: &Pattern) -> String {
-    let slot = |slot: &Slot| match slot {
-        Slot::Plain(text) => text.clone(),
-        Slot::Number(_) | Slot::Any => VALUE.to_owned(),
-    };
-    pattern.slots.iter().map(slot).collect()
 }

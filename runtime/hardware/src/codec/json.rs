@@ -16,7 +16,7 @@ pub const LONGEST: usize = 16 << 20;
 /// Longest answer that is shown whole, characters.
 const SHOWN: usize = 400;
 /// Stands for a value while a message is taken apart.
-const MARK: char = '\u{1}';
+const MARK: &str = "\u{1}";
 /// From here on a status means that the server refuses.
 const REFUSED: u16 = 400;
 
@@ -95,7 +95,7 @@ impl Json {
     pub(super) fn shown(&self, pattern: Option<&Pattern>, reply: &str) -> String {
         let status = reply.split(' ').next().unwrap_or_default();
         let members = pattern.zip(parts(reply)).map(|(pattern, (_, body))| {
-            let text = marked_pattern(pattern);
+            let text = pattern.with(MARK);
             let fields = message::answer(&text).map(|a| a.fields).unwrap_or_default();
             let member = |f: Field<'_>| body.pointer(&f.pointer).map(|v| format!(" {}={}", f.pointer, plain(v)));
             fields.into_iter().filter_map(member).collect::<String>()
@@ -111,7 +111,7 @@ impl Json {
         let (method, rest) = request.split_once(' ')?;
         let (target, body) = rest.split_once(' ').unwrap_or((rest, "{}"));
         let body: Value = serde_json::from_str(body).ok()?;
-        let text = marked_template(template);
+        let text = template.with(MARK);
         let wanted = message::request(&text).ok()?;
         if wanted.method != method {
             return None;
@@ -268,7 +268,7 @@ type Kept = Vec<(String, String)>;
 /// The numbers of an answer that looks like this, and what is kept of it.
 fn look(pattern: &Pattern, reply: &str) -> Option<(Vec<f64>, Kept)> {
     let (status, body) = parts(reply)?;
-    let text = marked_pattern(pattern);
+    let text = pattern.with(MARK);
     let answer = message::answer(&text).ok()?;
     if answer.status.is_some_and(|wanted| wanted != status) {
         return None;
@@ -293,22 +293,6 @@ fn look(pattern: &Pattern, reply: &str) -> Option<(Vec<f64>, Kept)> {
         numbers.extend(pattern::matched(&Pattern { slots, ..Pattern::default() }, &is)?);
     }
     Some((numbers, kept))
-}
-
-fn marked_pattern(pattern: &Pattern) -> String {
-    let slot = |slot: &Slot| match slot {
-        Slot::Plain(text) => text.clone(),
-        Slot::Number(_) | Slot::Any => MARK.to_string(),
-    };
-    pattern.slots.iter().map(slot).collect()
-}
-
-fn marked_template(template: &Template) -> String {
-    let piece = |piece: &Piece| match piece {
-        Piece::Plain(text) => text.clone(),
-        Piece::Number { .. } | Piece::Word(..) => MARK.to_string(),
-    };
-    template.pieces.iter().map(piece).collect()
 }
 
 fn shortened(text: &str) -> String {

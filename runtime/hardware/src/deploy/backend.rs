@@ -12,7 +12,6 @@ use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Advance, Watch};
 
-use super::device::Ear;
 use super::hardware::{Hardware, Running, address, wall};
 use super::journal::Entry;
 use super::preflight::carrier;
@@ -152,16 +151,7 @@ impl Backend for Hardware<'_, '_> {
                 None => {
                     self.go_live(out)?;
                     let text = self.texts(std::slice::from_ref(&until.asks)).concat();
-                    let asked = {
-                        let (name, driver, line) =
-                            (self.devices[device].name, self.devices[device].driver, self.line_of(device));
-                        let mut ear =
-                            Ear { time: now, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-                        match (self.devices[line].link.as_mut(), driver) {
-                            (Some(link), Some(driver)) => link.is_ready(&text, until, driver, &mut ear),
-                            _ => Err(Trouble::Lost("its line is not open".to_owned())),
-                        }
-                    };
+                    let asked = self.over(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {
                         Ok(true) => self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?,
                         Ok(false) if now >= deadline => {

@@ -6,7 +6,7 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
-use super::device::{Carrier, Ear};
+use super::device::Carrier;
 use super::hardware::{Hardware, Mode, wall};
 use super::journal::Entry;
 use crate::link::{self, Line, Trouble};
@@ -35,12 +35,7 @@ impl Hardware<'_, '_> {
                 let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
                 let mut ready = false;
                 for _ in 0..tries {
-                    let (time, line) = (self.twin.now(), self.line_of(index));
-                    let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-                    let asked = match self.devices[line].link.as_mut() {
-                        Some(link) => link.is_ready(&text, until, driver, &mut ear),
-                        None => Err(Trouble::Lost("its line is not open".to_owned())),
-                    };
+                    let asked = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     ready = asked.map_err(|trouble| self.trouble(index, &trouble, exchange.span))?;
                     if ready {
                         break;

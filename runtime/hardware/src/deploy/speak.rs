@@ -1,7 +1,7 @@
 //! What is said to devices and asked of them, operation by operation.
 
 use matterix_ir::plan::{Operation, StepId};
-use matterix_ir::wire::{Exchange, Pattern, Template};
+use matterix_ir::wire::{Driver, Exchange, Pattern, Template};
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
@@ -9,7 +9,7 @@ use matterix_runtime::fault::Fault;
 use super::device::Ear;
 use super::hardware::Hardware;
 use super::journal::Entry;
-use crate::link::Trouble;
+use crate::link::{Line, Overhear, Trouble};
 use crate::template;
 
 impl<'m> Hardware<'m, '_> {
@@ -37,7 +37,9 @@ impl<'m> Hardware<'m, '_> {
     ) -> Result<Vec<f64>, Trouble> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
-        let Some(driver) = self.devices[index].driver else { return Ok(Vec::new()) };
+        if self.devices[index].driver.is_none() {
+            return Ok(Vec::new());
+        }
         if let Some(why) = &self.devices[self.line_of(index)].lost {
             return Err(Trouble::Lost(format!("nothing more can be said to it: {why}")));
         }
@@ -48,12 +50,21 @@ impl<'m> Hardware<'m, '_> {
             }
             return Ok(Vec::new());
         }
-        let (name, line) = (device.name, self.line_of(index));
-        let Some(link) = self.devices[line].link.as_mut() else {
+        self.over(index, |link, driver, ear| link.say(texts, expects, driver, ear))
+    }
+
+    /// Does something over the line of a device.
+    pub(super) fn over<T>(
+        &mut self,
+        index: usize,
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        let (time, line) = (self.twin.now(), self.line_of(index));
+        let (device, driver) = (self.devices[index].name, self.devices[index].driver);
+        let (Some(link), Some(driver)) = (self.devices[line].link.as_deref_mut(), driver) else {
             return Err(Trouble::Lost("its line is not open".to_owned()));
         };
-        let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-        link.say(texts, expects, driver, &mut ear)
+        act(link, driver, &mut Ear { time, device, journal: &mut self.journal, trace: &mut *self.trace })
     }
 
     /// Asks a device for a quantity, SI.
@@ -68,7 +79,6 @@ impl<'m> Hardware<'m, '_> {
         let text = self.texts(std::slice::from_ref(&told.asks)).concat();
         let (time, is_dry) = (self.twin.now(), self.is_dry());
         let device = &mut self.devices[index];
-        let Some(driver) = device.driver else { return Ok(f64::NAN) };
         if is_dry {
             if let Some(codec) = &mut device.codec {
                 let frame = codec.ask(&text);
@@ -76,14 +86,7 @@ impl<'m> Hardware<'m, '_> {
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let (name, host) = (device.name, self.line_of(index));
-        let asked = match self.devices[host].link.as_mut() {
-            Some(link) => {
-                let mut ear = Ear { time, device: name, journal: &mut self.journal, trace: &mut *self.trace };
-                link.ask(&text, &told.expects, driver, &mut ear)
-            }
-            None => Err(Trouble::Lost("its line is not open".to_owned())),
-        };
+        let asked = self.over(index, |link, driver, ear| link.ask(&text, &told.expects, driver, ear));
         let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
         numbers
             .first()

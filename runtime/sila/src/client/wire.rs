@@ -6,7 +6,9 @@ use std::time::Duration;
 use http::uri::PathAndQuery;
 use prost::Message;
 use tokio::runtime::Runtime;
-use tonic::{Request, Streaming};
+use tonic::client::Grpc;
+use tonic::transport::Channel;
+use tonic::{Request, Response, Status, Streaming};
 use tonic_prost::ProstCodec;
 
 use super::Client;
@@ -27,15 +29,9 @@ impl Client {
         A: Message + Send + Sync + 'static,
         B: Message + Default + Send + Sync + 'static,
     {
-        let silent = self.silent(path.path().rsplit('/').next().unwrap_or_default());
-        let grpc = &mut self.grpc;
-        let call = async {
-            grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection broke off: {}", source(&e))))?;
-            let answer = grpc.unary(Request::new(message), path, ProstCodec::<A, B>::default()).await;
-            answer.map(tonic::Response::into_inner).map_err(|s| Failure::of(&s))
-        };
-        let answer = within(&self.runtime, self.timeout, call);
-        answer.unwrap_or(Err(silent))
+        self.patiently(path, async |grpc, path| {
+            grpc.unary(Request::new(message), path, ProstCodec::<A, B>::default()).await
+        })
     }
 
     pub(super) fn stream<A, B>(&mut self, path: PathAndQuery, message: A) -> Result<Streaming<B>, Failure>
@@ -43,15 +39,24 @@ impl Client {
         A: Message + Send + Sync + 'static,
         B: Message + Default + Send + Sync + 'static,
     {
+        self.patiently(path, async |grpc, path| {
+            grpc.server_streaming(Request::new(message), path, ProstCodec::<A, B>::default()).await
+        })
+    }
+
+    /// What a call answers, unless it takes longer than the client waits.
+    fn patiently<T>(
+        &mut self,
+        path: PathAndQuery,
+        call: impl AsyncFnOnce(&mut Grpc<Channel>, PathAndQuery) -> Result<Response<T>, Status>,
+    ) -> Result<T, Failure> {
         let silent = self.silent(path.path().rsplit('/').next().unwrap_or_default());
         let grpc = &mut self.grpc;
-        let call = async {
+        let answer = async {
             grpc.ready().await.map_err(|e| Failure::Lost(format!("the connection broke off: {}", source(&e))))?;
-            let answer = grpc.server_streaming(Request::new(message), path, ProstCodec::<A, B>::default()).await;
-            answer.map(tonic::Response::into_inner).map_err(|s| Failure::of(&s))
+            call(grpc, path).await.map(Response::into_inner).map_err(|s| Failure::of(&s))
         };
-        let answer = within(&self.runtime, self.timeout, call);
-        answer.unwrap_or(Err(silent))
+        within(&self.runtime, self.timeout, answer).unwrap_or(Err(silent))
     }
 }
 
