@@ -319,7 +319,7 @@ impl<'a> Elaborator<'a> {
         }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), n.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
         } else if let Some(module) = names.declared_in(&n.text).filter(|m| !m.is_empty()) {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", n.text));
         }
@@ -446,9 +446,18 @@ impl<'a> Elaborator<'a> {
         for item in items {
             let of = if single { self.spoken(&item) } else { None };
             let outer = of.is_some().then(|| (std::mem::take(&mut self.comparisons), std::mem::take(&mut self.terms)));
+            let instance = match &item {
+                Value::Instance(id) | Value::Qualified(id, _) => Some(*id),
+                _ => None,
+            };
+            let compared = self.comparisons.len();
             scope.bind(var.text.clone(), item);
             let noted = self.noted.len();
             let value = self.expr(body, scope);
+            if let Some(instance) = instance {
+                let inside = self.comparisons.iter_mut().skip(compared);
+                inside.for_each(|c| c.each.push((var.span, instance)));
+            }
             // The innermost of several, as all is bound there.
             if self.noting
                 && self.noted.len() == noted

@@ -136,8 +136,14 @@ impl Lab {
     }
 
     pub fn condition(&mut self, node: NodeId, text: &str, compared: Option<(NodeId, NodeId)>) -> Condition {
-        let comparison =
-            |(value, low)| Comparison { text: "a".into(), value, low: Some(low), high: None, unit: unit() };
+        let comparison = |(value, low)| Comparison {
+            text: "a".into(),
+            value,
+            low: Some(low),
+            high: None,
+            strict: true,
+            unit: unit(),
+        };
         let compared = compared.into_iter().map(comparison).collect();
         Condition {
             node,
