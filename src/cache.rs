@@ -12,7 +12,7 @@ use crate::files;
 /// How much is kept, bytes.
 const MOST: u64 = 64 << 20;
 /// How the files in it end.
-const ENDING: &str = "motions";
+const ENDING: &str = "found";
 
 /// The cache; nothing is kept where it is not wanted, or where the system has no place for it.
 pub fn of(unwanted: bool) -> Box<dyn Store> {

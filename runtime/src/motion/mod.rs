@@ -39,7 +39,7 @@ pub use fixture::Fixture;
 pub use moment::Moment;
 pub use performed::{Part, Performed};
 pub use perturb::{Moved, Perturbation, perturb};
-pub use preflight::{Nowhere, Store, preflight, supported};
+pub use preflight::{Nowhere, Store, preflight, seal, supported};
 pub use refused::{Meeting, Refused};
 pub use stage::{Actor, Carried, Stage};
 pub use together::together;

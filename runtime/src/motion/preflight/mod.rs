@@ -6,7 +6,7 @@ mod look;
 mod memory;
 mod more;
 mod offer;
-mod seal;
+pub mod seal;
 mod starts;
 mod told;
 pub(super) mod values;
