@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use matterix_runtime::motion::Perturbation;
 
-use crate::pipeline::{Options, Target};
+use crate::pipeline::{Fixes, Options, Target};
 
 use crate::report::Format;
 use crate::report::points::Place;
@@ -95,6 +95,12 @@ pub struct CheckArgs {
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
+    /// Make the corrections that findings offer, those that leave no doubt; with `--fix=all` also what is probably meant.
+    #[arg(long, value_enum, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "sure")]
+    pub fix: Option<Fixes>,
+    /// Look again whenever a file changes, until Ctrl-C.
+    #[arg(long, conflicts_with_all = ["fix", "at"])]
+    pub watch: bool,
     /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
     #[arg(long)]
     pub contents: bool,

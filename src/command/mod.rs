@@ -19,6 +19,7 @@ mod study;
 mod test;
 mod verify;
 mod view;
+mod watch;
 
 pub use bill::bill;
 pub use check::check;

@@ -1,10 +1,12 @@
 //! Every call into the compiler and the runtime.
 
 mod bill;
+mod clean;
 mod deploy;
 mod emit;
 mod emulate;
 mod many;
+mod mend;
 mod neighbours;
 mod plan;
 mod run;
@@ -28,6 +30,7 @@ pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
+pub use mend::{Fixes, Mended, mend};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 #[cfg(feature = "sila")]
@@ -84,18 +87,27 @@ impl Input {
     }
 }
 
-/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store.
+/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store, as is
+/// which files had none.
 pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
-    let found = match file {
-        Ok(file) => match fidelity {
-            Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
-            Fidelity::Motion => {
-                matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| preflight(program, store))
-            }
-        },
-        Err(found) => vec![found],
+    let file = match file {
+        Ok(file) => file,
+        Err(found) => return (sources, vec![found]),
     };
+    let neighbours = input.neighbours();
+    let entry = clean::Entry::of(&input.bytes, fidelity, store);
+    if entry.as_ref().is_some_and(|entry| entry.is_clean(&neighbours)) {
+        return (sources, Vec::new());
+    }
+    let read = clean::Noted::new(&neighbours);
+    let found = match fidelity {
+        Fidelity::Process => matterix_lang::check(&mut sources, file, &read),
+        Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store)),
+    };
+    if let Some(entry) = entry.filter(|_| found.is_empty()) {
+        entry.keep(read);
+    }
     (sources, found)
 }
 

@@ -172,7 +172,7 @@ impl<'a> Elaborator<'a> {
         }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         self.report(d);
         Value::Error

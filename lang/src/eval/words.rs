@@ -42,7 +42,7 @@ impl<'a> Elaborator<'a> {
         let mut d = Diagnostic::error(codes::UNKNOWN_NAME, n.span, headline, "no such word");
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), n.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
         }
         self.report(d);
         Value::Error
@@ -137,7 +137,7 @@ impl<'a> Elaborator<'a> {
             let best = near.first()?.clone();
             let headline = format!("`{name}` is never `{}`", word.text);
             let d = Diagnostic::error(codes::UNKNOWN_NAME, word.span, headline, "no state of it");
-            let d = d.fix(format!("replace with `{best}`"), word.span, best);
+            let d = d.guess(format!("replace with `{best}`"), word.span, best);
             Diagnostic { help: near::question(&near).into_iter().collect(), ..d }
         } else {
             let which: Vec<String> = knowing.iter().map(|m| format!("`{name}.{} is {}`", m.text, word.text)).collect();

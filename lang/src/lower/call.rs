@@ -121,7 +121,7 @@ impl<'a> Planner<'a, '_> {
         let near = near::nearest(&text, &all);
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), span, best.clone());
         }
         if let Some(module) = names.declared_in(&text).filter(|m| !m.is_empty()) {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{text}`"));

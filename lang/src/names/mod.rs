@@ -307,7 +307,7 @@ impl<'a> Names<'a> {
         let near = near::nearest(&name.text, self.own[module].keys());
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         } else if let Some(other) = self.declared_in(&name.text) {
             d.help.push(format!("`{}` is declared in `{other}`", name.text));
         }
@@ -354,7 +354,7 @@ impl<'a> Names<'a> {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", name.text));
         } else if let Some(best) = near.first() {
             d.help.extend(near::question(&near));
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         d
     }
