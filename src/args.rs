@@ -71,6 +71,8 @@ pub enum Command {
     View(ViewArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
+    /// Offer check, fix, run and the rest to an assistant, over the Model Context Protocol on standard input and output.
+    Mcp(McpArgs),
     /// Create a small project that checks, runs and passes.
     New(NewArgs),
     /// Print the versions of the command and the language.
@@ -497,6 +499,14 @@ pub struct ViewArgs {
     /// Write the page to a file that opens by itself, and serve nothing.
     #[arg(long, value_name = "FILE", conflicts_with = "port")]
     pub export: Option<PathBuf>,
+}
+
+/// `matterixc mcp`.
+#[derive(Debug, Args)]
+pub struct McpArgs {
+    /// The folder whose protocols it works on; nothing outside of it is read or written.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub root: PathBuf,
 }
 
 /// `matterixc explain`.

@@ -10,6 +10,7 @@ mod cancel;
 mod command;
 mod files;
 mod keys;
+mod mcp;
 mod pipeline;
 mod progress;
 mod report;
@@ -87,6 +88,7 @@ fn obey(cli: Cli) -> Exit {
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),
         Command::Explain(args) => command::explain(&args),
+        Command::Mcp(args) => command::mcp(&args),
         Command::New(args) => command::new(&args),
         Command::Version => command::version(),
     }

@@ -13,7 +13,7 @@ use crate::cache;
 use crate::files;
 use crate::pipeline::{self, Input, Mended};
 use crate::report::points::{self, Found};
-use crate::report::{Format, Reporter};
+use crate::report::{Format, Reporter, stricter};
 use crate::terminal::{self, Stream, complain, print};
 
 /// Reports on every file that can be read; findings go to standard output.
@@ -124,13 +124,5 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
             Err(format!("there is no statement of a workflow at this place of `{path}`{near}"))
         }
         Some(Found::Statement(_)) => Ok(out),
-    }
-}
-
-/// How bad it is with `--strict`.
-fn stricter(severity: Severity) -> Severity {
-    match severity {
-        Severity::Error | Severity::Warning => Severity::Error,
-        Severity::Advice => Severity::Warning,
     }
 }

@@ -17,27 +17,34 @@ pub fn explain(args: &ExplainArgs) -> Exit {
         print(Stream::Out, &index());
         return Exit::Fine;
     }
-    let Some(given) = &args.code else {
-        print(Stream::Out, &list(codes::ALL));
-        return Exit::Fine;
-    };
+    match explanation(args.code.as_deref()) {
+        Ok(page) => {
+            print(Stream::Out, &page);
+            Exit::Fine
+        }
+        Err(help) => {
+            complain(&format!("there is no diagnostic code `{}`", args.code.as_deref().unwrap_or_default()));
+            print(Stream::Err, &format!("help: {help}\n"));
+            Exit::Usage
+        }
+    }
+}
+
+/// The page of a code, the codes of a family, or all without one; `Err` says what may have been meant.
+pub fn explanation(given: Option<&str>) -> Result<String, String> {
+    let Some(given) = given else { return Ok(list(codes::ALL)) };
     let name = bare(given);
     if let Some(code) = codes::find(&name) {
-        print(Stream::Out, &format!("{}\n", code.page.trim_end()));
-        return Exit::Fine;
+        return Ok(format!("{}\n", code.page.trim_end()));
     }
     let family: Vec<Code> = codes::ALL.iter().copied().filter(|c| c.family.eq_ignore_ascii_case(&name)).collect();
     if !family.is_empty() {
-        print(Stream::Out, &list(&family));
-        return Exit::Fine;
+        return Ok(list(&family));
     }
-    complain(&format!("there is no diagnostic code `{given}`"));
-    let hint = match nearest(&name) {
-        Some(code) => format!("help: did you mean `{code}`?\n"),
-        None => "help: `matterixc explain` lists all codes\n".to_string(),
-    };
-    print(Stream::Err, &hint);
-    Exit::Usage
+    Err(match nearest(&name) {
+        Some(code) => format!("did you mean `{code}`?"),
+        None => "`matterixc explain` lists all codes".to_string(),
+    })
 }
 
 /// The code in what was pasted: `error[unit-mismatch]:` is `unit-mismatch`.

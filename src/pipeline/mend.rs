@@ -44,6 +44,30 @@ pub fn mend(input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Store) -
     (input, done)
 }
 
+/// The text of a file after these corrections of one check, and each with its place; `Err` says in words why they cannot
+/// all be made.
+pub fn correct(input: Input, sources: &Sources, fixes: &[&Fix]) -> Result<(Input, Vec<Mended>), String> {
+    let text = std::str::from_utf8(&input.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
+    let mut taken: Vec<Span> = Vec::new();
+    for fix in fixes {
+        for edit in &fix.edits {
+            if edit.span.file != FileId(0) {
+                return Err(format!("`{}` changes another file", fix.title));
+            }
+            if !taken.iter().all(|t| apart(*t, edit.span)) {
+                return Err(format!(
+                    "`{}` changes what another of the corrections changes; make one after the other",
+                    fix.title
+                ));
+            }
+        }
+        taken.extend(fix.edits.iter().map(|e| e.span));
+    }
+    let done = fixes.iter().map(|fix| of(fix, sources)).collect();
+    let text = apply(text, fixes.iter().flat_map(|fix| &fix.edits));
+    Ok((Input { bytes: text.into_bytes(), ..input }, done))
+}
+
 fn of(fix: &Fix, sources: &Sources) -> Mended {
     let first = fix.edits.iter().map(|e| e.span).min_by_key(|s| s.start).unwrap_or_default();
     Mended { at: sources.line_column(first), title: fix.title.clone() }

@@ -30,7 +30,7 @@ pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
-pub use mend::{Fixes, Mended, mend};
+pub use mend::{Fixes, Mended, correct, mend};
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 #[cfg(feature = "sila")]
@@ -45,18 +45,30 @@ pub struct Input {
     pub bytes: Vec<u8>,
     /// Folder of the modules it imports.
     dir: PathBuf,
+    /// The folder outside of which nothing is read, where there is one.
+    root: Option<PathBuf>,
 }
 
 impl Input {
     /// What a file holds.
     pub fn file(path: &Path, bytes: Vec<u8>) -> Self {
         let dir = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Input { name: path.display().to_string(), bytes, dir }
+        Input { name: path.display().to_string(), bytes, dir, root: None }
     }
 
     /// What was typed or piped in; its neighbours are in the current folder.
     pub fn stdin(bytes: Vec<u8>) -> Self {
-        Input { name: "<stdin>".to_string(), bytes, dir: PathBuf::new() }
+        Input { name: "<stdin>".to_string(), bytes, dir: PathBuf::new(), root: None }
+    }
+
+    /// What a client sent; its neighbours are in the current folder.
+    pub fn typed(bytes: Vec<u8>) -> Self {
+        Input { name: "<text>".to_string(), ..Input::stdin(bytes) }
+    }
+
+    /// The same with all that it imports taken from below a folder, given by its whole path without links.
+    pub fn within(self, root: &Path) -> Self {
+        Input { root: Some(root.to_path_buf()), ..self }
     }
 
     /// The text as the first file of a compilation; an error where it is not text.
@@ -83,7 +95,7 @@ impl Input {
     }
 
     fn neighbours(&self) -> Neighbours {
-        Neighbours::of(&self.dir)
+        Neighbours::of(&self.dir, self.root.as_deref())
     }
 }
 

@@ -1,6 +1,6 @@
 //! Modules on disk: next to the file that was named on the command line.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use matterix_ir::FileId;
 use matterix_lang::Loader;
@@ -13,12 +13,25 @@ const LARGEST_MESH: u64 = 64 << 20;
 /// Loads `sn1` from `sn1.mtx` and `parts::racks` from `parts/racks.mtx` in one folder.
 pub(super) struct Neighbours {
     dir: PathBuf,
+    root: Option<PathBuf>,
 }
 
 impl Neighbours {
-    /// The modules in a folder.
-    pub(super) fn of(dir: &Path) -> Self {
-        Neighbours { dir: dir.to_path_buf() }
+    /// The modules in a folder, nothing of which is read outside of `root`.
+    pub(super) fn of(dir: &Path, root: Option<&Path>) -> Self {
+        Neighbours { dir: dir.to_path_buf(), root: root.map(Path::to_path_buf) }
+    }
+
+    /// What a file holds, where it may be read; links lead to where they lead.
+    fn contents(&self, path: &Path, largest: u64) -> Result<Vec<u8>, String> {
+        if let Some(root) = &self.root {
+            let whole = path.canonicalize();
+            // Whether something is there is not told of what is elsewhere.
+            if whole.as_ref().is_ok_and(|whole| !whole.starts_with(root)) || whole.is_err() && leads_up(path) {
+                return Err("it is outside of the folder that may be read".to_string());
+            }
+        }
+        files::contents(path, largest)
     }
 }
 
@@ -33,16 +46,21 @@ impl Loader for Neighbours {
             path.push(part);
         }
         path.set_extension("mtx");
-        let text = String::from_utf8(files::contents(&path, files::LARGEST_TEXT).ok()?).ok()?;
+        let text = String::from_utf8(self.contents(&path, files::LARGEST_TEXT).ok()?).ok()?;
         Some((path.display().to_string(), text))
     }
 
     fn bytes(&self, _: FileId, path: &str) -> Result<Vec<u8>, String> {
-        files::contents(&self.dir.join(path), LARGEST_MESH)
+        self.contents(&self.dir.join(path), LARGEST_MESH)
     }
 
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
-        let bytes = files::contents(&self.dir.join(path), files::LARGEST_TEXT)?;
+        let bytes = self.contents(&self.dir.join(path), files::LARGEST_TEXT)?;
         String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_string())
     }
+}
+
+/// Whether a path may lead out of the folder it begins in.
+fn leads_up(path: &Path) -> bool {
+    path.components().any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
 }

@@ -11,6 +11,11 @@ pub(super) const VERSION: u32 = 1;
 
 /// Appends the object and a line end.
 pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut String) {
+    out.push_str(&format!("{}\n", object(diagnostic, texts)));
+}
+
+/// The object.
+pub(super) fn object(diagnostic: &Diagnostic, texts: &mut Texts<'_>) -> Value {
     let labels: Vec<Value> = diagnostic
         .labels
         .iter()
@@ -26,7 +31,7 @@ pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut S
         })
         .collect();
     let primary = diagnostic.labels.iter().find(|l| l.primary).map(|l| span(l.span, texts));
-    let object = json!({
+    json!({
         "version": VERSION,
         "code": diagnostic.code.name,
         "family": diagnostic.code.family,
@@ -36,8 +41,7 @@ pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut S
         "labels": labels,
         "help": diagnostic.help,
         "fixes": fixes,
-    });
-    out.push_str(&format!("{object}\n"));
+    })
 }
 
 /// A span; null in no known file.

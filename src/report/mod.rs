@@ -82,7 +82,7 @@ impl Reporter {
 
     /// The new findings among `diagnostics`, by file and position, ready to print.
     pub fn render(&mut self, sources: &Sources, diagnostics: Vec<Diagnostic>) -> String {
-        let fresh = self.fresh(sources, diagnostics);
+        let fresh = self.arrange(sources, diagnostics);
         let mut texts = Texts::new(sources);
         let mut out = String::new();
         match self.format {
@@ -114,7 +114,8 @@ impl Reporter {
         }
     }
 
-    fn fresh(&mut self, sources: &Sources, mut diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    /// The new findings among `diagnostics`, by file and position.
+    pub fn arrange(&mut self, sources: &Sources, mut diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
         diagnostics.sort_by(|a, b| {
             let key = |d: &Diagnostic| (d.span().file, d.span().start, d.span().end, d.severity, d.code.name);
             key(a).cmp(&key(b)).then_with(|| a.headline.cmp(&b.headline))
@@ -131,6 +132,19 @@ impl Reporter {
             }
         }
         diagnostics
+    }
+}
+
+/// A finding as `--format json` writes it.
+pub fn object(diagnostic: &Diagnostic, sources: &Sources) -> serde_json::Value {
+    json::object(diagnostic, &mut Texts::new(sources))
+}
+
+/// How bad it is with `--strict`.
+pub fn stricter(severity: Severity) -> Severity {
+    match severity {
+        Severity::Error | Severity::Warning => Severity::Error,
+        Severity::Advice => Severity::Warning,
     }
 }
 

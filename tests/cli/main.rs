@@ -20,6 +20,7 @@ mod gripping;
 mod harness;
 mod hollow;
 mod joints;
+mod mcp;
 mod mend;
 mod meshes;
 mod motion;

@@ -1,0 +1,68 @@
+//! What a tool answers: text to read and data, both of bounded size.
+
+use rmcp::model::{CallToolResult, ContentBlock};
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// Bytes of text or data of an answer, where the caller does not say.
+pub const BYTES: usize = 60_000;
+/// The most a caller may ask for.
+pub const MOST_BYTES: usize = 4 << 20;
+
+/// What a tool answers.
+pub struct Answer {
+    /// To read, one piece after the other.
+    pub texts: Vec<String>,
+    /// The same as data.
+    pub data: Value,
+}
+
+impl Answer {
+    /// With one text.
+    pub fn new(text: String, data: impl Serialize) -> Result<Self, String> {
+        let data = serde_json::to_value(data).map_err(|e| format!("the answer cannot be written: {e}"))?;
+        Ok(Answer { texts: vec![text], data })
+    }
+
+    /// As it is sent.
+    pub fn result(self) -> CallToolResult {
+        let mut result = CallToolResult::structured(self.data);
+        result.content = self.texts.into_iter().map(ContentBlock::text).collect();
+        result
+    }
+}
+
+/// What is wrong with a call, in words.
+pub fn refusal(why: String) -> CallToolResult {
+    CallToolResult::error(vec![ContentBlock::text(why)])
+}
+
+/// A text of at most so many bytes, cut at the end of a line.
+pub fn bounded(text: String, bytes: usize) -> String {
+    if text.len() <= bytes {
+        return text;
+    }
+    let kept = text.floor_char_boundary(bytes);
+    let kept = text[..kept].rfind('\n').map_or(kept, |line| line + 1);
+    let rest = text.len() - kept;
+    format!("{}... {rest} bytes more are left out\n", &text[..kept])
+}
+
+/// An object without its largest members, so that it takes at most so many bytes, and the names of those.
+pub fn pruned(object: Map<String, Value>, bytes: usize) -> (Map<String, Value>, Vec<String>) {
+    let sizes: Vec<(String, usize)> = object.iter().map(|(k, v)| (k.clone(), v.to_string().len() + k.len())).collect();
+    let mut total: usize = sizes.iter().map(|s| s.1).sum();
+    let mut by_size: Vec<&(String, usize)> = sizes.iter().collect();
+    by_size.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    let mut left_out = Vec::new();
+    for (name, size) in by_size {
+        if total <= bytes {
+            break;
+        }
+        total -= size;
+        left_out.push(name.clone());
+    }
+    left_out.sort();
+    let kept = object.into_iter().filter(|(name, _)| !left_out.contains(name)).collect();
+    (kept, left_out)
+}

@@ -1,0 +1,84 @@
+//! The folder that a server works in, and what it remembers while it runs.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use matterix_runtime::motion::Store;
+
+use crate::files;
+use crate::pipeline::Input;
+
+/// Bytes remembered of earlier checks.
+const MOST: usize = 64 << 20;
+
+/// What calls share.
+pub struct Desk {
+    root: PathBuf,
+    kept: Mutex<BTreeMap<String, Vec<u8>>>,
+}
+
+impl Desk {
+    /// Over a folder, which becomes the current one, so that findings name files as the client does.
+    pub fn of(root: &Path) -> Result<Self, String> {
+        let failed = |e: std::io::Error| format!("cannot serve `{}`: {}", root.display(), files::reason(&e));
+        let whole = root.canonicalize().map_err(failed)?;
+        std::env::set_current_dir(&whole).map_err(failed)?;
+        Ok(Desk { root: whole, kept: Mutex::default() })
+    }
+
+    /// A file of the folder by its path from there, links followed.
+    pub fn place(&self, path: &str) -> Result<PathBuf, String> {
+        let outside = || format!("`{path}` is not in the folder of the server; paths are given from there");
+        let asked = self.root.join(path);
+        let whole = match asked.canonicalize() {
+            Ok(whole) => whole,
+            // Whether something is there is not told of what is elsewhere.
+            Err(e) if self.is_above(&asked) => {
+                return Err(format!("cannot read `{path}`: {}", files::reason(&e)));
+            }
+            Err(_) => return Err(outside()),
+        };
+        whole.strip_prefix(&self.root).map(Path::to_path_buf).map_err(|_| outside())
+    }
+
+    /// Whether the nearest folder on the way that exists is one of the root.
+    fn is_above(&self, asked: &Path) -> bool {
+        let there = asked.ancestors().skip(1).find_map(|folder| folder.canonicalize().ok());
+        there.is_some_and(|folder| folder.starts_with(&self.root))
+    }
+
+    /// A file, or a text that stands for one in the folder itself.
+    pub fn input(&self, path: Option<&str>, text: Option<&str>) -> Result<Input, String> {
+        let input = match (path, text) {
+            (Some(path), None) => {
+                let place = self.place(path)?;
+                let bytes = files::read(&place)?;
+                Input::file(&place, bytes)
+            }
+            (None, Some(text)) => Input::typed(text.as_bytes().to_vec()),
+            _ => return Err("give either `path` or `text`".to_string()),
+        };
+        Ok(input.within(&self.root))
+    }
+
+    fn kept(&self) -> MutexGuard<'_, BTreeMap<String, Vec<u8>>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Ways of robots are remembered while the server runs, not on disk.
+impl Store for Desk {
+    fn load(&self, name: &str) -> Option<Vec<u8>> {
+        self.kept().get(name).cloned()
+    }
+
+    fn save(&self, name: &str, bytes: &[u8]) {
+        let mut kept = self.kept();
+        kept.insert(name.to_string(), bytes.to_vec());
+        let size: usize = kept.values().map(Vec::len).sum();
+        if size > MOST {
+            kept.clear();
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! The tool `fix`.
+
+use std::sync::atomic::AtomicBool;
+
+use matterix_ir::Fix;
+use rmcp::schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Task;
+use super::arguments::Fidelity;
+use crate::mcp::answer::Answer;
+use crate::mcp::desk::Desk;
+use crate::mcp::found::{Findings, judged, named, told};
+use crate::pipeline::{self, Fixes, Input, Mended};
+use crate::{args, files};
+
+/// Which corrections are made.
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(crate = "rmcp::schemars")]
+pub enum Which {
+    /// Those that leave no doubt what was meant.
+    Sure,
+    /// What was probably meant as well: names that are near, brackets, amounts. To be read afterwards.
+    All,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(crate = "rmcp::schemars")]
+pub struct FixTask {
+    /// The file, from the folder of the server. Either this or `text`.
+    path: Option<String>,
+    /// A protocol that is in no file.
+    text: Option<String>,
+    /// Corrections of the last `check` of this very text by their `id`, which do not overlap. Either this or `which`.
+    ids: Option<Vec<String>>,
+    /// All corrections of a kind, again and again until none is left.
+    which: Option<Which>,
+    /// Write the file; without it the new text is returned and nothing is written.
+    #[serde(default)]
+    write: bool,
+    /// As for `check`; the same gives the same findings.
+    fidelity: Option<Fidelity>,
+    /// Give up after so many seconds, 1 to 600; 60 if not given.
+    seconds: Option<u64>,
+}
+
+/// A correction that was made.
+#[derive(Serialize, JsonSchema)]
+#[schemars(crate = "rmcp::schemars")]
+pub struct Done {
+    /// Line, as it was then, from 1.
+    line: usize,
+    /// Column, from 1.
+    column: usize,
+    /// What was done.
+    title: String,
+}
+
+/// A text after its corrections.
+#[derive(Serialize, JsonSchema)]
+#[schemars(crate = "rmcp::schemars")]
+pub struct Fixed {
+    /// What was done, in this order.
+    applied: Vec<Done>,
+    /// Whether the file was written.
+    written: bool,
+    /// The text as it is now.
+    text: String,
+    /// What is still to be mended, with corrections of the new text.
+    #[serde(flatten)]
+    left: Findings,
+}
+
+impl Task for FixTask {
+    const NAME: &'static str = "fix";
+    const TITLE: &'static str = "Make corrections";
+    const ABOUT: &'static str = "Makes corrections that `check` offers: chosen ones by their ids, or `which: sure` (those that leave no \
+        doubt) or `which: all` (guesses too, to be read afterwards). Returns the new text and what is still wrong with it; writes the \
+        file only with `write: true`.";
+    const WRITES: bool = true;
+    type Data = Fixed;
+
+    fn limit(&self) -> Option<u64> {
+        self.seconds
+    }
+
+    fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+        if self.write && self.path.is_none() {
+            return Err("a `text` is in no file that could be written; give its `path`".to_string());
+        }
+        let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
+        let (mended, done) = match (&self.ids, self.which) {
+            (Some(ids), None) => chosen(input, ids, fidelity, desk)?,
+            (None, Some(Which::Sure)) => pipeline::mend(input, Fixes::Sure, fidelity, desk),
+            (None, Some(Which::All)) => pipeline::mend(input, Fixes::All, fidelity, desk),
+            _ => return Err("give either `ids` or `which`".to_string()),
+        };
+        let (sources, found) = pipeline::check(&mended, fidelity, desk);
+        let (left, found) = told(&sources, &judged(named(&sources, found), false));
+        let text = String::from_utf8(mended.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
+        let written = self.write && !done.is_empty();
+        if let Some(path) = self.path.filter(|_| written) {
+            files::replace(&desk.place(&path)?, &text)?;
+        }
+        let applied: Vec<Done> =
+            done.into_iter().map(|Mended { at: (line, column), title }| Done { line, column, title }).collect();
+        let mut said: String =
+            applied.iter().map(|d| format!("{}:{}: fixed: {}\n", d.line, d.column, d.title)).collect();
+        if said.is_empty() {
+            said = "nothing was changed\n".to_string();
+        }
+        let mut answer = Answer::new(said + "\n" + &found, Fixed { applied, written, text: text.clone(), left })?;
+        if !written {
+            answer.texts.push(text);
+        }
+        Ok(answer)
+    }
+}
+
+/// A text after the corrections that have these names.
+fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -> Result<(Input, Vec<Mended>), String> {
+    let (sources, found) = pipeline::check(&input, fidelity, desk);
+    let found = named(&sources, found);
+    let offered: Vec<(&String, &Fix)> = found.iter().flat_map(|n| n.ids.iter().zip(&n.diagnostic.fixes)).collect();
+    let mut fixes = Vec::new();
+    for id in ids {
+        let Some((_, fix)) = offered.iter().find(|(name, _)| *name == id) else {
+            return Err(format!(
+                "there is no correction `{id}` of this text as it is now; `check` names those there are"
+            ));
+        };
+        fixes.push(*fix);
+    }
+    pipeline::correct(input, &sources, &fixes)
+}
