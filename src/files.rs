@@ -97,6 +97,14 @@ fn search(dir: &Path, extension: &str, found: &mut Found) {
     }
 }
 
+/// Whether a path lies in a folder that is given by its whole path, links followed; where nothing is there, whether the nearest
+/// folder on the way to it does.
+pub fn lies_in(path: &Path, folder: &Path) -> bool {
+    let Ok(whole) = std::path::absolute(path) else { return false };
+    let there = whole.ancestors().find_map(|p| p.canonicalize().ok());
+    there.is_some_and(|there| there.starts_with(folder))
+}
+
 /// What standard input holds, or in words why it cannot be read.
 pub fn read_stdin() -> Result<Vec<u8>, String> {
     up_to(io::stdin().lock(), LARGEST_TEXT).map_err(|why| format!("cannot read standard input: {why}"))

@@ -31,21 +31,16 @@ impl Desk {
     pub fn place(&self, path: &str) -> Result<PathBuf, String> {
         let outside = || format!("`{path}` is not in the folder of the server; paths are given from there");
         let asked = self.root.join(path);
-        let whole = match asked.canonicalize() {
-            Ok(whole) => whole,
-            // Whether something is there is not told of what is elsewhere.
-            Err(e) if self.is_above(&asked) => {
-                return Err(format!("cannot read `{path}`: {}", files::reason(&e)));
-            }
-            Err(_) => return Err(outside()),
-        };
-        whole.strip_prefix(&self.root).map(Path::to_path_buf).map_err(|_| outside())
-    }
-
-    /// Whether the nearest folder on the way that exists is one of the root.
-    fn is_above(&self, asked: &Path) -> bool {
-        let there = asked.ancestors().skip(1).find_map(|folder| folder.canonicalize().ok());
-        there.is_some_and(|folder| folder.starts_with(&self.root))
+        // Whether something is there is not told of what is elsewhere.
+        if !files::lies_in(&asked, &self.root) {
+            return Err(outside());
+        }
+        let whole = asked.canonicalize().map_err(|e| format!("cannot read `{path}`: {}", files::reason(&e)))?;
+        match whole.strip_prefix(&self.root) {
+            Ok(own) if own.as_os_str().is_empty() => Ok(PathBuf::from(".")),
+            Ok(own) => Ok(own.to_path_buf()),
+            Err(_) => Err(outside()),
+        }
     }
 
     /// A file, or a text that stands for one in the folder itself.

@@ -1,6 +1,6 @@
 //! Modules on disk: next to the file that was named on the command line.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use matterix_ir::FileId;
 use matterix_lang::Loader;
@@ -24,12 +24,8 @@ impl Neighbours {
 
     /// What a file holds, where it may be read; links lead to where they lead.
     fn contents(&self, path: &Path, largest: u64) -> Result<Vec<u8>, String> {
-        if let Some(root) = &self.root {
-            let whole = path.canonicalize();
-            // Whether something is there is not told of what is elsewhere.
-            if whole.as_ref().is_ok_and(|whole| !whole.starts_with(root)) || whole.is_err() && leads_up(path) {
-                return Err("it is outside of the folder that may be read".to_string());
-            }
+        if self.root.as_ref().is_some_and(|root| !files::lies_in(path, root)) {
+            return Err("it is outside of the folder that may be read".to_string());
         }
         files::contents(path, largest)
     }
@@ -58,9 +54,4 @@ impl Loader for Neighbours {
         let bytes = self.contents(&self.dir.join(path), files::LARGEST_TEXT)?;
         String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_string())
     }
-}
-
-/// Whether a path may lead out of the folder it begins in.
-fn leads_up(path: &Path) -> bool {
-    path.components().any(|c| !matches!(c, Component::Normal(_) | Component::CurDir))
 }

@@ -38,7 +38,7 @@ SLIPS = {
     "equals.mtx": ("==", "=", True),
     "comment.mtx": ("5 s", "5 s # a pause", True),
     "name.mtx": ("of water", "of watr", True),
-    "verb.mtx": ("wait", "wiat", True),
+    "thing.mtx": ("table =", "tabel =", True),
     "member.mtx": ("contents.mass", "contents.mas", True),
     "unit.mtx": ("wait 5 s", "wait 5 mL", False),
     "amount.mtx": ("holding 100 g", "holding 900 g", False),

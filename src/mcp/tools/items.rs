@@ -53,8 +53,8 @@ pub fn search(words: &str, module: Option<&str>, most: usize) -> Vec<Item> {
     let asked = all().iter().filter(|item| module.is_none_or(|m| m == item.module));
     let mut ranked: Vec<((usize, usize), &Item)> =
         asked.map(|item| (fit(item, &words), item)).filter(|(fit, _)| fit.0 > 0).collect();
-    // Equal ones stay in the order of the library.
-    ranked.sort_by_key(|r| std::cmp::Reverse(r.0));
+    // Of equal ones what stands for itself comes before members; then the order of the library.
+    ranked.sort_by_key(|(fit, item)| (std::cmp::Reverse(*fit), item.name.contains('.')));
     ranked.into_iter().take(most).map(|(_, item)| item.clone()).collect()
 }
 
