@@ -42,10 +42,18 @@ pub fn bounded(text: String, bytes: usize) -> String {
     if text.len() <= bytes {
         return text;
     }
-    let kept = text.floor_char_boundary(bytes);
-    let kept = text[..kept].rfind('\n').map_or(kept, |line| line + 1);
-    let rest = text.len() - kept;
-    format!("{}... {rest} bytes more are left out\n", &text[..kept])
+    let head = beginning(&text, bytes);
+    let head = head.rfind('\n').map_or(head, |line| &head[..=line]);
+    format!("{head}... {} bytes more are left out\n", text.len() - head.len())
+}
+
+/// The beginning of a text, of at most so many bytes.
+pub fn beginning(text: &str, bytes: usize) -> &str {
+    let mut end = bytes.min(text.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    &text[..end]
 }
 
 /// An object without its largest members, so that it takes at most so many bytes, and the names of those.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::{Diagnostic, Fix, Severity, Sources};
 use rmcp::schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use crate::report::{self, Format, Look, Reporter, stricter};
 
@@ -24,6 +24,7 @@ pub struct Findings {
     /// How many warnings.
     pub warnings: usize,
     /// The first 50, as `check --format json` writes them (resource `mtx://findings`); each of their `fixes` has an `id` for the tool `fix`.
+    #[schemars(with = "Vec<Map<String, Value>>")]
     pub findings: Vec<Value>,
 }
 

@@ -14,6 +14,7 @@ mod work;
 use std::path::Path;
 
 use rmcp::ServiceExt;
+use rmcp::service::ServerInitializeError;
 use rmcp::transport::stdio;
 
 use crate::STACK;
@@ -31,7 +32,12 @@ pub fn serve(root: &Path) -> Result<(), String> {
         .build()
         .map_err(|e| failed("cannot start the server", &e))?;
     let ended = runtime.block_on(async {
-        let running = server.serve(stdio()).await.map_err(|e| failed("the client did not begin a session", &e))?;
+        let running = match server.serve(stdio()).await {
+            Ok(running) => running,
+            // Nothing was asked, so nothing is wrong.
+            Err(ServerInitializeError::ConnectionClosed(_)) => return Ok(()),
+            Err(e) => return Err(failed("the client did not begin a session", &e)),
+        };
         running.waiting().await.map(drop).map_err(|e| failed("the session broke off", &e))
     });
     // Work that nobody waits for any more does not hold up the end.

@@ -12,7 +12,7 @@ use crate::mcp::answer::{BYTES, MOST_BYTES};
 /// How closely the motions of robots are looked at.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-#[schemars(crate = "rmcp::schemars")]
+#[schemars(crate = "rmcp::schemars", inline)]
 pub enum Fidelity {
     /// Motions take their declared time.
     Process,

@@ -27,6 +27,7 @@ pub struct Check {
     #[serde(default)]
     strict: bool,
     /// Give up after so many seconds, 1 to 600; 60 if not given.
+    #[schemars(range(min = 1, max = 600))]
     seconds: Option<u64>,
 }
 

@@ -6,7 +6,7 @@ use matterix_ir::Sources;
 use matterix_ir::points::Points;
 use rmcp::schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 use super::Task;
 use super::arguments::bytes;
@@ -25,12 +25,16 @@ pub struct Contents {
     /// A protocol that is in no file.
     text: Option<String>,
     /// Only what is known after the statement on this line, counted from 1, but all of it; without it what every statement changes.
+    #[schemars(range(min = 1))]
     line: Option<usize>,
     /// With `line`, the innermost statement at this column, counted from 1.
+    #[schemars(range(min = 1))]
     column: Option<usize>,
     /// The most that the answer may take, as text and as data; 60000 if not given.
+    #[schemars(range(min = 1_000, max = 4_194_304))]
     bytes: Option<usize>,
     /// Give up after so many seconds, 1 to 600; 60 if not given.
+    #[schemars(range(min = 1, max = 600))]
     seconds: Option<u64>,
 }
 
@@ -39,6 +43,7 @@ pub struct Contents {
 #[schemars(crate = "rmcp::schemars")]
 pub struct Known {
     /// One entry per workflow, as `check --contents --format json` writes them (resource `mtx://contents`).
+    #[schemars(with = "Vec<Map<String, Value>>")]
     workflows: Vec<Value>,
     /// Workflows whose entry would be too large: ask for a `line`, or for more `bytes`.
     left_out: Vec<String>,

@@ -1,5 +1,6 @@
 //! The tool `fix`.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::Fix;
@@ -17,7 +18,7 @@ use crate::{args, files};
 /// Which corrections are made.
 #[derive(Clone, Copy, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-#[schemars(crate = "rmcp::schemars")]
+#[schemars(crate = "rmcp::schemars", inline)]
 pub enum Which {
     /// Those that leave no doubt what was meant.
     Sure,
@@ -43,6 +44,7 @@ pub struct FixTask {
     /// As for `check`; the same gives the same findings.
     fidelity: Option<Fidelity>,
     /// Give up after so many seconds, 1 to 600; 60 if not given.
+    #[schemars(range(min = 1, max = 600))]
     seconds: Option<u64>,
 }
 
@@ -126,7 +128,8 @@ fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -
     let found = named(&sources, found);
     let offered: Vec<(&String, &Fix)> = found.iter().flat_map(|n| n.ids.iter().zip(&n.diagnostic.fixes)).collect();
     let mut fixes = Vec::new();
-    for id in ids {
+    let asked: BTreeSet<&String> = ids.iter().collect();
+    for id in asked {
         let Some((_, fix)) = offered.iter().find(|(name, _)| *name == id) else {
             return Err(format!(
                 "there is no correction `{id}` of this text as it is now; `check` names those there are"

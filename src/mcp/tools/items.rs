@@ -9,6 +9,8 @@ use matterix_lang::syntax::parse;
 use rmcp::schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::mcp::answer::beginning;
+
 /// Bytes of a declaration that is shown whole; of a longer one the head is.
 const SHORT: usize = 240;
 
@@ -165,6 +167,6 @@ fn signature(text: &str, span: Span) -> String {
     let head = whole.split_once("{\n").map_or(whole, |(head, _)| head).trim_end();
     match head.len() <= 2 * SHORT {
         true => format!("{head} {{ ... }}"),
-        false => format!("{} ...", &head[..head.floor_char_boundary(2 * SHORT)]),
+        false => format!("{} ...", beginning(head, 2 * SHORT)),
     }
 }

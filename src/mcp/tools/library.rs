@@ -24,6 +24,7 @@ pub struct Library {
     /// A module such as `std::heating`: its whole text, or with `words` only items in it. Without both, all modules are listed.
     module: Option<String>,
     /// The most items that are named, 1 to 200; 15 if not given.
+    #[schemars(range(min = 1, max = 200))]
     items: Option<usize>,
 }
 

@@ -40,8 +40,10 @@ pub struct Plan {
     #[serde(default)]
     seed: u64,
     /// How many seconds to look for a shorter schedule, 1 to 600; 10 if not given.
+    #[schemars(range(min = 1, max = 600))]
     search: Option<u64>,
     /// The most that the answer may take, as text and as data; 60000 if not given.
+    #[schemars(range(min = 1_000, max = 4_194_304))]
     bytes: Option<usize>,
 }
 

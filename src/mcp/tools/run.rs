@@ -40,8 +40,10 @@ pub struct Run {
     /// Only these members of the report, as `expectations` or `contents`; all that fit if not given.
     members: Option<Vec<String>>,
     /// The most that the answer may take, as text and as data; 60000 if not given.
+    #[schemars(range(min = 1_000, max = 4_194_304))]
     bytes: Option<usize>,
     /// Stop after so many seconds, 1 to 600; 60 if not given.
+    #[schemars(range(min = 1, max = 600))]
     seconds: Option<u64>,
 }
 

@@ -1,7 +1,6 @@
 //! Tools, resources and prompts, and what a server has to bear.
 
 use std::fs;
-use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
@@ -76,6 +75,11 @@ fn a_check_says_what_the_command_says_and_names_corrections() {
         (&fixed["written"], &fixed["text"]),
         (&json!(true), &json!(fs::read_to_string(dir.join("w.mtx")).expect("it")))
     );
+    let twice = "mtx 1\nuse std::glassware::Beaker250mL\n\nlab bench {\n    ambient: 22 degC\n    b = Beaker250ml holding 1 g of water\n}\n";
+    let found = client.data("check", json!({ "text": twice }));
+    let id = &found["findings"][0]["fixes"][0]["id"];
+    let fixed = client.data("fix", json!({ "text": twice, "ids": [id, id] }));
+    assert_eq!(fixed["applied"].as_array().map(Vec::len), Some(1), "{found} {fixed}");
     let stale = client.refused("fix", json!({ "path": "w.mtx", "ids": ids }));
     assert!(stale.contains("there is no correction"), "{stale}");
     assert_eq!(client.close(), Some(0));
@@ -251,22 +255,24 @@ fn a_call_can_be_cancelled_and_ends_when_its_time_is_over() {
     let endless = "mtx 1\nlab bench {\n    ambient: 22 degC\n}\n\nworkflow w in bench {\n    repeat 2000000 times {\n        \
         wait 1 s\n    }\n}\n";
     let mut client = Client::new(&folder("mcp_cancel"));
-    let began = Instant::now();
     let result = client.call("run", json!({ "text": endless, "seconds": 1 }));
     let said = read(&result);
     assert!(said.contains("stopped when its seconds were over"), "{said}");
     assert_eq!(result["structuredContent"]["report"]["status"], "cancelled");
-    let id = client.begin("tools/call", json!({ "name": "run", "arguments": { "text": endless, "seconds": 600 } }));
-    client.send(&json!({ "jsonrpc": "2.0", "method": "notifications/cancelled", "params": { "requestId": id } }));
+    // More than are worked on at once: were they not stopped, the next call would find no place.
+    for _ in 0..6 {
+        let id = client.begin("tools/call", json!({ "name": "run", "arguments": { "text": endless, "seconds": 600 } }));
+        client.send(&json!({ "jsonrpc": "2.0", "method": "notifications/cancelled", "params": { "requestId": id } }));
+    }
     assert!(client.ask("ping", json!({}))["error"].is_null());
     assert_eq!(client.data("check", json!({ "text": WARM }))["errors"], 0);
     assert_eq!(client.close(), Some(0));
-    assert!(began.elapsed() < Duration::from_secs(120));
 }
 
 #[test]
 fn a_client_that_goes_away_ends_the_server() {
     assert_eq!(Client::new(root()).close(), Some(0));
+    assert_eq!(Client::silent(root()).close(), Some(0));
     let ended = matterixc_in(root(), &["mcp", "--root", "no/such/folder"]);
     assert_eq!((ended.code, ended.err.as_str()), (2, "error: cannot serve `no/such/folder`: there is no such file\n"));
 }
