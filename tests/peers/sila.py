@@ -409,7 +409,7 @@ def served_on_devices():
     folder = os.path.join(FOLDER, "on devices")
     os.makedirs(folder)
     (pathlib.Path(folder) / "lab.toml").write_text(f'[plate]\nsila = "{address}"\n')
-    process, host, port = start(folder, OWN, "--bind", "lab.toml")
+    process, host, port = start(folder, OWN, "--bind", "lab.toml", "--journal", "journal")
     try:
         client = SilaClient(host, port, insecure=True)
         client.PlateHeater.Heat(T=70.0)
@@ -427,9 +427,11 @@ def served_on_devices():
         client.close()
         process.send_signal(signal.SIGTERM)
         verdict("it leaves them safe", process.wait(15) == 0 and one.heard[-1] == ("Stop",), one.heard)
+        journal = (pathlib.Path(folder) / "journal").read_text()
+        verdict("and keeps a journal", "SetTarget" in journal and '"event":"end"' in journal, journal[-300:])
     finally:
         process.kill()
-    process, host, port = start(folder, OWN, "--bind", "lab.toml")
+    process, host, port = start(folder, OWN, "--bind", "lab.toml", "--journal", "journal2")
     try:
         client = SilaClient(host, port, insecure=True)
         one.cut()

@@ -43,6 +43,12 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not tell `colour`"),
         ("[beaker]\nport = \"x\"", "no driver says"),
         ("[plate", "not TOML"),
+        ("[plate]\naddress = \"nonsense\"", "the port of `nonsense` is missing"),
+        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is no port"),
+        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is no port"),
+        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not spoken here"),
+        ("[plate]\nport = \"\"", "a serial port has a path"),
+        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
     ];
     for (index, (bindings, wanted)) in cases.iter().enumerate() {
         let err = found(&format!("binding_{index}"), HEAT, bindings);
@@ -54,8 +60,9 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
 #[test]
 fn a_step_that_nobody_is_told_of_is_found_first() {
     let err = found("undriven", HEAT, "");
-    assert_eq!(err.matches("error[undriven]").count(), 4, "{err}");
-    assert!(err.contains("`IkaNamur`"), "{err}");
+    assert_eq!(err.matches("error[undriven]").count(), 1, "one device, one finding: {err}");
+    assert!(err.contains("lab.mtx:10") && err.contains("nor at 3 other places"), "{err}");
+    assert!(err.contains("[plate]\n") && err.contains("port = \"/dev/ttyUSB0\""), "{err}");
 }
 
 #[test]
