@@ -185,6 +185,25 @@ fn a_plan_completes_on_the_emulated_robot_as_in_the_recording() {
 }
 
 #[test]
+fn labware_of_ones_own_is_given_to_the_robot_first() {
+    let dir = bench("own_labware", "");
+    write(&dir, "plate.json", crate::emit::own_plate());
+    let lab = TRANSFER.replace("lab deck {", "asset Own from labware \"plate.json\"\n\nlab deck {");
+    write(&dir, "lab.mtx", lab.replace("plate = Corning96", "plate = Own"));
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let journal = std::fs::read_to_string(dir.join("journal")).expect("a journal");
+    let sent: Vec<&str> = journal.lines().filter(|l| l.contains("\"event\":\"out\"")).collect();
+    let given = |line: &&str| line.contains("/labware_definitions {") && line.contains("house");
+    let (given, loaded) =
+        (sent.iter().position(given), sent.iter().position(|l| l.contains("flat_96") && l.contains("loadLabware")));
+    assert!(given.is_some() && given < loaded, "{journal}");
+    assert_eq!(sent.iter().filter(|l| l.contains("labware_definitions")).count(), 1, "what it knows it is not given");
+}
+
+#[test]
 fn what_a_robot_cannot_do_its_emulator_refuses() {
     // The file of the emulated lab has no liquid.
     let dir = bench("empty", "");

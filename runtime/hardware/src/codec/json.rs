@@ -131,6 +131,7 @@ impl Json {
             let is_empty = is.as_object().is_some_and(Map::is_empty);
             match field.value {
                 "{}" if is_empty || is.is_object() => {}
+                whole if is.is_object() && serde_json::from_str::<Value>(whole).is_ok_and(|whole| whole == *is) => {}
                 wanted => out.extend(self.value(wanted, &plain(is), &mut values)?),
             }
         }
