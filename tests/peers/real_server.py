@@ -1,32 +1,82 @@
-"""Workflows on a robot's own server: that of Opentrons' source, on simulated hardware, or a robot that nothing can harm.
+"""Workflows on the server of Opentrons' robot itself, from its source, with simulated hardware.
 
-usage: real_server.py MATTERIXC FOLDER ADDRESS SPEED FILE.mtx...
+usage: real_server.py MATTERIXC FOLDER SOURCE PYTHON FILE.mtx...
 
-The server is not on PyPI. Of the source at https://github.com/Opentrons/opentrons, tag v8.1.0, it takes `robot-server` and
-`server-utils` on PYTHONPATH, Python 3.10 with opentrons==8.1.0, fastapi==0.99.1, uvicorn==0.27.0.post1, anyio==3.7.1,
-python-multipart==0.0.6, pydantic==1.10.12, python-dotenv==1.0.1, sqlalchemy==1.4.51, wsproto==1.2.0, paho-mqtt==1.6.1 and aiohttp;
-in the environment ENABLE_VIRTUAL_SMOOTHIE=true, OT_ROBOT_SERVER_persistence_directory=automatically_make_temporary and
-OT_ROBOT_SERVER_simulator_configuration_file_path=sim.json, which attaches `p300_single_v2.1` left, `p300_multi_v2.1` right and a
-heater-shaker; then `python -m uvicorn robot_server.app:app --port 31955 --ws wsproto`.
+The server is not on PyPI. SOURCE is a checkout of https://github.com/Opentrons/opentrons at the tag v8.1.0, of which `robot-server` and
+`server-utils` are used; PYTHON is a Python 3.10 with opentrons==8.1.0, fastapi==0.99.1, uvicorn==0.27.0.post1, anyio==3.7.1,
+python-multipart==0.0.6, pydantic==1.10.12, python-dotenv==1.0.1, sqlalchemy==1.4.51, wsproto==1.2.0, paho-mqtt==1.6.1 and aiohttp.
 
-Each workflow is deployed, and the server is asked what it did: every command has succeeded, and moves the volumes that the
-emitted form says. Then emitted protocols are uploaded and played, labware of one's own is given to it, and a person stops a run.
+Each workflow is deployed on a robot with its pipettes, and the server is asked what it did: every command has succeeded, and moves
+the volumes that the emitted form says. Then emitted protocols are uploaded and played, labware of one's own is given to it, a pipette
+is another one, and a person stops a run.
 """
 
 import collections
+import contextlib
 import json
 import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
+import urllib.error
 import urllib.request
 
-COMMAND, FOLDER, ADDRESS, SPEED, *FILES = sys.argv[1:]
-COMMAND = os.path.abspath(COMMAND)
+COMMAND, FOLDER, SOURCE, PYTHON, *FILES = sys.argv[1:]
+COMMAND, SOURCE = os.path.abspath(COMMAND), os.path.abspath(SOURCE)
+SPEED = "20"
+ADDRESS = ""
 BAD = []
+
+
+def pipettes(text):
+    """Those of a workflow, by mount."""
+    global ADDRESS
+    ADDRESS = "127.0.0.1:1"
+    said = ran(place(f"dry{len(os.listdir(FOLDER))}", text), "deploy", "lab.mtx", "--bind", "lab.toml").stdout
+    found = re.findall(r'pipetteName\\":\\"(\w+)\\",\\"mount\\":\\"(\w+)', said)
+    return {mount: {"model": name.replace("_gen2", "_v2.1"), "id": mount} for name, mount in found}
+
+
+@contextlib.contextmanager
+def robot(attached):
+    """A robot with these pipettes and a heater-shaker."""
+    global ADDRESS
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    modules = {"heatershaker": [{"model": "heaterShakerModuleV1", "serial_number": "hs", "calls": []}]}
+    simulated = pathlib.Path(FOLDER) / f"{port}.json"
+    simulated.write_text(json.dumps({"machine": "OT-2 Standard", "attached_instruments": attached, "attached_modules": modules}))
+    environment = os.environ | {
+        "PYTHONPATH": f"{SOURCE}/robot-server:{SOURCE}/server-utils",
+        "ENABLE_VIRTUAL_SMOOTHIE": "true",
+        "OT_API_CONFIG_DIR": os.path.abspath(f"{FOLDER}/{port}"),
+        "OT_ROBOT_SERVER_persistence_directory": "automatically_make_temporary",
+        "OT_ROBOT_SERVER_simulator_configuration_file_path": os.path.abspath(simulated),
+    }
+    arguments = ["-m", "uvicorn", "robot_server.app:app", "--port", str(port), "--ws", "wsproto"]
+    with open(f"{FOLDER}/{port}.log", "w") as log:
+        process = subprocess.Popen([PYTHON, *arguments], env=environment, stdout=log, stderr=log)
+    ADDRESS = f"127.0.0.1:{port}"
+    try:
+        until = time.monotonic() + 120
+        while True:
+            with contextlib.suppress(OSError, urllib.error.HTTPError):
+                # The database is there after the modules, as a rule.
+                ask("/runs")
+                if ask("/modules"):
+                    break
+            if time.monotonic() > until:
+                raise SystemExit(f"the server does not start: see {FOLDER}/{port}.log")
+            time.sleep(0.5)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def verdict(what, good, said=""):
@@ -141,10 +191,22 @@ def stopped(text):
     verdict("a run that a person stops", good, f"{status} after {took:.1f} s" if good else f"{status} {said[-1500:]}")
 
 
+def another(text):
+    folder = place("another", text)
+    ended = ran(folder, *DEPLOY)
+    flat = " ".join(ended.stderr.split())
+    good = ended.returncode == 1 and "expected instrument" in flat and "lab.toml:2:8" in flat
+    verdict("a pipette that is another one, in the server's words", good, "" if good else ended.stderr[-1500:])
+
+
+os.makedirs(FOLDER)
 for file in FILES:
-    whole(file)
+    with robot(pipettes(pathlib.Path(file).read_text())):
+        whole(file)
 FIRST = pathlib.Path(FILES[0]).read_text()
-played(FIRST)
-own_labware(FIRST)
-stopped(FIRST)
+with robot(pipettes(FIRST)):
+    played(FIRST)
+    own_labware(FIRST)
+    another(FIRST.replace("P300Single", "P20Single"))
+    stopped(FIRST)
 sys.exit(1 if BAD else 0)
