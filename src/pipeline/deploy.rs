@@ -177,7 +177,8 @@ pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
         Trouble::Garbled(_) => codes::DEVICE_GARBLED,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
     };
-    let headline = format!("`{device}` cannot be reached: {}", trouble.text());
+    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
+    let headline = format!("`{device}` {what}: {}", trouble.text());
     let d = Diagnostic::error(code, *at, headline, "bound here");
     d.help(if goes_on {
         "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"

@@ -66,6 +66,17 @@ fn a_step_that_nobody_is_told_of_is_found_first() {
 }
 
 #[test]
+fn the_device_that_would_be_told_is_the_one_to_bind() {
+    let dir = bench("undriven_pump", include_str!("../../deploy/dose.mtx"), "pump", "");
+    write(&dir, "lab.toml", "");
+    let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
+    assert_eq!(ended.err.matches("error[undriven]").count(), 1, "{}", ended.err);
+    for said in ["`pump`", "[pump]\n", "driver = \"CavroDt\"", "driver = \"CavroOem\""] {
+        assert!(ended.err.contains(said), "{said}: {}", ended.err);
+    }
+}
+
+#[test]
 fn a_decision_on_what_no_device_tells_is_found_first() {
     let hidden = HEAT.replace("plate.temperature >= 30 degC timeout", "beaker.contents.temperature >= 30 degC timeout");
     let err = found("unobserved", &hidden, "[plate]\nport = \"x\"");

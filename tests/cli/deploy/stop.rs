@@ -70,6 +70,7 @@ fn signal(which: &str, process: &Child) {
 }
 
 /// Stops a deployment on a robot whose server has frozen, with so many signals; what it says, and how long it takes to end.
+#[allow(clippy::disallowed_methods, reason = "how long a person waits is told by the wall clock")]
 fn frozen(name: &str, signals: usize) -> (String, Duration) {
     let dir = folder(&format!("deploy_{name}"));
     write(&dir, "lab.mtx", include_str!("../../deploy/transfer.mtx"));

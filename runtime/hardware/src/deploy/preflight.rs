@@ -18,7 +18,7 @@ pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed)
         let node = program.plan.get(id);
         match step {
             Step::Operation(operation) if carrier(id, operation, devices).is_none() => {
-                if let Some(key) = operation.device.and_then(|device| key(program, devices, device)) {
+                if let Some(key) = key(program, devices, id, operation) {
                     unbound.entry(key).or_default().push(id);
                     continue;
                 }
@@ -79,6 +79,7 @@ fn not_bound(program: &Program, key: InstanceId, steps: &[StepId]) -> Diagnostic
     let headline = format!("nothing carries out `{label}`: the bindings do not say where `{name}` is");
     let told = match at.len() {
         0 | 1 => "nobody is told".to_owned(),
+        2 => "nobody is told this, nor at another place".to_owned(),
         n => format!("nobody is told this, nor at {} other places", n - 1),
     };
     Diagnostic::error(codes::UNDRIVEN, span, headline, told).help(lines(program, key))

@@ -1,20 +1,26 @@
 //! Devices that bindings leave out, and what to write for them.
 
 use matterix_ir::Program;
+use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Driver, Transport};
 
 use super::device::Device;
 
-/// The instance that bindings would have to name for a device to be told something: itself, or the one over whose line it is
-/// spoken to; none where they have it.
-pub(super) fn key(program: &Program, devices: &[Device<'_>], device: InstanceId) -> Option<InstanceId> {
-    let own = |d: &&Driver| d.instance == device;
-    let drivers = || program.drivers.iter().filter(own);
-    let hosts = drivers().filter_map(|d| d.host.as_ref()).map(|h| h.instance);
-    let key = if drivers().any(|d| d.host.is_none()) { device } else { hosts.min().unwrap_or(device) };
+/// The instance that bindings would have to name for a step to be told to something: one whose driver has a line for it, or
+/// over whose line that one is spoken to, else the device of the step; none where they have it.
+pub(super) fn key(
+    program: &Program,
+    devices: &[Device<'_>],
+    step: StepId,
+    operation: &Operation,
+) -> Option<InstanceId> {
+    let line_of = |d: &Driver| d.host.as_ref().map_or(d.instance, |h| h.instance);
+    let callers = program.drivers.iter().filter(|d| d.call(step).is_some()).map(line_of).min();
+    let own = || program.drivers.iter().filter(|d| Some(d.instance) == operation.device).map(line_of).min();
+    let key = callers.or_else(own).or(operation.device)?;
     let is_bound = |id| devices.iter().any(|d| d.binding.instance == id);
-    (!is_bound(key) && !is_bound(device)).then_some(key)
+    (!is_bound(key) && !operation.device.is_some_and(is_bound)).then_some(key)
 }
 
 /// What to write for it.
