@@ -77,6 +77,25 @@ fn the_device_that_would_be_told_is_the_one_to_bind() {
 }
 
 #[test]
+fn what_is_said_of_some_devices_only_is_known_before() {
+    let driver = |condition: &str| {
+        let line = "serial(baud: 9600, frame: \"7E1\", framing: namur, timeout: 1 s)";
+        format!("driver Own for IkaRetControl over {line} {{\n    open while {condition} sends \"OWN\"\n}}\nworkflow")
+    };
+    let dry = |name: &str, condition: &str| {
+        let dir = bench(name, &HEAT.replace("workflow", &driver(condition)), "plate", "");
+        write(&dir, "lab.toml", "[plate]\nport = \"x\"\ndriver = \"Own\"");
+        matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"])
+    };
+    let later = dry("open_while_later", "temperature > 30 degC");
+    assert!(later.err.contains("error[driver-line]") && later.err.contains("lab.mtx:11:16"), "{}", later.err);
+    for (name, condition) in [("open_while_so", "mass > 1 kg"), ("open_while_not", "mass > 100 kg")] {
+        let ended = dry(name, condition);
+        assert!(!ended.err.contains("driver-line") && ended.err.contains("undriven"), "{}", ended.err);
+    }
+}
+
+#[test]
 fn a_decision_on_what_no_device_tells_is_found_first() {
     let hidden = HEAT.replace("plate.temperature >= 30 degC timeout", "beaker.contents.temperature >= 30 degC timeout");
     let err = found("unobserved", &hidden, "[plate]\nport = \"x\"");
