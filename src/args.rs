@@ -440,6 +440,9 @@ pub struct ServeArgs {
     /// Where the devices of the lab are; the digital twin answers without it.
     #[arg(long, value_name = "FILE")]
     pub bind: Option<PathBuf>,
+    /// Where to keep the journal of what is said to devices; needed where there are some.
+    #[arg(long, value_name = "FILE", requires = "bind")]
+    pub journal: Option<PathBuf>,
     /// Show all bytes that go to devices and come from them.
     #[arg(long, requires = "bind")]
     pub trace: bool,
