@@ -53,7 +53,8 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).0
 }
 
-/// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
+/// Checks a file; of a workflow without an error, what stands where in its lab and what robots with joints do is looked at by
+/// `motions` as well.
 pub fn check_and(
     sources: &mut Sources,
     file: FileId,
@@ -440,7 +441,7 @@ enum Wanted {
     Scripted(&'static str),
     /// What is known at every statement.
     Contents,
-    /// A program too, where robots with joints are in the lab.
+    /// A program too, where there is something to see in space: robots with joints, or things with places.
     Motions,
 }
 
@@ -534,7 +535,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
                 elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
-            if wanted != Wanted::Motions || !elaborator.has_robots() {
+            if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
                 return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
             }
         }
@@ -692,7 +693,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
                 .map(|k| lab.tables.kind_name(k).to_string())
                 .collect()
         };
-        let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
+        let (name, owner, pose, at, span) = (inst.name.clone(), inst.owner, inst.pose, inst.at, inst.span);
         let support = inst.placed.first().map(|p| p.1);
         let on: Vec<Frame> = match owner {
             Some(owner) => {
@@ -716,6 +717,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             support,
             pose,
             placed,
+            at,
             frames,
             shape,
             solids,

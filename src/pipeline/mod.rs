@@ -19,7 +19,7 @@ use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::args::Fidelity;
-use matterix_runtime::motion::{Store, preflight};
+use matterix_runtime::motion::{Store, overlaps, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
@@ -84,12 +84,13 @@ impl Input {
     }
 }
 
-/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store.
+/// Findings of a file and of where its labs put things; at the fidelity `motion` also those in the way of robots, whose ways
+/// are kept in a store.
 pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let found = match file {
         Ok(file) => match fidelity {
-            Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
+            Fidelity::Process => matterix_lang::check_and(&mut sources, file, &input.neighbours(), &overlaps),
             Fidelity::Motion => {
                 matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| preflight(program, store))
             }
@@ -102,6 +103,11 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
 /// What would go wrong with the motions of a program.
 pub fn motions(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     preflight(program, store)
+}
+
+/// What of a program stands in one place before anything moves.
+pub fn standing(program: &Program) -> Vec<Diagnostic> {
+    overlaps(program)
 }
 
 /// Findings of a file, and what is known at every statement of its workflows.

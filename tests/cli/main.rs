@@ -24,6 +24,7 @@ mod meshes;
 mod motion;
 mod new;
 mod offers;
+mod overlap;
 mod pages;
 mod physique;
 mod pipeline_tests;

@@ -77,6 +77,7 @@ codes! {
     EMPTY_RANGE "empty-range" "N0" "the lower end of a range is above its upper end";
     OUT_OF_REACH "out-of-reach" "G1" "a robot does not get to where it is to go";
     COLLISION "collision" "G2" "a robot, or what it holds, runs into something";
+    OVERLAP "overlap" "G2" "two things of a lab are put into one place";
     MISPLACED_GRIP "misplaced-grip" "G4" "a gripper is not where it would have to be to grip or let go";
     OUT_OF_RANGE "out-of-range" "D1" "a parameter outside what it may be";
     INVALID_LAW "invalid-law" "N0" "a law changes what it may not change";

@@ -89,6 +89,13 @@ impl Body {
         self.around.mins.abs().max(self.around.maxs.abs()).length()
     }
 
+    /// The least and the greatest corner of a box around it as it is placed, m.
+    pub fn bounds(&self, at: &Isometry) -> [[f64; 3]; 2] {
+        let around = self.pieces.iter().map(|p| p.shape.compute_aabb(&(*at * p.at))).reduce(|a, b| a.merged(&b));
+        let around = around.unwrap_or_else(|| self.around.transform_by(at));
+        [around.mins.to_array(), around.maxs.to_array()]
+    }
+
     /// The nearest or deepest touch of two bodies, if they are no farther apart than `within`, m.
     pub fn touch(&self, at: &Isometry, other: &Body, other_at: &Isometry, within: f64) -> Option<Touch> {
         // The other in the frame of this one.
