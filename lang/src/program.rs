@@ -59,7 +59,7 @@ pub fn check_and(
     sources: &mut Sources,
     file: FileId,
     loader: &dyn Loader,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
 ) -> Vec<Diagnostic> {
     examine(sources, file, loader, Wanted::Motions, motions).0
 }
@@ -75,7 +75,7 @@ fn examine(
     file: FileId,
     loader: &dyn Loader,
     wanted: Wanted,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
 ) -> (Vec<Diagnostic>, Vec<Points>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let (names, found) = Names::new(&modules);
@@ -101,17 +101,23 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
-        let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+    let mut judged = judge(&tables, sources, &tasks, wanted);
+    for (task, built) in tasks.iter().zip(&mut judged) {
+        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
-        fine &= !many(&names.decl(task.item).item.kind);
+        if !fine || many(&names.decl(task.item).item.kind) {
+            built.program = None;
+        }
+    }
+    let moved = crate::share::over(&judged, |built| built.program.iter().flat_map(motions).collect::<Vec<_>>());
+    for ((task, mut built), moved) in tasks.iter().zip(judged).zip(moved) {
         if let Some(Many::Fit(fit)) = &mut built.many
             && let Err(d) = study::data::read(fit, &tables, sources, loader)
         {
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
-        diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
+        diagnostics.extend(moved);
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
         let kind = &names.decl(task.item).item.kind;

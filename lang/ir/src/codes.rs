@@ -141,6 +141,7 @@ codes! {
     TOO_THIN "too-thin" "G4" "a gripper does not close far enough to hold what it is to grip";
     TOO_TALL "too-tall" "G5" "something is put where there is not enough room above";
     GRIP_TOO_WEAK "grip-too-weak" "G3" "the friction of a gripper's fingers does not bear what it is to hold";
+    OFF_PLACE "off-place" "G5" "a lab puts something beside the place of several that it names";
     SLIDES "slides" "G5" "something is put where it slides off or topples";
     UNSTABLE "unstable" "G5" "something is put on what is narrower than its foot";
     WRONG_HOLE "wrong-hole" "G5" "something is put into a hole that is too narrow, or far too wide, for it";
