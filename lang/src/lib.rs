@@ -18,6 +18,7 @@ pub mod points;
 pub mod program;
 pub mod prose;
 pub mod screen;
+mod share;
 mod sila;
 pub mod stock;
 mod study;

@@ -53,12 +53,13 @@ pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Di
     examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).0
 }
 
-/// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
+/// Checks a file; of a workflow without an error, what stands where in its lab and what robots with joints do is looked at by
+/// `motions` as well.
 pub fn check_and(
     sources: &mut Sources,
     file: FileId,
     loader: &dyn Loader,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
 ) -> Vec<Diagnostic> {
     examine(sources, file, loader, Wanted::Motions, motions).0
 }
@@ -74,7 +75,7 @@ fn examine(
     file: FileId,
     loader: &dyn Loader,
     wanted: Wanted,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
 ) -> (Vec<Diagnostic>, Vec<Points>) {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let (names, found) = Names::new(&modules);
@@ -100,17 +101,23 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
-        let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+    let mut judged = judge(&tables, sources, &tasks, wanted);
+    for (task, built) in tasks.iter().zip(&mut judged) {
+        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
-        fine &= !many(&names.decl(task.item).item.kind);
+        if !fine || many(&names.decl(task.item).item.kind) {
+            built.program = None;
+        }
+    }
+    let moved = crate::share::over(&judged, |built| built.program.iter().flat_map(motions).collect::<Vec<_>>());
+    for ((task, mut built), moved) in tasks.iter().zip(judged).zip(moved) {
         if let Some(Many::Fit(fit)) = &mut built.many
             && let Err(d) = study::data::read(fit, &tables, sources, loader)
         {
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
-        diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
+        diagnostics.extend(moved);
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
         let kind = &names.decl(task.item).item.kind;
@@ -440,7 +447,7 @@ enum Wanted {
     Scripted(&'static str),
     /// What is known at every statement.
     Contents,
-    /// A program too, where robots with joints are in the lab.
+    /// A program too, where there is something to see in space: robots with joints, or things with places.
     Motions,
 }
 
@@ -534,7 +541,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
                 elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
-            if wanted != Wanted::Motions || !elaborator.has_robots() {
+            if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
                 return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
             }
         }
@@ -692,7 +699,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
                 .map(|k| lab.tables.kind_name(k).to_string())
                 .collect()
         };
-        let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
+        let (name, owner, pose, at, span) = (inst.name.clone(), inst.owner, inst.pose, inst.at, inst.span);
         let support = inst.placed.first().map(|p| p.1);
         let on: Vec<Frame> = match owner {
             Some(owner) => {
@@ -716,6 +723,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             support,
             pose,
             placed,
+            at,
             frames,
             shape,
             solids,

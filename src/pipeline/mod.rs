@@ -21,7 +21,7 @@ use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::args::Fidelity;
-use matterix_runtime::motion::{Store, preflight};
+use matterix_runtime::motion::{Store, overlaps, preflight};
 use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
@@ -87,8 +87,8 @@ impl Input {
     }
 }
 
-/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store, as is
-/// which files had none.
+/// Findings of a file and of where its labs put things; at the fidelity `motion` also those in the way of robots, whose ways
+/// are kept in a store, as is which files had none.
 pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let file = match file {
@@ -102,7 +102,7 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
     }
     let read = clean::Noted::new(&neighbours);
     let found = match fidelity {
-        Fidelity::Process => matterix_lang::check(&mut sources, file, &read),
+        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps),
         Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store)),
     };
     if let Some(entry) = entry.filter(|_| found.is_empty()) {
@@ -114,6 +114,11 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
 /// What would go wrong with the motions of a program.
 pub fn motions(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     preflight(program, store)
+}
+
+/// What of a program stands in one place before anything moves.
+pub fn standing(program: &Program) -> Vec<Diagnostic> {
+    overlaps(program)
 }
 
 /// Findings of a file, and what is known at every statement of its workflows.

@@ -25,6 +25,7 @@ mod meshes;
 mod motion;
 mod new;
 mod offers;
+mod overlap;
 mod pages;
 mod physique;
 mod pipeline_tests;
