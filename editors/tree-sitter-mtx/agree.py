@@ -69,7 +69,7 @@ def refused(matterixc, texts, folder):
             path.write_bytes(text.encode())
             paths.append(str(path))
         said = subprocess.run([matterixc, "fmt", "--check", "--color", "never", *paths], capture_output=True, text=True).stderr
-        for headline, path in re.findall(r"^error\[[^\]]*\]: (.*)\n +╭─\[(.*?):\d+:\d+\]", said, re.M):
+        for headline, path in re.findall(r"^error\[[^\]]*\]: (.*?)\n +╭─\[([^\n]*?):\d+:\d+\]", said, re.M | re.S):
             if not NOT_GRAMMAR.search(headline):
                 found.setdefault(int(pathlib.Path(path).stem), headline)
     return found

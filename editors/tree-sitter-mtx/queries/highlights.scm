@@ -21,7 +21,7 @@
 [
   "use" "dimension" "unit" "species" "solution" "reaction" "reactive_group" "material" "incompatible" "allow" "hazard" "caution"
   "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "driver" "lab" "skill" "workflow" "study" "fit" "test"
-  "point" "prefixes" "labelled" "symmetric" "also" "any" "where" "per"
+  "point" "prefixes" "labelled" "symmetric" "also" "any" "where" "when" "per"
 ] @keyword
 
 (role) @keyword.storage
@@ -41,22 +41,19 @@
 [ "if" "else" ] @keyword.control.conditional
 [ "repeat" "for" "while" ] @keyword.control.repeat
 [ "try" "retry" "fail" "finally" ] @keyword.control.exception
-(handler "on" @keyword.control.exception)
 (return_statement "return" @keyword.control.return)
 
 ; ---- operators
-(logical_expression operator: _ @keyword.operator)
-(comparison operator: [ "in" "is" ] @keyword.operator)
-[ "not" "of" ] @keyword.operator
-(conversion "as" @keyword.operator)
-(label) @keyword.operator
+[ "and" "or" "not" "is" "of" "to" "from" "into" "onto" "on" "in" "with" "by" "at" "using" "through" "as" ] @keyword.operator
 [ "==" "!=" "<=" ">=" ">" "<" "+" "-" "*" "/" "^" "+-" ".." "=" "+=" "-=" "->" "<->" "<-" "&" "|" "?" "'" ] @operator
 
 [ "(" ")" "[" "]" "{" "}" ] @punctuation.bracket
 [ "," ";" ":" "::" "." ] @punctuation.delimiter
 
 ; ---- names
-(verb_word) @function
+; The last of several words is the verb's or a thing's: only the compiler knows.
+(call . (verb_word) @function)
+(call (verb_word) @function . (verb_word))
 (verb (identifier) @function)
 (call_expression function: (identifier) @function.call)
 (function name: (identifier) @function)
@@ -97,6 +94,8 @@
   (reactive_group name: (identifier) @constant)
   (constant name: (identifier) @constant)
 ]
+((use (identifier) @type) (#match? @type "^[A-Z]"))
+((use path: (scoped_name name: (identifier) @type)) (#match? @type "^[A-Z]"))
 (lab name: (identifier) @module)
 (scoped_name scope: (identifier) @module)
 (source format: (identifier) @module)

@@ -150,25 +150,25 @@ static void mark(TSLexer *lexer, bool marking) {
     if (marking) lexer->mark_end(lexer);
 }
 
-// `^-2`, `^1/2`. What is marked is what counts: a `/` that has been read without a mark is left to `after_slash`.
-static bool unit_exponent(TSLexer *lexer, bool marking, bool *after_slash) {
-    if (!accept(lexer, '^')) return false;
+// What has been read beyond what is marked: nothing, a `/` that may go on with another name, or something that ends the unit.
+typedef enum { NOTHING, SLASH, STOP } Beyond;
+
+// `^-2`, `^1/2`.
+static Beyond unit_exponent(TSLexer *lexer, bool marking) {
+    if (!accept(lexer, '^')) return NOTHING;
     accept(lexer, '-');
-    if (!is_digit(next(lexer))) return false;
+    if (!is_digit(next(lexer))) return STOP;
     while (is_digit(next(lexer))) advance(lexer);
     mark(lexer, marking);
-    if (!accept(lexer, '/')) return true;
-    if (!is_digit(next(lexer))) {
-        *after_slash = true;
-        return true;
-    }
+    if (!accept(lexer, '/')) return NOTHING;
+    if (!is_digit(next(lexer))) return SLASH;
     while (is_digit(next(lexer))) advance(lexer);
     mark(lexer, marking);
-    return true;
+    return NOTHING;
 }
 
-// A name with its exponent; `word` is what has been read of it. False where there is no name.
-static bool unit_name(TSLexer *lexer, bool marking, bool *after_slash) {
+// A name with its exponent. False where there is none.
+static bool unit_name(TSLexer *lexer, bool marking, Beyond *beyond) {
     if (accept(lexer, '%')) {
         mark(lexer, marking);
         if (is_letter(next(lexer))) {
@@ -176,7 +176,7 @@ static bool unit_name(TSLexer *lexer, bool marking, bool *after_slash) {
             mark(lexer, marking);
             if (accept(lexer, '/')) {
                 if (!is_letter(next(lexer))) {
-                    *after_slash = true;
+                    *beyond = SLASH;
                     return true;
                 }
                 advance(lexer);
@@ -189,48 +189,46 @@ static bool unit_name(TSLexer *lexer, bool marking, bool *after_slash) {
     } else {
         return false;
     }
-    if (next(lexer) == '^') unit_exponent(lexer, marking, after_slash);
+    *beyond = unit_exponent(lexer, marking);
     return true;
 }
 
-// `(mol*s)^2`: nothing of it is marked before it is whole.
-static bool unit_group(TSLexer *lexer, bool *after_slash) {
-    bool slash = false;
-    if (!unit_name(lexer, false, &slash)) return false;
-    while (slash || next(lexer) == '*' || next(lexer) == '/') {
-        if (!slash) advance(lexer);
-        slash = false;
-        if (!unit_name(lexer, false, &slash)) return false;
-    }
+// `mol*s)^2` after the bracket: nothing of it is marked before it is whole.
+static bool unit_group(TSLexer *lexer, Beyond *beyond) {
+    do {
+        *beyond = NOTHING;
+        if (!unit_name(lexer, false, beyond) || *beyond == STOP) return false;
+    } while (*beyond == SLASH || accept(lexer, '*') || accept(lexer, '/'));
     if (!accept(lexer, ')')) return false;
     lexer->mark_end(lexer);
-    if (next(lexer) == '^') unit_exponent(lexer, true, after_slash);
+    *beyond = unit_exponent(lexer, true);
     return true;
 }
 
 // Where the unit ends is marked; a name character must not follow there.
 static bool scan_unit(TSLexer *lexer, enum Token token) {
-    bool slash = false;
+    Beyond beyond = NOTHING;
     if (accept(lexer, '1') && !accept(lexer, '/')) return false;
     if (is_letter(next(lexer))) {
         Word word;
         read_word(lexer, &word);
-        if (is_reserved(lexer, &word) || is_one_of(&word, NOT_UNITS)) {
-            if (!is_unit_letter(next(lexer))) return false;
-        }
+        bool word_alone = !is_unit_letter(next(lexer));
+        if (word_alone && (is_reserved(lexer, &word) || is_one_of(&word, NOT_UNITS))) return false;
         while (is_unit_letter(next(lexer)) || is_digit(next(lexer))) advance(lexer);
         lexer->mark_end(lexer);
-        if (next(lexer) == '^') unit_exponent(lexer, true, &slash);
+        beyond = unit_exponent(lexer, true);
     } else if (accept(lexer, '(')) {
-        if (!unit_group(lexer, &slash)) return false;
-    } else if (!unit_name(lexer, true, &slash)) {
+        if (!unit_group(lexer, &beyond)) return false;
+    } else if (!unit_name(lexer, true, &beyond)) {
         return false;
     }
-    for (;;) {
-        if (!slash && is_idc(next(lexer))) return false;
-        if (!slash && !accept(lexer, '/') && !accept(lexer, '*')) break;
-        slash = false;
-        if (accept(lexer, '(') ? !unit_group(lexer, &slash) : !unit_name(lexer, true, &slash)) break;
+    while (beyond != STOP) {
+        if (beyond == NOTHING) {
+            if (is_idc(next(lexer))) return false;
+            if (!accept(lexer, '/') && !accept(lexer, '*')) break;
+        }
+        beyond = NOTHING;
+        if (accept(lexer, '(') ? !unit_group(lexer, &beyond) : !unit_name(lexer, true, &beyond)) break;
     }
     return found(lexer, token);
 }
