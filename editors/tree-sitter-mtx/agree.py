@@ -3,7 +3,7 @@
 
 usage: agree.py MATTERIXC [--mutants N] [--seed N] [--show N] [--floor RATE]
 
-Needs a C compiler and the package `tree-sitter` (tests/peers/requirements.txt says how such packages are installed).
+Needs a C compiler and the package in requirements.txt beside it.
 Exit status 1 where a file is judged differently, or a smaller share of the mutants than the floor is judged alike.
 """
 

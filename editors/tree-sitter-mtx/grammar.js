@@ -87,7 +87,7 @@ module.exports = grammar({
     _name: ($) => choice($.identifier, $.scoped_name, alias($._dotted_name, $.member_expression)),
     scoped_name: ($) => seq(field('scope', $._name), token.immediate('::'), $._tight, field('name', $.identifier)),
     _dotted_name: ($) => seq(field('object', $._name), $._member),
-    _member: ($) => seq(token.immediate('.'), field('member', alias($._immediate_word, $.member_name))),
+    _member: ($) => seq(token.immediate('.'), $._tight, field('member', alias($._immediate_word, $.member_name))),
     _immediate_word: () => token.immediate(/[A-Za-z_][A-Za-z0-9_]*/),
     label: () => choice(...LABELS),
 
