@@ -64,6 +64,12 @@ test('the server starts, finds what is wrong while it is typed, answers, and sto
     const at = { textDocument: { uri: document.uri.toString() }, position: { line: 10, character: 8 } };
     const hover = await mock.running.client.sendRequest('textDocument/hover', at);
     assert.match(JSON.stringify(hover?.contents ?? ''), /beaker/);
+    mock.seen.hovers = [{ contents: [{ value: hover.contents.value }] }];
+    await mock.seen.commands.get('mtx.contents')();
+    assert.match(mock.seen.shown[0].getText(), /^line 1\n[^]*beaker/);
+
+    const library = await mock.seen.providers['mtx-std'].provideTextDocumentContent(mock.vscode.Uri.parse('mtx-std:/heating.mtx'));
+    assert.match(library, /^mtx 1\n/);
     const edits = await mock.running.client.sendRequest('textDocument/formatting', {
       textDocument: at.textDocument, options: { tabSize: 4, insertSpaces: true },
     });

@@ -76,7 +76,7 @@ const kind = (value) => ({ value, append: (more) => kind(`${value}.${more}`) });
 
 // A mock of the editor: { vscode, ... what the extension did with it }.
 function editor(settings = {}) {
-  const seen = { diagnostics: new Map(), commands: new Map(), errors: [], status: undefined, output: [], tasks: [], panels: [], providers: {}, opened: [] };
+  const seen = { diagnostics: new Map(), commands: new Map(), errors: [], status: undefined, output: [], tasks: [], panels: [], shown: [], hovers: [], providers: {}, opened: [] };
   const events = {};
   const event = (name) => (events[name] ??= new EventEmitter()).event;
   const documents = [];
@@ -103,6 +103,7 @@ function editor(settings = {}) {
       showErrorMessage: async (text) => { seen.errors.push(text); },
       showWarningMessage: async (text) => { seen.errors.push(text); },
       showInformationMessage: async () => undefined,
+      showTextDocument: async (document) => { seen.shown.push(document); },
       withProgress: async (_, act) => act({ report() {} }, new CancellationTokenSource().token),
       createWebviewPanel: (type, title) => { const panel = { title, webview: { html: '' } }; seen.panels.push(panel); return panel; },
       onDidChangeActiveTextEditor: event('activeEditor'),
@@ -119,10 +120,12 @@ function editor(settings = {}) {
       registerTextDocumentContentProvider: (scheme, provider) => { seen.providers[scheme] = provider; return new Disposable(); },
       createFileSystemWatcher: () => ({ onDidCreate: event('none'), onDidChange: event('none'), onDidDelete: event('none'), dispose() {} }),
       applyEdit: async () => true,
+      openTextDocument: async (uri) => new Document(uri, seen.providers[uri.scheme].provideTextDocumentContent(uri)),
       fs: {},
     },
     languages: {
       match: (selector, document) => (matches(selector, document) ? 10 : 0),
+      setTextDocumentLanguage: async (document, languageId) => Object.assign(document, { languageId }),
       createLanguageStatusItem: () => (seen.status = { dispose() {} }),
       createDiagnosticCollection: () => ({
         set: (uri, found) => { seen.diagnostics.set(uri.toString(), found ?? []); (events.published ??= new EventEmitter()).fire(uri); },
@@ -133,7 +136,7 @@ function editor(settings = {}) {
     },
     commands: {
       registerCommand: (name, act) => { seen.commands.set(name, act); return new Disposable(() => seen.commands.delete(name)); },
-      executeCommand: async () => undefined,
+      executeCommand: async (name) => (name === 'vscode.executeHoverProvider' ? seen.hovers : undefined),
     },
     tasks: { registerTaskProvider: () => new Disposable(), executeTask: async (task) => { seen.tasks.push(task); } },
   };
