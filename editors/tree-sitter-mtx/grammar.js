@@ -52,7 +52,7 @@ module.exports = grammar({
   externals: ($) => [
     $._newline, $._blank_line, $._nl_clause, $._nl_more,
     $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_argument, $._species_index, $._less,
-    $._tight, $._error_sentinel,
+    $._tight, $._same_line, $._error_sentinel,
   ],
 
   extras: ($) => [/[ \t\r]/, $.doc_comment, $.comment, $._blank_line],
@@ -194,7 +194,7 @@ module.exports = grammar({
       seq('<-', nl($), field('value', $.call)),
       seq(optional(seq(':', field('type', $.type))), '=', nl($), field('value', $.expression)),
     )),
-    wait_statement: ($) => seq('wait', choice(
+    wait_statement: ($) => seq('wait', $._same_line, choice(
       seq('until', field('condition', $.expression), optional($.timeout), optional($._handlers)),
       field('duration', $._operand),
     )),
@@ -209,7 +209,7 @@ module.exports = grammar({
       seq('while', field('condition', $.expression), optional(seq('max', field('bound', $._operand)))),
       seq(field('count', $._operand), 'times'),
     ), field('body', $.block)),
-    for_statement: ($) => seq('for', field('name', $.identifier), 'in', nl($), field('set', $._operand), field('body', $.block)),
+    for_statement: ($) => seq('for', field('name', $.identifier), $._same_line, 'in', nl($), field('set', $._operand), field('body', $.block)),
     within_statement: ($) => seq(
       'within', field('window', $._operand), 'after', field('after', $._operand), field('body', $.block),
       optional($._handlers),
@@ -255,7 +255,7 @@ module.exports = grammar({
     _law_block: ($) => seq(nl($), field('body', $.law_block)),
     _law: ($) => choice($.law_let, $.law_for, $.law_if, $.assignment, $._operand),
     law_let: ($) => seq('let', field('name', $.identifier), '=', nl($), field('value', $.expression)),
-    law_for: ($) => seq('for', field('name', $.identifier), 'in', nl($), field('set', $._operand), field('body', $.law_block)),
+    law_for: ($) => seq('for', field('name', $.identifier), $._same_line, 'in', nl($), field('set', $._operand), field('body', $.law_block)),
     law_if: ($) => seq(
       'if', field('condition', $.expression), field('body', $.law_block),
       repeat(seq('else', 'if', field('condition', $.expression), field('body', $.law_block))),
@@ -452,7 +452,7 @@ module.exports = grammar({
     fill: ($) => seq(
       $.place, optional(seq('..', nl($), $.place)), nl($), ':', nl($), field('value', $._operand),
     ),
-    include: ($) => seq('include', field('path', $._name), 'as', field('name', $.identifier), repeat($.labelled), optional($.options)),
+    include: ($) => seq('include', field('path', $._name), $._same_line, 'as', field('name', $.identifier), repeat($.labelled), optional($.options)),
     between: ($) => seq('between', $._operand, 'and', nl($), $._operand, $.fields),
     skill: ($) => seq(
       optional('extern'), 'skill', $._signature, repeat($._clause),

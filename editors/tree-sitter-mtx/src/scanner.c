@@ -9,7 +9,7 @@
 enum Token {
     NEWLINE, BLANK_LINE, NL_CLAUSE, NL_MORE,
     UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_ARGUMENT, SPECIES_INDEX, LESS,
-    TIGHT, ERROR_SENTINEL,
+    TIGHT, SAME_LINE, ERROR_SENTINEL,
 };
 
 // With these a line goes on, wherever they are no names of fields: nothing begins with them.
@@ -353,10 +353,13 @@ void tree_sitter_mtx_external_scanner_deserialize(void *payload, const char *buf
 bool tree_sitter_mtx_external_scanner_scan(void *payload, TSLexer *lexer, const bool *valid) {
     (void)payload;
     bool recovering = valid[ERROR_SENTINEL];
-    if (!recovering && valid[TIGHT]) {
-        if (!is_letter(next(lexer)) && next(lexer) != '_') return false;
+    if (!recovering && (valid[TIGHT] || valid[SAME_LINE])) {
+        while (!valid[TIGHT] && is_blank(next(lexer))) lexer->advance(lexer, true);
         lexer->mark_end(lexer);
-        return found(lexer, TIGHT);
+        // A line end has no place here, whatever follows it.
+        if (accept(lexer, '\n')) return found(lexer, NEWLINE);
+        if (!valid[TIGHT]) return found(lexer, SAME_LINE);
+        return (is_letter(next(lexer)) || next(lexer) == '_') && found(lexer, TIGHT);
     }
     if (!recovering && valid[UNIT]) {
         if (next(lexer) == ' ') lexer->advance(lexer, true);
