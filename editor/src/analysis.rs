@@ -5,7 +5,7 @@ use std::sync::Arc;
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
-use matterix_lang::{Loader, program};
+use matterix_lang::{Loader, Session, program};
 use matterix_syntax::ast;
 
 /// A file with everything that it imports, as the last check saw it.
@@ -24,11 +24,11 @@ pub struct Analysis {
 }
 
 impl Analysis {
-    /// Checks a text under its name; imports come from the loader.
-    pub fn of(name: &str, text: &str, loader: &dyn Loader) -> Analysis {
+    /// Checks a text under its name; imports come from the loader. What the session knows from earlier checks is not worked out again.
+    pub fn of(name: &str, text: &str, loader: &dyn Loader, session: &mut Session) -> Analysis {
         let mut sources = Sources::default();
         let root = sources.add(name, text);
-        let seen = program::examined(&mut sources, root, loader);
+        let seen = program::examined(&mut sources, root, loader, session);
         Analysis { root, sources, modules: seen.modules, findings: seen.findings, points: seen.points }
     }
 

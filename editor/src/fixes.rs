@@ -10,7 +10,10 @@ pub fn fixes_at(analysis: &Analysis, file: FileId, start: usize, end: usize) -> 
         let span = finding.span();
         span.file == file && span.start as usize <= end && start <= span.end as usize
     });
-    touched.flat_map(|finding| finding.fixes.iter().map(move |fix| (finding, fix))).filter(|(_, fix)| ours(analysis, fix)).collect()
+    touched
+        .flat_map(|finding| finding.fixes.iter().map(move |fix| (finding, fix)))
+        .filter(|(_, fix)| ours(analysis, fix))
+        .collect()
 }
 
 /// The edits of all findings in a file that have just one correction; of those that would meet the first.
@@ -19,9 +22,9 @@ pub fn all_fixes(analysis: &Analysis, file: FileId) -> Vec<&Edit> {
     for finding in analysis.findings.iter().filter(|finding| finding.span().file == file) {
         let [fix] = finding.fixes.as_slice() else { continue };
         let apart = |edit: &&Edit| {
-            edits.iter().all(|o| {
-                o.span.file != edit.span.file || o.span.end < edit.span.start || edit.span.end < o.span.start
-            })
+            edits
+                .iter()
+                .all(|o| o.span.file != edit.span.file || o.span.end < edit.span.start || edit.span.end < o.span.start)
         };
         let known = |edit: &Edit| edits.iter().any(|o| **o == *edit);
         if ours(analysis, fix) && !fix.edits.iter().any(known) && fix.edits.iter().all(|edit| apart(&edit)) {

@@ -63,10 +63,13 @@ mod tests {
     fn bodies_comments_and_imports_fold() {
         let text = "mtx 1\nuse a\nuse b\n// one\n// two\nlab x {\n    y = \"{\"\n}\nfn f() = 1 // no {\n";
         let found: Vec<(&str, FoldKind)> = folds(text).into_iter().map(|f| (&text[f.range], f.kind)).collect();
-        assert_eq!(found, [
-            ("use a\nuse b", FoldKind::Imports),
-            ("// one\n// two", FoldKind::Comment),
-            ("{\n    y = \"{\"\n}", FoldKind::Body),
-        ]);
+        assert_eq!(
+            found,
+            [
+                ("use a\nuse b", FoldKind::Imports),
+                ("// one\n// two", FoldKind::Comment),
+                ("{\n    y = \"{\"\n}", FoldKind::Body),
+            ]
+        );
     }
 }

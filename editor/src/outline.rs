@@ -74,7 +74,9 @@ fn symbol(name: &Name, detail: &'static str, kind: SymbolKind, span: Span, child
 fn item(item: &Item) -> Option<Symbol> {
     let (detail, kind) = match &item.kind {
         ItemKind::Error | ItemKind::Use { .. } | ItemKind::Incompatible { .. } | ItemKind::Allow { .. } => return None,
-        ItemKind::Dimension { name, .. } => return Some(symbol(name, "dimension", SymbolKind::Unit, item.span, Vec::new())),
+        ItemKind::Dimension { name, .. } => {
+            return Some(symbol(name, "dimension", SymbolKind::Unit, item.span, Vec::new()));
+        }
         ItemKind::Unit { name, .. } => {
             let name = Name { text: name.text.clone(), span: name.span };
             return Some(symbol(&name, "unit", SymbolKind::Unit, item.span, Vec::new()));

@@ -12,7 +12,8 @@ pub fn statement(analysis: &Analysis, file: FileId, offset: usize) -> Vec<(&Poin
     let stands = |points: &Points| {
         let inner = points.points.iter().enumerate().filter(|(_, point)| {
             let (start, end) = (point.span.start as usize, point.span.end as usize);
-            let head = text.get(start..end).and_then(|t| t.find('{')).filter(|_| point.block).map(|brace| start + brace);
+            let head =
+                text.get(start..end).and_then(|t| t.find('{')).filter(|_| point.block).map(|brace| start + brace);
             point.span.file == file && start <= offset && offset <= head.unwrap_or(end)
         });
         inner.min_by_key(|(_, point)| point.span.len()).map(|(index, _)| index)

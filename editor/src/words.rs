@@ -61,7 +61,9 @@ pub fn words(text: &str, modules: &[Arc<Module>]) -> Vec<Word> {
         // Words of one call have nothing but blanks between them.
         let run = (1..=run).rev().find(|n| blanks(text, &found[i..i + n])).unwrap_or(1);
         if word.class == Class::Call {
-            let of = |n: usize| found[i..i + n].iter().filter_map(|w| text.get(w.start..w.end)).collect::<Vec<_>>().join(" ");
+            let of = |n: usize| {
+                found[i..i + n].iter().filter_map(|w| text.get(w.start..w.end)).collect::<Vec<_>>().join(" ")
+            };
             let verb = (1..=run).rev().find(|n| verbs.contains(&of(*n))).unwrap_or(1);
             let call = found[i..i + run].iter().enumerate();
             out.extend(call.map(|(n, w)| Word {
@@ -115,7 +117,7 @@ fn kind(class: Class) -> (Kind, bool) {
 /// The words of all verbs.
 fn verbs(modules: &[Arc<Module>]) -> BTreeSet<String> {
     let mut out = BTreeSet::new();
-    let mut add = |sig: &Sig| drop(out.insert(verb_text(&sig.verb)));
+    let mut add = |sig: &Sig| out.extend([verb_text(&sig.verb)]);
     for item in modules.iter().flat_map(|module| &module.tree.items) {
         match &item.kind {
             ItemKind::Skill { sig, .. } => add(sig),

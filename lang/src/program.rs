@@ -21,6 +21,7 @@ use crate::lower::Planner;
 use crate::lower::wires::Wires;
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
+use crate::session::{self, Earlier, Package, Session, Verdict};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -63,7 +64,7 @@ pub struct Examined {
 
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).findings
+    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new(), &mut Session::default()).findings
 }
 
 /// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
@@ -73,19 +74,19 @@ pub fn check_and(
     loader: &dyn Loader,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
 ) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Motions, motions).findings
+    examine(sources, file, loader, Wanted::Motions, motions, &mut Session::default()).findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    let seen = examined(sources, file, loader);
+    let seen = examined(sources, file, loader, &mut Session::default());
     (seen.findings, seen.points)
 }
 
-/// Checks a file as [`contents`] does, and gives the trees as well.
-pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Examined {
-    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new())
+/// Checks a file as [`contents`] does, and gives the trees as well. What a session knows from earlier checks is not worked out again.
+pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader, session: &mut Session) -> Examined {
+    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new(), session)
 }
 
 fn examine(
@@ -94,8 +95,9 @@ fn examine(
     loader: &dyn Loader,
     wanted: Wanted,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    session: &mut Session,
 ) -> Examined {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
     let (tables, found) = Tables::new(&names);
@@ -119,7 +121,10 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
+    let package = sources.get(file).map_or_else(String::new, |source| source.name.clone());
+    let package = session.package(&package);
+    let verdicts = judge_anew(&tables, sources, (root, file), &tasks, wanted, package);
+    for (task, mut built) in tasks.iter().zip(verdicts) {
         let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
         fine &= !many(&names.decl(task.item).item.kind);
@@ -209,7 +214,7 @@ fn compile_and<T>(
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
 ) -> (Option<Made<T>>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -276,7 +281,7 @@ pub fn many_runs(
     options: &Options,
     fits: bool,
 ) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -311,7 +316,7 @@ pub fn many_runs(
 /// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
 /// them is returned apart.
 pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -465,6 +470,7 @@ enum Wanted {
 }
 
 /// One workflow, built.
+#[derive(Default)]
 struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
@@ -473,6 +479,68 @@ struct Built {
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+}
+
+impl From<Verdict> for Built {
+    fn from(known: Verdict) -> Built {
+        let Verdict { findings, points, starts, uses, many } = known;
+        Built { findings, points, starts, uses, many, ..Built::default() }
+    }
+}
+
+impl Built {
+    /// What is kept of it.
+    fn verdict(&self) -> Verdict {
+        let Built { findings, points, starts, uses, many, .. } = self;
+        Verdict {
+            findings: findings.clone(),
+            points: points.clone(),
+            starts: starts.clone(),
+            uses: uses.clone(),
+            many: many.clone(),
+        }
+    }
+}
+
+/// Verdicts of the tasks of a package, in their order; those that hold on are taken from its earlier check.
+fn judge_anew<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    (root, file): (usize, FileId),
+    tasks: &[Task<'a>],
+    wanted: Wanted,
+    package: &mut Package,
+) -> Vec<Built> {
+    // A program is not kept.
+    if wanted != Wanted::Contents {
+        return judge(tables, sources, tasks, wanted);
+    }
+    let names = tables.names;
+    let mut now = Earlier::of(names.modules, sources, root);
+    let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
+    let lab = |task: &Task<'_>| {
+        names::item_name(names.decl(task.lab).item).map(|(name, _)| (names.decl(task.lab).module, name))
+    };
+    let known: Vec<Option<Verdict>> = tasks
+        .iter()
+        .map(|task| {
+            let verdict = matched.as_ref()?.verdict(session::number(names, task.item)?, &lab(task)?)?;
+            Some(verdict).filter(|v| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
+        })
+        .collect();
+    let open: Vec<Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t.clone()).collect();
+    let mut judged = judge(tables, sources, &open, wanted).into_iter();
+    let all: Vec<Built> = known.into_iter().filter_map(|v| v.map(Built::from).or_else(|| judged.next())).collect();
+    for (task, built) in tasks.iter().zip(&all) {
+        let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
+        // What it runs may stand in another file, where it is common to all.
+        let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
+        if let (Some(item), Some(lab)) = (session::number(names, task.item), lab(task)) {
+            now.keep((item, runs), lab, built.verdict());
+        }
+    }
+    package.earlier = Some(now);
+    all
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.

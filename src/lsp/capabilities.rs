@@ -41,9 +41,7 @@ impl Client {
         let symbols = text.and_then(|t| t.document_symbol.as_ref());
         Client {
             encoding: Encoding::agreed(offered),
-            refreshes_hints: space
-                .and_then(|w| w.inlay_hint.as_ref())
-                .is_some_and(|h| h.refresh_support == Some(true)),
+            refreshes_hints: space.and_then(|w| w.inlay_hint.as_ref()).is_some_and(|h| h.refresh_support == Some(true)),
             watches_files: space
                 .and_then(|w| w.did_change_watched_files.as_ref())
                 .is_some_and(|w| w.dynamic_registration == Some(true)),
@@ -99,7 +97,8 @@ pub fn offered(client: &Client) -> Value {
 pub fn registrations(client: &Client) -> Option<RegistrationParams> {
     // Modules, and what assets and studies name.
     let globs = ["**/*.mtx", "**/*.{json,urdf,xml,csv,stl,obj,glb,gltf,usd,usda,usdc,usdz}"];
-    let watchers = globs.map(|glob| FileSystemWatcher { glob_pattern: GlobPattern::String(glob.to_string()), kind: None });
+    let watchers =
+        globs.map(|glob| FileSystemWatcher { glob_pattern: GlobPattern::String(glob.to_string()), kind: None });
     client.watches_files.then(|| RegistrationParams {
         registrations: vec![Registration {
             id: "files".to_string(),
