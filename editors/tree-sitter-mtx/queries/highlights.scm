@@ -45,6 +45,7 @@
 
 ; ---- operators
 [ "and" "or" "not" "is" "of" "to" "from" "into" "onto" "on" "in" "with" "by" "at" "using" "through" "as" ] @keyword.operator
+(label) @keyword.operator
 [ "==" "!=" "<=" ">=" ">" "<" "+" "-" "*" "/" "^" "+-" ".." "=" "+=" "-=" "->" "<->" "<-" "&" "|" "?" "'" ] @operator
 
 [ "(" ")" "[" "]" "{" "}" ] @punctuation.bracket
@@ -56,6 +57,7 @@
 (call (verb_word) @function . (verb_word))
 (verb (identifier) @function)
 (call_expression function: (identifier) @function.call)
+(vary draw: (identifier) @function.call)
 (function name: (identifier) @function)
 [
   (workflow name: (identifier) @function)
