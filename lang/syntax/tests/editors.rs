@@ -48,7 +48,8 @@ fn grammars_of_editors_know_every_word() -> Result {
 #[test]
 fn grammars_of_editors_reserve_the_same_words() -> Result {
     let grammar = read("grammar/mtx.pest")?;
-    let reserved: BTreeSet<&str> = keywords(&grammar).into_iter().filter(|word| !matterix_syntax::is_name(word)).collect();
+    let reserved: BTreeSet<&str> =
+        keywords(&grammar).into_iter().filter(|word| !matterix_syntax::is_name(word)).collect();
     let tree_sitter = read("editors/tree-sitter-mtx/grammar.js")?;
     assert_eq!(words(between(&tree_sitter, "const RESERVED = [", "];")?), reserved);
     // `max` is a name where it is called, which the scanner asks for itself.
