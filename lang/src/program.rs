@@ -1,5 +1,7 @@
 //! The whole front end: from a file to a program.
 
+use std::sync::Arc;
+
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
@@ -17,7 +19,7 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
-use crate::names::{self, DeclId, Names, near};
+use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
@@ -48,9 +50,20 @@ pub struct Test {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// What a check saw.
+#[derive(Debug)]
+pub struct Examined {
+    /// The library's modules, then those of the package.
+    pub modules: Vec<Arc<Module>>,
+    /// Each finding once, in the order of the text.
+    pub findings: Vec<Diagnostic>,
+    /// What is known at every statement, where that was asked for: one per workflow that could be followed.
+    pub points: Vec<Points>,
+}
+
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).0
+    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).findings
 }
 
 /// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
@@ -60,12 +73,18 @@ pub fn check_and(
     loader: &dyn Loader,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
 ) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Motions, motions).0
+    examine(sources, file, loader, Wanted::Motions, motions).findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
+    let seen = examined(sources, file, loader);
+    (seen.findings, seen.points)
+}
+
+/// Checks a file as [`contents`] does, and gives the trees as well.
+pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Examined {
     examine(sources, file, loader, Wanted::Contents, &|_| Vec::new())
 }
 
@@ -75,7 +94,7 @@ fn examine(
     loader: &dyn Loader,
     wanted: Wanted,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
-) -> (Vec<Diagnostic>, Vec<Points>) {
+) -> Examined {
     let (modules, mut diagnostics) = names::load(sources, file, loader);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -132,7 +151,8 @@ fn examine(
             }
         }
     }
-    (finish(diagnostics, sources), points)
+    let findings = finish(diagnostics, sources);
+    Examined { modules, findings, points }
 }
 
 /// Compiles one workflow of a file; no program where there is an error.

@@ -8,11 +8,11 @@ use std::sync::Arc;
 use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
-use crate::library;
 use crate::loader::Loader;
+use crate::{import, library};
 
 /// A module: one file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Module {
     /// `std::thermal`, `sn1`; the file that is compiled has the empty name.
     pub name: String,
@@ -46,7 +46,7 @@ pub struct Decl<'a> {
 #[derive(Debug)]
 pub struct Names<'a> {
     /// All modules.
-    pub modules: &'a [Module],
+    pub modules: &'a [Arc<Module>],
     /// All named items.
     pub decls: Vec<Decl<'a>>,
     scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
@@ -54,7 +54,7 @@ pub struct Names<'a> {
 }
 
 /// Parses the root file and everything it imports; the library comes first.
-pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Module>, Vec<Diagnostic>) {
+pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
     let (mut modules, mut diagnostics, first) = library(sources, root);
     let mut queue = vec![(String::new(), root)];
     let mut parsed = Some(first);
@@ -63,7 +63,7 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
         diagnostics.extend(found);
         for item in &tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
-            let known = |m: &str, modules: &[Module], queue: &[(String, FileId)]| {
+            let known = |m: &str, modules: &[Arc<Module>], queue: &[(String, FileId)]| {
                 modules.iter().any(|x| x.name == m) || queue.iter().any(|x| x.0 == m)
             };
             if path.segments[0].text == "std" {
@@ -92,23 +92,25 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
                 }
             }
         }
-        modules.push(Module { name, file, tree });
+        modules.push(Arc::new(Module { name, file, tree }));
     }
     let used = used(&modules);
-    for (module, _) in modules.iter_mut().zip(used).filter(|(_, used)| *used) {
-        diagnostics.extend(crate::import::import(&mut module.tree, module.file, loader));
+    for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
+        let module = Arc::make_mut(module);
+        diagnostics.extend(import::import(&mut module.tree, module.file, loader));
     }
-    if modules.iter().any(|m| crate::import::has_features(&m.tree)) {
+    if modules.iter().any(|m| import::has_features(&m.tree)) {
         let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
-        for module in &mut modules {
-            diagnostics.extend(crate::import::features(&mut module.tree, module.file, &units, sources, loader));
+        for module in modules.iter_mut().filter(|module| import::has_features(&module.tree)) {
+            let module = Arc::make_mut(module);
+            diagnostics.extend(import::features(&mut module.tree, module.file, &units, sources, loader));
         }
     }
     (modules, diagnostics)
 }
 
 /// Which modules the user's files import, directly or through others: data files of the others are not read.
-fn used(modules: &[Module]) -> Vec<bool> {
+fn used(modules: &[Arc<Module>]) -> Vec<bool> {
     let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
     let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
     while let Some(index) = todo.pop() {
@@ -129,7 +131,7 @@ fn parse(sources: &Sources, file: FileId) -> (ast::File, Vec<Diagnostic>) {
 }
 
 /// The library's modules and their findings, and the tree of the root file, which is parsed meanwhile.
-fn library(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
+fn library(sources: &mut Sources, root: FileId) -> (Vec<Arc<Module>>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
     let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
     let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
     let (trees, first) = std::thread::scope(|scope| {
@@ -141,7 +143,7 @@ fn library(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>
     let mut diagnostics = Vec::new();
     let module = |((module, file), (tree, found)): ((&library::Module, FileId), _)| {
         diagnostics.extend(found);
-        Module { name: module.name.to_string(), file, tree }
+        Arc::new(Module { name: module.name.to_string(), file, tree })
     };
     let modules = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
     (modules, diagnostics, first)
@@ -197,7 +199,7 @@ pub fn verb_text(words: &[Name]) -> String {
 
 impl<'a> Names<'a> {
     /// Collects the declarations of all modules and resolves their imports.
-    pub fn new(modules: &'a [Module]) -> (Self, Vec<Diagnostic>) {
+    pub fn new(modules: &'a [Arc<Module>]) -> (Self, Vec<Diagnostic>) {
         let mut names = Names { modules, decls: Vec::new(), scopes: Vec::new(), own: Vec::new() };
         let mut diagnostics = Vec::new();
         for (index, module) in modules.iter().enumerate() {
