@@ -5,7 +5,7 @@ use std::sync::Arc;
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
-use matterix_lang::{Loader, program};
+use matterix_lang::{Loader, Meanings, program};
 use matterix_syntax::ast;
 
 /// A file with everything that it imports, as the last check saw it.
@@ -21,6 +21,8 @@ pub struct Analysis {
     pub findings: Vec<Diagnostic>,
     /// What is known at the statements of the workflows that could be followed.
     pub points: Vec<Points>,
+    /// What names and expressions mean.
+    pub meanings: Arc<Meanings>,
 }
 
 impl Analysis {
@@ -29,7 +31,8 @@ impl Analysis {
         let mut sources = Sources::default();
         let root = sources.add(name, text);
         let seen = program::examined(&mut sources, root, loader);
-        Analysis { root, sources, modules: seen.modules, findings: seen.findings, points: seen.points }
+        let meanings = Arc::new(seen.meanings);
+        Analysis { root, sources, modules: seen.modules, findings: seen.findings, points: seen.points, meanings }
     }
 
     /// The text of a file; empty where it is not known.

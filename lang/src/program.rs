@@ -19,6 +19,7 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
+use crate::meanings::{Meanings, Seeing};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
 use crate::study::{self, Many};
@@ -59,6 +60,8 @@ pub struct Examined {
     pub findings: Vec<Diagnostic>,
     /// What is known at every statement, where that was asked for: one per workflow that could be followed.
     pub points: Vec<Points>,
+    /// What names and expressions mean, where that was asked for.
+    pub meanings: Meanings,
 }
 
 /// Checks a file: everything it declares, and every workflow in its lab.
@@ -102,7 +105,8 @@ fn examine(
     diagnostics.extend(found);
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
-    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let mut meanings = (wanted == Wanted::Contents).then(|| Box::new(Meanings::of(&tables)));
+    diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut meanings));
     let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -129,6 +133,9 @@ fn examine(
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
+        if let (Some(meanings), Some(found)) = (&mut meanings, built.meanings.take()) {
+            meanings.join(*found);
+        }
         diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
@@ -147,12 +154,13 @@ fn examine(
     if items.is_empty() {
         for id in names.declared_by(root) {
             if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
-                diagnostics.extend(checks::lab(&tables, id));
+                diagnostics.extend(checks::lab(&tables, id, &mut meanings));
             }
         }
     }
     let findings = finish(diagnostics, sources);
-    Examined { modules, findings, points }
+    let meanings = meanings.map_or_else(Meanings::default, |meanings| *meanings);
+    Examined { modules, findings, points, meanings }
 }
 
 /// Compiles one workflow of a file; no program where there is an error.
@@ -469,6 +477,7 @@ struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
     points: Option<Points>,
+    meanings: Seeing,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
@@ -511,6 +520,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
     let mut draft = true;
     loop {
         let mut elaborator = Elaborator::new(tables, reach.clone());
+        elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
@@ -547,6 +557,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
+        elaborator.note_things(lab);
+        let meanings = elaborator.meanings.take();
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -555,7 +567,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !elaborator.has_robots() {
-                return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+                let findings = elaborator.diagnostics;
+                return Built { program: None, wiring, points, meanings, findings, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -583,7 +596,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let (drivers, offers) = (elaborator.drivers, elaborator.offers);
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
-        return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+        let findings = elaborator.diagnostics;
+        return Built { program: Some(program), wiring, points, meanings, findings, starts, uses, many };
     }
 }
 

@@ -4,6 +4,7 @@
 mod sort;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use matterix_ir::{FileId, Span, Unit};
 use rustc_hash::FxHashMap;
@@ -12,11 +13,12 @@ pub use sort::Sort;
 
 use crate::ast::{ItemKind, MemberKind};
 use crate::elaborate::tables::{MemberRef, member_name};
-use crate::elaborate::Elaborator;
+use crate::elaborate::{Elaborator, Tables};
 use crate::eval::Value;
 use crate::library;
 use crate::lower::Verb;
 use crate::names::{DeclId, item_name};
+use crate::units::Units;
 
 /// What an expression was found to be.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +31,14 @@ pub struct Seen {
     pub unit: Option<Unit>,
 }
 
+/// What was noted, where that is asked for.
+pub type Seeing = Option<Box<Meanings>>;
+
 /// What was noted.
 #[derive(Clone, Debug, Default)]
 pub struct Meanings {
+    /// What stands around every text: kinds and units.
+    pub around: Around,
     /// Names, and where what they stand for is declared: its name, or the call form of a skill or command.
     pub names: FxHashMap<Span, Span>,
     /// Expressions.
@@ -42,7 +49,25 @@ pub struct Meanings {
     pub opened: Option<FileId>,
 }
 
+/// What is declared, apart from the texts that declare it.
+#[derive(Clone, Debug, Default)]
+pub struct Around {
+    /// What the names that each module sees stand for.
+    pub scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
+    /// Each capability and asset with everything that it extends, most derived first.
+    pub ancestors: BTreeMap<DeclId, Vec<DeclId>>,
+    /// All dimensions and units.
+    pub units: Units,
+}
+
 impl Meanings {
+    /// Nothing but what is declared.
+    pub fn of(tables: &Tables<'_>) -> Meanings {
+        let ancestors = tables.kinds.iter().map(|(id, kind)| (*id, kind.ancestors.clone())).collect();
+        let around = Around { scopes: tables.names.scopes().to_vec(), ancestors, units: tables.units.clone() };
+        Meanings { around, ..Meanings::default() }
+    }
+
     /// Whether what stands in a file is noted: the user's own files and the one of the library that is looked at.
     fn notes(&self, file: FileId) -> bool {
         !library::is_module(file) || self.opened == Some(file)
