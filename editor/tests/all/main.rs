@@ -1,0 +1,4 @@
+//! What an editor is told about names.
+
+mod support;
+mod tokens;
