@@ -78,7 +78,8 @@ impl Index {
         let from = lines.iter().position(|l| !l.trim_start().starts_with("///")).unwrap_or(0);
         let indent = lines.get(from + 1).map_or(0, |l| l.len() - l.trim_start().len());
         let shown = lines.iter().skip(from).take(HEAD_LINES).enumerate();
-        let shown = shown.map(|(i, l)| if i == 0 { l.trim() } else { l.get(indent.min(4)..).unwrap_or_else(|| l.trim()) });
+        let shown =
+            shown.map(|(i, l)| if i == 0 { l.trim() } else { l.get(indent.min(4)..).unwrap_or_else(|| l.trim()) });
         let mut out = shown.collect::<Vec<_>>().join("\n");
         if lines.len() - from > HEAD_LINES {
             out.push_str("\n…");
@@ -93,7 +94,8 @@ impl Index {
                 let dimension = self.units().describe(&unit.dimension, unit.offset.is_some());
                 let si = self.units().symbol(&unit.dimension);
                 let size = show_number(unit.factor * factor);
-                let zero = unit.offset.filter(|o| *o != 0.0).map(|o| format!(", 0 {} is {} {si}", def.name, show_number(o)));
+                let zero =
+                    unit.offset.filter(|o| *o != 0.0).map(|o| format!(", 0 {} is {} {si}", def.name, show_number(o)));
                 Some(format!("{dimension}; 1 {} is {size} {si}{}", def.name, zero.unwrap_or_default()))
             }
             Kind::Dimension => match &def.sort {

@@ -4,6 +4,7 @@
 
 mod analysis;
 pub mod calls;
+pub mod complete;
 pub mod hover;
 pub mod index;
 pub mod references;

@@ -111,8 +111,10 @@ pub struct Symbol {
 impl Index {
     /// Declarations of the package whose name has the letters of a query in their order.
     pub fn symbols(&self, query: &str) -> Vec<Symbol> {
-        let wanted = |d: &Def| !matches!(d.kind, Kind::Variable | Kind::Parameter | Kind::Option | Kind::Word | Kind::Job);
-        let found = self.own_defs().filter(|(_, d)| wanted(d) && !self.is_library(d.span.file) && holds(&d.name, query));
+        let wanted =
+            |d: &Def| !matches!(d.kind, Kind::Variable | Kind::Parameter | Kind::Option | Kind::Word | Kind::Job);
+        let found =
+            self.own_defs().filter(|(_, d)| wanted(d) && !self.is_library(d.span.file) && holds(&d.name, query));
         found
             .map(|(_, d)| Symbol {
                 name: d.name.clone(),

@@ -27,7 +27,9 @@ pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefI
     if index.is_library(d.span.file) {
         return Err(format!("`{}` belongs to the standard library", d.name));
     }
-    if index.sources().get(d.span.file).is_none_or(|s| !s.name.ends_with(".mtx")) && !index.own_files().any(|f| f == d.span.file) {
+    if index.sources().get(d.span.file).is_none_or(|s| !s.name.ends_with(".mtx"))
+        && !index.own_files().any(|f| f == d.span.file)
+    {
         return Err(format!("`{}` comes from a file that is no text of the language", d.name));
     }
     if d.kind == Kind::Word {
@@ -103,9 +105,13 @@ fn fits(kind: Kind, name: &str) -> bool {
             let mut words = name.split(' ');
             words.all(word)
         }
-        Kind::Species => reads(&format!("mtx 1\nspecies {name} {{ by: mass }}\n")) && !name.contains(char::is_whitespace),
+        Kind::Species => {
+            reads(&format!("mtx 1\nspecies {name} {{ by: mass }}\n")) && !name.contains(char::is_whitespace)
+        }
         Kind::Unit => reads(&format!("mtx 1\nunit {name}: Volume = 1 L\n")) && name.chars().all(char::is_alphabetic),
-        Kind::Failure | Kind::Member | Kind::Option => name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && word(name),
+        Kind::Failure | Kind::Member | Kind::Option => {
+            name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') && word(name)
+        }
         _ => word(name),
     }
 }
@@ -118,8 +124,28 @@ fn reads(text: &str) -> bool {
 
 /// Names that mean the same everywhere.
 const FIXED: &[&str] = &[
-    "true", "false", "nothing", "unlimited", "elapsed", "self", "ambient", "rest", "sum", "product", "all", "any", "failure",
-    "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job",
+    "true",
+    "false",
+    "nothing",
+    "unlimited",
+    "elapsed",
+    "self",
+    "ambient",
+    "rest",
+    "sum",
+    "product",
+    "all",
+    "any",
+    "failure",
+    "timeout",
+    "late",
+    "max",
+    "broken",
+    "need",
+    "promise",
+    "claimed",
+    "wrong_reagent",
+    "job",
 ];
 
 impl Index {
@@ -163,7 +189,8 @@ impl Index {
             }
             if let Some(kind) = self.decl_of(owner) {
                 let family = self.family(kind);
-                let members = family.into_iter().filter_map(|k| self.of_decl(k)).flat_map(|k| self.def(k).inside.clone());
+                let members =
+                    family.into_iter().filter_map(|k| self.of_decl(k)).flat_map(|k| self.def(k).inside.clone());
                 let mut members = members.filter(|o| *o != def && self.def(*o).name == name);
                 if let Some(other) = members.next() {
                     return already(other);

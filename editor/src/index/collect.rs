@@ -228,8 +228,11 @@ impl Index {
         if ty.words.is_empty() || !self.def(owner).words.is_empty() {
             return;
         }
-        let words: Vec<DefId> =
-            ty.words.iter().map(|w| self.add(Def { owner: Some(owner), ..bare(&w.text, Kind::Word, w.span, ty.span) })).collect();
+        let words: Vec<DefId> = ty
+            .words
+            .iter()
+            .map(|w| self.add(Def { owner: Some(owner), ..bare(&w.text, Kind::Word, w.span, ty.span) }))
+            .collect();
         if let Some(def) = self.own_mut(owner) {
             def.inside.retain(|d| !words.contains(d));
             def.words = words;

@@ -59,11 +59,8 @@ const OF_GRID: &[(&str, &str)] = &[
 ];
 
 /// What can be asked of a step.
-const OF_STEP: &[(&str, &str)] = &[
-    ("start", "when it began"),
-    ("end", "when it ended"),
-    ("elapsed", "how long it has lasted so far"),
-];
+const OF_STEP: &[(&str, &str)] =
+    &[("start", "when it began"), ("end", "when it ended"), ("elapsed", "how long it has lasted so far")];
 
 /// What can be asked of a thing that counts species.
 const OF_MIXTURE: &[(&str, &str)] =
@@ -243,7 +240,8 @@ impl Index {
 
     fn counts_species(&self, kinds: &[DeclId]) -> bool {
         let all = kinds.iter().flat_map(|k| self.ancestors(*k)).filter_map(|k| self.of_decl(*k));
-        all.flat_map(|d| &self.def(d).inside).any(|d| self.own.per_species.contains(d) || self.library.per_species.contains(d))
+        all.flat_map(|d| &self.def(d).inside)
+            .any(|d| self.own.per_species.contains(d) || self.library.per_species.contains(d))
     }
 
     /// Parts of the kinds by name.
@@ -262,7 +260,9 @@ impl Index {
     pub(crate) fn grid_of(&self, kinds: &[DeclId]) -> Option<(DefId, Sort)> {
         let members = self.members_of(kinds);
         let grid = members.iter().find(|d| self.def(**d).kind == Kind::Grid).or_else(|| {
-            members.iter().find(|d| matches!(&self.def(**d).sort, Sort::List(inner) if matches!(**inner, Sort::Thing(..))))
+            members
+                .iter()
+                .find(|d| matches!(&self.def(**d).sort, Sort::List(inner) if matches!(**inner, Sort::Thing(..))))
         })?;
         match &self.def(*grid).sort {
             Sort::List(inner) => Some((*grid, (**inner).clone())),

@@ -267,14 +267,44 @@ impl Index {
             let mut labs = region.labs.clone();
             out.extend(labs.iter().flat_map(|l| &self.def(*l).inside));
             for _ in 0..4 {
-                labs = labs.iter().flat_map(|l| &self.def(*l).inside).map(|d| self.def(*d)).filter(|d| d.kind == Kind::Included).flat_map(|d| d.words.clone()).collect();
-                out.extend(labs.iter().flat_map(|l| &self.def(*l).inside).filter(|d| self.def(**d).kind == Kind::Setting));
+                labs = labs
+                    .iter()
+                    .flat_map(|l| &self.def(*l).inside)
+                    .map(|d| self.def(*d))
+                    .filter(|d| d.kind == Kind::Included)
+                    .flat_map(|d| d.words.clone())
+                    .collect();
+                out.extend(
+                    labs.iter().flat_map(|l| &self.def(*l).inside).filter(|d| self.def(**d).kind == Kind::Setting),
+                );
             }
         }
         if let Some(module) = self.module_of(file) {
             out.extend(self.visible(module).map(|v| v.1));
         }
         out
+    }
+
+    /// Everything that each lab holds, with its kinds, by full name.
+    pub(crate) fn labs_built(&self) -> impl Iterator<Item = &BTreeMap<String, Vec<DeclId>>> {
+        self.meanings.things.values()
+    }
+
+    /// Everything that was found of expressions.
+    pub(crate) fn all_seen(&self) -> impl Iterator<Item = &Seen> {
+        self.meanings.values.values()
+    }
+
+    /// Names of all modules.
+    pub(crate) fn module_names(&self) -> impl Iterator<Item = &str> {
+        self.modules.iter().map(|m| m.name.as_str()).filter(|n| !n.is_empty())
+    }
+
+    /// What a module declares by name.
+    pub(crate) fn declared_in(&self, module: &str) -> Vec<DefId> {
+        let Some(module) = self.modules.iter().find(|m| m.name == module) else { return Vec::new() };
+        let part = if self.is_library(module.file) { &*self.library } else { &self.own };
+        part.decls.iter().copied().filter(|d| self.def(*d).span.file == module.file).collect()
     }
 
     /// A module by its number.

@@ -130,7 +130,8 @@ impl Walk<'_> {
         let labels: Vec<&str> =
             self.index.def(def).inside.iter().filter_map(|p| self.index.def(*p).label.as_deref()).collect();
         let command = self.index.def(def).kind == Kind::Command;
-        let unknown = call.labelled.iter().filter(|(l, _)| !labels.contains(&l.text.as_str()) && !(command && l.text == "by"));
+        let unknown =
+            call.labelled.iter().filter(|(l, _)| !labels.contains(&l.text.as_str()) && !(command && l.text == "by"));
         let missing = labels.iter().filter(|l| !call.labelled.iter().any(|(c, _)| c.text == **l));
         unknown.count() + missing.count()
     }

@@ -251,7 +251,11 @@ impl Walk<'_> {
     fn setting(&self, name: &str) -> Option<DefId> {
         let included = |labs: &[DefId]| -> Vec<DefId> {
             let inside = labs.iter().flat_map(|l| &self.index.def(*l).inside);
-            inside.map(|d| self.index.def(*d)).filter(|d| d.kind == Kind::Included).flat_map(|d| d.words.clone()).collect()
+            inside
+                .map(|d| self.index.def(*d))
+                .filter(|d| d.kind == Kind::Included)
+                .flat_map(|d| d.words.clone())
+                .collect()
         };
         let mut labs = self.labs.clone();
         for _ in 0..4 {

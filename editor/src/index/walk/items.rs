@@ -529,14 +529,21 @@ impl Walk<'_> {
                 let at = self.index.module_of(span.file).unwrap_or(self.at);
                 path.segments.last().and_then(|n| self.index.lookup(at, &n.text)).into_iter().collect()
             }
-            _ => self.index.visible(self.at).filter(|(_, d)| self.index.def(*d).kind == Kind::Lab).map(|l| l.1).collect(),
+            _ => {
+                self.index.visible(self.at).filter(|(_, d)| self.index.def(*d).kind == Kind::Lab).map(|l| l.1).collect()
+            }
         };
         for param in self.index.def(workflow).inside.clone() {
             let name = self.index.def(param).name.clone();
             self.enter(&name, param, self.end.min(span.end));
         }
         // Steps stay in sight when their workflow has ended.
-        let steps: Vec<_> = self.index.defs().filter(|(_, d)| d.kind == Kind::Step && d.owner == Some(workflow)).map(|d| (d.1.name.clone(), d.0)).collect();
+        let steps: Vec<_> = self
+            .index
+            .defs()
+            .filter(|(_, d)| d.kind == Kind::Step && d.owner == Some(workflow))
+            .map(|d| (d.1.name.clone(), d.0))
+            .collect();
         self.scope.extend(steps);
     }
 
