@@ -81,6 +81,13 @@ impl Index {
         index
     }
 
+    /// The index as it is where nothing could be evaluated: from what is declared alone.
+    pub fn declared(analysis: &Analysis) -> Index {
+        let around = analysis.meanings.around.clone();
+        let meanings = Arc::new(Meanings { around, ..Meanings::default() });
+        Index::of(&Analysis { meanings, ..analysis.clone() })
+    }
+
     fn library(analysis: &Analysis) -> Part {
         let mut index = Index {
             library: Arc::default(),
