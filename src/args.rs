@@ -69,6 +69,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
     View(ViewArgs),
+    /// Answer an editor: a language server on standard input and output.
+    Lsp(LspArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
     /// Create a small project that checks, runs and passes.
@@ -101,6 +103,14 @@ pub struct CheckArgs {
     /// Say everything that is known after the statement at this place.
     #[arg(long, value_name = "LINE[:COLUMN]", requires = "contents")]
     pub at: Option<Place>,
+}
+
+/// `matterixc lsp`.
+#[derive(Debug, Args)]
+pub struct LspArgs {
+    /// Speak on standard input and output, as is done without it too: what some editors add.
+    #[arg(long)]
+    pub stdio: bool,
 }
 
 /// `matterixc fmt`.

@@ -20,7 +20,6 @@ use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::args::Fidelity;
 use matterix_runtime::motion::{Store, preflight};
-use neighbours::Neighbours;
 
 pub use bill::{Prices, bill};
 pub use deploy::{Plan as DeployPlan, deploy};
@@ -28,6 +27,7 @@ pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
+pub use neighbours::Neighbours;
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 #[cfg(feature = "sila")]
@@ -97,6 +97,13 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
         Err(found) => vec![found],
     };
     (sources, found)
+}
+
+/// Findings of a text with those in the way of robots; its neighbours come from a loader.
+pub fn check_text(name: &str, text: &str, loader: &dyn matterix_lang::Loader, store: &dyn Store) -> Vec<Diagnostic> {
+    let mut sources = Sources::default();
+    let file = sources.add(name, text);
+    matterix_lang::check_and(&mut sources, file, loader, &|program| preflight(program, store))
 }
 
 /// What would go wrong with the motions of a program.

@@ -165,6 +165,10 @@ impl Place<'_> {
     pub(crate) fn inside(&self, context: &Context<'_>, out: &mut Offers) {
         let Some(block) = context.block() else { return };
         let head = block.head.first().map_or("", |t| t.text);
+        if head == "use" {
+            let path = block.head[1..].iter().map(|t| t.text).collect::<String>();
+            return self.module_items(path.trim_end_matches(':'), out);
+        }
         let item = context.item();
         let depth = context.open.iter().filter(|o| o.bracket == '{').count();
         let begins = context.before.is_empty() && context.open.last().is_some_and(|o| o.bracket == '{');

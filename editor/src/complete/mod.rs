@@ -70,8 +70,7 @@ pub fn complete(index: &Index, file: FileId, text: &str, cursor: usize) -> Offer
     if context.quiet {
         return out;
     }
-    let offset = moved(index.sources().get(file).map_or("", |s| &s.text), text, context.word.0);
-    let place = Place { index, file, offset };
+    let place = Place::of(index, file, text, context.word.0);
     place.offers(&context, &mut out);
     let typed = context.word.1.to_lowercase();
     out.all.retain(|c| fits(&c.label.to_lowercase(), &typed));
@@ -87,19 +86,6 @@ fn fits(label: &str, typed: &str) -> bool {
         let mut letters = rest.chars();
         typed.chars().all(|c| letters.any(|l| l == c))
     })
-}
-
-/// The place in an earlier text that a place in a later one comes from: what is before the first and behind the last change
-/// stays where it is.
-pub(crate) fn moved(earlier: &str, later: &str, at: usize) -> usize {
-    let same = earlier.bytes().zip(later.bytes()).take_while(|(a, b)| a == b).count();
-    if at <= same {
-        return at;
-    }
-    let most = (earlier.len().min(later.len())) - same;
-    let tail = earlier.bytes().rev().zip(later.bytes().rev()).take(most).take_while(|(a, b)| a == b).count();
-    let from_end = later.len() - at.min(later.len());
-    if from_end <= tail { earlier.len() - from_end } else { same }
 }
 
 impl Place<'_> {

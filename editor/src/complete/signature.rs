@@ -3,7 +3,6 @@
 use matterix_ir::FileId;
 
 use super::context::{LABELS, context};
-use super::moved;
 use super::values::Place;
 use crate::Index;
 use crate::index::{DefId, Kind};
@@ -27,8 +26,7 @@ pub fn signature(index: &Index, file: FileId, text: &str, cursor: usize) -> Opti
     if context.quiet {
         return None;
     }
-    let offset = moved(index.sources().get(file).map_or("", |s| &s.text), text, context.word.0);
-    let place = Place { index, file, offset };
+    let place = Place::of(index, file, text, context.word.0);
     // The innermost function whose brackets are open.
     for (at, open) in context.open.iter().enumerate().rev() {
         if open.bracket == '{' {

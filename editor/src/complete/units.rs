@@ -12,7 +12,7 @@ const PREFIXES: &[&str] = &["k", "m", "u", "n", "c"];
 impl Place<'_> {
     /// Units of what is expected, those that the package writes first; all units where nothing is.
     pub(crate) fn units(&self, wanted: Option<&Sort>, typed: &str, out: &mut Offers) {
-        let dimension = dimension_of(wanted);
+        let (dimension, point) = dimension_of(wanted).map_or((None, false), |(d, p)| (Some(d), p));
         let units = self.index.units();
         let mut all: Vec<(String, u8)> = Vec::new();
         let mut add = |name: String, rank: u8| {
@@ -21,7 +21,7 @@ impl Place<'_> {
             }
         };
         if let Some(dimension) = &dimension {
-            for unit in self.index.written_units(dimension) {
+            for unit in self.index.written_units(dimension, point) {
                 add(unit, 1);
             }
         }
@@ -32,14 +32,15 @@ impl Place<'_> {
             if !fits {
                 continue;
             }
-            add(name.to_string(), 3);
+            let rank = if dimension.is_some() && point != def.offset.is_some() { 6 } else { 3 };
+            add(name.to_string(), rank);
             let prefixed = def.prefixes && (dimension.is_some() || typed.chars().count() > 1);
             if prefixed {
-                PREFIXES.iter().for_each(|p| add(format!("{p}{name}"), 4));
+                PREFIXES.iter().for_each(|p| add(format!("{p}{name}"), rank + 1));
             }
         }
         if let Some(dimension) = dimension.filter(|d| !d.is_one() && !d.is_any()) {
-            add(units.symbol(&dimension), 2);
+            add(units.symbol(&dimension), if point { 6 } else { 2 });
         }
         for (name, rank) in all {
             let resolved = units.resolve(&name).ok();
@@ -50,10 +51,10 @@ impl Place<'_> {
     }
 }
 
-/// The dimension of what is expected.
-fn dimension_of(wanted: Option<&Sort>) -> Option<Dimension> {
+/// The dimension of what is expected, and whether it is a point on a scale.
+fn dimension_of(wanted: Option<&Sort>) -> Option<(Dimension, bool)> {
     match wanted? {
-        Sort::Quantity(dimension, _) if !dimension.is_any() => Some(dimension.clone()),
+        Sort::Quantity(dimension, point) if !dimension.is_any() => Some((dimension.clone(), *point)),
         Sort::Range(inner) | Sort::List(inner) => dimension_of(Some(inner)),
         Sort::Tuple(items) => dimension_of(items.first()),
         _ => None,
@@ -62,11 +63,12 @@ fn dimension_of(wanted: Option<&Sort>) -> Option<Dimension> {
 
 impl crate::Index {
     /// Units of a dimension that the package writes, the most frequent first.
-    pub(crate) fn written_units(&self, dimension: &Dimension) -> Vec<String> {
+    pub(crate) fn written_units(&self, dimension: &Dimension, point: bool) -> Vec<String> {
         let mut counts: std::collections::BTreeMap<&str, usize> = std::collections::BTreeMap::new();
         for seen in self.all_seen() {
-            if let (Sort::Quantity(of, _), Some(unit)) = (&seen.sort, &seen.unit)
+            if let (Sort::Quantity(of, at), Some(unit)) = (&seen.sort, &seen.unit)
                 && of == dimension
+                && *at == point
                 && !unit.symbol.is_empty()
             {
                 *counts.entry(&unit.symbol).or_default() += 1;

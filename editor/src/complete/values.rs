@@ -4,8 +4,8 @@ use matterix_ir::FileId;
 use matterix_lang::meanings::Sort;
 
 use super::context::{Context, Token, primary};
-use crate::Index;
 use crate::index::{DefId, Kind, Meaning};
+use crate::{Drift, Index};
 
 /// What is expected at a cursor.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +31,13 @@ pub(crate) struct Place<'i> {
     pub(crate) offset: usize,
 }
 
-impl Place<'_> {
+impl<'i> Place<'i> {
+    /// A place of the current text of a file.
+    pub(crate) fn of(index: &'i Index, file: FileId, text: &str, at: usize) -> Place<'i> {
+        let drift = Drift::between(index.sources().get(file).map_or("", |s| &s.text), text);
+        Place { index, file, offset: drift.back(at) }
+    }
+
     /// What a name stands for here, with its kind of value.
     pub(crate) fn named(&self, name: &str) -> Option<(DefId, Sort)> {
         let found = self.index.named_at(self.file, self.offset, name);

@@ -20,7 +20,13 @@ fn declarations_say_what_the_check_found() {
                 Meaning::Def(b) if index.key(a) == plain.key(b) => agreed += 1,
                 // Without a check less is known, but nothing else.
                 Meaning::Open | Meaning::Unknown | Meaning::Language(_) => {}
-                other => wrong.push(format!("{}: `{}` is {other:?}", path.display(), index.text(checked.span))),
+                Meaning::Def(b) => {
+                    let (a, b) = (index.def(a).span, plain.def(b).span);
+                    let of = |s| index.module_name(s).to_string();
+                    let text = index.text(checked.span);
+                    wrong.push(format!("{}: `{text}` is {} and {}", path.display(), of(a.file), of(b.file)));
+                }
+                Meaning::Module(_) => wrong.push(format!("{}: a module", path.display())),
             }
         }
     }

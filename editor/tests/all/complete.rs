@@ -7,7 +7,7 @@ use crate::support::{Files, analysed, marked};
 
 /// The best labels at `$0` in a line of the workflow of the lab; the analysis is that of the text with the line.
 fn offers(line: &str) -> Vec<String> {
-    in_text(&LAB.replace("    swing crate to open\n", &format!("    swing crate to open\n    {line}\n")))
+    in_text(&LAB.replace("    for x in", &format!("    {line}\n    for x in")))
 }
 
 fn in_text(text: &str) -> Vec<String> {

@@ -9,7 +9,7 @@ pub const LAB: &str = r#"mtx 1
 use std::glassware::Beaker250mL
 use std::heating::IkaRetControl
 /// How warm it gets.
-const warm: Temperature = 60 degC
+const warm: Temperature = 45 degC
 /// Opens and closes.
 capability Lidded: Body {
     /// Where its lid is.
@@ -69,7 +69,7 @@ fn declared(what: &str) -> String {
 #[test]
 fn names_lead_to_their_declarations() {
     let cases = [
-        ("Temperature = |warm", "const warm: Temperature = 60 degC"),
+        ("Temperature = |warm", "const warm: Temperature = 45 degC"),
         ("bring |beaker", "beaker = Beaker250mL on plate holding 100 g of water"),
         ("    |bring beaker", "skill bring(v: Container) to(t: Temperature) with(p: Heater & Surface)"),
         ("with plate { l|imit: 2 h", "option limit: Duration = 1 h"),
@@ -84,7 +84,7 @@ fn names_lead_to_their_declarations() {
         ("target - |ambient", "ambient: 22 degC"),
         ("of |water", "species water {"),
         ("= |Beaker250mL on", "asset Beaker250mL: Vessel {"),
-        ("60 deg|C", "unit degC: Temperature = 1 K from 273.15 K also °C"),
+        ("45 deg|C", "unit degC: Temperature = 1 K from 273.15 K also °C"),
         ("    |heat p", "command heat to(t: Temperature)"),
         ("p: Heater & |Surface", "capability Surface: Body {"),
         ("|rise > 1 K", "let rise = target - ambient"),
@@ -137,10 +137,10 @@ fn said(what: &str) -> String {
 #[test]
 fn hover_says_what_a_name_is() {
     let cases: &[(&str, &[&str])] = &[
-        ("Temperature = |warm", &["const warm", "Temperature", "60 degC = 333.15 K", "How warm it gets."]),
+        ("Temperature = |warm", &["const warm", "Temperature", "45 degC = 318.15 K", "How warm it gets."]),
         ("crate.|lid ==", &["state lid: open | closed = closed", "of capability `Lidded`", "Where its lid is."]),
         ("    |bring beaker", &["skill bring", "Brings a vessel to a temperature."]),
-        ("60 deg|C", &["Temperature", "0 degC is 273.15 K"]),
+        ("45 deg|C", &["Temperature", "0 degC is 273.15 K"]),
         ("|rise > 1 K", &["let rise", "TemperatureDifference"]),
         ("bring |beaker", &["beaker = Beaker250mL", "Beaker250mL"]),
         ("target - |ambient", &["ambient: 22 degC", "22 degC = 295.15 K"]),

@@ -5,6 +5,7 @@
 
 pub mod ast;
 mod brackets;
+pub mod classes;
 mod cursor;
 mod decode;
 mod dump;
@@ -82,6 +83,23 @@ pub fn parse_value(file: FileId, text: &str, start: usize) -> (Expr, Vec<Diagnos
         return (Expr { kind: Box::new(ExprKind::Error), span }, vec![too_deep(span)]);
     }
     with_stack(depth, || lower::Lower::new(file, text, &Offsets::default()).value(start, text.len()))
+}
+
+/// What stands in brackets, with them, in the order of the closing ones; brackets that were left open stand for nothing.
+pub fn groups(text: &str) -> Vec<std::ops::Range<usize>> {
+    let mut open: Vec<(u8, usize)> = Vec::new();
+    let mut out = Vec::new();
+    for bracket in scan::scan(text).brackets {
+        match scan::closer(bracket.byte) {
+            Some(closer) => open.push((closer, bracket.at)),
+            None => {
+                let Some(index) = open.iter().rposition(|(closer, _)| *closer == bracket.byte) else { continue };
+                out.extend(open.get(index).map(|(_, start)| *start..bracket.at + 1));
+                open.truncate(index);
+            }
+        }
+    }
+    out
 }
 
 /// Whether a word can be a name of the language.
