@@ -1,12 +1,14 @@
 //! What is known of a file after a check.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
 use matterix_lang::{Loader, Meanings, program};
 use matterix_syntax::ast;
+
+use crate::Index;
 
 /// A file with everything that it imports, as the last check saw it.
 #[derive(Clone, Debug)]
@@ -23,6 +25,8 @@ pub struct Analysis {
     pub points: Vec<Points>,
     /// What names and expressions mean.
     pub meanings: Arc<Meanings>,
+    /// The index of names, once it was asked for.
+    pub index: OnceLock<Arc<Index>>,
 }
 
 impl Analysis {
@@ -32,7 +36,20 @@ impl Analysis {
         let root = sources.add(name, text);
         let seen = program::examined(&mut sources, root, loader);
         let meanings = Arc::new(seen.meanings);
-        Analysis { root, sources, modules: seen.modules, findings: seen.findings, points: seen.points, meanings }
+        Analysis {
+            root,
+            sources,
+            modules: seen.modules,
+            findings: seen.findings,
+            points: seen.points,
+            meanings,
+            index: OnceLock::new(),
+        }
+    }
+
+    /// The index of names.
+    pub fn index(&self) -> Arc<Index> {
+        self.index.get_or_init(|| Arc::new(Index::of(self))).clone()
     }
 
     /// The text of a file; empty where it is not known.

@@ -59,6 +59,7 @@ impl<'i> Place<'i> {
         let (first, mut rest) = tokens.split_first()?;
         let (mut def, mut sort) = match first.text {
             "self" => (None, self.this()?),
+            "elapsed" => (None, self.index.duration()),
             "(" => return None,
             name => self.named(name).map(|(d, s)| (Some(d), s))?,
         };

@@ -349,6 +349,13 @@ impl Index {
         self.modules.iter().filter(|m| !m.is_library()).map(|m| m.file)
     }
 
+    /// The file under a name, as the sources have it.
+    pub fn file(&self, name: &str) -> Option<FileId> {
+        let files = (0..).map(FileId).map_while(|id| Some((id, self.sources.get(id)?)));
+        let mut files = files.filter(|(_, s)| s.name == name);
+        files.next().map(|f| f.0)
+    }
+
     /// The name of the module that a file is.
     pub fn module_name(&self, file: FileId) -> &str {
         self.modules.iter().find(|m| m.file == file).map_or("", |m| &m.name)

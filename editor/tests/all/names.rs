@@ -80,7 +80,7 @@ fn names_lead_to_their_declarations() {
         ("swing crate to |open", "command swing to(position: open | closed)"),
         ("lid == |open", "state lid: open | closed = closed"),
         ("|look.elapsed", "step look { expect beaker.contents.temperature > 40 degC }"),
-        ("v.|contents.temperature", "part contents: Mixture"),
+        ("v.|contents.temperature", "part contents: OpenMixture"),
         ("target - |ambient", "ambient: 22 degC"),
         ("of |water", "species water {"),
         ("= |Beaker250mL on", "asset Beaker250mL: Vessel {"),

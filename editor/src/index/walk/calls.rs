@@ -129,7 +129,13 @@ impl Walk<'_> {
     fn misfit(&self, def: DefId, call: &Call) -> usize {
         let labels: Vec<&str> =
             self.index.def(def).inside.iter().filter_map(|p| self.index.def(*p).label.as_deref()).collect();
-        let command = self.index.def(def).kind == Kind::Command;
+        let takes = self.index.def(def).inside.iter().any(|p| {
+            let p = self.index.def(*p);
+            p.kind == Kind::Parameter && p.label.is_none()
+        });
+        let object = call.object.is_some() || call.words.len() > self.index.def(def).name.split(' ').count();
+        // `by` names the device of a command whose object is something else.
+        let command = self.index.def(def).kind == Kind::Command && (takes || !object);
         let unknown =
             call.labelled.iter().filter(|(l, _)| !labels.contains(&l.text.as_str()) && !(command && l.text == "by"));
         let missing = labels.iter().filter(|l| !call.labelled.iter().any(|(c, _)| c.text == **l));
