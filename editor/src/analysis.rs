@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
-use matterix_lang::{Loader, Meanings, program};
+use matterix_lang::{Gathered, Loader, Session, program};
 use matterix_syntax::ast;
 
 use crate::Index;
@@ -24,17 +24,17 @@ pub struct Analysis {
     /// What is known at the statements of the workflows that could be followed.
     pub points: Vec<Points>,
     /// What names and expressions mean.
-    pub meanings: Arc<Meanings>,
+    pub meanings: Arc<Gathered>,
     /// The index of names, once it was asked for.
     pub index: OnceLock<Arc<Index>>,
 }
 
 impl Analysis {
-    /// Checks a text under its name; imports come from the loader.
-    pub fn of(name: &str, text: &str, loader: &dyn Loader) -> Analysis {
+    /// Checks a text under its name; imports come from the loader. What the session knows from earlier checks is not worked out again.
+    pub fn of(name: &str, text: &str, loader: &dyn Loader, session: &mut Session) -> Analysis {
         let mut sources = Sources::default();
         let root = sources.add(name, text);
-        let seen = program::examined(&mut sources, root, loader);
+        let seen = program::examined(&mut sources, root, loader, session);
         let meanings = Arc::new(seen.meanings);
         Analysis {
             root,

@@ -117,7 +117,7 @@ fn kind(class: Class) -> (Kind, bool) {
 /// The words of all verbs.
 fn verbs(modules: &[Arc<Module>]) -> BTreeSet<String> {
     let mut out = BTreeSet::new();
-    let mut add = |sig: &Sig| drop(out.insert(verb_text(&sig.verb)));
+    let mut add = |sig: &Sig| out.extend([verb_text(&sig.verb)]);
     for item in modules.iter().flat_map(|module| &module.tree.items) {
         match &item.kind {
             ItemKind::Skill { sig, .. } => add(sig),

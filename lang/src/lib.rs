@@ -19,6 +19,7 @@ pub mod points;
 pub mod program;
 pub mod prose;
 pub mod screen;
+mod session;
 mod sila;
 pub mod stock;
 mod study;
@@ -29,6 +30,7 @@ pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
 pub use lower::wires::Wires;
-pub use meanings::Meanings;
+pub use meanings::{Gathered, Meanings};
 pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, script, tests};
+pub use session::Session;
 pub use study::Many;

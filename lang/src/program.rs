@@ -19,9 +19,10 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
-use crate::meanings::{Meanings, Seeing};
+use crate::meanings::{Around, Gathered, Noted};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
+use crate::session::{self, Earlier, Package, Session, Verdict};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -61,12 +62,12 @@ pub struct Examined {
     /// What is known at every statement, where that was asked for: one per workflow that could be followed.
     pub points: Vec<Points>,
     /// What names and expressions mean, where that was asked for.
-    pub meanings: Meanings,
+    pub meanings: Gathered,
 }
 
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).findings
+    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new(), &mut Session::default()).findings
 }
 
 /// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
@@ -76,19 +77,19 @@ pub fn check_and(
     loader: &dyn Loader,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
 ) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Motions, motions).findings
+    examine(sources, file, loader, Wanted::Motions, motions, &mut Session::default()).findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    let seen = examined(sources, file, loader);
+    let seen = examined(sources, file, loader, &mut Session::default());
     (seen.findings, seen.points)
 }
 
-/// Checks a file as [`contents`] does, and gives the trees as well.
-pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Examined {
-    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new())
+/// Checks a file as [`contents`] does, and gives the trees as well. What a session knows from earlier checks is not worked out again.
+pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader, session: &mut Session) -> Examined {
+    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new(), session)
 }
 
 fn examine(
@@ -97,16 +98,18 @@ fn examine(
     loader: &dyn Loader,
     wanted: Wanted,
     motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    session: &mut Session,
 ) -> Examined {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
     let (tables, found) = Tables::new(&names);
     diagnostics.extend(found);
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
-    let mut meanings = (wanted == Wanted::Contents).then(|| Box::new(Meanings::of(&tables)));
-    diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut meanings));
+    let mut seeing = (wanted == Wanted::Contents).then(Box::default);
+    diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut seeing));
+    let mut meanings = Gathered::default();
     let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -123,7 +126,10 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
+    let package = sources.get(file).map_or_else(String::new, |source| source.name.clone());
+    let package = session.package(&package);
+    let verdicts = judge_anew(&tables, sources, (root, file), &tasks, wanted, package);
+    for (task, mut built) in tasks.iter().zip(verdicts) {
         let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
         fine &= !many(&names.decl(task.item).item.kind);
@@ -133,9 +139,7 @@ fn examine(
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
-        if let (Some(meanings), Some(found)) = (&mut meanings, built.meanings.take()) {
-            meanings.join(*found);
-        }
+        meanings.pieces.extend(built.noted.take());
         diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
@@ -154,12 +158,17 @@ fn examine(
     if items.is_empty() {
         for id in names.declared_by(root) {
             if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
-                diagnostics.extend(checks::lab(&tables, id, &mut meanings));
+                diagnostics.extend(checks::lab(&tables, id, &mut seeing));
             }
         }
     }
     let findings = finish(diagnostics, sources);
-    let meanings = meanings.map_or_else(Meanings::default, |meanings| *meanings);
+    if wanted == Wanted::Contents {
+        meanings.pieces.splice(..0, Noted::of(seeing, &modules));
+        meanings.around = Around::of(&tables);
+        drop(tables);
+        meanings.around.scopes = names.into_scopes();
+    }
     Examined { modules, findings, points, meanings }
 }
 
@@ -217,7 +226,7 @@ fn compile_and<T>(
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
 ) -> (Option<Made<T>>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -284,7 +293,7 @@ pub fn many_runs(
     options: &Options,
     fits: bool,
 ) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -319,7 +328,7 @@ pub fn many_runs(
 /// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
 /// them is returned apart.
 pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -473,15 +482,79 @@ enum Wanted {
 }
 
 /// One workflow, built.
+#[derive(Default)]
 struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
     points: Option<Points>,
-    meanings: Seeing,
+    noted: Option<Noted>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+}
+
+impl From<Verdict> for Built {
+    fn from(known: Verdict) -> Built {
+        let Verdict { findings, points, noted, starts, uses, many } = known;
+        Built { findings, points, noted, starts, uses, many, ..Built::default() }
+    }
+}
+
+impl Built {
+    /// What is kept of it.
+    fn verdict(&self) -> Verdict {
+        let Built { findings, points, noted, starts, uses, many, .. } = self;
+        Verdict {
+            findings: findings.clone(),
+            points: points.clone(),
+            noted: noted.clone(),
+            starts: starts.clone(),
+            uses: uses.clone(),
+            many: many.clone(),
+        }
+    }
+}
+
+/// Verdicts of the tasks of a package, in their order; those that hold on are taken from its earlier check.
+fn judge_anew<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    (root, file): (usize, FileId),
+    tasks: &[Task<'a>],
+    wanted: Wanted,
+    package: &mut Package,
+) -> Vec<Built> {
+    // A program is not kept.
+    if wanted != Wanted::Contents {
+        return judge(tables, sources, tasks, wanted);
+    }
+    let names = tables.names;
+    let mut now = Earlier::of(names.modules, sources, root);
+    let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
+    let lab = |task: &Task<'_>| {
+        names::item_name(names.decl(task.lab).item).map(|(name, _)| (names.decl(task.lab).module, name))
+    };
+    let known: Vec<Option<Verdict>> = tasks
+        .iter()
+        .map(|task| {
+            let verdict = matched.as_ref()?.verdict(session::number(names, task.item)?, &lab(task)?)?;
+            Some(verdict).filter(|v| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
+        })
+        .collect();
+    let open: Vec<Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t.clone()).collect();
+    let mut judged = judge(tables, sources, &open, wanted).into_iter();
+    let all: Vec<Built> = known.into_iter().filter_map(|v| v.map(Built::from).or_else(|| judged.next())).collect();
+    for (task, built) in tasks.iter().zip(&all) {
+        let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
+        // What it runs may stand in another file, where it is common to all.
+        let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
+        if let (Some(item), Some(lab)) = (session::number(names, task.item), lab(task)) {
+            now.keep((item, runs), lab, built.verdict());
+        }
+    }
+    package.earlier = Some(now);
+    all
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
@@ -558,7 +631,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
         elaborator.note_things(lab);
-        let meanings = elaborator.meanings.take();
+        let noted = Noted::of(elaborator.meanings.take(), tables.names.modules);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -568,7 +641,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !elaborator.has_robots() {
                 let findings = elaborator.diagnostics;
-                return Built { program: None, wiring, points, meanings, findings, starts, uses, many };
+                return Built { program: None, wiring, points, noted, findings, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -597,7 +670,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let (drivers, offers) = (elaborator.drivers, elaborator.offers);
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
         let findings = elaborator.diagnostics;
-        return Built { program: Some(program), wiring, points, meanings, findings, starts, uses, many };
+        return Built { program: Some(program), wiring, points, noted, findings, starts, uses, many };
     }
 }
 

@@ -11,7 +11,7 @@ use std::time::Duration;
 use crossbeam_channel::{Receiver, Sender};
 use matterix_editor::Analysis;
 use matterix_ir::{Diagnostic, FileId};
-use matterix_lang::Loader;
+use matterix_lang::{Loader, Session};
 
 use crate::STACK;
 use crate::cache;
@@ -100,6 +100,7 @@ impl Judge {
 
 fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
     let mut done: BTreeMap<String, u64> = BTreeMap::new();
+    let mut session = Session::default();
     while let Ok(round) = wished.recv() {
         let round = wished.try_iter().last().unwrap_or(round);
         for wish in round.wishes {
@@ -110,7 +111,7 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
                 continue;
             }
             let texts = Texts::new(wish.folder.as_deref(), &round.open);
-            let analysis = Analysis::of(&wish.name, &wish.text, &texts);
+            let analysis = Analysis::of(&wish.name, &wish.text, &texts, &mut session);
             let said = Said::Checked(Box::new(analysis), texts.asked());
             done.insert(wish.uri.clone(), wish.stamp);
             if verdicts.send(Verdict { uri: wish.uri, stamp: wish.stamp, said }).is_err() {

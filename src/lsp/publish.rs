@@ -63,7 +63,11 @@ impl Published {
                 // Of itself a text says the last that is known; elsewhere only what holds for the texts as they are.
                 if current || at == of {
                     let there = now.entry(at).or_default();
-                    found.iter().for_each(|d| if !there.contains(d) { there.push(d.clone()) });
+                    found.iter().for_each(|d| {
+                        if !there.contains(d) {
+                            there.push(d.clone())
+                        }
+                    });
                 }
             }
         }
@@ -140,10 +144,15 @@ impl<'s> Places<'s> {
     /// The address and range of a span.
     pub fn of(&self, span: Span) -> Option<(Uri, Range)> {
         let source = self.analysis.sources.get(span.file)?;
-        let known = self.known.borrow_mut().entry(span.file).or_insert_with(|| {
-            let uri = address(&source.name, self.documents, self.shelf)?;
-            Some((uri, Rc::new(Lines::of(&source.text, self.encoding))))
-        }).clone();
+        let known = self
+            .known
+            .borrow_mut()
+            .entry(span.file)
+            .or_insert_with(|| {
+                let uri = address(&source.name, self.documents, self.shelf)?;
+                Some((uri, Rc::new(Lines::of(&source.text, self.encoding))))
+            })
+            .clone();
         let (uri, lines) = known?;
         Some((uri, lines.range(&source.text, span.start as usize, span.end as usize)))
     }

@@ -12,7 +12,7 @@ use lsp_types::notification::{self as told, Notification as _};
 use lsp_types::request::{self as asked, Request as _};
 use lsp_types::{InitializeParams, MessageType};
 use matterix_editor::Analysis;
-use matterix_lang::LibraryOnly;
+use matterix_lang::{LibraryOnly, Session};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
@@ -116,7 +116,7 @@ impl Server {
 
     /// What is known of names of the library where no text is open.
     pub fn library(&self) -> Arc<matterix_editor::Index> {
-        Analysis::of("", "mtx 1\n", &LibraryOnly).index()
+        Analysis::of("", "mtx 1\n", &LibraryOnly, &mut Session::default()).index()
     }
 
     /// Takes messages and verdicts until the end. Without a request to end before it, an end is a failure.

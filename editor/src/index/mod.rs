@@ -14,9 +14,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, OnceLock};
 
 use matterix_ir::{FileId, Sources, Span};
-use matterix_lang::Meanings;
 use matterix_lang::meanings::{Seen, Sort};
 use matterix_lang::names::{DeclId, Module};
+use matterix_lang::{Gathered, Meanings};
 
 pub use def::{Def, DefId, Kind, Local, Meaning, Region, Use};
 pub use members::Member;
@@ -60,7 +60,8 @@ pub struct Index {
     own: Part,
     modules: Vec<Arc<Module>>,
     sources: Arc<Sources>,
-    meanings: Arc<Meanings>,
+    meanings: Meanings,
+    gathered: Arc<Gathered>,
 }
 
 /// The part of the library, which is the same for everyone.
@@ -75,7 +76,8 @@ impl Index {
             own: Part { first: library.defs.len() as u32, ..Part::default() },
             modules: analysis.modules.clone(),
             sources: Arc::new(analysis.sources.clone()),
-            meanings: analysis.meanings.clone(),
+            meanings: analysis.meanings.joined(),
+            gathered: analysis.meanings.clone(),
         };
         index.fill(|module| !module.is_library());
         index
@@ -84,7 +86,7 @@ impl Index {
     /// The index as it is where nothing could be evaluated: from what is declared alone.
     pub fn declared(analysis: &Analysis) -> Index {
         let around = analysis.meanings.around.clone();
-        let meanings = Arc::new(Meanings { around, ..Meanings::default() });
+        let meanings = Arc::new(Gathered { around, ..Gathered::default() });
         Index::of(&Analysis { meanings, ..analysis.clone() })
     }
 
@@ -94,7 +96,8 @@ impl Index {
             own: Part::default(),
             modules: analysis.modules.clone(),
             sources: Arc::new(analysis.sources.clone()),
-            meanings: analysis.meanings.clone(),
+            meanings: Meanings::default(),
+            gathered: analysis.meanings.clone(),
         };
         index.fill(Module::is_library);
         index.own
@@ -157,12 +160,12 @@ impl Index {
 
     /// What a name of a module stands for.
     pub(crate) fn lookup(&self, module: usize, name: &str) -> Option<DefId> {
-        self.meanings.around.scopes.get(module)?.get(name).and_then(|id| self.of_decl(*id))
+        self.gathered.around.scopes.get(module)?.get(name).and_then(|id| self.of_decl(*id))
     }
 
     /// The names that a module sees.
     pub(crate) fn visible(&self, module: usize) -> impl Iterator<Item = (&str, DefId)> {
-        let scope = self.meanings.around.scopes.get(module).into_iter().flatten();
+        let scope = self.gathered.around.scopes.get(module).into_iter().flatten();
         scope.filter_map(|(name, id)| Some((&**name, self.of_decl(*id)?)))
     }
 
@@ -246,7 +249,7 @@ impl Index {
 
     /// A kind with everything that it extends and everything that extends it.
     pub(crate) fn family(&self, kind: DeclId) -> Vec<DeclId> {
-        let around = &self.meanings.around.ancestors;
+        let around = &self.gathered.around.ancestors;
         let below = around.iter().filter(|(_, above)| above.contains(&kind)).map(|(id, _)| *id);
         let mut all: Vec<DeclId> = below.flat_map(|id| self.ancestors(id).to_vec()).collect();
         all.sort();
@@ -326,7 +329,7 @@ impl Index {
 
     /// All dimensions and units.
     pub fn units(&self) -> &matterix_lang::units::Units {
-        &self.meanings.around.units
+        &self.gathered.around.units
     }
 
     /// The text of a span.
@@ -397,7 +400,7 @@ impl Index {
 
     /// A kind with everything it extends, most derived first.
     pub(crate) fn ancestors(&self, kind: DeclId) -> &[DeclId] {
-        self.meanings.around.ancestors.get(&kind).map_or(&[], Vec::as_slice)
+        self.gathered.around.ancestors.get(&kind).map_or(&[], Vec::as_slice)
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use matterix_editor::{Analysis, Index};
 use matterix_ir::FileId;
-use matterix_lang::Loader;
+use matterix_lang::{Loader, Session};
 
 /// Files by the names of their modules, then those of a folder.
 #[derive(Default)]
@@ -59,7 +59,7 @@ pub fn examples() -> Vec<(PathBuf, String)> {
 
 /// The analysis of a text in a folder.
 pub fn analysed(name: &str, text: &str, files: &Files) -> (Analysis, Index) {
-    let analysis = Analysis::of(name, text, files);
+    let analysis = Analysis::of(name, text, files, &mut Session::default());
     let index = Index::of(&analysis);
     (analysis, index)
 }

@@ -18,12 +18,7 @@ pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Ve
 }
 
 /// Checks the declarations of one module, and notes what names mean where that is asked for.
-pub fn declarations_and(
-    tables: &Tables<'_>,
-    sources: &Sources,
-    module: usize,
-    seeing: &mut Seeing,
-) -> Vec<Diagnostic> {
+pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, seeing: &mut Seeing) -> Vec<Diagnostic> {
     let mut out = Vec::new();
     for id in tables.names.declared_by(module) {
         let mut lab = Elaborator::new(tables, Reach::default());

@@ -1,6 +1,7 @@
 //! What names and expressions were found to mean while a text was checked. It is noted only where that is asked for, by the
 //! evaluator and the planner themselves, so that what is shown is what was checked.
 
+mod noted;
 mod sort;
 
 use std::collections::BTreeMap;
@@ -9,6 +10,7 @@ use std::sync::Arc;
 use matterix_ir::{FileId, Span, Unit};
 use rustc_hash::FxHashMap;
 
+pub use noted::Noted;
 pub use sort::Sort;
 
 use crate::ast::{ItemKind, MemberKind};
@@ -34,11 +36,27 @@ pub struct Seen {
 /// What was noted, where that is asked for.
 pub type Seeing = Option<Box<Meanings>>;
 
+/// All that a check has noted of a package, as it was noted piece by piece.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    /// What is declared.
+    pub around: Around,
+    /// What the checks of declarations and of each workflow have noted; of what several did the first counts.
+    pub pieces: Vec<Noted>,
+}
+
+impl Gathered {
+    /// All of it as one.
+    pub fn joined(&self) -> Meanings {
+        let mut all = Meanings::default();
+        self.pieces.iter().for_each(|piece| piece.join_into(&mut all));
+        all
+    }
+}
+
 /// What was noted.
 #[derive(Clone, Debug, Default)]
 pub struct Meanings {
-    /// What stands around every text: kinds and units.
-    pub around: Around,
     /// Names, and where what they stand for is declared: its name, or the call form of a skill or command.
     pub names: FxHashMap<Span, Span>,
     /// Expressions.
@@ -60,28 +78,18 @@ pub struct Around {
     pub units: Units,
 }
 
-impl Meanings {
-    /// Nothing but what is declared.
-    pub fn of(tables: &Tables<'_>) -> Meanings {
+impl Around {
+    /// What the tables say; the scopes of the modules are still to come.
+    pub fn of(tables: &Tables<'_>) -> Around {
         let ancestors = tables.kinds.iter().map(|(id, kind)| (*id, kind.ancestors.clone())).collect();
-        let around = Around { scopes: tables.names.scopes().to_vec(), ancestors, units: tables.units.clone() };
-        Meanings { around, ..Meanings::default() }
+        Around { scopes: Vec::new(), ancestors, units: tables.units.clone() }
     }
+}
 
+impl Meanings {
     /// Whether what stands in a file is noted: the user's own files and the one of the library that is looked at.
     fn notes(&self, file: FileId) -> bool {
         !library::is_module(file) || self.opened == Some(file)
-    }
-
-    /// Adds what another look at the same text has noted. What both know is what the first one found.
-    pub fn join(&mut self, other: Meanings) {
-        for (span, declared) in other.names {
-            self.names.entry(span).or_insert(declared);
-        }
-        for (span, seen) in other.values {
-            self.see(span, seen);
-        }
-        self.things.extend(other.things);
     }
 
     /// Notes a value; where there is one already, what is not the same in both is forgotten.

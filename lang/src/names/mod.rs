@@ -9,6 +9,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
 use crate::loader::Loader;
+use crate::session::{self, Session};
 use crate::{import, library};
 
 /// A module: one file.
@@ -54,14 +55,22 @@ pub struct Names<'a> {
 }
 
 /// Parses the root file and everything it imports; the library comes first.
-pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics, first) = library(sources, root);
+///
+/// What the session knows of texts that have not changed is taken from there.
+pub fn load(
+    sources: &mut Sources,
+    root: FileId,
+    loader: &dyn Loader,
+    session: &mut Session,
+) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
+    let package = sources.get(root).map_or_else(String::new, |source| source.name.clone());
+    let (mut modules, mut diagnostics, first) = library(sources, root, &package, session);
     let mut queue = vec![(String::new(), root)];
     let mut parsed = Some(first);
     while let Some((name, file)) = queue.pop() {
-        let (tree, found) = parsed.take().unwrap_or_else(|| parse(sources, file));
+        let (module, found) = parsed.take().unwrap_or_else(|| session.module(sources, &package, &name, file));
         diagnostics.extend(found);
-        for item in &tree.items {
+        for item in &module.tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
             let known = |m: &str, modules: &[Arc<Module>], queue: &[(String, FileId)]| {
                 modules.iter().any(|x| x.name == m) || queue.iter().any(|x| x.0 == m)
@@ -92,12 +101,14 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Ar
                 }
             }
         }
-        modules.push(Arc::new(Module { name, file, tree }));
+        modules.push(module);
     }
+    session.tidy(&package);
     let used = used(&modules);
     for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
-        let module = Arc::make_mut(module);
-        diagnostics.extend(import::import(&mut module.tree, module.file, loader));
+        let (made, found) = session::imported(session, module, loader);
+        *module = made;
+        diagnostics.extend(found);
     }
     if modules.iter().any(|m| import::has_features(&m.tree)) {
         let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
@@ -126,17 +137,25 @@ fn used(modules: &[Arc<Module>]) -> Vec<bool> {
     used
 }
 
-fn parse(sources: &Sources, file: FileId) -> (ast::File, Vec<Diagnostic>) {
-    crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text))
-}
+/// A module with what is wrong with its text.
+type Read = (Arc<Module>, Vec<Diagnostic>);
 
-/// The library's modules and their findings, and the tree of the root file, which is parsed meanwhile.
-fn library(sources: &mut Sources, root: FileId) -> (Vec<Arc<Module>>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
+/// The library's modules and their findings, and the module of the root file, which is parsed meanwhile.
+fn library(
+    sources: &mut Sources,
+    root: FileId,
+    package: &str,
+    session: &mut Session,
+) -> (Vec<Arc<Module>>, Vec<Diagnostic>, Read) {
     let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
+    if session.library.iter().map(|module| module.file).eq(files.iter().copied()) {
+        let first = session.module(sources, package, "", root);
+        return (session.library.clone(), Vec::new(), first);
+    }
     let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
     let (trees, first) = std::thread::scope(|scope| {
         let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
-        let first = parse(sources, root);
+        let first = session.module(sources, package, "", root);
         // Where there is no thread to be had, this one does the work.
         (reading.ok().and_then(|reading| reading.join().ok()).unwrap_or_else(read), first)
     });
@@ -145,7 +164,10 @@ fn library(sources: &mut Sources, root: FileId) -> (Vec<Arc<Module>>, Vec<Diagno
         diagnostics.extend(found);
         Arc::new(Module { name: module.name.to_string(), file, tree })
     };
-    let modules = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
+    let modules: Vec<Arc<Module>> = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
+    if diagnostics.is_empty() {
+        session.library.clone_from(&modules);
+    }
     (modules, diagnostics, first)
 }
 
@@ -327,8 +349,8 @@ impl<'a> Names<'a> {
     }
 
     /// What the names that each module sees stand for.
-    pub fn scopes(&self) -> &[BTreeMap<Arc<str>, DeclId>] {
-        &self.scopes
+    pub fn into_scopes(self) -> Vec<BTreeMap<Arc<str>, DeclId>> {
+        self.scopes
     }
 
     /// Everything a module sees.

@@ -144,8 +144,17 @@ fn is_junk(rule: Rule) -> bool {
     use Rule::*;
     matches!(
         rule,
-        bad_rest | bad_field_rest | bad_clause_rest | bad_field | bad_clause | bad_member | bad_wire | bad_lab_line
-            | bad_study_line | bad_fit_line | bad_text
+        bad_rest
+            | bad_field_rest
+            | bad_clause_rest
+            | bad_field
+            | bad_clause
+            | bad_member
+            | bad_wire
+            | bad_lab_line
+            | bad_study_line
+            | bad_fit_line
+            | bad_text
     )
 }
 
@@ -166,7 +175,9 @@ fn class(rule: Rule, parent: Rule, text: &str, called: bool) -> Option<Class> {
         (let_ | law_let | for_ | law_for | each | step | start | instance | include, ident) => {
             Class::Declared(Declared::Variable)
         }
-        (value_member, word) | (frame_member | frame | part_line | grid | joint, ident) => Class::Declared(Declared::Member),
+        (value_member, word) | (frame_member | frame | part_line | grid | joint, ident) => {
+            Class::Declared(Declared::Member)
+        }
         (const_ | dimension | solution | reaction | reactive_group | material | driver | lab | study | fit, ident) => {
             Class::Declared(Declared::Other)
         }

@@ -3,8 +3,7 @@
 use std::collections::HashMap;
 
 use lsp_types::{
-    CodeAction, CodeActionKind, CodeActionOrCommand, CodeActionParams, CodeActionResponse, TextEdit, Uri,
-    WorkspaceEdit,
+    CodeAction, CodeActionKind, CodeActionOrCommand, CodeActionParams, CodeActionResponse, TextEdit, Uri, WorkspaceEdit,
 };
 use matterix_editor::{all_fixes, fixes_at};
 use matterix_ir::{Diagnostic, Edit};
@@ -20,7 +19,9 @@ pub fn actions(server: &mut Server, params: CodeActionParams) -> Option<CodeActi
     let places = Places::new(&analysis, &server.documents, &server.shelf, server.client.encoding);
     let wanted = |kind: &CodeActionKind| {
         let only = params.context.only.as_ref();
-        only.is_none_or(|only| only.iter().any(|o| kind.as_str() == o.as_str() || kind.as_str().starts_with(&format!("{}.", o.as_str()))))
+        only.is_none_or(|only| {
+            only.iter().any(|o| kind.as_str() == o.as_str() || kind.as_str().starts_with(&format!("{}.", o.as_str())))
+        })
     };
     let (start, end) = document.lines.bytes(&document.text, params.range);
     let mut out = Vec::new();
@@ -35,7 +36,13 @@ pub fn actions(server: &mut Server, params: CodeActionParams) -> Option<CodeActi
     if wanted(&CodeActionKind::SOURCE_FIX_ALL) {
         let all = all_fixes(&analysis, analysis.root);
         if let Some(edit) = edit(&places, all.iter().copied()).filter(|_| !all.is_empty()) {
-            out.push(action("fix all that has one correction".to_string(), CodeActionKind::SOURCE_FIX_ALL, edit, None, false));
+            out.push(action(
+                "fix all that has one correction".to_string(),
+                CodeActionKind::SOURCE_FIX_ALL,
+                edit,
+                None,
+                false,
+            ));
         }
     }
     Some(out)

@@ -17,7 +17,8 @@ pub fn hints(server: &mut Server, params: InlayHintParams) -> Option<Vec<InlayHi
     let (start, end) = lines.bytes(text, params.range);
     let mut out = Vec::new();
     for hint in matterix_editor::hints(&seen.analysis, seen.file) {
-        let Some((at, _)) = seen.drift.range(hint.offset, hint.offset).filter(|(at, _)| (start..=end).contains(at)) else {
+        let Some((at, _)) = seen.drift.range(hint.offset, hint.offset).filter(|(at, _)| (start..=end).contains(at))
+        else {
             continue;
         };
         let said = match &hint.told {

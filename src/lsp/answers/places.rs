@@ -8,6 +8,7 @@ use lsp_types::{Location, Position, Range, Uri};
 use matterix_editor::references::Place;
 use matterix_editor::{Analysis, Drift, Index};
 use matterix_ir::{FileId, Span};
+use matterix_lang::Session;
 
 use crate::files;
 use crate::lsp::documents::Document;
@@ -56,7 +57,8 @@ impl<'s> Named<'s> {
         }
         let document = named.document;
         let open = server.documents.texts();
-        let analysis = Analysis::of(&document.name(), &document.text, &Texts::new(document.folder(), &open));
+        let texts = Texts::new(document.folder(), &open);
+        let analysis = Analysis::of(&document.name(), &document.text, &texts, &mut Session::default());
         let drift = Drift::between(&document.text, &document.text);
         Some(Named { document, file: analysis.root, index: analysis.index(), drift })
     }
@@ -114,6 +116,7 @@ const ABOVE: usize = 3;
 pub fn around(server: &Server, of: &Place, word: &str) -> Vec<Arc<Index>> {
     let texts = server.documents.texts();
     let mut all = open(server);
+    let mut session = Session::default();
     for path in files_around(Path::new(&of.file)) {
         if texts.contains_key(&path) {
             continue;
@@ -121,7 +124,8 @@ pub fn around(server: &Server, of: &Place, word: &str) -> Vec<Arc<Index>> {
         let Ok(bytes) = files::contents(&path, files::LARGEST_TEXT) else { continue };
         let Ok(text) = String::from_utf8(bytes) else { continue };
         if text.contains(word) {
-            let analysis = Analysis::of(&path.display().to_string(), &text, &Texts::new(path.parent(), &texts));
+            let beside = Texts::new(path.parent(), &texts);
+            let analysis = Analysis::of(&path.display().to_string(), &text, &beside, &mut session);
             all.push(analysis.index());
         }
     }
