@@ -117,10 +117,11 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                         statements.push(Vec::new());
                     }
                     '}' | ')' | ']' => {
-                        if open.pop().is_some() {
-                            statements.pop();
-                        }
+                        let closed = open.pop().and_then(|_| statements.pop()).unwrap_or_default();
                         let depth = open.len();
+                        if c != '}' {
+                            statements[depth].extend(closed);
+                        }
                         statements[depth].push(token);
                         if c == '}' && open.last().is_none_or(|o| o.bracket == '{') && !followed(text, end) {
                             statements[depth].clear();

@@ -83,7 +83,7 @@ fn names_lead_to_their_declarations() {
         ("v.|contents.temperature", "part contents: OpenMixture"),
         ("target - |ambient", "ambient: 22 degC"),
         ("of |water", "species water {"),
-        ("= |Beaker250mL on", "asset Beaker250mL: Vessel {"),
+        ("= |Beaker250mL on", "asset Beaker250mL: Container, Graspable"),
         ("45 deg|C", "unit degC: Temperature = 1 K from 273.15 K also °C"),
         ("    |heat p", "command heat to(t: Temperature)"),
         ("p: Heater & |Surface", "capability Surface: Body {"),
