@@ -20,6 +20,7 @@ mod gripping;
 mod harness;
 mod hollow;
 mod joints;
+mod lsp;
 mod meshes;
 mod motion;
 mod new;
