@@ -147,7 +147,7 @@ impl Index {
         };
         match sort {
             Sort::Any => String::new(),
-            Sort::Quantity(dimension, point) => self.units().describe(dimension, *point),
+            Sort::Quantity(dimension, point) => self.described(dimension, *point),
             Sort::Truth => "a truth value".into(),
             Sort::Text => "a text".into(),
             Sort::Word(words) => format!("one of {}", matterix_lang::eval::words::list(words)),

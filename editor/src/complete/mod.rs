@@ -8,6 +8,8 @@ mod steps;
 mod units;
 mod values;
 
+use std::collections::BTreeSet;
+
 use matterix_ir::FileId;
 use matterix_lang::meanings::Sort;
 
@@ -194,6 +196,7 @@ impl Place<'_> {
         if !names.iter().any(|d| self.index.def(*d).kind == Kind::Thing) {
             names.extend(self.index.own_defs().filter(|(_, d)| d.kind == Kind::Thing).map(|d| d.0));
         }
+        let mut there: BTreeSet<String> = out.all.iter().map(|c| c.label.clone()).collect();
         for def in names {
             let d = self.index.def(def);
             let local = matches!(
@@ -210,13 +213,17 @@ impl Place<'_> {
                     | Kind::Grid
                     | Kind::Frame
             );
+            if !local || there.contains(&d.name) {
+                continue;
+            }
             let built = match &d.sort {
                 Sort::Thing(kinds, Some(full)) => {
                     Sort::Thing(self.index.built(full).unwrap_or(kinds).clone(), Some(full.clone()))
                 }
                 other => other.clone(),
             };
-            if local && wanted(&built, d.kind) && !out.all.iter().any(|c| c.label == d.name) {
+            if wanted(&built, d.kind) {
+                there.insert(d.name.clone());
                 out.all.push(self.offer(&d.name, def, rank));
             }
         }

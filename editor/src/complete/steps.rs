@@ -1,6 +1,9 @@
 //! What can be written in a block of steps, and in calls.
 
+use std::collections::BTreeSet;
+
 use matterix_lang::meanings::Sort;
+use matterix_lang::names::DeclId;
 
 use super::context::{Context, LABELS};
 use super::values::{Place, Wanted};
@@ -69,14 +72,26 @@ impl Place<'_> {
     fn verbs(&self, words: &[&str], out: &mut Offers) {
         let Some(module) = self.index.module_of(self.file) else { return };
         let begin = words.iter().map(|w| format!("{w} ")).collect::<String>();
-        let things = self.things();
+        let able: BTreeSet<DeclId> = self
+            .things()
+            .iter()
+            .flat_map(|t| match t {
+                Sort::Thing(kinds, _) => kinds.clone(),
+                _ => Vec::new(),
+            })
+            .flat_map(|k| self.index.ancestors(k).to_vec())
+            .collect();
+        let mut there: BTreeSet<String> = out.all.iter().filter(|c| c.def.is_some()).map(|c| c.label.clone()).collect();
         for (verb, def) in self.index.all_verbs() {
             let Some(rest) = verb.strip_prefix(begin.as_str()) else { continue };
             let seen = match self.index.def(def).kind {
                 Kind::Skill => self.index.lookup(module, verb) == Some(def),
-                _ => things.iter().any(|t| self.index.can(t, def)),
+                _ => {
+                    let owner = self.index.def(def).owner.and_then(|o| self.index.decl_of(o));
+                    owner.is_some_and(|o| able.contains(&o))
+                }
             };
-            if seen && !out.all.iter().any(|c| c.label == rest && c.def.is_some()) {
+            if seen && there.insert(rest.to_string()) {
                 let docs = self.index.def(def).docs.first().cloned().unwrap_or_default();
                 let detail = if docs.is_empty() { self.index.form(def) } else { docs };
                 let own = u8::from(self.index.is_library(self.index.def(def).span.file));

@@ -44,7 +44,7 @@ impl Place<'_> {
         }
         for (name, rank) in all {
             let resolved = units.resolve(&name).ok();
-            let detail = resolved.map(|r| units.describe(&r.dimension, r.point)).unwrap_or_default();
+            let detail = resolved.map(|r| self.index.described(&r.dimension, r.point)).unwrap_or_default();
             let def = self.index.measure(&name);
             out.all.push(Completion { text: name.clone(), label: name, kind: Offer::Unit, detail, def, rank });
         }

@@ -111,7 +111,10 @@ impl Index {
                         LabLineKind::Include { name, .. } => (Kind::Included, name),
                         LabLineKind::Between { .. } | LabLineKind::Error => continue,
                     };
-                    self.add_inside(id, kind, name, line.span);
+                    let def = self.add_inside(id, kind, name, line.span);
+                    if kind == Kind::Setting {
+                        self.own.settings.entry(name.text.clone()).or_insert(def);
+                    }
                 }
             }
             ItemKind::Hazard { params, .. }

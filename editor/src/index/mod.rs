@@ -11,11 +11,12 @@ mod settle;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, OnceLock, RwLock};
 
 use matterix_ir::{FileId, Sources, Span};
 use matterix_lang::meanings::{Seen, Sort};
 use matterix_lang::names::{DeclId, Module};
+use matterix_lang::units::Dimension;
 use matterix_lang::{Gathered, Meanings};
 
 pub use def::{Def, DefId, Kind, Local, Meaning, Region, Use};
@@ -37,6 +38,8 @@ pub(crate) struct Part {
     verbs: BTreeMap<String, Vec<DefId>>,
     /// Failures by name, and all places that declare them.
     failures: BTreeMap<String, (DefId, Vec<Span>)>,
+    /// Settings of labs by name.
+    settings: BTreeMap<String, DefId>,
     /// Units and dimensions by name.
     measures: BTreeMap<String, DefId>,
     /// Names in the order of the text.
@@ -54,7 +57,7 @@ pub(crate) struct Part {
 }
 
 /// The index of one analysis.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Index {
     library: Arc<Part>,
     own: Part,
@@ -62,6 +65,8 @@ pub struct Index {
     sources: Arc<Sources>,
     meanings: Meanings,
     gathered: Arc<Gathered>,
+    /// Dimensions in words, as far as they were asked for.
+    described: RwLock<HashMap<(Dimension, bool), String>>,
 }
 
 /// The part of the library, which is the same for everyone.
@@ -78,6 +83,7 @@ impl Index {
             sources: Arc::new(analysis.sources.clone()),
             meanings: analysis.meanings.joined(),
             gathered: analysis.meanings.clone(),
+            described: RwLock::default(),
         };
         index.fill(|module| !module.is_library());
         index
@@ -98,6 +104,7 @@ impl Index {
             sources: Arc::new(analysis.sources.clone()),
             meanings: Meanings::default(),
             gathered: analysis.meanings.clone(),
+            described: RwLock::default(),
         };
         index.fill(Module::is_library);
         index.own
@@ -325,6 +332,24 @@ impl Index {
     /// The file of a module.
     pub(crate) fn module_file(&self, module: u32) -> Option<FileId> {
         self.module_at(module).map(|m| m.file)
+    }
+
+    /// The setting of a lab with this name, if one has it.
+    pub(crate) fn setting(&self, name: &str) -> Option<DefId> {
+        self.own.settings.get(name).or_else(|| self.library.settings.get(name)).copied()
+    }
+
+    /// A dimension in words.
+    pub(crate) fn described(&self, dimension: &Dimension, point: bool) -> String {
+        let key = (dimension.clone(), point);
+        if let Some(known) = self.described.read().ok().and_then(|known| known.get(&key).cloned()) {
+            return known;
+        }
+        let words = self.units().describe(dimension, point);
+        if let Ok(mut known) = self.described.write() {
+            known.insert(key, words.clone());
+        }
+        words
     }
 
     /// All dimensions and units.

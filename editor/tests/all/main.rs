@@ -4,6 +4,7 @@ mod agree;
 mod complete;
 mod names;
 mod rename;
+mod speed;
 mod support;
 mod survive;
 mod tokens;

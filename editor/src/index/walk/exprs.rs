@@ -266,8 +266,7 @@ impl Walk<'_> {
             }
             labs = included(&labs);
         }
-        let own = self.index.own_defs().find(|(_, d)| d.kind == Kind::Setting && d.name == name);
-        own.map(|d| d.0)
+        self.index.setting(name)
     }
 
     /// A bare word.
