@@ -1,12 +1,14 @@
 //! What is known of a file after a check.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
-use matterix_lang::{Loader, Session, program};
+use matterix_lang::{Gathered, Loader, Session, program};
 use matterix_syntax::ast;
+
+use crate::Index;
 
 /// A file with everything that it imports, as the last check saw it.
 #[derive(Clone, Debug)]
@@ -21,6 +23,10 @@ pub struct Analysis {
     pub findings: Vec<Diagnostic>,
     /// What is known at the statements of the workflows that could be followed.
     pub points: Vec<Points>,
+    /// What names and expressions mean.
+    pub meanings: Arc<Gathered>,
+    /// The index of names, once it was asked for.
+    pub index: OnceLock<Arc<Index>>,
 }
 
 impl Analysis {
@@ -29,7 +35,21 @@ impl Analysis {
         let mut sources = Sources::default();
         let root = sources.add(name, text);
         let seen = program::examined(&mut sources, root, loader, session);
-        Analysis { root, sources, modules: seen.modules, findings: seen.findings, points: seen.points }
+        let meanings = Arc::new(seen.meanings);
+        Analysis {
+            root,
+            sources,
+            modules: seen.modules,
+            findings: seen.findings,
+            points: seen.points,
+            meanings,
+            index: OnceLock::new(),
+        }
+    }
+
+    /// The index of names.
+    pub fn index(&self) -> Arc<Index> {
+        self.index.get_or_init(|| Arc::new(Index::of(self))).clone()
     }
 
     /// The text of a file; empty where it is not known.

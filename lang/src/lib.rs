@@ -13,6 +13,7 @@ mod labware;
 pub mod library;
 pub mod loader;
 pub mod lower;
+pub mod meanings;
 pub mod names;
 pub mod points;
 pub mod program;
@@ -30,6 +31,7 @@ pub use matterix_syntax::{self as syntax, ast, fmt};
 
 pub use loader::{LibraryOnly, Loader};
 pub use lower::wires::Wires;
+pub use meanings::{Gathered, Meanings};
 pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, script, tests};
 pub use session::Session;
 pub use study::Many;

@@ -19,6 +19,7 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
+use crate::meanings::{Around, Gathered, Noted};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
 use crate::session::{self, Earlier, Package, Session, Verdict};
@@ -60,6 +61,8 @@ pub struct Examined {
     pub findings: Vec<Diagnostic>,
     /// What is known at every statement, where that was asked for: one per workflow that could be followed.
     pub points: Vec<Points>,
+    /// What names and expressions mean, where that was asked for.
+    pub meanings: Gathered,
 }
 
 /// Checks a file: everything it declares, and every workflow in its lab.
@@ -105,7 +108,9 @@ fn examine(
     diagnostics.extend(found);
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
-    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let mut seeing = (wanted == Wanted::Contents).then(Box::default);
+    diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut seeing));
+    let mut meanings = Gathered::default();
     let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -140,6 +145,7 @@ fn examine(
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
+        meanings.pieces.extend(built.noted.take());
         diagnostics.extend(moved);
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
@@ -158,12 +164,18 @@ fn examine(
     if items.is_empty() {
         for id in names.declared_by(root) {
             if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
-                diagnostics.extend(checks::lab(&tables, id));
+                diagnostics.extend(checks::lab(&tables, id, &mut seeing));
             }
         }
     }
     let findings = finish(diagnostics, sources);
-    Examined { modules, findings, points }
+    if wanted == Wanted::Contents {
+        meanings.pieces.splice(..0, Noted::of(seeing, &modules));
+        meanings.around = Around::of(&tables);
+        drop(tables);
+        meanings.around.scopes = names.into_scopes();
+    }
+    Examined { modules, findings, points, meanings }
 }
 
 /// Compiles one workflow of a file; no program where there is an error.
@@ -481,6 +493,7 @@ struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
     points: Option<Points>,
+    noted: Option<Noted>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
@@ -489,18 +502,19 @@ struct Built {
 
 impl From<Verdict> for Built {
     fn from(known: Verdict) -> Built {
-        let Verdict { findings, points, starts, uses, many } = known;
-        Built { findings, points, starts, uses, many, ..Built::default() }
+        let Verdict { findings, points, noted, starts, uses, many } = known;
+        Built { findings, points, noted, starts, uses, many, ..Built::default() }
     }
 }
 
 impl Built {
     /// What is kept of it.
     fn verdict(&self) -> Verdict {
-        let Built { findings, points, starts, uses, many, .. } = self;
+        let Built { findings, points, noted, starts, uses, many, .. } = self;
         Verdict {
             findings: findings.clone(),
             points: points.clone(),
+            noted: noted.clone(),
             starts: starts.clone(),
             uses: uses.clone(),
             many: many.clone(),
@@ -585,6 +599,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
     let mut draft = true;
     loop {
         let mut elaborator = Elaborator::new(tables, reach.clone());
+        elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
@@ -621,6 +636,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
+        elaborator.note_things(lab);
+        let noted = Noted::of(elaborator.meanings.take(), tables.names.modules);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -629,7 +646,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
-                return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+                let findings = elaborator.diagnostics;
+                return Built { program: None, wiring, points, noted, findings, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -657,7 +675,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let (drivers, offers) = (elaborator.drivers, elaborator.offers);
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
-        return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+        let findings = elaborator.diagnostics;
+        return Built { program: Some(program), wiring, points, noted, findings, starts, uses, many };
     }
 }
 

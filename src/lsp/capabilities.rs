@@ -1,11 +1,12 @@
 //! What client and server can do.
 
 use lsp_types::{
-    CodeActionKind, CodeActionOptions, CodeActionProviderCapability, DidChangeWatchedFilesRegistrationOptions,
-    FileSystemWatcher, FoldingRangeProviderCapability, GlobPattern, HoverProviderCapability, InitializeParams, OneOf,
-    Registration, RegistrationParams, SaveOptions, SemanticTokensFullOptions, SemanticTokensLegend,
-    SemanticTokensOptions, ServerCapabilities, TextDocumentSyncCapability, TextDocumentSyncKind,
-    TextDocumentSyncOptions, TextDocumentSyncSaveOptions,
+    CallHierarchyServerCapability, CodeActionKind, CodeActionOptions, CodeActionProviderCapability, CompletionOptions,
+    DidChangeWatchedFilesRegistrationOptions, FileSystemWatcher, FoldingRangeProviderCapability, GlobPattern,
+    HoverProviderCapability, InitializeParams, OneOf, Registration, RegistrationParams, RenameOptions, SaveOptions,
+    SemanticTokensFullOptions, SemanticTokensLegend, SemanticTokensOptions, ServerCapabilities, SignatureHelpOptions,
+    TextDocumentSyncCapability, TextDocumentSyncKind, TextDocumentSyncOptions, TextDocumentSyncSaveOptions,
+    TypeDefinitionProviderCapability, WorkDoneProgressOptions,
 };
 use serde_json::{Value, json};
 
@@ -26,6 +27,8 @@ pub struct Client {
     pub takes_actions: bool,
     /// It shows Markdown where text is shown.
     pub shows_markdown: bool,
+    /// It lets places of what was completed be filled.
+    pub fills_places: bool,
     /// It shows symbols inside of symbols.
     pub nests_symbols: bool,
 }
@@ -38,6 +41,7 @@ impl Client {
         let space = can.workspace.as_ref();
         let offered = can.general.as_ref().and_then(|g| g.position_encodings.as_deref()).unwrap_or_default();
         let formats = text.and_then(|t| t.hover.as_ref()).and_then(|h| h.content_format.as_deref()).unwrap_or_default();
+        let items = text.and_then(|t| t.completion.as_ref()).and_then(|c| c.completion_item.as_ref());
         let symbols = text.and_then(|t| t.document_symbol.as_ref());
         Client {
             encoding: Encoding::agreed(offered),
@@ -49,6 +53,7 @@ impl Client {
                 .and_then(|t| t.code_action.as_ref())
                 .is_some_and(|a| a.code_action_literal_support.is_some()),
             shows_markdown: formats.contains(&lsp_types::MarkupKind::Markdown),
+            fills_places: items.is_some_and(|i| i.snippet_support == Some(true)),
             nests_symbols: symbols.is_some_and(|s| s.hierarchical_document_symbol_support == Some(true)),
         }
     }
@@ -75,6 +80,25 @@ pub fn offered(client: &Client) -> Value {
             ..TextDocumentSyncOptions::default()
         })),
         hover_provider: Some(HoverProviderCapability::Simple(true)),
+        definition_provider: Some(OneOf::Left(true)),
+        type_definition_provider: Some(TypeDefinitionProviderCapability::Simple(true)),
+        references_provider: Some(OneOf::Left(true)),
+        document_highlight_provider: Some(OneOf::Left(true)),
+        rename_provider: Some(OneOf::Right(RenameOptions {
+            prepare_provider: Some(true),
+            work_done_progress_options: WorkDoneProgressOptions::default(),
+        })),
+        workspace_symbol_provider: Some(OneOf::Left(true)),
+        call_hierarchy_provider: Some(CallHierarchyServerCapability::Simple(true)),
+        completion_provider: Some(CompletionOptions {
+            resolve_provider: Some(true),
+            trigger_characters: Some([".", ":", "[", "("].map(String::from).to_vec()),
+            ..CompletionOptions::default()
+        }),
+        signature_help_provider: Some(SignatureHelpOptions {
+            trigger_characters: Some([" ", "(", ",", "{"].map(String::from).to_vec()),
+            ..SignatureHelpOptions::default()
+        }),
         document_symbol_provider: Some(OneOf::Left(true)),
         folding_range_provider: Some(FoldingRangeProviderCapability::Simple(true)),
         document_formatting_provider: Some(OneOf::Left(true)),

@@ -149,7 +149,7 @@ fn look_at_motions(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
 }
 
 /// Modules beside a text: those that are open as they are on the screen, the others as on the disk.
-struct Texts<'o> {
+pub struct Texts<'o> {
     folder: Option<&'o Path>,
     neighbours: Neighbours,
     open: &'o BTreeMap<PathBuf, Arc<str>>,
@@ -157,7 +157,8 @@ struct Texts<'o> {
 }
 
 impl<'o> Texts<'o> {
-    fn new(folder: Option<&'o Path>, open: &'o BTreeMap<PathBuf, Arc<str>>) -> Self {
+    /// Beside a text in a folder; none where it lies nowhere.
+    pub fn new(folder: Option<&'o Path>, open: &'o BTreeMap<PathBuf, Arc<str>>) -> Self {
         let neighbours = Neighbours::of(folder.unwrap_or(Path::new("")));
         Texts { folder, neighbours, open, asked: RefCell::default() }
     }

@@ -11,6 +11,8 @@ use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response}
 use lsp_types::notification::{self as told, Notification as _};
 use lsp_types::request::{self as asked, Request as _};
 use lsp_types::{InitializeParams, MessageType};
+use matterix_editor::Analysis;
+use matterix_lang::{LibraryOnly, Session};
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
@@ -110,6 +112,11 @@ impl Server {
             asked: 0,
             urgent: None,
         }
+    }
+
+    /// What is known of names of the library where no text is open.
+    pub fn library(&self) -> Arc<matterix_editor::Index> {
+        Analysis::of("", "mtx 1\n", &LibraryOnly, &mut Session::default()).index()
     }
 
     /// Takes messages and verdicts until the end. Without a request to end before it, an end is a failure.

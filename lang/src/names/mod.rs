@@ -348,6 +348,11 @@ impl<'a> Names<'a> {
         self.scopes[module].get(name).copied()
     }
 
+    /// What the names that each module sees stand for.
+    pub fn into_scopes(self) -> Vec<BTreeMap<Arc<str>, DeclId>> {
+        self.scopes
+    }
+
     /// Everything a module sees.
     pub fn visible(&self, module: usize) -> impl Iterator<Item = (&str, DeclId)> {
         self.scopes[module].iter().map(|(k, v)| (&**k, *v))

@@ -9,6 +9,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, Span};
 
 use crate::ast::{Item, ItemKind};
 use crate::check::{Starts, Uses};
+use crate::meanings::Noted;
 use crate::names::{DeclId, Module, Names, item_name};
 use crate::study::Many;
 use crate::syntax::moved::Moved;
@@ -20,6 +21,8 @@ pub(crate) struct Verdict {
     pub(crate) findings: Vec<Diagnostic>,
     /// What is known at its statements, where that was asked for.
     pub(crate) points: Option<Points>,
+    /// What names and expressions mean in it, where that was asked for.
+    pub(crate) noted: Option<Noted>,
     /// Which reactions start in it.
     pub(crate) starts: Option<Starts>,
     /// Which things it has to do with.
@@ -34,6 +37,7 @@ impl Moved for Verdict {
         for point in self.points.iter_mut().flat_map(|points| &mut points.points) {
             point.span.moved(to);
         }
+        self.noted.moved(to);
         self.starts.moved(to);
         self.uses.moved(to);
         self.many.moved(to);
@@ -98,6 +102,8 @@ pub(crate) struct Match<'e> {
     shifts: BTreeMap<FileId, Vec<Stretch>>,
     /// Whether the same names are declared.
     same_names: bool,
+    /// Whether as many are, so that declarations have the numbers they had.
+    same_numbers: bool,
 }
 
 /// An item that stayed as it was.
@@ -132,7 +138,7 @@ impl Earlier {
         if !same_library || self.files.len() != now.files.len() {
             return None;
         }
-        let mut found = Match { earlier: self, stayed: BTreeMap::new(), shifts: BTreeMap::new(), same_names: true };
+        let mut found = Match { earlier: self, stayed: BTreeMap::new(), shifts: BTreeMap::new(), same_names: true, same_numbers: true };
         for (old, new) in self.files.iter().zip(&now.files) {
             if old.file != new.file {
                 return None;
@@ -197,6 +203,7 @@ impl<'e> Match<'e> {
             file.items.iter().filter(|i| i.sort == Sort::Judged).map(|i| i.name.clone()).collect()
         };
         self.same_names &= names(old) == names(new);
+        self.same_numbers &= of(old, Sort::Judged).len() == of(new, Sort::Judged).len();
         pairs.sort_unstable();
         let stretch = |(a, b): (usize, usize)| {
             let (was, is) = (old.items.get(a)?, new.items.get(b)?);
@@ -212,7 +219,8 @@ impl<'e> Match<'e> {
             let runs = judged.runs.is_none_or(|runs| self.stayed.contains_key(&runs));
             runs && judged.lab == *lab && self.stayed.get(&judged.item) == Some(&item)
         };
-        let known = self.earlier.verdicts.iter().find(stayed)?;
+        // What was noted of names counts declarations.
+        let known = self.earlier.verdicts.iter().find(stayed).filter(|_| self.same_numbers)?;
         // What is not found may be taken for another name.
         if !self.same_names && !known.verdict.findings.is_empty() {
             return None;

@@ -1,10 +1,14 @@
 //! What is answered to requests about texts, a file for each kind.
 
 mod actions;
+mod calls;
+mod complete;
 mod format;
 mod hints;
 mod hover;
+mod names;
 mod outline;
+mod places;
 pub mod tokens;
 
 use std::borrow::Cow;
@@ -34,6 +38,27 @@ pub fn answer(server: &mut Server, request: Request) -> Answer {
         asked::RangeFormatting::METHOD => with::<asked::RangeFormatting>(server, request, format::range),
         asked::CodeActionRequest::METHOD => with::<asked::CodeActionRequest>(server, request, actions::actions),
         asked::InlayHintRequest::METHOD => with::<asked::InlayHintRequest>(server, request, hints::hints),
+        asked::GotoDefinition::METHOD => with::<asked::GotoDefinition>(server, request, names::definition),
+        asked::GotoTypeDefinition::METHOD => with::<asked::GotoTypeDefinition>(server, request, names::type_definition),
+        asked::References::METHOD => with::<asked::References>(server, request, names::references),
+        asked::DocumentHighlightRequest::METHOD => {
+            with::<asked::DocumentHighlightRequest>(server, request, names::highlights)
+        }
+        asked::PrepareRenameRequest::METHOD => refusing::<asked::PrepareRenameRequest>(server, request, names::prepare),
+        asked::Rename::METHOD => refusing::<asked::Rename>(server, request, names::renamed),
+        asked::WorkspaceSymbolRequest::METHOD => with::<asked::WorkspaceSymbolRequest>(server, request, names::symbols),
+        asked::Completion::METHOD => with::<asked::Completion>(server, request, complete::offers),
+        asked::ResolveCompletionItem::METHOD => {
+            with::<asked::ResolveCompletionItem>(server, request, complete::resolve)
+        }
+        asked::SignatureHelpRequest::METHOD => with::<asked::SignatureHelpRequest>(server, request, complete::form),
+        asked::CallHierarchyPrepare::METHOD => with::<asked::CallHierarchyPrepare>(server, request, calls::prepare),
+        asked::CallHierarchyIncomingCalls::METHOD => {
+            with::<asked::CallHierarchyIncomingCalls>(server, request, calls::incoming)
+        }
+        asked::CallHierarchyOutgoingCalls::METHOD => {
+            with::<asked::CallHierarchyOutgoingCalls>(server, request, calls::outgoing)
+        }
         asked::SemanticTokensFullRequest::METHOD => {
             with::<asked::SemanticTokensFullRequest>(server, request, tokens::full)
         }
@@ -56,6 +81,17 @@ fn with<R: asked::Request>(
 ) -> Answer {
     let params = serde_json::from_value(request.params).map_err(|why| (ErrorCode::InvalidParams, why.to_string()))?;
     serde_json::to_value(answer(server, params)).map_err(|why| (ErrorCode::InternalError, why.to_string()))
+}
+
+/// The same for what may be refused, with the reason.
+fn refusing<R: asked::Request>(
+    server: &mut Server,
+    request: Request,
+    answer: impl FnOnce(&mut Server, R::Params) -> Result<R::Result, String>,
+) -> Answer {
+    let params = serde_json::from_value(request.params).map_err(|why| (ErrorCode::InvalidParams, why.to_string()))?;
+    let answer = answer(server, params).map_err(|why| (ErrorCode::RequestFailed, why))?;
+    serde_json::to_value(answer).map_err(|why| (ErrorCode::InternalError, why.to_string()))
 }
 
 /// The text under an address of the server's scheme.

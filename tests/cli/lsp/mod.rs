@@ -1,6 +1,7 @@
 //! The language server, as an editor sees it.
 
 mod client;
+mod names;
 mod replay;
 
 use std::fs;
