@@ -710,8 +710,9 @@ impl Walk<'_> {
             }
             WireKind::Reply { fails, .. } => self.failure(fails),
             WireKind::Answers { with, .. } => self.text(with),
-            WireKind::Fixed { when, exchange } => {
+            WireKind::Fixed { when, condition, exchange } => {
                 self.language(when.span, "when it is said");
+                self.exprs(condition);
                 self.exchange(exchange);
             }
             WireKind::Alive { condition, every, by, otherwise } => {
