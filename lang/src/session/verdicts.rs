@@ -138,7 +138,13 @@ impl Earlier {
         if !same_library || self.files.len() != now.files.len() {
             return None;
         }
-        let mut found = Match { earlier: self, stayed: BTreeMap::new(), shifts: BTreeMap::new(), same_names: true, same_numbers: true };
+        let mut found = Match {
+            earlier: self,
+            stayed: BTreeMap::new(),
+            shifts: BTreeMap::new(),
+            same_names: true,
+            same_numbers: true,
+        };
         for (old, new) in self.files.iter().zip(&now.files) {
             if old.file != new.file {
                 return None;
