@@ -17,6 +17,9 @@ use crate::STACK;
 use crate::cache;
 use crate::pipeline::{self, Neighbours};
 
+/// Bytes of a text whose check takes longer than one waits for.
+const LARGE: usize = 64 << 10;
+
 /// How long nothing must have changed before the ways of robots are looked at.
 const QUIET: Duration = Duration::from_millis(400);
 
@@ -58,6 +61,8 @@ pub struct Verdict {
 /// What was found, and how.
 #[derive(Debug)]
 pub enum Said {
+    /// By reading the text alone: the rest of a large one takes its time.
+    Read(Vec<Diagnostic>),
     /// By a check, which asked for these files.
     Checked(Box<Analysis>, Vec<PathBuf>),
     /// By a check that looked at the ways of robots as well.
@@ -109,6 +114,14 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
             }
             if done.get(&wish.uri) == Some(&wish.stamp) {
                 continue;
+            }
+            if wish.text.len() > LARGE {
+                let found = session.syntax(&wish.name, &wish.text);
+                let said = Said::Read(found);
+                let verdict = Verdict { uri: wish.uri.clone(), stamp: wish.stamp, said };
+                if verdicts.send(verdict).is_err() {
+                    return;
+                }
             }
             let texts = Texts::new(wish.folder.as_deref(), &round.open);
             let analysis = Analysis::of(&wish.name, &wish.text, &texts, &mut session);

@@ -41,6 +41,11 @@ impl Published {
         self.fresh.insert(uri.to_string());
     }
 
+    /// This was told of a text, whatever was checked.
+    pub fn told(&mut self, params: &PublishDiagnosticsParams) {
+        self.told.insert(params.uri.as_str().to_string(), (None, params.diagnostics.clone()));
+    }
+
     /// A text was closed: what its check found elsewhere goes too.
     pub fn forget(&mut self, uri: &str) {
         self.moved.remove(uri);
@@ -103,6 +108,16 @@ impl Published {
         self.told = told;
         news
     }
+}
+
+/// What is to be told of a text of which no more than its own mistakes is known yet.
+pub fn read(document: &Document, found: &[Diagnostic], shelf: &Shelf) -> PublishDiagnosticsParams {
+    let place = |span: Span| {
+        let range = document.lines.range(&document.text, span.start as usize, span.end as usize);
+        (span.file == FileId(0)).then(|| (document.uri.clone(), range))
+    };
+    let diagnostics = found.iter().map(|d| findings::diagnostic(d, &place, &|code| shelf.page(code))).collect();
+    PublishDiagnosticsParams { uri: document.uri.clone(), diagnostics, version: None }
 }
 
 /// The findings of a text by the addresses they stand at.
