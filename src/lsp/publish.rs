@@ -64,6 +64,10 @@ impl Published {
         let mut now: BTreeMap<&str, Vec<lsp_types::Diagnostic>> = BTreeMap::new();
         for (of, placed) in &self.places {
             let current = documents.iter().any(|d| d.uri.as_str() == of && d.current().is_some());
+            if current {
+                // That nothing is wrong is told too.
+                now.entry(of).or_default();
+            }
             for (at, found) in placed {
                 // Of itself a text says the last that is known; elsewhere only what holds for the texts as they are.
                 if current || at == of {
