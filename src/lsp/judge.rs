@@ -23,6 +23,9 @@ const LARGE: usize = 64 << 10;
 /// How long nothing must have changed before the ways of robots are looked at.
 const QUIET: Duration = Duration::from_millis(400);
 
+/// The open texts by their paths.
+pub type Open = Arc<BTreeMap<PathBuf, Arc<str>>>;
+
 /// A text to be checked.
 #[derive(Clone, Debug)]
 pub struct Wish {
@@ -44,7 +47,7 @@ pub struct Round {
     /// What is to be checked.
     pub wishes: Vec<Wish>,
     /// The open texts by their paths.
-    pub open: Arc<BTreeMap<PathBuf, Arc<str>>>,
+    pub open: Open,
 }
 
 /// What was found.
@@ -136,7 +139,7 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
 
 fn look_at_motions(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
     let store = cache::of(false);
-    let mut wishes: BTreeMap<String, (Wish, Arc<BTreeMap<PathBuf, Arc<str>>>)> = BTreeMap::new();
+    let mut wishes: BTreeMap<String, (Wish, Open)> = BTreeMap::new();
     loop {
         let came = match wishes.is_empty() {
             true => wished.recv().ok(),

@@ -143,6 +143,9 @@ fn placed(
     Some(out)
 }
 
+/// The address and the lines of a file, as far as it has an address.
+type Known = Option<(Uri, Rc<Lines>)>;
+
 /// Where the spans of a check stand in the protocol's terms.
 pub struct Places<'s> {
     analysis: &'s Analysis,
@@ -151,7 +154,7 @@ pub struct Places<'s> {
     pub shelf: &'s Shelf,
     encoding: Encoding,
     /// Addresses and lines of the files that were asked for.
-    known: RefCell<BTreeMap<FileId, Option<(Uri, Rc<Lines>)>>>,
+    known: RefCell<BTreeMap<FileId, Known>>,
 }
 
 impl<'s> Places<'s> {
