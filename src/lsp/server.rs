@@ -299,7 +299,7 @@ impl Server {
                 self.tell::<told::PublishDiagnostics>(params);
             }
             Said::Checked(analysis, asked) => {
-                let hints = document.judged.as_ref().is_none_or(|(_, last)| last.points != analysis.points);
+                let hints = document.judged.as_ref().is_none_or(|(_, last)| !last.knows_the_same(&analysis));
                 document.judged = Some((verdict.stamp, Arc::new(*analysis)));
                 document.asked = asked;
                 if !current {
