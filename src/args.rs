@@ -69,6 +69,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
     View(ViewArgs),
+    /// Answer an editor: a language server on standard input and output.
+    Lsp(LspArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
     /// Offer check, fix, run and the rest to an assistant, over the Model Context Protocol on standard input and output.
@@ -109,6 +111,14 @@ pub struct CheckArgs {
     /// Say everything that is known after the statement at this place.
     #[arg(long, value_name = "LINE[:COLUMN]", requires = "contents")]
     pub at: Option<Place>,
+}
+
+/// `matterixc lsp`.
+#[derive(Debug, Args)]
+pub struct LspArgs {
+    /// Speak on standard input and output, as is done without it too: what some editors add.
+    #[arg(long)]
+    pub stdio: bool,
 }
 
 /// `matterixc fmt`.
@@ -442,6 +452,9 @@ pub struct ServeArgs {
     /// Where the devices of the lab are; the digital twin answers without it.
     #[arg(long, value_name = "FILE")]
     pub bind: Option<PathBuf>,
+    /// Where to keep the journal of what is said to devices; needed where there are some.
+    #[arg(long, value_name = "FILE", requires = "bind")]
+    pub journal: Option<PathBuf>,
     /// Show all bytes that go to devices and come from them.
     #[arg(long, requires = "bind")]
     pub trace: bool,

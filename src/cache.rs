@@ -23,7 +23,7 @@ pub fn of(unwanted: bool) -> Box<dyn Store> {
 }
 
 /// `$XDG_CACHE_HOME/matterixc`, `~/.cache/matterixc`, or what Windows has for it.
-fn folder() -> Option<PathBuf> {
+pub fn folder() -> Option<PathBuf> {
     let base = choose_base_strategy().ok()?.cache_dir();
     Some(base.join(env!("CARGO_PKG_NAME"))).filter(|folder| folder.is_absolute())
 }

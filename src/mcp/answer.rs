@@ -74,3 +74,29 @@ pub fn pruned(object: Map<String, Value>, bytes: usize) -> (Map<String, Value>, 
     let kept = object.into_iter().filter(|(name, _)| !left_out.contains(name)).collect();
     (kept, left_out)
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_text_is_cut_at_the_end_of_a_line_or_of_a_character() {
+        assert_eq!(bounded("short\n".to_string(), 10), "short\n");
+        assert_eq!(bounded("one\ntwo\nthree\n".to_string(), 10), "one\ntwo\n... 6 bytes more are left out\n");
+        assert_eq!(bounded("µµµ".to_string(), 3), "µ... 4 bytes more are left out\n");
+    }
+
+    #[test]
+    fn of_an_object_the_largest_members_are_left_out() {
+        let Value::Object(object) = json!({ "a": [1, 2, 3, 4, 5, 6, 7, 8], "b": 1, "c": "a text" }) else { return };
+        let (kept, left_out) = pruned(object.clone(), 1000);
+        assert_eq!((kept.len(), left_out.len()), (3, 0));
+        let (kept, left_out) = pruned(object, 12);
+        assert_eq!(
+            (kept.keys().map(String::as_str).collect::<Vec<_>>(), left_out),
+            (vec!["b", "c"], vec!["a".to_string()])
+        );
+    }
+}

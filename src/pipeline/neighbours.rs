@@ -11,15 +11,20 @@ use crate::files;
 const LARGEST_MESH: u64 = 64 << 20;
 
 /// Loads `sn1` from `sn1.mtx` and `parts::racks` from `parts/racks.mtx` in one folder.
-pub(super) struct Neighbours {
+pub struct Neighbours {
     dir: PathBuf,
     root: Option<PathBuf>,
 }
 
 impl Neighbours {
-    /// The modules in a folder, nothing of which is read outside of `root`.
-    pub(super) fn of(dir: &Path, root: Option<&Path>) -> Self {
-        Neighbours { dir: dir.to_path_buf(), root: root.map(Path::to_path_buf) }
+    /// The modules in a folder.
+    pub fn of(dir: &Path) -> Self {
+        Neighbours { dir: dir.to_path_buf(), root: None }
+    }
+
+    /// The same, nothing of which is read outside of a folder that is given by its whole path.
+    pub fn within(self, root: Option<&Path>) -> Self {
+        Neighbours { root: root.map(Path::to_path_buf), ..self }
     }
 
     /// What a file holds, where it may be read; links lead to where they lead.
@@ -29,10 +34,9 @@ impl Neighbours {
         }
         files::contents(path, largest)
     }
-}
 
-impl Loader for Neighbours {
-    fn load(&self, _: FileId, module: &str) -> Option<(String, String)> {
+    /// The file that a module is; none where its name cannot be one.
+    pub fn path(&self, module: &str) -> Option<PathBuf> {
         let mut path = self.dir.clone();
         for part in module.split("::") {
             // A module path names files below the folder, never elsewhere.
@@ -42,6 +46,13 @@ impl Loader for Neighbours {
             path.push(part);
         }
         path.set_extension("mtx");
+        Some(path)
+    }
+}
+
+impl Loader for Neighbours {
+    fn load(&self, _: FileId, module: &str) -> Option<(String, String)> {
+        let path = self.path(module)?;
         let text = String::from_utf8(self.contents(&path, files::LARGEST_TEXT).ok()?).ok()?;
         Some((path.display().to_string(), text))
     }

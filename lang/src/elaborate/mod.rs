@@ -270,6 +270,8 @@ pub struct Elaborator<'a> {
     pub open_calls: Vec<DeclId>,
     /// Constants being evaluated.
     pub open_consts: Vec<DeclId>,
+    /// What names and expressions were found to mean, where that is asked for.
+    pub meanings: Option<Box<crate::meanings::Meanings>>,
     /// Constants that were evaluated without a finding.
     pub known_consts: FxHashMap<DeclId, Value>,
 }
@@ -341,6 +343,7 @@ impl<'a> Elaborator<'a> {
             open_members: Vec::new(),
             open_calls: Vec::new(),
             open_consts: Vec::new(),
+            meanings: None,
             known_consts: FxHashMap::default(),
         }
     }

@@ -12,6 +12,14 @@ use crate::units::Dimension;
 impl<'a> Elaborator<'a> {
     /// Evaluates an expression; what is wrong is reported and gives [`Value::Error`].
     pub fn expr(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
+        let value = self.evaluate(e, scope);
+        if self.meanings.is_some() {
+            self.note_value(e.span, &value);
+        }
+        value
+    }
+
+    fn evaluate(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
         match &*e.kind {
             ExprKind::Error => Value::Error,
             ExprKind::Number(v) => self.number(*v, Dimension::one(), true),
@@ -191,12 +199,16 @@ impl<'a> Elaborator<'a> {
             };
         }
         if let Some(value) = self.of_lab(&n.text, scope) {
+            if let Value::Instance(id) = value {
+                self.note_name(n.span, |lab| Some(lab.instances[id.0 as usize].span));
+            }
             return value;
         }
         if let Some(value) = self.setting(&n.text) {
             return value;
         }
         if let Some(id) = self.tables.names.lookup(scope.module, &n.text) {
+            self.note_declared(n.span, id);
             return self.declared(id, n);
         }
         self.unknown_name(n, scope)

@@ -264,6 +264,7 @@ impl<'a> Elaborator<'a> {
 
     /// The value of a member, made once per instance.
     pub fn member_value(&mut self, id: InstanceId, m: MemberRef<'a>, at: Span) -> Value {
+        self.note_member(at, m);
         let MemberKind::Value { role, name, .. } = &m.member.kind else {
             return match &m.member.kind {
                 MemberKind::Frame { name, .. } => Value::Frame(id, name.text.clone()),

@@ -32,6 +32,7 @@ impl<'a> Elaborator<'a> {
     fn word(&mut self, e: &'a Expr, words: &Arc<[String]>, scope: &mut Scope) -> Value {
         let ExprKind::Name(n) = &*e.kind else { return self.expr(e, scope) };
         if let Some(value) = self.word_named(&n.text, words) {
+            self.note_value(e.span, &value);
             return value;
         }
         if self.resolves(n, scope) {
@@ -129,6 +130,7 @@ impl<'a> Elaborator<'a> {
             let value = self.member(Value::Instance(id), member);
             let Value::Enum(_, words) = &value else { return Some(Value::Error) };
             let wanted = self.word_named(&word.text, words)?;
+            self.note_value(word.span, &wanted);
             return Some(self.compare(Binary::Eq, value, wanted, word.span, word.span));
         }
         let name = self.instances[id.0 as usize].name.clone();

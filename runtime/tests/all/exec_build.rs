@@ -54,6 +54,7 @@ impl Lab {
             support: None,
             pose: Pose::default(),
             placed: true,
+            at: None,
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),

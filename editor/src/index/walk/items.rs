@@ -1,0 +1,212 @@
+//! Items: what is declared at the top of a file.
+
+use matterix_lang::ast::{Expr, ExprKind, FieldValue, Item, ItemKind, Name, Path, StmtKind};
+
+use super::Walk;
+use crate::index::{Kind, Meaning};
+
+impl Walk<'_> {
+    pub(super) fn item(&mut self, item: &Item) {
+        self.scope.clear();
+        self.labs.clear();
+        self.this = None;
+        self.end = item.span.end;
+        self.file = item.span.file;
+        let name = match &item.kind {
+            ItemKind::Dimension { name, .. } => Some(name.span),
+            ItemKind::Unit { name, .. } => Some(name.span),
+            ItemKind::Skill { sig, .. } => Some(sig.span),
+            _ => matterix_lang::names::item_name(item).map(|n| n.1),
+        };
+        self.item = name.and_then(|span| self.index.declared_at(span));
+        if let (Some(span), false) = (name, matches!(item.kind, ItemKind::Skill { .. })) {
+            self.declares(span);
+        }
+        self.inner(item);
+        self.region(item.span);
+    }
+
+    fn inner(&mut self, item: &Item) {
+        match &item.kind {
+            ItemKind::Error => {}
+            ItemKind::Use { path, names } => self.import(path, names.as_deref()),
+            ItemKind::Dimension { definition, .. } => {
+                if let Some(e) = definition {
+                    self.dimensions(e);
+                }
+            }
+            ItemKind::Unit { dimension, definition, origin, aliases, .. } => {
+                if let Some(name) = dimension {
+                    let def = self.index.measure(&name.text);
+                    self.maybe(name.span, def);
+                }
+                self.exprs(definition.iter().chain(origin));
+                for alias in aliases {
+                    self.declares(alias.span);
+                }
+            }
+            ItemKind::Species { fields, .. } => self.species_fields(fields),
+            ItemKind::Solution { fields, labelled, .. } => {
+                for f in fields {
+                    self.global(&f.key);
+                    if let FieldValue::Expr(Expr { kind, .. }) = &f.value
+                        && let ExprKind::Name(n) = &**kind
+                        && n.text == "rest"
+                    {
+                        self.language(n.span, "what the others leave of the whole");
+                        continue;
+                    }
+                    self.value(&f.value);
+                }
+                if let Some(label) = labelled {
+                    self.expr(&label.value);
+                    self.global(&label.species);
+                    self.exprs(&label.tolerance);
+                }
+            }
+            ItemKind::Reaction { reactants, products, fields, .. } => {
+                self.terms(reactants);
+                self.terms(products);
+                self.reaction_fields(fields);
+            }
+            ItemKind::ReactiveGroup { fields, .. } | ItemKind::Material { fields, .. } => self.class_fields(fields),
+            ItemKind::Incompatible { a, b, fields } => {
+                self.global(a);
+                self.global(b);
+                self.class_fields(fields);
+            }
+            ItemKind::Allow { a, b, .. } => {
+                self.global(a);
+                self.global(b);
+            }
+            ItemKind::Hazard { params, when, .. } => {
+                self.params(params);
+                self.expr(when);
+            }
+            ItemKind::Capability { extends, members, .. } => {
+                extends.iter().for_each(|p| self.path(p));
+                self.this = self.item;
+                members.iter().for_each(|m| self.member_line(m));
+            }
+            ItemKind::Asset { extends, lines, source, .. } => {
+                extends.iter().for_each(|p| self.path(p));
+                if let Some((format, _)) = source {
+                    self.language(format.span, "a format of files that assets come from");
+                }
+                self.this = self.item;
+                let file = source.as_ref().map(|s| s.1.span);
+                lines.iter().for_each(|l| self.asset_line(l, file));
+            }
+            ItemKind::Process(p) => {
+                self.params(&p.params);
+                self.exprs(&p.guard);
+                self.laws(&p.laws);
+            }
+            ItemKind::Event(e) => {
+                self.params(&e.params);
+                self.expr(&e.when);
+                self.laws(&e.laws);
+            }
+            ItemKind::Relation { params, definition, .. } => {
+                self.params(params);
+                self.exprs(definition);
+            }
+            ItemKind::Fn { params, result, body, options, .. } => {
+                self.params(params);
+                result.iter().for_each(|t| self.ty(t));
+                self.exprs(body);
+                self.member_options(options);
+            }
+            ItemKind::Const { ty, value, .. } => {
+                ty.iter().for_each(|t| self.ty(t));
+                let words = self.item.map(|d| self.index.def(d).words.clone()).unwrap_or_default();
+                self.expr_among(value, &words);
+            }
+            ItemKind::Driver { device, transport, args, wires, .. } => {
+                self.path(device);
+                let driver = self.index.lookup(self.at, &transport.text);
+                match driver.filter(|d| self.index.def(*d).kind == Kind::Driver) {
+                    Some(def) => self.known(transport.span, def),
+                    None => self.language(transport.span, "a kind of line"),
+                }
+                for arg in args {
+                    if let Some(name) = &arg.name {
+                        self.language(name.span, "a setting of the line");
+                    }
+                    match &*arg.value.kind {
+                        ExprKind::Name(n) => self.language(n.span, "a setting of the line"),
+                        _ => drop(self.expr(&arg.value)),
+                    }
+                }
+                self.this = self.named(device);
+                wires.iter().for_each(|w| self.wire(w));
+            }
+            ItemKind::Lab { params, lines, .. } => {
+                self.labs = self.item.into_iter().collect();
+                self.params(params);
+                lines.iter().for_each(|l| self.lab_line(l));
+            }
+            ItemKind::Skill { sig, clauses, body, handlers, .. } => {
+                self.signature(sig, clauses);
+                self.clauses(clauses);
+                if let Some(body) = body {
+                    self.guarded(body, handlers);
+                }
+            }
+            ItemKind::Workflow { params, lab, body, handlers, .. } => {
+                self.in_lab(lab.as_ref());
+                self.params(params);
+                self.guarded(body, handlers);
+            }
+            ItemKind::Study { of, lines, .. } => {
+                self.many(of);
+                lines.iter().for_each(|l| self.study_line(l));
+            }
+            ItemKind::Fit { of, lines, .. } => {
+                self.many(of);
+                lines.iter().for_each(|l| self.fit_line(l));
+            }
+            ItemKind::Test { lab, body, handlers, .. } => {
+                match (lab, body.stmts.first().map(|s| &s.kind)) {
+                    (None, Some(StmtKind::Run { workflow, .. })) => self.like(self.named(workflow)),
+                    _ => self.in_lab(lab.as_ref()),
+                }
+                self.guarded(body, handlers);
+            }
+        }
+    }
+
+    fn import(&mut self, path: &Path, names: Option<&[Name]>) {
+        let module = |n: usize| path.segments[..n].iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
+        let count = path.segments.len();
+        let known = |this: &Self, name: &str| this.index.modules.iter().position(|m| m.name == name);
+        let of_item = names.is_none() && count > 1 && known(self, &module(count - 1)).is_some();
+        let modules = if of_item { count - 1 } else { count };
+        let from = known(self, &module(modules));
+        for segment in &path.segments[..modules] {
+            self.note(segment.span, from.map_or(Meaning::Unknown, |m| Meaning::Module(m as u32)));
+        }
+        let last = path.segments.last().filter(|_| of_item);
+        for name in names.into_iter().flatten().chain(last) {
+            let def = from.and_then(|m| self.index.lookup(m, &name.text));
+            self.maybe(name.span, def);
+        }
+    }
+
+    /// What a dimension is made of.
+    fn dimensions(&mut self, e: &Expr) {
+        match &*e.kind {
+            ExprKind::Name(n) => {
+                let def = self.index.measure(&n.text);
+                self.maybe(n.span, def);
+            }
+            ExprKind::Binary(_, a, b) => {
+                self.dimensions(a);
+                self.dimensions(b);
+            }
+            ExprKind::Tuple(items, _) => items.iter().for_each(|i| self.dimensions(i)),
+            ExprKind::Unary(_, inner) => self.dimensions(inner),
+            _ => {}
+        }
+    }
+}
