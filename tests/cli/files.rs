@@ -68,7 +68,7 @@ fn findings_as_json_are_one_object_per_line() {
     assert_eq!(found["code"], "syntax");
     assert_eq!(found["severity"], "error");
     assert_eq!(found["span"]["file"], "bytes.mtx");
-    assert_eq!(found["span"]["start"], serde_json::json!({ "line": 2, "column": 1, "byte": 6 }));
+    assert_eq!(found["span"]["start"], serde_json::json!({ "line": 2, "column": 1, "utf16": 1, "byte": 6 }));
 }
 
 #[test]
