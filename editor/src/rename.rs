@@ -32,6 +32,9 @@ pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefI
     {
         return Err(format!("`{}` comes from a file that is no text of the language", d.name));
     }
+    if d.kind == Kind::Setting && FIXED.contains(&d.name.as_str()) {
+        return Err(format!("`{}` is a setting that laws read by this name", d.name));
+    }
     if d.kind == Kind::Word {
         return Err(format!("`{}` is a word of a state: types are the same if their words are", d.name));
     }

@@ -22,7 +22,7 @@ fn a_mesh_stands_in_the_way_is_recorded_and_shown() {
     write(&dir, "wedge.obj", WEDGE);
     let asset = "asset Thing: Body {\n    mass: 200 g\n    shape: mesh(\"wedge.obj\", 10 mm)\n}";
     write(&dir, "beside.mtx", bench(asset, "(450, 700)"));
-    write(&dir, "inside.mtx", bench(asset, "(450, -250)"));
+    write(&dir, "close.mtx", bench(asset, "(450, -110)"));
     let ended = matterixc_in(&dir, &["run", "beside.mtx", "--fidelity", "motion", "--out", "out"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
     let judged = matterixc_in(&dir, &["verify", "out"]);
@@ -32,7 +32,7 @@ fn a_mesh_stands_in_the_way_is_recorded_and_shown() {
         let page = std::fs::read_to_string(dir.join("page.html")).expect("a page");
         assert!(page.contains("\"indices\":[0,1,2"), "{shown}");
     }
-    let found = matterixc_in(&dir, &["check", "inside.mtx", "--fidelity", "motion", "--format", "concise"]);
+    let found = matterixc_in(&dir, &["check", "close.mtx", "--fidelity", "motion", "--format", "concise"]);
     assert!(found.out.contains("error[collision]") && found.out.contains("`thing`"), "{}", found.out);
 }
 

@@ -107,7 +107,7 @@ fn others_run_into_what_is_said_to_be_run_into() {
              asset Thing: Body {{\n    mass: 200 g\n    mesh: mesh(\"wedge.obj\", 1 mm)\n    shape: box(300 mm, 300 mm, 400 mm)\n    {collision}\n}}\n\
              lab bench {{\n    ambient: 25 degC\n    table = OpticalTable\n    panda = FrankaPanda {{ gripper: FrankaHand {{}} }} on table at (0, 0) mm\n    \
              plate = IkaRetControl on table at (450, 200) mm\n    beaker = Beaker250mL on table at (450, -250) mm\n    \
-             thing = Thing on table at (450, -250) mm\n}}\nworkflow carry in bench {{\n    place beaker on plate by panda\n}}\n"
+             thing = Thing on table at (450, -440) mm\n}}\nworkflow carry in bench {{\n    place beaker on plate by panda\n}}\n"
         )
     };
     write(&dir, "in.mtx", lab(""));

@@ -1,5 +1,7 @@
 //! The language server, as an editor sees it.
 
+#![allow(clippy::unwrap_used)]
+
 mod client;
 mod names;
 mod replay;

@@ -1,4 +1,6 @@
 //! Texts typed character by character: nothing ends the server, nothing stale is told, and what is told in the end is what `check` says.
+//!
+//! With `MATTERIX_REPLAY=all` every example is typed from its first character and cut at every byte; `.ci/peers` does so.
 
 use std::fs;
 use std::path::Path;
@@ -98,6 +100,57 @@ fn what_is_typed_is_told_as_it_is_checked() {
         editor.tell("textDocument/didClose", json!({ "textDocument": { "uri": at } }));
     }
     assert_eq!(editor.close(), Some(0));
+}
+
+/// Of the cuts of a text, every so many is waited for, and of those every so many is compared with `check`.
+const WAITED: usize = 16;
+const COMPARED: usize = 31;
+
+/// The files with examples in a folder and those below.
+fn examples(folder: &Path, out: &mut Vec<std::path::PathBuf>) {
+    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        match path.is_dir() {
+            true => examples(&path, out),
+            false => out.extend(Some(path).filter(|p| p.extension().is_some_and(|end| end == "mtx"))),
+        }
+    }
+}
+
+#[test]
+fn every_example_is_typed_and_cut_where_that_is_asked_for() {
+    if std::env::var("MATTERIX_REPLAY").as_deref() != Ok("all") {
+        return;
+    }
+    let mut all = Vec::new();
+    examples(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), &mut all);
+    all.sort();
+    let folder = folder("replay_all");
+    let mut cuts = 0;
+    for path in all {
+        let text = fs::read_to_string(&path).unwrap();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let copy = folder.join(path.file_name().unwrap());
+        let mut editor = Client::new(BINARY, "utf-8");
+        let at = uri(&copy);
+        editor.open(&at, "");
+        let mut version = typed(&mut editor, &at, &text, 0, 1);
+        fs::write(&copy, &text).unwrap();
+        assert_eq!(told(&editor.findings(&at, version), &text), checked(&copy), "{name}");
+        for cut in (0..text.len()).filter(|i| text.is_char_boundary(*i)) {
+            version += 1;
+            cuts += 1;
+            editor.change(&at, version, None, &text[..cut]);
+            if cut % WAITED == 0 {
+                let found = editor.findings(&at, version);
+                if cut % (WAITED * COMPARED) == 0 {
+                    fs::write(&copy, &text[..cut]).unwrap();
+                    assert_eq!(told(&found, &text[..cut]), checked(&copy), "{name}, {cut} bytes");
+                }
+            }
+        }
+        assert_eq!(editor.close(), Some(0), "{name}");
+    }
+    assert!(cuts > 10_000, "{cuts}");
 }
 
 #[test]
