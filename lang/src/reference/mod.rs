@@ -38,7 +38,7 @@ pub fn pages() -> Vec<Page> {
 /// Every command and skill of the library with its form, by module, for a page that has everything in one place.
 pub fn verbs() -> String {
     let library = Library::read();
-    library.modules.iter().map(|module| calls::list(module)).collect()
+    library.modules.iter().map(calls::list).collect()
 }
 
 /// The dimensions of the library, each with its units, for a page that has everything in one place.

@@ -35,12 +35,12 @@ pub fn page(library: &Library, module: &Module) -> String {
         }
         text
     };
-    let things = |one: fn(&Library, &Module, &crate::ast::Item) -> String| {
+    let each = |one: fn(&Library, &Module, &crate::ast::Item) -> String| {
         module.tree.items.iter().map(|item| one(library, module, item)).collect::<String>()
     };
     let sections = [
-        ("Capabilities", things(things::capability)),
-        ("Assets", things(things::asset)),
+        ("Capabilities", each(things::capability)),
+        ("Assets", each(things::asset)),
         ("Skills", skills(false)),
         ("Primitive skills", skills(true)),
         ("Functions and relations", tables::functions(library, module)),

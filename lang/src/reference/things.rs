@@ -1,6 +1,6 @@
 //! Capabilities and assets: members, defaults, and what concrete types say of themselves.
 
-use crate::ast::{AssetLine, FieldValue, Item, ItemKind, Member, MemberKind, Path, Role};
+use crate::ast::{AssetLine, Item, ItemKind, Member, MemberKind, Path, Role};
 
 use super::calls;
 use super::markdown::{cell, code, line, paragraphs, table};
@@ -127,12 +127,7 @@ pub fn asset(library: &Library, module: &Module, item: &Item) -> String {
             AssetLine::Field(f) => {
                 let text = module.shown(f.span);
                 let value = text.split_once(':').map_or("", |(_, value)| value.trim());
-                let value = if matches!(f.value, FieldValue::Fields(_)) {
-                    value.replace("} {", "}, {")
-                } else {
-                    value.to_string()
-                };
-                rows.push(vec![code(&f.key.text), code(&value)]);
+                rows.push(vec![code(&f.key.text), code(value)]);
             }
             AssetLine::Part { name, literal } => rows.push(vec![code(&name.text), code(&module.shown(literal.span))]),
             AssetLine::Grid(grid) => {
