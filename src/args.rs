@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use matterix_runtime::motion::Perturbation;
 
-use crate::pipeline::{Options, Target};
+use crate::pipeline::{Fixes, Options, Target};
 
 use crate::report::Format;
 use crate::report::points::Place;
@@ -69,6 +69,8 @@ pub enum Command {
     Verify(VerifyArgs),
     /// Show a lab, or play a recording, on a page in three dimensions.
     View(ViewArgs),
+    /// Answer an editor: a language server on standard input and output.
+    Lsp(LspArgs),
     /// Explain a diagnostic code, or list them all.
     Explain(ExplainArgs),
     /// Create a small project that checks, runs and passes.
@@ -95,12 +97,26 @@ pub struct CheckArgs {
     /// Plan all motions anew instead of taking them from the cache of earlier checks.
     #[arg(long)]
     pub no_cache: bool,
+    /// Make the corrections that findings offer, those that leave no doubt; with `--fix=all` also what is probably meant.
+    #[arg(long, value_enum, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "sure")]
+    pub fix: Option<Fixes>,
+    /// Look again whenever a file changes, until Ctrl-C.
+    #[arg(long, conflicts_with_all = ["fix", "at"])]
+    pub watch: bool,
     /// Say what is known at every statement: what vessels hold, how devices stand, how much time has passed.
     #[arg(long)]
     pub contents: bool,
     /// Say everything that is known after the statement at this place.
     #[arg(long, value_name = "LINE[:COLUMN]", requires = "contents")]
     pub at: Option<Place>,
+}
+
+/// `matterixc lsp`.
+#[derive(Debug, Args)]
+pub struct LspArgs {
+    /// Speak on standard input and output, as is done without it too: what some editors add.
+    #[arg(long)]
+    pub stdio: bool,
 }
 
 /// `matterixc fmt`.
@@ -434,6 +450,9 @@ pub struct ServeArgs {
     /// Where the devices of the lab are; the digital twin answers without it.
     #[arg(long, value_name = "FILE")]
     pub bind: Option<PathBuf>,
+    /// Where to keep the journal of what is said to devices; needed where there are some.
+    #[arg(long, value_name = "FILE", requires = "bind")]
+    pub journal: Option<PathBuf>,
     /// Show all bytes that go to devices and come from them.
     #[arg(long, requires = "bind")]
     pub trace: bool,

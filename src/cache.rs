@@ -12,7 +12,7 @@ use crate::files;
 /// How much is kept, bytes.
 const MOST: u64 = 64 << 20;
 /// How the files in it end.
-const ENDING: &str = "motions";
+const ENDING: &str = "found";
 
 /// The cache; nothing is kept where it is not wanted, or where the system has no place for it.
 pub fn of(unwanted: bool) -> Box<dyn Store> {
@@ -23,7 +23,7 @@ pub fn of(unwanted: bool) -> Box<dyn Store> {
 }
 
 /// `$XDG_CACHE_HOME/matterixc`, `~/.cache/matterixc`, or what Windows has for it.
-fn folder() -> Option<PathBuf> {
+pub fn folder() -> Option<PathBuf> {
     let base = choose_base_strategy().ok()?.cache_dir();
     Some(base.join(env!("CARGO_PKG_NAME"))).filter(|folder| folder.is_absolute())
 }

@@ -1,5 +1,6 @@
 //! Ctrl-C: the first asks the run to stop, so that every `finally` runs; the second ends the command at once.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::terminal::{Stream, print};
@@ -7,8 +8,15 @@ use crate::terminal::{Stream, print};
 static PRESSED: AtomicBool = AtomicBool::new(false);
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// Exit status of a command that was interrupted twice, as shells count it.
-const INTERRUPTED: i32 = 130;
+static LAST_WORDS: OnceLock<fn() -> String> = OnceLock::new();
+
+/// Exit status of a command that was interrupted twice: it did not come to its end.
+const INTERRUPTED: i32 = 1;
+
+/// What is said when it ends at once.
+pub fn last_words(say: fn() -> String) {
+    LAST_WORDS.get_or_init(|| say);
+}
 
 /// From here on Ctrl-C and a request to terminate set the flag returned.
 pub fn on_interrupt() -> Result<&'static AtomicBool, String> {
@@ -30,6 +38,9 @@ pub fn ask(said: &str) {
 fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
     let handler = move || {
         if PRESSED.swap(true, Ordering::SeqCst) {
+            if let Some(say) = LAST_WORDS.get() {
+                print(Stream::Err, &say());
+            }
             std::process::exit(INTERRUPTED);
         }
         print(Stream::Err, said);

@@ -10,6 +10,7 @@ mod cancel;
 mod command;
 mod files;
 mod keys;
+mod lsp;
 mod pipeline;
 mod progress;
 mod report;
@@ -86,6 +87,7 @@ fn obey(cli: Cli) -> Exit {
         Command::Serve(args) => command::serve(&args, cli.color),
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),
+        Command::Lsp(args) => command::lsp(&args),
         Command::Explain(args) => command::explain(&args),
         Command::New(args) => command::new(&args),
         Command::Version => command::version(),

@@ -119,6 +119,19 @@ pub fn features(
     found
 }
 
+/// Whether assets of a module name files, or shapes of theirs.
+pub fn reads(tree: &File) -> bool {
+    tree.items.iter().any(|item| match &item.kind {
+        ItemKind::Asset { source, lines, .. } => source.is_some() || lines.iter().flat_map(shapes_of).any(names_file),
+        _ => false,
+    })
+}
+
+/// Whether a shape is a mesh of a file.
+fn names_file(shape: &Expr) -> bool {
+    matches!(&*shape.kind, ExprKind::Call(callee, _) if matches!(&*callee.kind, ExprKind::Name(name) if name.text == "mesh"))
+}
+
 /// Replaces each `from FORMAT "file"` of a module by the lines of that file.
 pub fn import(tree: &mut File, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
     let mut beside = Beside { from: file, loader, found: Vec::new() };

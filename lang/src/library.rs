@@ -26,6 +26,11 @@ pub fn read(index: usize, file: FileId) -> (ast::File, Vec<Diagnostic>) {
     }
 }
 
+/// Whether a file is a module of the library, where the user's own file is the first.
+pub fn is_module(file: FileId) -> bool {
+    (FIRST..FIRST + MODULES.len() as u32).contains(&file.0)
+}
+
 macro_rules! files {
     ($($path:literal => $name:literal)*) => {
         /// Data files of the library with their texts.

@@ -1,5 +1,7 @@
 //! The whole front end: from a file to a program.
 
+use std::sync::Arc;
+
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
@@ -17,8 +19,10 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
-use crate::names::{self, DeclId, Names, near};
+use crate::meanings::{Around, Gathered, Noted};
+use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
+use crate::session::{self, Earlier, Package, Session, Verdict};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -48,25 +52,45 @@ pub struct Test {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Checks a file: everything it declares, and every workflow in its lab.
-pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new()).0
+/// What a check saw.
+#[derive(Debug)]
+pub struct Examined {
+    /// The library's modules, then those of the package.
+    pub modules: Vec<Arc<Module>>,
+    /// Each finding once, in the order of the text.
+    pub findings: Vec<Diagnostic>,
+    /// What is known at every statement, where that was asked for: one per workflow that could be followed.
+    pub points: Vec<Points>,
+    /// What names and expressions mean, where that was asked for.
+    pub meanings: Gathered,
 }
 
-/// Checks a file; what robots with joints do in a workflow without an error is looked at by `motions` as well.
+/// Checks a file: everything it declares, and every workflow in its lab.
+pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
+    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new(), &mut Session::default()).findings
+}
+
+/// Checks a file; of a workflow without an error, what stands where in its lab and what robots with joints do is looked at by
+/// `motions` as well.
 pub fn check_and(
     sources: &mut Sources,
     file: FileId,
     loader: &dyn Loader,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
 ) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Motions, motions).0
+    examine(sources, file, loader, Wanted::Motions, motions, &mut Session::default()).findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new())
+    let seen = examined(sources, file, loader, &mut Session::default());
+    (seen.findings, seen.points)
+}
+
+/// Checks a file as [`contents`] does, and gives the trees as well. What a session knows from earlier checks is not worked out again.
+pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader, session: &mut Session) -> Examined {
+    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new(), session)
 }
 
 fn examine(
@@ -74,16 +98,19 @@ fn examine(
     file: FileId,
     loader: &dyn Loader,
     wanted: Wanted,
-    motions: &dyn Fn(&Program) -> Vec<Diagnostic>,
-) -> (Vec<Diagnostic>, Vec<Points>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
+    session: &mut Session,
+) -> Examined {
+    let (modules, mut diagnostics) = names::load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
     let (tables, found) = Tables::new(&names);
     diagnostics.extend(found);
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
-    diagnostics.extend(checks::declarations(&tables, sources, root));
+    let mut seeing = (wanted == Wanted::Contents).then(Box::default);
+    diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut seeing));
+    let mut meanings = Gathered::default();
     let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -100,17 +127,26 @@ fn examine(
         diagnostics.extend(task::check_given(&tables, task.item, &task.given));
     }
     let mut points = Vec::new();
-    for (task, mut built) in tasks.iter().zip(judge(&tables, sources, &tasks, wanted)) {
-        let mut fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+    let package = sources.get(file).map_or_else(String::new, |source| source.name.clone());
+    let package = session.package(&package);
+    let mut judged = judge_anew(&tables, sources, (root, file), &tasks, wanted, package);
+    for (task, built) in tasks.iter().zip(&mut judged) {
+        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
-        fine &= !many(&names.decl(task.item).item.kind);
+        if !fine || many(&names.decl(task.item).item.kind) {
+            built.program = None;
+        }
+    }
+    let moved = crate::share::over(&judged, |built| built.program.iter().flat_map(motions).collect::<Vec<_>>());
+    for ((task, mut built), moved) in tasks.iter().zip(judged).zip(moved) {
         if let Some(Many::Fit(fit)) = &mut built.many
             && let Err(d) = study::data::read(fit, &tables, sources, loader)
         {
             diagnostics.push(*d);
         }
         diagnostics.extend(built.findings);
-        diagnostics.extend(built.program.filter(|_| fine).iter().flat_map(motions));
+        meanings.pieces.extend(built.noted.take());
+        diagnostics.extend(moved);
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
         let kind = &names.decl(task.item).item.kind;
@@ -128,11 +164,18 @@ fn examine(
     if items.is_empty() {
         for id in names.declared_by(root) {
             if matches!(names.decl(id).item.kind, ItemKind::Lab { .. }) {
-                diagnostics.extend(checks::lab(&tables, id));
+                diagnostics.extend(checks::lab(&tables, id, &mut seeing));
             }
         }
     }
-    (finish(diagnostics, sources), points)
+    let findings = finish(diagnostics, sources);
+    if wanted == Wanted::Contents {
+        meanings.pieces.splice(..0, Noted::of(seeing, &modules));
+        meanings.around = Around::of(&tables);
+        drop(tables);
+        meanings.around.scopes = names.into_scopes();
+    }
+    Examined { modules, findings, points, meanings }
 }
 
 /// Compiles one workflow of a file; no program where there is an error.
@@ -189,7 +232,7 @@ fn compile_and<T>(
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
 ) -> (Option<Made<T>>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -256,7 +299,7 @@ pub fn many_runs(
     options: &Options,
     fits: bool,
 ) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -291,7 +334,7 @@ pub fn many_runs(
 /// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
 /// them is returned apart.
 pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader);
+    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -440,19 +483,84 @@ enum Wanted {
     Scripted(&'static str),
     /// What is known at every statement.
     Contents,
-    /// A program too, where robots with joints are in the lab.
+    /// A program too, where there is something to see in space: robots with joints, or things with places.
     Motions,
 }
 
 /// One workflow, built.
+#[derive(Default)]
 struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
     points: Option<Points>,
+    noted: Option<Noted>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+}
+
+impl From<Verdict> for Built {
+    fn from(known: Verdict) -> Built {
+        let Verdict { findings, points, noted, starts, uses, many } = known;
+        Built { findings, points, noted, starts, uses, many, ..Built::default() }
+    }
+}
+
+impl Built {
+    /// What is kept of it.
+    fn verdict(&self) -> Verdict {
+        let Built { findings, points, noted, starts, uses, many, .. } = self;
+        Verdict {
+            findings: findings.clone(),
+            points: points.clone(),
+            noted: noted.clone(),
+            starts: starts.clone(),
+            uses: uses.clone(),
+            many: many.clone(),
+        }
+    }
+}
+
+/// Verdicts of the tasks of a package, in their order; those that hold on are taken from its earlier check.
+fn judge_anew<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    (root, file): (usize, FileId),
+    tasks: &[Task<'a>],
+    wanted: Wanted,
+    package: &mut Package,
+) -> Vec<Built> {
+    // A program is not kept.
+    if wanted != Wanted::Contents {
+        return judge(tables, sources, tasks, wanted);
+    }
+    let names = tables.names;
+    let mut now = Earlier::of(names.modules, sources, root);
+    let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
+    let lab = |task: &Task<'_>| {
+        names::item_name(names.decl(task.lab).item).map(|(name, _)| (names.decl(task.lab).module, name))
+    };
+    let known: Vec<Option<Verdict>> = tasks
+        .iter()
+        .map(|task| {
+            let verdict = matched.as_ref()?.verdict(session::number(names, task.item)?, &lab(task)?)?;
+            Some(verdict).filter(|v| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
+        })
+        .collect();
+    let open: Vec<Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t.clone()).collect();
+    let mut judged = judge(tables, sources, &open, wanted).into_iter();
+    let all: Vec<Built> = known.into_iter().filter_map(|v| v.map(Built::from).or_else(|| judged.next())).collect();
+    for (task, built) in tasks.iter().zip(&all) {
+        let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
+        // What it runs may stand in another file, where it is common to all.
+        let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
+        if let (Some(item), Some(lab)) = (session::number(names, task.item), lab(task)) {
+            now.keep((item, runs), lab, built.verdict());
+        }
+    }
+    package.earlier = Some(now);
+    all
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
@@ -491,6 +599,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
     let mut draft = true;
     loop {
         let mut elaborator = Elaborator::new(tables, reach.clone());
+        elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;
@@ -527,6 +636,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
+        elaborator.note_things(lab);
+        let noted = Noted::of(elaborator.meanings.take(), tables.names.modules);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -534,8 +645,9 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
                 elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
-            if wanted != Wanted::Motions || !elaborator.has_robots() {
-                return Built { program: None, wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+            if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
+                let findings = elaborator.diagnostics;
+                return Built { program: None, wiring, points, noted, findings, starts, uses, many };
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -563,7 +675,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
         let (drivers, offers) = (elaborator.drivers, elaborator.offers);
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
-        return Built { program: Some(program), wiring, points, findings: elaborator.diagnostics, starts, uses, many };
+        let findings = elaborator.diagnostics;
+        return Built { program: Some(program), wiring, points, noted, findings, starts, uses, many };
     }
 }
 
@@ -692,7 +805,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
                 .map(|k| lab.tables.kind_name(k).to_string())
                 .collect()
         };
-        let (name, owner, pose, span) = (inst.name.clone(), inst.owner, inst.pose, inst.span);
+        let (name, owner, pose, at, span) = (inst.name.clone(), inst.owner, inst.pose, inst.at, inst.span);
         let support = inst.placed.first().map(|p| p.1);
         let on: Vec<Frame> = match owner {
             Some(owner) => {
@@ -716,6 +829,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             support,
             pose,
             placed,
+            at,
             frames,
             shape,
             solids,

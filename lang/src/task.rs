@@ -128,7 +128,7 @@ pub fn check_given(tables: &Tables<'_>, item: DeclId, given: &[Given<'_>]) -> Ve
             d = d.because(name.span, "this workflow");
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
-                d = d.fix(format!("replace with `{best}`"), g.name.span, best.clone());
+                d = d.guess(format!("replace with `{best}`"), g.name.span, best.clone());
             }
             out.push(d);
         }

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::Sources;
-use matterix_lang::LibraryOnly;
 use matterix_lang::elaborate::Tables;
 use matterix_lang::names::{self, Names};
 use matterix_lang::screen::Party;
+use matterix_lang::{LibraryOnly, Session};
 
 /// Groups of a species in words.
 fn groups(tables: &Tables<'_>, name: &str) -> BTreeSet<String> {
@@ -20,7 +20,7 @@ fn groups(tables: &Tables<'_>, name: &str) -> BTreeSet<String> {
 fn common_species_belong_to_their_groups() {
     let mut sources = Sources::default();
     let file = sources.add("bench.mtx", "mtx 1\n");
-    let (modules, found) = names::load(&mut sources, file, &LibraryOnly);
+    let (modules, found) = names::load(&mut sources, file, &LibraryOnly, &mut Session::default());
     assert_eq!(found, []);
     let (names, found) = Names::new(&modules);
     assert_eq!(found, []);

@@ -1,15 +1,17 @@
 //! `matterixc check`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use matterix_ir::points::Points;
 use matterix_ir::{Severity, Sources};
+use matterix_runtime::motion::Store;
 
+use super::watch;
 use crate::Exit;
 use crate::args::{CheckArgs, Color};
 use crate::cache;
 use crate::files;
-use crate::pipeline::{self, Input};
+use crate::pipeline::{self, Input, Mended};
 use crate::report::points::{self, Found};
 use crate::report::{Format, Reporter};
 use crate::terminal::{self, Stream, complain, print};
@@ -20,19 +22,29 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
         complain("a place is in one file: give one with `--at`");
         return Exit::Usage;
     }
+    if args.watch {
+        return super::or_complain(watch::watch(&args.files, |files| look(args, files, color)));
+    }
+    let (found, exit) = look(args, &args.files, color);
+    print(Stream::Out, &found);
+    exit
+}
+
+/// Looks through files once: what is to be printed, and how it ends.
+fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
     let mut reporter = Reporter::new(args.format, terminal::look(Stream::Out, color));
     let mut exit = Exit::Fine;
+    let mut out = String::new();
     let cache = cache::of(args.no_cache);
-    for path in &args.files {
-        let bytes = match files::read(path) {
-            Ok(bytes) => bytes,
+    for path in files {
+        let input = match read(path, args, &*cache) {
+            Ok(input) => input,
             Err(message) => {
                 complain(&message);
                 exit = Exit::Usage;
                 continue;
             }
         };
-        let input = Input::file(path, bytes);
         let (sources, mut diagnostics, known) = match args.contents {
             true => pipeline::contents(&input),
             false => {
@@ -44,40 +56,57 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
             true => diagnostics.iter_mut().for_each(|d| d.severity = stricter(d.severity)),
             false => diagnostics.retain(|d| d.severity != Severity::Advice),
         }
-        print(Stream::Out, &reporter.render(&sources, diagnostics));
-        if args.contents
-            && let Err(message) = contents(args, path, &known, &sources)
-        {
-            complain(&message);
-            exit = Exit::Usage;
+        out += &reporter.render(&sources, diagnostics);
+        if args.contents {
+            match contents(args, path, &known, &sources) {
+                Ok(text) => out += &text,
+                Err(message) => {
+                    complain(&message);
+                    exit = Exit::Usage;
+                }
+            }
         }
     }
     if exit == Exit::Fine || reporter.tally() != Default::default() || args.format != Format::Human {
-        print(Stream::Out, &reporter.summary());
+        out += &reporter.summary();
     }
-    if reporter.tally().errors > 0 { exit.max(Exit::Findings) } else { exit }
+    let exit = if reporter.tally().errors > 0 { exit.max(Exit::Findings) } else { exit };
+    (out, exit)
 }
 
-/// Prints what is known at the statements of a file; `Err` says in words why there is no such place.
-fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) -> Result<(), String> {
+/// A file, mended where that is wanted; what was done is said on standard error.
+fn read(path: &Path, args: &CheckArgs, cache: &dyn Store) -> Result<Input, String> {
+    let input = Input::file(path, files::read(path)?);
+    let Some(which) = args.fix else { return Ok(input) };
+    let (mended, done) = pipeline::mend(input, which, args.fidelity, cache);
+    if !done.is_empty() {
+        files::replace(path, &mended.bytes)?;
+    }
+    for Mended { at: (line, column), title } in &done {
+        print(Stream::Err, &format!("{}:{line}:{column}: fixed: {title}\n", mended.name));
+    }
+    Ok(mended)
+}
+
+/// What is known at the statements of a file; `Err` says in words why there is no such place.
+fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) -> Result<String, String> {
     let json = args.format == Format::Json;
+    let mut out = String::new();
     let Some(place) = args.at else {
         for points in known {
-            let text = if json { points::json(points, None, sources) } else { points::table(points, sources) + "\n" };
-            print(Stream::Out, &text);
+            out += &if json { points::json(points, None, sources) } else { points::table(points, sources) + "\n" };
         }
-        return Ok(());
+        return Ok(out);
     };
     let mut missed = None;
     let mut shown = false;
     for points in known {
         match points::find(points, place, sources) {
             Found::Statement(index) => {
-                let text = match json {
+                out += &match json {
                     true => points::json(points, Some(index), sources),
                     false => points::all(points, index, sources) + "\n",
                 };
-                print(Stream::Out, &text);
                 shown = true;
             }
             found => missed = missed.or(Some(found)),
@@ -85,7 +114,7 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
     }
     let path = path.display();
     match missed {
-        _ if shown => Ok(()),
+        _ if shown => Ok(out),
         None => Err(format!("nothing is known of `{path}`: none of its workflows could be followed")),
         Some(Found::NoLine(lines)) => Err(format!("`{path}` has {lines} lines")),
         Some(Found::Nothing(before, after)) => {
@@ -94,7 +123,7 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
                 if near.is_empty() { String::new() } else { format!("; the nearest are at {}", near.join(" and ")) };
             Err(format!("there is no statement of a workflow at this place of `{path}`{near}"))
         }
-        Some(Found::Statement(_)) => Ok(()),
+        Some(Found::Statement(_)) => Ok(out),
     }
 }
 

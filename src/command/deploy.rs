@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 
-use matterix_hardware::deploy::{Journal, Mode};
+use matterix_hardware::deploy::{Exposed, Journal, Mode};
 use matterix_ir::Severity;
 use matterix_ir::quantity::show_number;
 
@@ -14,6 +14,9 @@ use crate::pipeline::{self, Choices, DeployPlan, Input, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::terminal::{Stream, print};
 use crate::{Exit, cancel, files};
+
+/// Devices that are left as they are when a person cannot wait.
+pub(super) static EXPOSED: Exposed = Exposed::new();
 
 /// Compiles, looks whether devices can do it, and lets them do it.
 pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
@@ -77,7 +80,9 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         journal,
         cancel,
         person: &person,
+        exposed: &EXPOSED,
     };
+    cancel::last_words(left_exposed);
     if args.speed != 1.0 && mode != Mode::Dry {
         let speed = show_number(args.speed);
         print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
@@ -91,15 +96,30 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     findings.end();
     if let Some(end) = deployed.end {
         let [judged, met, unseen] = deployed.counts;
-        let how = if deployed.passed { "passed" } else { "did not pass" };
+        let how = match (deployed.stopped, deployed.passed) {
+            (true, _) => "was stopped by a person",
+            (false, true) => "passed",
+            (false, false) => "did not pass",
+        };
         let seen = format!("{judged} expectations: {met} met, {unseen} not observed");
         print(Stream::Err, &format!("the deployment {how} after {} s; {seen}\n", show_number(end)));
+    } else if deployed.stopped {
+        print(Stream::Err, "the deployment was stopped by a person before it began\n");
     }
     Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
 }
 
+/// What is said where nothing more is done.
+pub(super) fn left_exposed() -> String {
+    let names = EXPOSED.names().iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+    match names.is_empty() {
+        true => "ended at once: no device was told anything that it was not made safe from\n".to_owned(),
+        false => format!("ended at once; not made safe: {names}: go and look now\n"),
+    }
+}
+
 /// Removes a new journal into which nothing was written: what was refused beforehand may be tried again with it.
-fn forget_empty(journal: &Path) {
+pub(super) fn forget_empty(journal: &Path) {
     if std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() == 0) {
         // It stays where it cannot be removed, which the next attempt says.
         let _ = std::fs::remove_file(journal);

@@ -7,7 +7,7 @@ use matterix_hardware::binding;
 use matterix_hardware::deploy::Carrier;
 use matterix_hardware::link::{Overhear, Trouble};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
-use matterix_ir::{Diagnostic, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Severity, codes};
 
 use super::bill::show;
 use crate::args::Color;
@@ -39,12 +39,12 @@ pub fn play(
     let players: Vec<_> = bindings
         .iter()
         .filter_map(|b| match &b.carrier {
-            Carrier::Line { driver, place, .. } => Some((&program.drivers[*driver], place)),
+            Carrier::Line { driver, place, .. } => Some((&program.drivers[*driver], place, b.at)),
             _ => None,
         })
-        .filter(|(driver, _)| !driver.play.is_empty())
+        .filter(|(driver, ..)| !driver.play.is_empty())
         .collect();
-    let [(driver, place)] = players.as_slice() else {
+    let [(driver, place, at)] = players.as_slice() else {
         let several = if players.is_empty() { "no device of these bindings" } else { "more than one device" };
         return Err(format!("{several} has a driver that says how a file is played"));
     };
@@ -66,7 +66,7 @@ pub fn play(
         Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
         Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };
-    let d = Diagnostic::error(code, Span::default(), format!("`{device}`: {headline}"), "not run to its end");
+    let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");
     show(&sources, vec![d], color);
     Ok(Exit::Findings)
 }

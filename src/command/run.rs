@@ -40,14 +40,15 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         None => Vec::new(),
     };
 
-    if args.fidelity == Fidelity::Motion && !args.dry {
-        let found = pipeline::motions(&program, &*cache::of(args.no_cache));
-        let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
-        findings.show(&sources, found);
-        if is_wrong {
-            findings.end();
-            return Ok(Exit::Findings);
-        }
+    let found = match args.fidelity == Fidelity::Motion && !args.dry {
+        true => pipeline::motions(&program, &*cache::of(args.no_cache)),
+        false => pipeline::standing(&program),
+    };
+    let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
+    findings.show(&sources, found);
+    if is_wrong {
+        findings.end();
+        return Ok(Exit::Findings);
     }
     let cancel = cancel::on_interrupt()?;
     let turns = match turns(args, &program, cancel)? {

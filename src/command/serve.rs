@@ -2,6 +2,7 @@
 
 use std::net::{SocketAddr, ToSocketAddrs};
 
+use matterix_hardware::deploy::Journal;
 use matterix_ir::Severity;
 
 use super::run::Findings;
@@ -24,6 +25,9 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         }
         None => None,
     };
+    if bindings.is_some() && args.journal.is_none() {
+        return Err("what is sent to devices is kept in a journal: say where with `--journal FILE`".to_string());
+    }
     let mut findings = Findings::new(RunFormat::Human, color);
     let options = Options { workflow: args.workflow.clone(), wires: Wires::Offered, ..Options::default() };
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
@@ -45,16 +49,22 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
             print(Stream::Err, &format!("{}: {commands} commands, {properties} properties\n", feature.id()));
         }
     };
+    let journal = args.journal.as_deref().map(Journal::create).transpose()?;
+    cancel::last_words(super::deploy::left_exposed);
     let service = Service {
         address,
         bindings: file,
         speed: args.speed,
         seed: args.seed,
         trace: args.trace,
+        journal: journal.unwrap_or_default(),
+        exposed: &super::deploy::EXPOSED,
         cancel: cancel::on_interrupt_quietly()?,
         ready: &mut ready,
     };
-    let found = pipeline::serve(&program, &sources, service)?;
+    let found = pipeline::serve(&program, &sources, service);
+    args.journal.iter().for_each(|path| super::deploy::forget_empty(path));
+    let found = found?;
     let failed = found.iter().any(|d| d.severity == Severity::Error);
     findings.show(&sources, found);
     findings.end();

@@ -7,7 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
-use matterix_hardware::deploy::{Device, Entry, Hardware, Journal, Mode, Settings, digest, preflight};
+use matterix_hardware::deploy::{
+    Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, digest, preflight,
+};
+use matterix_hardware::link::Trouble;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Verdict};
@@ -34,6 +37,8 @@ pub struct Plan<'p> {
     pub cancel: &'p AtomicBool,
     /// Asks a person.
     pub person: &'p dyn Fn(&str) -> bool,
+    /// Kept up to date with what is told to devices.
+    pub exposed: &'p Exposed,
 }
 
 /// What came of it.
@@ -42,6 +47,8 @@ pub struct Deployed {
     pub diagnostics: Vec<Diagnostic>,
     /// Whether it came to its end with all expectations met or not observed.
     pub passed: bool,
+    /// Whether a person ended it early.
+    pub stopped: bool,
     /// s of lab time; nothing where it did not begin.
     pub end: Option<f64>,
     /// Expectations that were judged, met and not observed.
@@ -50,7 +57,7 @@ pub struct Deployed {
 
 impl Deployed {
     fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
-        Deployed { diagnostics, passed: false, end: None, counts: [0; 3] }
+        Deployed { diagnostics, passed: false, stopped: false, end: None, counts: [0; 3] }
     }
 }
 
@@ -76,7 +83,8 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let twin = Sim::new(engine, &prepared, plan.seed);
     let shows = plan.trace || plan.mode == Mode::Dry;
     let trace = traced(shows);
-    let settings = Settings { mode: plan.mode, speed: plan.speed, cancel: plan.cancel, person: plan.person };
+    let Plan { mode, speed, cancel, person, exposed, .. } = plan;
+    let settings = Settings { mode, speed, cancel, person, exposed };
     let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
     let found = {
         let (observed, devices) = hardware.view();
@@ -86,30 +94,38 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
         return Ok(Deployed::not_begun(found));
     }
     let is_open = before.iter().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
-    let opened = if is_open {
+    let (begins, goes_on) = (before.is_empty(), !before.is_empty());
+    if is_open {
         hardware.follow_journal(before);
-        Ok(())
-    } else if before.is_empty() {
-        hardware.begin_journal(&digest).and_then(|()| hardware.open(false))
-    } else {
-        // It was cut off before anything of the plan was begun.
-        hardware.open(false)
-    };
-    if let Err(fault) = opened {
-        let mut found = vec![of_fault(fault)];
+    }
+    let unreached = hardware.connect();
+    if !unreached.is_empty() {
+        return Ok(Deployed::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
+    }
+    if begins && let Err(fault) = hardware.begin_journal(&digest) {
+        return Ok(Deployed::not_begun(vec![of_fault(fault)]));
+    }
+    // One that was cut off before anything of the plan was begun opens its lines as a new one does.
+    if !is_open && let Err(failed) = hardware.open() {
+        let mut found = vec![not_opened(failed, sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
-        return Ok(Deployed::not_begun(found));
+        let stopped = plan.cancel.load(Ordering::Relaxed);
+        return Ok(Deployed { stopped, ..Deployed::not_begun(found) });
     }
     let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
     let mut told = Told { person: plan.person, cancel: plan.cancel };
     let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
+    if let Some(unreached) = hardware.unreached() {
+        return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
+    }
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    let stopped = !well && plan.cancel.load(Ordering::Relaxed);
     let mut found = findings(&execution, sources);
     if !well {
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
-    let status = match (well, plan.cancel.load(Ordering::Relaxed)) {
+    let status = match (well, stopped) {
         (_, true) => "stopped by a person",
         (true, false) => "ended",
         (false, false) => "failed",
@@ -118,7 +134,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| d.severity != Severity::Error);
-    Ok(Deployed { diagnostics: found, passed, end: Some(execution.end_time), counts })
+    Ok(Deployed { diagnostics: found, passed, stopped, end: Some(execution.end_time), counts })
 }
 
 /// Why a journal is of another deployment, or of one that has ended.
@@ -153,9 +169,32 @@ pub(super) fn of_fault(fault: Fault) -> Diagnostic {
     exec::diagnostic(&FailureTrace::of_fault(fault))
 }
 
-pub(super) fn unsafe_left(why: String) -> Diagnostic {
+/// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
+pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
+    let Unreached { device, at, trouble } = unreached;
+    let code = match trouble {
+        Trouble::Lost(_) => codes::DEVICE_LOST,
+        Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+        Trouble::Refused { .. } => codes::DEVICE_REFUSED,
+    };
+    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
+    let headline = format!("`{device}` {what}: {}", trouble.text());
+    let d = Diagnostic::error(code, *at, headline, "bound here");
+    d.help(if goes_on {
+        "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
+    } else {
+        "nothing was said to any device"
+    })
+}
+
+/// What went wrong when drivers said what they say first, with the place where the device is bound.
+pub(super) fn not_opened((fault, at): (Fault, Span), sources: &Sources) -> Diagnostic {
+    super::run::led_by_the_user(of_fault(fault).because(at, "bound here"), sources)
+}
+
+pub(super) fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
     let headline = format!("a device could not be made safe: {why}");
-    Diagnostic::error(codes::DEVICE_LOST, Span::default(), headline, "see to it").help("go and look at it now")
+    Diagnostic::error(codes::DEVICE_LOST, at, headline, "see to it").help("go and look at it now")
 }
 
 fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {

@@ -1,10 +1,12 @@
 //! Every call into the compiler and the runtime.
 
 mod bill;
+mod clean;
 mod deploy;
 mod emit;
 mod emulate;
 mod many;
+mod mend;
 mod neighbours;
 mod plan;
 mod run;
@@ -19,8 +21,7 @@ use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 
 use crate::args::Fidelity;
-use matterix_runtime::motion::{Store, preflight};
-use neighbours::Neighbours;
+use matterix_runtime::motion::{Store, overlaps, preflight};
 
 pub use bill::{Prices, bill};
 pub use deploy::{Plan as DeployPlan, deploy};
@@ -28,6 +29,8 @@ pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
+pub use mend::{Fixes, Mended, mend};
+pub use neighbours::Neighbours;
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};
 #[cfg(feature = "sila")]
@@ -84,24 +87,45 @@ impl Input {
     }
 }
 
-/// Findings of a file; at the fidelity `motion` also those in the way of robots, whose ways are kept in a store.
+/// Findings of a file and of where its labs put things; at the fidelity `motion` also those in the way of robots, whose ways
+/// are kept in a store, as is which files had none.
 pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
-    let found = match file {
-        Ok(file) => match fidelity {
-            Fidelity::Process => matterix_lang::check(&mut sources, file, &input.neighbours()),
-            Fidelity::Motion => {
-                matterix_lang::check_and(&mut sources, file, &input.neighbours(), &|program| preflight(program, store))
-            }
-        },
-        Err(found) => vec![found],
+    let file = match file {
+        Ok(file) => file,
+        Err(found) => return (sources, vec![found]),
     };
+    let neighbours = input.neighbours();
+    let entry = clean::Entry::of(&input.bytes, fidelity, store);
+    if entry.as_ref().is_some_and(|entry| entry.is_clean(&neighbours)) {
+        return (sources, Vec::new());
+    }
+    let read = clean::Noted::new(&neighbours);
+    let found = match fidelity {
+        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps),
+        Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store)),
+    };
+    if let Some(entry) = entry.filter(|_| found.is_empty()) {
+        entry.keep(read);
+    }
     (sources, found)
+}
+
+/// Findings of a text with those in the way of robots; its neighbours come from a loader.
+pub fn check_text(name: &str, text: &str, loader: &dyn matterix_lang::Loader, store: &dyn Store) -> Vec<Diagnostic> {
+    let mut sources = Sources::default();
+    let file = sources.add(name, text);
+    matterix_lang::check_and(&mut sources, file, loader, &|program| preflight(program, store))
 }
 
 /// What would go wrong with the motions of a program.
 pub fn motions(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     preflight(program, store)
+}
+
+/// What of a program stands in one place before anything moves.
+pub fn standing(program: &Program) -> Vec<Diagnostic> {
+    overlaps(program)
 }
 
 /// Findings of a file, and what is known at every statement of its workflows.

@@ -11,19 +11,18 @@ use crate::files;
 const LARGEST_MESH: u64 = 64 << 20;
 
 /// Loads `sn1` from `sn1.mtx` and `parts::racks` from `parts/racks.mtx` in one folder.
-pub(super) struct Neighbours {
+pub struct Neighbours {
     dir: PathBuf,
 }
 
 impl Neighbours {
     /// The modules in a folder.
-    pub(super) fn of(dir: &Path) -> Self {
+    pub fn of(dir: &Path) -> Self {
         Neighbours { dir: dir.to_path_buf() }
     }
-}
 
-impl Loader for Neighbours {
-    fn load(&self, _: FileId, module: &str) -> Option<(String, String)> {
+    /// The file that a module is; none where its name cannot be one.
+    pub fn path(&self, module: &str) -> Option<PathBuf> {
         let mut path = self.dir.clone();
         for part in module.split("::") {
             // A module path names files below the folder, never elsewhere.
@@ -33,6 +32,13 @@ impl Loader for Neighbours {
             path.push(part);
         }
         path.set_extension("mtx");
+        Some(path)
+    }
+}
+
+impl Loader for Neighbours {
+    fn load(&self, _: FileId, module: &str) -> Option<(String, String)> {
+        let path = self.path(module)?;
         let text = String::from_utf8(files::contents(&path, files::LARGEST_TEXT).ok()?).ok()?;
         Some((path.display().to_string(), text))
     }

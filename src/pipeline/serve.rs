@@ -7,7 +7,7 @@ use std::net::SocketAddr;
 use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::binding;
-use matterix_hardware::deploy::{Device, Hardware, Journal, Mode, Settings};
+use matterix_hardware::deploy::{Device, Exposed, Hardware, Journal, Mode, Settings, digest};
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
 use matterix_ir::offer::{Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
@@ -17,7 +17,7 @@ use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
 use matterix_sila_wire::serve as answer;
 
-use super::deploy::{of_fault, traced, unsafe_left};
+use super::deploy::{not_opened, not_reached, of_fault, traced, unsafe_left};
 use crate::terminal::{Stream, print};
 
 /// What a server is given beside a program.
@@ -32,6 +32,10 @@ pub struct Service<'p> {
     pub seed: u64,
     /// Shows all that goes over lines.
     pub trace: bool,
+    /// What is kept of what is said to devices.
+    pub journal: Journal,
+    /// Kept up to date with what is told to devices.
+    pub exposed: &'p Exposed,
     /// Ends it.
     pub cancel: &'p AtomicBool,
     /// Told where it answers, and what it offers.
@@ -39,7 +43,7 @@ pub struct Service<'p> {
 }
 
 /// Serves until it is ended; what was wrong before, or went wrong then.
-pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Result<Vec<Diagnostic>, String> {
+pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> Result<Vec<Diagnostic>, String> {
     let prepared = Prepared::new(program);
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
@@ -58,8 +62,10 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
     let devices: Vec<Device<'_>> = bindings.into_iter().map(|b| Device::new(program, b)).collect::<Result<_, _>>()?;
     let over = traced(service.trace);
     let nobody = |_: &str| false;
-    let settings = Settings { mode: Mode::Real, speed: service.speed, cancel: service.cancel, person: &nobody };
-    let mut hardware = Hardware::new(program, sources, twin, devices, settings, Journal::none(), Box::new(over));
+    let Service { speed, cancel, exposed, .. } = service;
+    let settings = Settings { mode: Mode::Real, speed, cancel, person: &nobody, exposed };
+    let journal = std::mem::take(&mut service.journal);
+    let mut hardware = Hardware::new(program, sources, twin, devices, settings, journal, Box::new(over));
     // What no device does or tells is not offered.
     let (offers, shown) = {
         let (observed, devices) = hardware.view();
@@ -83,8 +89,15 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
         let shown: Vec<&Shown> = program.offers.shown.iter().filter(seen).collect();
         (offers, shown)
     };
-    if let Err(fault) = hardware.open(false) {
-        let mut found = vec![of_fault(fault)];
+    let unreached = hardware.connect();
+    if !unreached.is_empty() {
+        return Ok(unreached.iter().map(|u| not_reached(u, false)).collect());
+    }
+    if let Err(fault) = hardware.begin_journal(&digest(program, text)?) {
+        return Ok(vec![of_fault(fault)]);
+    }
+    if let Err(failed) = hardware.open() {
+        let mut found = vec![not_opened(failed, sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
         return Ok(found);
     }
@@ -93,6 +106,8 @@ pub fn serve(program: &Program, sources: &Sources, service: Service<'_>) -> Resu
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
+    let status = if found.iter().any(|d| d.severity == Severity::Error) { "failed" } else { "ended" };
+    found.extend(hardware.end_journal(status).err().map(of_fault));
     Ok(found)
 }
 

@@ -6,6 +6,9 @@ use serde_json::{Value, json};
 use super::text::{Text, Texts};
 use super::word;
 
+/// What is promised in `docs/diagnostics-json.md`; members may be added to it.
+pub(super) const VERSION: u32 = 1;
+
 /// Appends the object and a line end.
 pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut String) {
     let labels: Vec<Value> = diagnostic
@@ -19,12 +22,14 @@ pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, out: &mut S
         .map(|f| {
             let edits: Vec<Value> =
                 f.edits.iter().map(|e| json!({ "span": span(e.span, texts), "text": e.text })).collect();
-            json!({ "title": f.title, "edits": edits })
+            json!({ "title": f.title, "edits": edits, "sure": f.sure })
         })
         .collect();
     let primary = diagnostic.labels.iter().find(|l| l.primary).map(|l| span(l.span, texts));
     let object = json!({
+        "version": VERSION,
         "code": diagnostic.code.name,
+        "family": diagnostic.code.family,
         "severity": word(diagnostic.severity),
         "headline": diagnostic.headline,
         "span": primary,
@@ -43,5 +48,6 @@ pub(super) fn span(span: Span, texts: &mut Texts<'_>) -> Value {
 
 fn position(byte: u32, text: &Text) -> Value {
     let (line, column) = text.position(byte as usize);
-    json!({ "line": line, "column": column, "byte": byte })
+    let (_, utf16) = text.position_utf16(byte as usize);
+    json!({ "line": line, "column": column, "utf16": utf16, "byte": byte })
 }

@@ -4,6 +4,7 @@ mod concise;
 mod human;
 mod json;
 pub mod points;
+mod sarif;
 mod text;
 
 use std::collections::BTreeSet;
@@ -22,6 +23,8 @@ pub enum Format {
     Concise,
     /// One JSON object per line, described in `docs/diagnostics-json.md`.
     Json,
+    /// One document in SARIF 2.1.0, for systems that collect findings.
+    Sarif,
 }
 
 /// How the human form is laid out.
@@ -63,12 +66,13 @@ pub struct Reporter {
     look: Look,
     tally: Tally,
     seen: BTreeSet<(String, u32, u32, &'static str, String)>,
+    log: sarif::Log,
 }
 
 impl Reporter {
     /// A reporter that has seen nothing.
     pub fn new(format: Format, look: Look) -> Self {
-        Reporter { format, look, tally: Tally::default(), seen: BTreeSet::new() }
+        Reporter { format, look, tally: Tally::default(), seen: BTreeSet::new(), log: sarif::Log::default() }
     }
 
     /// What was found so far.
@@ -84,6 +88,7 @@ impl Reporter {
         match self.format {
             Format::Concise => fresh.iter().for_each(|d| concise::render(d, &mut texts, &mut out)),
             Format::Json => fresh.iter().for_each(|d| json::render(d, &mut texts, &mut out)),
+            Format::Sarif => fresh.iter().for_each(|d| self.log.push(d, &mut texts)),
             Format::Human => {
                 for diagnostic in fresh.iter().take(MOST_SHOWN) {
                     human::render(diagnostic, &mut texts, self.look, &mut out);
@@ -98,9 +103,11 @@ impl Reporter {
         out
     }
 
-    /// The last line: how many there were; empty for tools, and where a quiet form found nothing.
+    /// The last line: how many there were; empty for tools, and where a quiet form found nothing. A document stands for
+    /// all that was found.
     pub fn summary(&self) -> String {
         match self.format {
+            Format::Sarif => self.log.document(),
             Format::Json => String::new(),
             Format::Concise if self.tally == Tally::default() => String::new(),
             _ => format!("{}\n", self.tally),

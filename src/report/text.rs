@@ -73,6 +73,13 @@ impl Text {
         (line + 1, self.shown[self.starts[line]..byte].chars().count() + 1)
     }
 
+    /// One-based line and column in code units of UTF-16, as editors count.
+    pub(super) fn position_utf16(&self, byte: usize) -> (usize, usize) {
+        let byte = self.clamp(byte);
+        let line = self.line_of(byte);
+        (line + 1, self.shown[self.starts[line]..byte].chars().map(char::len_utf16).sum::<usize>() + 1)
+    }
+
     /// The bytes to underline for a span: inside the file, on characters, and not over many lines.
     pub(super) fn underlined(&self, span: Span, most_lines: usize) -> (usize, usize) {
         let start = self.clamp(span.start as usize);

@@ -27,8 +27,10 @@ fn check(dir: &Path, text: &str, more: &[&str]) -> String {
     String::from_utf8(ended.stdout).expect("text")
 }
 
-/// The file of the cache that says what was found in whole programs; each of the others is about a lab.
+/// The files of the cache that say what was found in whole programs, and in which files nothing; each of the others is
+/// about a lab.
 const PROGRAMS: &str = "programs-";
+const CLEAN: &str = "clean-";
 
 /// The files of the cache.
 fn kept(dir: &Path) -> Vec<PathBuf> {
@@ -78,8 +80,8 @@ fn process_fidelity_leaves_motions_out() {
 
 /// What is kept of motions in labs, and what of findings in programs.
 fn labs_and_programs(dir: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
-    let of_programs = |file: &PathBuf| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(PROGRAMS));
-    kept(dir).into_iter().partition(|file| !of_programs(file))
+    let is = |file: &PathBuf, of: &str| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(of));
+    kept(dir).into_iter().filter(|file| !is(file, CLEAN)).partition(|file| !is(file, PROGRAMS))
 }
 
 #[test]
@@ -107,6 +109,26 @@ fn what_was_planned_is_remembered_and_said_in_the_same_bytes() {
     // Another lab is another matter.
     check(&dir, &bench(" at (440, -250) mm", "    place beaker on plate by panda"), &[]);
     assert_eq!(labs_and_programs(&dir).0.len(), 2);
+}
+
+#[test]
+fn a_file_without_findings_is_looked_through_again_when_what_it_read_has_changed() {
+    let dir = folder("beforehand_clean");
+    let clean = |dir: &Path| kept(dir).iter().filter(|f| f.to_string_lossy().contains(CLEAN)).count();
+    let text = "mtx 1\nuse rooms\n\nworkflow pause in room {\n    wait stay\n}\n";
+    let room = |stay: &str| format!("mtx 1\nlab room {{ ambient: 22 degC }}\nconst stay: Duration = {stay}\n");
+    write(&dir, "rooms.mtx", &room("1 min"));
+    assert_eq!(check(&dir, text, &[]), "");
+    assert_eq!(clean(&dir), 1);
+    assert_eq!(check(&dir, text, &[]), "");
+    write(&dir, "rooms.mtx", &room("1 mL"));
+    assert!(check(&dir, text, &[]).contains("rooms.mtx:3:24: error[unit-mismatch]"), "{}", check(&dir, text, &[]));
+    fs::remove_file(dir.join("rooms.mtx")).expect("it was written");
+    assert!(check(&dir, text, &[]).contains("error[unknown-module]"), "{}", check(&dir, text, &[]));
+    write(&dir, "rooms.mtx", &room("1 min"));
+    assert_eq!(check(&dir, text, &[]), "");
+    assert_eq!(check(&dir, text, &["--fidelity", "process"]), "");
+    assert_eq!(clean(&dir), 2, "each fidelity is a matter of its own");
 }
 
 #[test]

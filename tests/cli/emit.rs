@@ -209,7 +209,7 @@ fn what_the_text_decides_is_no_branch() {
 }
 
 /// A plate whose definition does not come with Opentrons' software.
-fn own_plate() -> String {
+pub fn own_plate() -> String {
     let text = fs::read_to_string(root().join("assets/labware/corning_96_wellplate_360ul_flat.json")).expect("read");
     let mut definition: Value = serde_json::from_str(&text).expect("JSON");
     definition["namespace"] = "house".into();

@@ -222,6 +222,6 @@ fn arms_that_are_in_each_other_at_the_start_are_one_error() {
     assert!(!near.contains("before it goes"), "{near}");
     write(&dir, "lab.mtx", text.replace("table at (500, 0) mm", "table at (0, 0) mm"));
     let found = matterixc_in(&dir, &["check", "lab.mtx", "--format", "concise"]).out;
-    assert!(found.contains("lab.mtx:17:9: error[collision]: `left` stands in `right` before it goes to"), "{found}");
+    assert!(found.contains("error[overlap]: `right` and `left` are in one place"), "{found}");
     assert_eq!(found.lines().count(), 2, "{found}");
 }

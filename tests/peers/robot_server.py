@@ -31,6 +31,7 @@ from opentrons.protocol_engine.create_protocol_engine import create_protocol_eng
 from opentrons.protocol_engine.errors import ProtocolEngineError
 from opentrons.protocol_reader import ProtocolReader
 from opentrons.protocol_runner import RunOrchestrator
+from opentrons_shared_data.labware.labware_definition import labware_definition_type_adapter
 from pydantic import TypeAdapter, ValidationError
 
 SPEED = "200"
@@ -116,6 +117,9 @@ class Robot:
         match (method, parts[2:]):
             case ("POST", ["commands"]):
                 return self.command(run, body, "waitUntilComplete=true" in query)
+            case ("POST", ["labware_definitions"]):
+                definition = labware_definition_type_adapter.validate_python(body["data"])
+                return 201, {"data": {"definitionUri": str(run.steered.add_labware_definition(definition))}}
             case ("GET", ["commands", name]):
                 return 200, {"data": run.command(name)}
             case ("POST", ["actions"]) if body["data"]["actionType"] == "play":
@@ -223,10 +227,12 @@ def volumes(commands):
     return net
 
 
-def deploy(command, folder, name, text, address):
+def deploy(command, folder, name, text, address, files={}):
     place = pathlib.Path(folder) / name
     place.mkdir(parents=True)
     (place / "lab.mtx").write_text(text)
+    for name, content in files.items():
+        (place / name).write_text(content)
     (place / "lab.toml").write_text(f'[ot2]\nhttp = "{address}"\n')
     arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SPEED]
     return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True, timeout=120)
@@ -276,6 +282,21 @@ def uploaded(command, folder, file):
         good = ended.returncode == 0 and [run.summary()["status"] for run in runs] == ["succeeded"]
         verdict(f"{target}, uploaded and played", good, f"{len(done)} commands" if good else ended.stderr[-1500:])
 
+
+
+def own_labware(command, folder, file):
+    """Labware that is not in Opentrons' own library is given to the robot, which then knows it."""
+    assets = pathlib.Path(__file__).parents[2] / "assets" / "labware"
+    definition = json.loads((assets / "corning_96_wellplate_360ul_flat.json").read_text())
+    definition |= {"namespace": "house", "version": 7}
+    definition["parameters"]["loadName"] = "flat_96"
+    text = pathlib.Path(file).read_text().replace("plate = Corning96", "plate = Own")
+    text = text.replace("lab deck {", 'asset Own from labware "plate.json"\n\nlab deck {')
+    robot = Robot()
+    ended = deploy(command, folder, "own", text, serve(robot), {"plate.json": json.dumps(definition)})
+    loaded = [c["params"] for c in told(robot) if c["commandType"] == "loadLabware" and c["status"] == "succeeded"]
+    good = ended.returncode == 0 and any(p["loadName"] == "flat_96" for p in loaded)
+    verdict("labware of one's own", good, f"{len(robot.commands)} commands" if good else ended.stderr[-1500:])
 
 
 def spoiled(command, folder, file):
@@ -330,6 +351,7 @@ def main():
     for number, file in enumerate(files):
         whole(command, folder, file, recording if number == 0 else None)
     uploaded(command, folder, files[0])
+    own_labware(command, folder, files[0])
     spoiled(command, folder, files[0])
     sys.exit(1 if BAD else 0)
 

@@ -18,6 +18,7 @@ fn instance(name: &str, shape: Option<Shape>, at: [f64; 3]) -> Instance {
         support: None,
         pose: Pose::at(at),
         placed: true,
+        at: None,
         frames: Vec::new(),
         solids: Vec::new(),
         collision: Vec::new(),

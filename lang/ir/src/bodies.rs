@@ -13,6 +13,22 @@ pub struct Bodies {
     pub things: Vec<Thing>,
     /// What has joints.
     pub machines: Vec<Machine>,
+    /// What has a place of its own.
+    #[serde(default)]
+    pub standing: Vec<Standing>,
+}
+
+/// A thing that is no part of another one and of which the lab says where it stands when the run begins.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// Full name.
+    pub name: String,
+    /// What it stands on, then what that is a part of or stands on, down to the lab; full names.
+    pub carriers: Vec<String>,
+    /// Whether the text gives its place on that; else it is somewhere on it, or where there is one place only.
+    pub told: bool,
+    /// Whether it can be gripped or has joints.
+    pub loose: bool,
 }
 
 /// A rigid thing; where it is, the recording tells under its name.

@@ -77,6 +77,7 @@ codes! {
     EMPTY_RANGE "empty-range" "N0" "the lower end of a range is above its upper end";
     OUT_OF_REACH "out-of-reach" "G1" "a robot does not get to where it is to go";
     COLLISION "collision" "G2" "a robot, or what it holds, runs into something";
+    OVERLAP "overlap" "G2" "two things of a lab are put into one place";
     MISPLACED_GRIP "misplaced-grip" "G4" "a gripper is not where it would have to be to grip or let go";
     OUT_OF_RANGE "out-of-range" "D1" "a parameter outside what it may be";
     INVALID_LAW "invalid-law" "N0" "a law changes what it may not change";
@@ -140,6 +141,7 @@ codes! {
     TOO_THIN "too-thin" "G4" "a gripper does not close far enough to hold what it is to grip";
     TOO_TALL "too-tall" "G5" "something is put where there is not enough room above";
     GRIP_TOO_WEAK "grip-too-weak" "G3" "the friction of a gripper's fingers does not bear what it is to hold";
+    OFF_PLACE "off-place" "G5" "a lab puts something beside the place of several that it names";
     SLIDES "slides" "G5" "something is put where it slides off or topples";
     UNSTABLE "unstable" "G5" "something is put on what is narrower than its foot";
     WRONG_HOLE "wrong-hole" "G5" "something is put into a hole that is too narrow, or far too wide, for it";

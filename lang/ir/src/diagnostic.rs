@@ -43,6 +43,9 @@ pub struct Fix {
     pub title: String,
     /// The replacements, not overlapping.
     pub edits: Vec<Edit>,
+    /// Whether it says the same as the text was meant to: it may be done without asking. A guess at a name, an amount
+    /// or the place of a bracket is a person's to judge.
+    pub sure: bool,
 }
 
 /// One finding: *what* in the headline, *where* in the labels, *how to mend* in the help.
@@ -97,9 +100,15 @@ impl Diagnostic {
         self
     }
 
-    /// Adds a correction that replaces the text under `span`.
+    /// Adds a correction that replaces the text under `span` and leaves no doubt what was meant.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
+        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: true });
+        self
+    }
+
+    /// Adds a correction that replaces the text under `span` by what was probably meant.
+    pub fn guess(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: false });
         self
     }
 

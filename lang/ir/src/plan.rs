@@ -9,6 +9,9 @@ use crate::model::{Action, Domain};
 use crate::scene::InstanceId;
 use crate::{NodeId, Span, Text, Unit};
 
+/// The longest time a run takes unless set otherwise, s of lab time: 30 days.
+pub const LONGEST_RUN: f64 = 30.0 * 86_400.0;
+
 /// A node of the plan, by its index in [`Plan::steps`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct StepId(pub u32);
@@ -118,6 +121,8 @@ pub struct Comparison {
     pub low: Option<NodeId>,
     /// Upper limit, if there is one.
     pub high: Option<NodeId>,
+    /// Whether the limit itself is outside: `<`, not `<=`.
+    pub strict: bool,
     /// Unit of the limits.
     pub unit: Unit,
 }

@@ -41,6 +41,35 @@ impl Unit {
     }
 }
 
+/// Shorter than this counts as nothing, s: what adding times up leaves.
+const ROUNDING: f64 = 1e-6;
+
+/// A duration given in s, in days, hours, minutes and seconds: `1 h 30 min`; days alone from a thousand on.
+pub fn show_duration(seconds: f64) -> String {
+    if seconds < 0.0 {
+        return format!("-{}", show_duration(-seconds));
+    }
+    if !seconds.is_finite() || seconds < 1.0 {
+        return format!("{} s", show_number(seconds));
+    }
+    let mut left = seconds;
+    let mut parts = Vec::new();
+    for (unit, size) in [("day", 86_400.0), ("h", 3600.0), ("min", 60.0)] {
+        let whole = ((left + ROUNDING) / size).floor();
+        if whole >= 1.0 {
+            parts.push(format!("{} {unit}", show_number(whole)));
+            left -= whole * size;
+        }
+        if whole >= 1000.0 {
+            left = 0.0;
+        }
+    }
+    if left > ROUNDING {
+        parts.push(format!("{} s", show_number(left)));
+    }
+    parts.join(" ")
+}
+
 /// Six significant digits at most, without trailing zeros; powers of ten outside 1e-4 .. 1e7.
 pub fn show_number(value: f64) -> String {
     if value == 0.0 {

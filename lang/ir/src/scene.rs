@@ -151,6 +151,9 @@ pub struct Instance {
     /// Whether that is known, seen from there: the text says it, or leaves no other choice.
     #[serde(default)]
     pub placed: bool,
+    /// Where the text says that, if it does.
+    #[serde(default)]
+    pub at: Option<Span>,
     /// Its named points.
     pub frames: Vec<Frame>,
     /// Its body.

@@ -9,15 +9,23 @@ use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
 use crate::lower::{Planner, script};
+use crate::meanings::Seeing;
 use crate::names::DeclId;
 
 /// Checks the declarations of one module.
 pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Vec<Diagnostic> {
+    declarations_and(tables, sources, module, &mut None)
+}
+
+/// Checks the declarations of one module, and notes what names mean where that is asked for.
+pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, seeing: &mut Seeing) -> Vec<Diagnostic> {
     let mut out = Vec::new();
     for id in tables.names.declared_by(module) {
         let mut lab = Elaborator::new(tables, Reach::default());
         lab.prototype = true;
+        lab.meanings = seeing.take();
         declaration(&mut lab, sources, id, module);
+        *seeing = lab.meanings.take();
         out.extend(lab.diagnostics);
     }
     out

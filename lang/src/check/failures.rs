@@ -39,7 +39,7 @@ pub fn undeclared(sig: &Sig, clauses: &[Clause], within: Span, steps: &[PlanStep
         }
     };
     let end = Span { start: place.end, ..place };
-    Some(d.help("declare it with `fails`, or handle it with `on NAME { }` after the steps").fix(title, end, text))
+    Some(d.help("declare it with `fails`, or handle it with `on NAME { }` after the steps").guess(title, end, text))
 }
 
 /// What ends a workflow because it has no handler: known to whoever wrote it, or not.

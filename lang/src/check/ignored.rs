@@ -42,7 +42,7 @@ fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {
             let near = near::nearest(&o.name.text, known);
             d.help.extend(near::question(&near));
             match near.first() {
-                Some(best) => d.fix(format!("replace with `{best}`"), o.name.span, best.clone()),
+                Some(best) => d.guess(format!("replace with `{best}`"), o.name.span, best.clone()),
                 None => d,
             }
         })

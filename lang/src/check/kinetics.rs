@@ -10,6 +10,7 @@ use crate::elaborate::tables::ReactionDef;
 use crate::elaborate::{Elaborator, SpeciesId, Tables};
 use crate::eval::ReactionId;
 use crate::names::DeclId;
+use crate::syntax::moved::Moved;
 
 /// What one workflow's lab says of the reactions: which start, and what there is anywhere.
 #[derive(Clone, Debug)]
@@ -22,6 +23,12 @@ pub struct Starts {
     lab: Span,
     /// What is known of the conditions of reactions over the plan, if it could be followed.
     pub windows: Option<BTreeMap<ReactionId, Window>>,
+}
+
+impl Moved for Starts {
+    fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
+        self.lab.moved(to);
+    }
 }
 
 /// Which reactions can start in a lab.

@@ -23,24 +23,28 @@ pub use self::flow::{After, Known, Seen};
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::ReactionId;
+use crate::meanings::Seeing;
 use crate::names::{self, DeclId};
 
 pub use consequences::without_consequences;
-pub use declarations::{bind, declarations};
+pub use declarations::{bind, declarations, declarations_and};
 pub use failures::{undeclared, unhandled};
 pub use unused::{Uses, reagents, things, uses};
 
-/// Checks a lab that no workflow of its file uses.
-pub fn lab(tables: &Tables<'_>, id: DeclId) -> Vec<Diagnostic> {
+/// Checks a lab that no workflow of its file uses, and notes what names mean where that is asked for.
+pub fn lab(tables: &Tables<'_>, id: DeclId, seeing: &mut Seeing) -> Vec<Diagnostic> {
     let mut reach = Reach::default();
     loop {
         let mut lab = Elaborator::new(tables, reach.clone());
+        lab.meanings = seeing.take();
         lab.open_parameters = true;
         lab.lab(id);
         lab.initialise();
         let events = lab.events();
         lab.processes();
         drop(events);
+        lab.note_things(id);
+        *seeing = lab.meanings.take();
         let next = Reach::compute(&lab);
         if next == reach {
             mixing::contents(&mut lab);

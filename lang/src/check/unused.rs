@@ -11,9 +11,32 @@ use matterix_ir::{Diagnostic, Severity, Sources, Span, codes};
 use crate::ast::{Item, ItemKind, LabLineKind};
 use crate::elaborate::{Elaborator, Tables};
 use crate::names::{DeclId, Names, item_name};
+use crate::syntax::moved::Moved;
 
-/// The things of a lab by the place of their names, each with whether a workflow has to do with it.
-pub type Uses = BTreeMap<Span, bool>;
+/// What one workflow has to do with the things of its lab.
+#[derive(Clone, Debug)]
+pub struct Uses {
+    /// The things by the place of their names, each with whether the workflow has to do with it.
+    things: BTreeMap<Span, bool>,
+    /// Names of the things, and whether the lab's file says them outside of its labs.
+    said: BTreeMap<String, bool>,
+    /// The module of the lab.
+    module: usize,
+}
+
+impl Uses {
+    /// Whether the file of the lab still says the same names outside of its labs.
+    pub fn hold(&self, tables: &Tables<'_>, sources: &Sources) -> bool {
+        let spoken = words_outside_labs(tables, sources, self.module);
+        self.said.iter().all(|(name, said)| spoken.contains(name) == *said)
+    }
+}
+
+impl Moved for Uses {
+    fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
+        self.things = std::mem::take(&mut self.things).into_iter().map(|(span, used)| (to(span), used)).collect();
+    }
+}
 
 /// What one workflow has to do with the things of its lab; nothing where it is not whole.
 pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan) -> Option<Uses> {
@@ -25,9 +48,12 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
     let mut used: BTreeSet<InstanceId> = BTreeSet::new();
     let tops =
         || (0..lab.instances.len() as u32).map(InstanceId).filter(|i| lab.instances[i.0 as usize].owner.is_none());
+    let mut said: BTreeMap<String, bool> = BTreeMap::new();
     for id in tops() {
         let name = &lab.instances[id.0 as usize].name;
-        let named = name.rsplit('.').next().is_some_and(|n| spoken.contains(n));
+        let last = name.rsplit('.').next().unwrap_or(name);
+        let named = spoken.contains(last);
+        said.insert(last.to_string(), named);
         if named || lab.gone_through.iter().any(|kind| lab.instance_is(id, *kind)) {
             used.insert(id);
         }
@@ -60,13 +86,14 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
         // Included labs are judged where they run alone; what carries something is there for that.
         inst.span.file == decl.item.span.file && !inst.name.contains('.') && !carriers.contains(id)
     };
-    Some(tops().filter(own).map(|id| (lab.instances[id.0 as usize].span, used.contains(&id))).collect())
+    let things = tops().filter(own).map(|id| (lab.instances[id.0 as usize].span, used.contains(&id))).collect();
+    Some(Uses { things, said, module: decl.module })
 }
 
 /// Things that no workflow of the file has to do with.
 pub fn things(sources: &Sources, uses: &[Uses]) -> Vec<Diagnostic> {
-    let mut all = Uses::new();
-    for (span, used) in uses.iter().flatten() {
+    let mut all: BTreeMap<Span, bool> = BTreeMap::new();
+    for (span, used) in uses.iter().flat_map(|uses| &uses.things) {
         *all.entry(*span).or_default() |= *used;
     }
     let idle = all.into_iter().filter(|(_, used)| !used);

@@ -1,6 +1,8 @@
 //! Structures from SMILES, and the only door to the crate that reads them.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::RwLock;
 
 use chematic::core::{AtomIdx, Molecule, implicit_hcount};
 use chematic::smiles::{self, SmilesError};
@@ -13,6 +15,12 @@ use super::rational::Rational;
 pub const MAX_LENGTH: usize = 2_000;
 /// Most atoms of a molecule, written hydrogens included.
 const MAX_ATOMS: usize = 400;
+
+/// So many texts are kept with what they say.
+const MOST_KEPT: usize = 4096;
+
+/// Structures by their texts: those of the library are asked for again in every check that an editor has made.
+static KEPT: RwLock<BTreeMap<String, Structure>> = RwLock::new(BTreeMap::new());
 
 /// A molecule or ion, or several (`[K+].[I-]`).
 #[derive(Clone)]
@@ -74,11 +82,21 @@ impl Structure {
         if let Some((offset, _)) = text.char_indices().find(|(_, c)| !c.is_ascii_graphic()) {
             return Err(StructureError { kind: StructureErrorKind::UnexpectedCharacter, offset: Some(offset) });
         }
+        if let Some(known) = KEPT.read().ok().and_then(|kept| kept.get(text).cloned()) {
+            return Ok(known);
+        }
         let read = guarded(|| {
             let molecule = smiles::parse(text).map_err(|e| reworded(e, text))?;
             Structure::made(molecule)
         });
-        read.unwrap_or(Err(whole(StructureErrorKind::Unsupported)))
+        let read = read.unwrap_or(Err(whole(StructureErrorKind::Unsupported)));
+        if let (Ok(structure), Ok(mut kept)) = (&read, KEPT.write()) {
+            if kept.len() >= MOST_KEPT {
+                kept.clear();
+            }
+            kept.insert(text.to_string(), structure.clone());
+        }
+        read
     }
 
     /// The structure of a molecule that was read or that a template made.

@@ -36,7 +36,7 @@ pub fn unknown_fields(fields: &[Field], known: &[&str], owner: &str, diagnostics
             );
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
-                d = d.fix(format!("replace with `{best}`"), f.key.span, best.clone());
+                d = d.guess(format!("replace with `{best}`"), f.key.span, best.clone());
             }
             diagnostics.push(d);
         }

@@ -102,7 +102,7 @@ impl<'a> Elaborator<'a> {
         let mut d = Diagnostic::error(codes::UNKNOWN_MEMBER, name.span, headline, "not in this lab");
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         self.report(d);
         Value::Error

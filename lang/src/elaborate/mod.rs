@@ -117,6 +117,17 @@ pub struct ExtensiveKey {
     pub species: Option<SpeciesId>,
 }
 
+/// A comparison, not yet in words.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// Where what is compared is written.
+    pub span: Span,
+    /// The comparison.
+    pub comparison: Comparison,
+    /// Names that folds around it give, as written there, with the instances they stand for.
+    pub each: Vec<(Span, InstanceId)>,
+}
+
 /// What a condition asks of one of several things.
 #[derive(Clone, Debug)]
 pub struct Asked {
@@ -125,7 +136,7 @@ pub struct Asked {
     /// Not 0 if it holds.
     pub node: NodeId,
     /// What is compared.
-    pub compared: Vec<(Span, Comparison)>,
+    pub compared: Vec<Compared>,
     /// The members that are named.
     pub terms: Vec<Term>,
 }
@@ -220,7 +231,7 @@ pub struct Elaborator<'a> {
     /// Concentrations by mixture, species, capability and kind.
     pub view_values: BTreeMap<(InstanceId, SpeciesId, DeclId, Dimension), Value>,
     /// What the expression evaluated last compared.
-    pub comparisons: Vec<(Span, Comparison)>,
+    pub comparisons: Vec<Compared>,
     /// The members that the expression evaluated last names.
     pub terms: Vec<Term>,
     /// Where a call says of what it takes something, and its sources are looked into.
@@ -259,6 +270,8 @@ pub struct Elaborator<'a> {
     pub open_calls: Vec<DeclId>,
     /// Constants being evaluated.
     pub open_consts: Vec<DeclId>,
+    /// What names and expressions were found to mean, where that is asked for.
+    pub meanings: Option<Box<crate::meanings::Meanings>>,
     /// Constants that were evaluated without a finding.
     pub known_consts: FxHashMap<DeclId, Value>,
 }
@@ -330,6 +343,7 @@ impl<'a> Elaborator<'a> {
             open_members: Vec::new(),
             open_calls: Vec::new(),
             open_consts: Vec::new(),
+            meanings: None,
             known_consts: FxHashMap::default(),
         }
     }

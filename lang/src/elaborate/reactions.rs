@@ -111,7 +111,7 @@ fn check_balance(
         Some(coefficients) if coefficients.len() == left.len() + right.len() => {
             let (a, b) = coefficients.split_at(left.len());
             let mended = format!("{} -> {}", show_side(table, left, a), show_side(table, right, b));
-            d = d.help(format!("it balances as `{mended}`")).fix("balance the equation", span, mended);
+            d = d.help(format!("it balances as `{mended}`")).guess("balance the equation", span, mended);
         }
         _ => d = d.help("check the species: one may be missing, or have another formula than you think"),
     }

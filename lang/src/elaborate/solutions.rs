@@ -223,7 +223,7 @@ impl<'a> Elaborator<'a> {
         }
         let rounded = show_number(format!("{:.3e}", unit.of_si(actual)).parse().unwrap_or_default());
         let mended = format!("{rounded} {}", unit.symbol);
-        self.report(d.help(format!("write `labelled {mended} of {}`", species.text)).fix(
+        self.report(d.help(format!("write `labelled {mended} of {}`", species.text)).guess(
             "correct the label",
             value.span,
             mended,

@@ -9,6 +9,10 @@ use matterix_ir::{Diagnostic, codes};
 use super::Elaborator;
 use super::geometry::Geometry;
 
+/// How far something may be from the middle of its place among several, m: clips have play, and deck and labware are
+/// measured anew.
+const PLAY: f64 = 5e-3;
+
 /// How far a thing's centre of mass may be beyond what bears it, m: shapes are nominal.
 const NOMINAL: f64 = 1e-3;
 
@@ -28,7 +32,7 @@ impl Elaborator<'_> {
                 continue;
             }
             let carriers = self.borne_by(id);
-            if !rings.iter().any(|ring| carriers.iter().any(|c| ring.contains(c))) {
+            if !rings.iter().any(|ring| carriers.iter().any(|c| ring.contains(c))) && !self.judge_slot(id) {
                 self.judge_place(id);
             }
         }
@@ -64,6 +68,32 @@ impl Elaborator<'_> {
         );
         let last = others.iter().fold(d, |d, (other, at)| d.because(*at, format!("`{other}` stands on what it bears")));
         self.report(last);
+    }
+
+    /// Reports a thing `at` another spot than the one that the place of several defines which it is in, such as a slot of a
+    /// deck; whether it does.
+    fn judge_slot(&mut self, id: InstanceId) -> bool {
+        let instance = &self.instances[id.0 as usize];
+        let (Some(at), Some((_, on))) = (instance.at, instance.placed.first().cloned()) else { return false };
+        let [x, y, _] = instance.pose.position;
+        let (name, place) = (instance.name.clone(), &self.instances[on.0 as usize]);
+        if !place.one_of_many || x.hypot(y) <= PLAY {
+            return false;
+        }
+        let (slot, whole) = (place.name.clone(), place.owner.map(|o| self.instances[o.0 as usize].name.clone()));
+        // What has a body of its own, such as a shelf, may bear things anywhere.
+        let Geometry { shape, room, solids, .. } = self.geometry(on);
+        if shape != room || !solids.is_empty() {
+            return false;
+        }
+        let headline = format!("`{name}` does not stand in the place that `{slot}` is");
+        let label = format!("it is {:.0} mm from there", x.hypot(y) * 1e3);
+        let d = Diagnostic::error(codes::OFF_PLACE, at, headline, label);
+        self.report(match whole {
+            Some(whole) => d.help(format!("leave out `at`: `{slot}` says where on `{whole}` it stands")),
+            None => d.help("leave out `at`"),
+        });
+        true
     }
 
     /// Reports a thing whose centre of mass is beyond what bears it.

@@ -268,7 +268,7 @@ pub fn unit_error(unit: &UnitText, error: UnitError) -> Diagnostic {
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
                 let mended = unit.text.replacen(&name, best, 1);
-                d = d.fix(format!("replace with `{mended}`"), unit.span, mended);
+                d = d.guess(format!("replace with `{mended}`"), unit.span, mended);
             }
             if name == "%" {
                 d.help = vec!["say of what: `%w/w` (by mass) or `%v/v` (by volume)".into()];

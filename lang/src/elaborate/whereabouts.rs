@@ -23,4 +23,9 @@ impl Elaborator<'_> {
         };
         self.instances.iter().map(known).collect()
     }
+
+    /// Whether the text says of two things or more where they stand.
+    pub fn has_places(&self) -> bool {
+        self.instances.iter().filter(|i| i.owner.is_none() && i.at.is_some()).nth(1).is_some()
+    }
 }

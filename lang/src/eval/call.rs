@@ -19,7 +19,10 @@ impl<'a> Elaborator<'a> {
             // A function is looked up where a name that is not a function would be refused.
             ExprKind::Name(n) if scope.var(&n.text).is_none() => {
                 match self.tables.names.lookup(scope.module, &n.text) {
-                    Some(id) if self.is_function(id) => Value::Function(id),
+                    Some(id) if self.is_function(id) => {
+                        self.note_declared(n.span, id);
+                        Value::Function(id)
+                    }
                     _ => {
                         let d = self.tables.names.unknown(scope.module, n, "function", |k| {
                             matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })

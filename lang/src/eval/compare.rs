@@ -5,8 +5,8 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Span, UnaryOp, Unit, cod
 
 use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, UnitText};
-use crate::elaborate::Elaborator;
 use crate::elaborate::units::unit_error;
+use crate::elaborate::{Compared, Elaborator};
 
 impl<'a> Elaborator<'a> {
     /// A truth value's node, or a report.
@@ -59,6 +59,7 @@ impl<'a> Elaborator<'a> {
             }
         };
         let upper = matches!(op, Binary::Lt | Binary::Le);
+        let strict = matches!(op, Binary::Lt | Binary::Gt);
         // The side that is a constant is the limit.
         let (value, limit, span, upper) = if self.is_fixed(x.node) && !self.is_fixed(y.node) {
             (&y, &x, at_b, !upper)
@@ -66,7 +67,10 @@ impl<'a> Elaborator<'a> {
             (&x, &y, at_a, upper)
         };
         let (low, high) = if upper { (None, Some(limit.node)) } else { (Some(limit.node), None) };
-        self.compared(value, low, high, limit, span);
+        let unit = self.unit_between(value, limit);
+        let value = value.node;
+        let comparison = Comparison { text: String::new(), value, low, high, strict, unit };
+        self.comparisons.push(Compared { span, comparison, each: Vec::new() });
         Value::Bool(node)
     }
 
@@ -90,9 +94,9 @@ impl<'a> Elaborator<'a> {
         !self.graph.leaves(node).meets(Leaves::LIVE)
     }
 
-    fn compared(&mut self, value: &Num, low: Option<NodeId>, high: Option<NodeId>, limit: &Num, span: Span) {
-        let unit = limit.unit.as_deref().cloned().unwrap_or_else(|| self.unit_of(value));
-        self.comparisons.push((span, Comparison { text: String::new(), value: value.node, low, high, unit }));
+    /// The unit a comparison is shown in: that of its limit, where it has one.
+    fn unit_between(&self, value: &Num, limit: &Num) -> Unit {
+        limit.unit.as_deref().cloned().unwrap_or_else(|| self.unit_of(value))
     }
 
     /// The unit a quantity is shown in: the one it was written in, where there is one.
@@ -235,7 +239,11 @@ impl<'a> Elaborator<'a> {
                 let Some((_, high)) = self.comparable(x, Value::Num(*high), at_x, at_set) else { return Value::Error };
                 let above = self.graph.binary(BinaryOp::Le, low.node, value.node);
                 let below = self.graph.binary(BinaryOp::Le, value.node, high.node);
-                self.compared(&value, Some(low.node), Some(high.node), &low, at_x);
+                let unit = self.unit_between(&value, &low);
+                let (low, high) = (Some(low.node), Some(high.node));
+                let value = value.node;
+                let comparison = Comparison { text: String::new(), value, low, high, strict: false, unit };
+                self.comparisons.push(Compared { span: at_x, comparison, each: Vec::new() });
                 Value::Bool(self.graph.binary(BinaryOp::And, above, below))
             }
             Value::List(items) => {

@@ -12,6 +12,14 @@ use crate::units::Dimension;
 impl<'a> Elaborator<'a> {
     /// Evaluates an expression; what is wrong is reported and gives [`Value::Error`].
     pub fn expr(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
+        let value = self.evaluate(e, scope);
+        if self.meanings.is_some() {
+            self.note_value(e.span, &value);
+        }
+        value
+    }
+
+    fn evaluate(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
         match &*e.kind {
             ExprKind::Error => Value::Error,
             ExprKind::Number(v) => self.number(*v, Dimension::one(), true),
@@ -191,12 +199,16 @@ impl<'a> Elaborator<'a> {
             };
         }
         if let Some(value) = self.of_lab(&n.text, scope) {
+            if let Value::Instance(id) = value {
+                self.note_name(n.span, |lab| Some(lab.instances[id.0 as usize].span));
+            }
             return value;
         }
         if let Some(value) = self.setting(&n.text) {
             return value;
         }
         if let Some(id) = self.tables.names.lookup(scope.module, &n.text) {
+            self.note_declared(n.span, id);
             return self.declared(id, n);
         }
         self.unknown_name(n, scope)
@@ -319,7 +331,7 @@ impl<'a> Elaborator<'a> {
         }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), n.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
         } else if let Some(module) = names.declared_in(&n.text).filter(|m| !m.is_empty()) {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", n.text));
         }
@@ -446,9 +458,18 @@ impl<'a> Elaborator<'a> {
         for item in items {
             let of = if single { self.spoken(&item) } else { None };
             let outer = of.is_some().then(|| (std::mem::take(&mut self.comparisons), std::mem::take(&mut self.terms)));
+            let instance = match &item {
+                Value::Instance(id) | Value::Qualified(id, _) => Some(*id),
+                _ => None,
+            };
+            let compared = self.comparisons.len();
             scope.bind(var.text.clone(), item);
             let noted = self.noted.len();
             let value = self.expr(body, scope);
+            if let Some(instance) = instance {
+                let inside = self.comparisons.iter_mut().skip(compared);
+                inside.for_each(|c| c.each.push((var.span, instance)));
+            }
             // The innermost of several, as all is bound there.
             if self.noting
                 && self.noted.len() == noted

@@ -172,7 +172,7 @@ impl<'a> Elaborator<'a> {
         }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         self.report(d);
         Value::Error
@@ -264,6 +264,7 @@ impl<'a> Elaborator<'a> {
 
     /// The value of a member, made once per instance.
     pub fn member_value(&mut self, id: InstanceId, m: MemberRef<'a>, at: Span) -> Value {
+        self.note_member(at, m);
         let MemberKind::Value { role, name, .. } = &m.member.kind else {
             return match &m.member.kind {
                 MemberKind::Frame { name, .. } => Value::Frame(id, name.text.clone()),

@@ -141,7 +141,7 @@ impl Tables<'_> {
         let near = near::nearest(&name.text, names);
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         d
     }

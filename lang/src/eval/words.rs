@@ -32,6 +32,7 @@ impl<'a> Elaborator<'a> {
     fn word(&mut self, e: &'a Expr, words: &Arc<[String]>, scope: &mut Scope) -> Value {
         let ExprKind::Name(n) = &*e.kind else { return self.expr(e, scope) };
         if let Some(value) = self.word_named(&n.text, words) {
+            self.note_value(e.span, &value);
             return value;
         }
         if self.resolves(n, scope) {
@@ -42,7 +43,7 @@ impl<'a> Elaborator<'a> {
         let mut d = Diagnostic::error(codes::UNKNOWN_NAME, n.span, headline, "no such word");
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), n.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
         }
         self.report(d);
         Value::Error
@@ -129,6 +130,7 @@ impl<'a> Elaborator<'a> {
             let value = self.member(Value::Instance(id), member);
             let Value::Enum(_, words) = &value else { return Some(Value::Error) };
             let wanted = self.word_named(&word.text, words)?;
+            self.note_value(word.span, &wanted);
             return Some(self.compare(Binary::Eq, value, wanted, word.span, word.span));
         }
         let name = self.instances[id.0 as usize].name.clone();
@@ -137,7 +139,7 @@ impl<'a> Elaborator<'a> {
             let best = near.first()?.clone();
             let headline = format!("`{name}` is never `{}`", word.text);
             let d = Diagnostic::error(codes::UNKNOWN_NAME, word.span, headline, "no state of it");
-            let d = d.fix(format!("replace with `{best}`"), word.span, best);
+            let d = d.guess(format!("replace with `{best}`"), word.span, best);
             Diagnostic { help: near::question(&near).into_iter().collect(), ..d }
         } else {
             let which: Vec<String> = knowing.iter().map(|m| format!("`{name}.{} is {}`", m.text, word.text)).collect();

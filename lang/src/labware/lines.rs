@@ -17,7 +17,7 @@ const TIP_PLAY: f64 = 0.2;
 const TIP_END: f64 = 0.2;
 
 /// The lines a definition stands for; all of them point to where its file is named.
-pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
+pub(super) fn of(definition: &Definition, text: &str, at: Span) -> Vec<AssetLine> {
     let write = Writer { definition, at };
     let mut lines: Vec<AssetLine> = definition
         .size()
@@ -27,8 +27,26 @@ pub(super) fn of(definition: &Definition, at: Span) -> Vec<AssetLine> {
         .collect();
     let known_by = definition.uri().map(|uri| write.expr(ExprKind::Text(uri)));
     lines.extend(known_by.map(|uri| AssetLine::Field(write.field("definition", uri))));
+    let whole = write.expr(ExprKind::Text(unbroken(text)));
+    lines.push(AssetLine::Field(write.field("described", whole)));
     lines.extend(write.grids().into_iter().map(AssetLine::Grid));
     lines
+}
+
+/// JSON as one word: without blanks between its signs, and with those in its texts, and single quotes, as their numbers.
+fn unbroken(json: &str) -> String {
+    let (mut out, mut quoted, mut escaped) = (String::with_capacity(json.len()), false, false);
+    for c in json.chars() {
+        match c {
+            ' ' if quoted => out.push_str("\\u0020"),
+            '\'' => out.push_str("\\u0027"),
+            c if !quoted && c.is_ascii_whitespace() => {}
+            c => out.push(c),
+        }
+        quoted ^= c == '"' && !escaped;
+        escaped = c == '\\' && !escaped;
+    }
+    out
 }
 
 struct Writer<'d> {

@@ -17,5 +17,5 @@ pub(crate) fn lines(text: &str, path: &Name) -> Result<(Vec<AssetLine>, Option<P
     let definition = Definition::read(text)?;
     let name = Name { text: definition.capability(), span: path.span };
     let kind = Path { segments: vec![name], span: path.span };
-    Ok((lines::of(&definition, path.span), Some(kind)))
+    Ok((lines::of(&definition, text, path.span), Some(kind)))
 }

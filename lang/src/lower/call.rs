@@ -49,6 +49,7 @@ impl<'a> Planner<'a, '_> {
         }
         let verb_span = call.words.first().map_or(call.span, |w| w.span.to(call.words[count - 1].span));
         let verb = self.choose(&verbs, &object, call, verb_span, scope)?;
+        self.lab.note_verb(verb_span, &verb);
         self.lab.verbs.insert(call.span, verb.clone());
         self.said = said;
         match verb {
@@ -59,7 +60,9 @@ impl<'a> Planner<'a, '_> {
 
     fn name_value(&mut self, e: &Expr, scope: &mut Scope) -> Value {
         let ExprKind::Name(n) = &*e.kind else { return Value::Error };
-        self.lab.name_of(n, scope)
+        let value = self.lab.name_of(n, scope);
+        self.lab.note_value(n.span, &value);
+        value
     }
 
     /// The meanings of the longest declared verb that the words begin with, and its number of words.
@@ -121,7 +124,7 @@ impl<'a> Planner<'a, '_> {
         let near = near::nearest(&text, &all);
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), span, best.clone());
         }
         if let Some(module) = names.declared_in(&text).filter(|m| !m.is_empty()) {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{text}`"));

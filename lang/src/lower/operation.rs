@@ -213,7 +213,7 @@ impl<'a> Planner<'a, '_> {
         bounds: Option<&'a crate::ast::Expr>,
         inner: &mut Scope,
     ) -> Option<Takes> {
-        let nominal = self.duration_node(nominal, inner, "takes")?;
+        let nominal = self.time_node(nominal, inner, "takes")?;
         let bounds = match bounds {
             None => None,
             Some(e) => {

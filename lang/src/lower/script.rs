@@ -37,7 +37,7 @@ struct Driver<'a> {
 /// What is said before anything else.
 fn opening(wire: &Wire) -> Option<&Exchange> {
     match &wire.kind {
-        WireKind::Fixed { when, exchange } if when.text == OPEN => Some(exchange),
+        WireKind::Fixed { when, exchange, .. } if when.text == OPEN => Some(exchange),
         _ => None,
     }
 }
@@ -224,7 +224,10 @@ impl<'a> Planner<'a, '_> {
                     }
                     self.messages(&exchange.sends, &mut scope);
                 }
-                WireKind::Fixed { when, exchange } if when.text == OPEN => {
+                WireKind::Fixed { condition: Some(condition), .. } => {
+                    self.not_said(driver.transport, condition.span, "conditions of lines");
+                }
+                WireKind::Fixed { when, exchange, .. } if when.text == OPEN => {
                     self.only_sends(driver.transport, wire, exchange);
                     self.messages(&exchange.sends, &mut Scope::of(device, driver.module));
                 }

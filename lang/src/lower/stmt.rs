@@ -285,23 +285,23 @@ impl<'a> Planner<'a, '_> {
         Unit::scaled("s", 1.0)
     }
 
-    /// A duration's node, s.
+    /// A duration's node, s; one that is negative whatever happens is reported where it stands.
     pub fn duration_node(&mut self, e: &'a Expr, scope: &mut Scope, what: &str) -> Option<NodeId> {
+        let node = self.time_node(e, scope, what)?;
+        if self.lab.graph.constant(node).is_some_and(|v| v < 0.0) {
+            let headline = "a duration cannot be negative";
+            self.lab.report(Diagnostic::error(codes::TYPE_MISMATCH, e.span, headline, "before it begins"));
+            return None;
+        }
+        Some(node)
+    }
+
+    /// The node of a time of either sign, s.
+    pub fn time_node(&mut self, e: &'a Expr, scope: &mut Scope, what: &str) -> Option<NodeId> {
         let v = self.lab.expr(e, scope);
         let ty = Type::Quantity { dimension: self.lab.duration(), point: false, optional: false };
         match self.lab.coerce(v, &ty, e.span, what) {
-            Value::Num(n) => {
-                if self.lab.graph.constant(n.node).is_some_and(|v| v < 0.0) {
-                    self.lab.report(Diagnostic::error(
-                        codes::TYPE_MISMATCH,
-                        e.span,
-                        "a duration cannot be negative",
-                        "before it begins",
-                    ));
-                    return None;
-                }
-                Some(n.node)
-            }
+            Value::Num(n) => Some(n.node),
             _ => None,
         }
     }

@@ -9,6 +9,7 @@ use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 use super::Planner;
 use super::call::Bound;
 use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
+use crate::elaborate::Compared;
 use crate::eval::{Scope, Value};
 use crate::names::{Names, near, verb_text};
 
@@ -130,8 +131,14 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// Comparisons with what is compared as it is written.
-    fn in_words(&self, compared: Vec<(Span, Comparison)>) -> Vec<Comparison> {
-        compared.into_iter().map(|(span, c)| Comparison { text: self.text(span), ..c }).collect()
+    fn in_words(&self, compared: Vec<Compared>) -> Vec<Comparison> {
+        let words = |c: &Compared| {
+            let text = self.text(c.span);
+            c.each
+                .iter()
+                .fold(text, |text, (name, id)| with_name(text, self.sources.slice(*name), || self.lab.spoken_name(*id)))
+        };
+        compared.into_iter().map(|c| Comparison { text: words(&c), ..c.comparison }).collect()
     }
 
     /// What a `needs` or `presumes` clause asks, with the failure and the help it names.
@@ -153,10 +160,23 @@ impl<'a> Planner<'a, '_> {
         self.lab.noting = words.is_some();
         let condition = self.condition(cond, scope);
         self.lab.noting = false;
-        let (condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
+        let (mut condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
+        self.name_arguments(&mut condition, scope);
         let said = words.map(|words| self.said(words, &condition, bound, scope)).unwrap_or_default();
         let refusal = refusal.map(|r| Refusal { failure: r.failure.text.clone(), help: r.help.clone(), said });
         Some(Condition { refusal, ..condition })
+    }
+
+    /// In what is compared, the names of parameters make room for those of the instances that were given.
+    fn name_arguments(&self, condition: &mut Condition, scope: &Scope) {
+        let each = condition.each.iter_mut().flat_map(|asked| &mut asked.compared);
+        for one in condition.compared.iter_mut().chain(each) {
+            for (name, value) in &scope.vars {
+                if let Value::Instance(id) = value {
+                    one.text = with_name(std::mem::take(&mut one.text), name, || self.lab.spoken_name(*id));
+                }
+            }
+        }
     }
 
     /// Words for each that a condition asks about; for all of it where it asks about nothing in turn.
@@ -280,8 +300,28 @@ impl<'a> Planner<'a, '_> {
         );
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         self.lab.report(d);
     }
+}
+
+/// An expression with a name in it replaced by what it stands for; members called the same stay.
+fn with_name(text: String, name: &str, stands_for: impl Fn() -> String) -> String {
+    let of_name = |c: char| c.is_alphanumeric() || c == '_';
+    let mut out = String::new();
+    let mut done = 0;
+    for (at, found) in text.match_indices(name) {
+        let before = text[..at].trim_end().chars().next_back();
+        let joined = text[..at].chars().next_back().is_some_and(of_name) || before == Some('.');
+        if !joined && !text[at + found.len()..].starts_with(of_name) {
+            out += &text[done..at];
+            out += &stands_for();
+            done = at + found.len();
+        }
+    }
+    if done == 0 {
+        return text;
+    }
+    out + &text[done..]
 }

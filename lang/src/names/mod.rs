@@ -8,11 +8,12 @@ use std::sync::Arc;
 use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
-use crate::library;
 use crate::loader::Loader;
+use crate::session::{self, Session};
+use crate::{import, library};
 
 /// A module: one file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Module {
     /// `std::thermal`, `sn1`; the file that is compiled has the empty name.
     pub name: String,
@@ -46,7 +47,7 @@ pub struct Decl<'a> {
 #[derive(Debug)]
 pub struct Names<'a> {
     /// All modules.
-    pub modules: &'a [Module],
+    pub modules: &'a [Arc<Module>],
     /// All named items.
     pub decls: Vec<Decl<'a>>,
     scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
@@ -54,16 +55,24 @@ pub struct Names<'a> {
 }
 
 /// Parses the root file and everything it imports; the library comes first.
-pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Module>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics, first) = library(sources, root);
+///
+/// What the session knows of texts that have not changed is taken from there.
+pub fn load(
+    sources: &mut Sources,
+    root: FileId,
+    loader: &dyn Loader,
+    session: &mut Session,
+) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
+    let package = sources.get(root).map_or_else(String::new, |source| source.name.clone());
+    let (mut modules, mut diagnostics, first) = library(sources, root, &package, session);
     let mut queue = vec![(String::new(), root)];
     let mut parsed = Some(first);
     while let Some((name, file)) = queue.pop() {
-        let (tree, found) = parsed.take().unwrap_or_else(|| parse(sources, file));
+        let (module, found) = parsed.take().unwrap_or_else(|| session.module(sources, &package, &name, file));
         diagnostics.extend(found);
-        for item in &tree.items {
+        for item in &module.tree.items {
             let ItemKind::Use { path, names } = &item.kind else { continue };
-            let known = |m: &str, modules: &[Module], queue: &[(String, FileId)]| {
+            let known = |m: &str, modules: &[Arc<Module>], queue: &[(String, FileId)]| {
                 modules.iter().any(|x| x.name == m) || queue.iter().any(|x| x.0 == m)
             };
             if path.segments[0].text == "std" {
@@ -92,23 +101,27 @@ pub fn load(sources: &mut Sources, root: FileId, loader: &dyn Loader) -> (Vec<Mo
                 }
             }
         }
-        modules.push(Module { name, file, tree });
+        modules.push(module);
     }
+    session.tidy(&package);
     let used = used(&modules);
-    for (module, _) in modules.iter_mut().zip(used).filter(|(_, used)| *used) {
-        diagnostics.extend(crate::import::import(&mut module.tree, module.file, loader));
+    for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
+        let (made, found) = session::imported(session, module, loader);
+        *module = made;
+        diagnostics.extend(found);
     }
-    if modules.iter().any(|m| crate::import::has_features(&m.tree)) {
+    if modules.iter().any(|m| import::has_features(&m.tree)) {
         let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
-        for module in &mut modules {
-            diagnostics.extend(crate::import::features(&mut module.tree, module.file, &units, sources, loader));
+        for module in modules.iter_mut().filter(|module| import::has_features(&module.tree)) {
+            let module = Arc::make_mut(module);
+            diagnostics.extend(import::features(&mut module.tree, module.file, &units, sources, loader));
         }
     }
     (modules, diagnostics)
 }
 
 /// Which modules the user's files import, directly or through others: data files of the others are not read.
-fn used(modules: &[Module]) -> Vec<bool> {
+fn used(modules: &[Arc<Module>]) -> Vec<bool> {
     let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
     let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
     while let Some(index) = todo.pop() {
@@ -124,26 +137,37 @@ fn used(modules: &[Module]) -> Vec<bool> {
     used
 }
 
-fn parse(sources: &Sources, file: FileId) -> (ast::File, Vec<Diagnostic>) {
-    crate::syntax::parse(file, sources.get(file).map_or("", |s| &s.text))
-}
+/// A module with what is wrong with its text.
+type Read = (Arc<Module>, Vec<Diagnostic>);
 
-/// The library's modules and their findings, and the tree of the root file, which is parsed meanwhile.
-fn library(sources: &mut Sources, root: FileId) -> (Vec<Module>, Vec<Diagnostic>, (ast::File, Vec<Diagnostic>)) {
+/// The library's modules and their findings, and the module of the root file, which is parsed meanwhile.
+fn library(
+    sources: &mut Sources,
+    root: FileId,
+    package: &str,
+    session: &mut Session,
+) -> (Vec<Arc<Module>>, Vec<Diagnostic>, Read) {
     let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
+    if session.library.iter().map(|module| module.file).eq(files.iter().copied()) {
+        let first = session.module(sources, package, "", root);
+        return (session.library.clone(), Vec::new(), first);
+    }
     let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
     let (trees, first) = std::thread::scope(|scope| {
         let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
-        let first = parse(sources, root);
+        let first = session.module(sources, package, "", root);
         // Where there is no thread to be had, this one does the work.
         (reading.ok().and_then(|reading| reading.join().ok()).unwrap_or_else(read), first)
     });
     let mut diagnostics = Vec::new();
     let module = |((module, file), (tree, found)): ((&library::Module, FileId), _)| {
         diagnostics.extend(found);
-        Module { name: module.name.to_string(), file, tree }
+        Arc::new(Module { name: module.name.to_string(), file, tree })
     };
-    let modules = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
+    let modules: Vec<Arc<Module>> = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
+    if diagnostics.is_empty() {
+        session.library.clone_from(&modules);
+    }
     (modules, diagnostics, first)
 }
 
@@ -197,7 +221,7 @@ pub fn verb_text(words: &[Name]) -> String {
 
 impl<'a> Names<'a> {
     /// Collects the declarations of all modules and resolves their imports.
-    pub fn new(modules: &'a [Module]) -> (Self, Vec<Diagnostic>) {
+    pub fn new(modules: &'a [Arc<Module>]) -> (Self, Vec<Diagnostic>) {
         let mut names = Names { modules, decls: Vec::new(), scopes: Vec::new(), own: Vec::new() };
         let mut diagnostics = Vec::new();
         for (index, module) in modules.iter().enumerate() {
@@ -307,7 +331,7 @@ impl<'a> Names<'a> {
         let near = near::nearest(&name.text, self.own[module].keys());
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         } else if let Some(other) = self.declared_in(&name.text) {
             d.help.push(format!("`{}` is declared in `{other}`", name.text));
         }
@@ -322,6 +346,11 @@ impl<'a> Names<'a> {
     /// What `name` stands for in a module.
     pub fn lookup(&self, module: usize, name: &str) -> Option<DeclId> {
         self.scopes[module].get(name).copied()
+    }
+
+    /// What the names that each module sees stand for.
+    pub fn into_scopes(self) -> Vec<BTreeMap<Arc<str>, DeclId>> {
+        self.scopes
     }
 
     /// Everything a module sees.
@@ -354,7 +383,7 @@ impl<'a> Names<'a> {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", name.text));
         } else if let Some(best) = near.first() {
             d.help.extend(near::question(&near));
-            d = d.fix(format!("replace with `{best}`"), name.span, best.clone());
+            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
         }
         d
     }

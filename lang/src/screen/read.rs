@@ -136,7 +136,7 @@ impl Reader<'_, '_> {
             );
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
-                d = d.fix(format!("replace with `{best}`"), word.span, best.clone());
+                d = d.guess(format!("replace with `{best}`"), word.span, best.clone());
             } else {
                 let all: Vec<String> = Consequence::names().map(|n| format!("`{n}`")).collect();
                 d = d.help(format!("it is one of {}", all.join(", ")));

@@ -13,7 +13,10 @@ pub use choose::choose;
 pub use lines::{count_of, resolve};
 pub use open::Open;
 
+use matterix_ir::Span;
 use matterix_ir::study::{Fit, Study};
+
+use crate::syntax::moved::Moved;
 
 /// What many runs are for.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,4 +25,22 @@ pub enum Many {
     Study(Study),
     /// To find what data say of parameters.
     Fit(Fit),
+}
+
+impl Moved for Many {
+    fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
+        match self {
+            Many::Study(study) => {
+                let free = study.varied.iter_mut().map(|varied| &mut varied.free.span);
+                let reports = study.reports.iter_mut().map(|report| &mut report.span);
+                free.chain(reports).chain([&mut study.span]).for_each(|span| span.moved(to));
+            }
+            Many::Fit(fit) => {
+                let free = fit.estimates.iter_mut().map(|estimate| &mut estimate.free.span);
+                let columns = fit.matches.iter_mut().map(|matched| &mut matched.column_span);
+                let own = [&mut fit.span, &mut fit.data_span];
+                free.chain(columns).chain(own).for_each(|span| span.moved(to));
+            }
+        }
+    }
 }

@@ -920,6 +920,8 @@ pub enum WireKind {
     Fixed {
         /// `open`, `close`, `halt` or `safe`.
         when: Name,
+        /// Only of devices of which this holds.
+        condition: Option<Expr>,
         /// What is said then.
         exchange: Exchange,
     },

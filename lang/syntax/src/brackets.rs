@@ -108,7 +108,7 @@ impl Balance<'_> {
                     "this text has no closing quote",
                     "a text ends on its line, with `\"`",
                 )
-                .fix("close the text", self.span(open.end, open.end), "\""),
+                .guess("close the text", self.span(open.end, open.end), "\""),
             );
         }
     }
@@ -191,7 +191,7 @@ impl Balance<'_> {
                 format!("`{opener}` is not closed"),
                 format!("`{insert}` is missing for this"),
             )
-            .fix(format!("add `{insert}`"), self.span(end, end), insert),
+            .guess(format!("add `{insert}`"), self.span(end, end), insert),
         );
     }
 
@@ -235,7 +235,7 @@ impl Balance<'_> {
                         format!("`{insert}` is expected"),
                     )
                     .because(self.span(top.at, top.at + 1), "opened here")
-                    .fix(format!("write `{insert}`"), span, insert),
+                    .guess(format!("write `{insert}`"), span, insert),
                 );
             }
             _ => self.stray(bracket),
@@ -246,7 +246,7 @@ impl Balance<'_> {
         let span = self.span(bracket.at, bracket.at + 1);
         self.changes.push(Change { at: bracket.at, remove: 1, insert: " " });
         let headline = format!("`{}` closes nothing", char::from(bracket.byte));
-        self.found.push(Diagnostic::error(codes::SYNTAX, span, headline, "nothing is open here").fix(
+        self.found.push(Diagnostic::error(codes::SYNTAX, span, headline, "nothing is open here").guess(
             "remove it",
             span,
             "",
@@ -300,7 +300,7 @@ impl Balance<'_> {
         self.found.push(
             Diagnostic::error(codes::SYNTAX, span, format!("`{{` is missing after `{what}`"), "the block starts here")
                 .because(self.span(bracket.at, bracket.at + 1), "and ends here")
-                .fix("add `{`", span, " {"),
+                .guess("add `{`", span, " {"),
         );
     }
 
@@ -346,7 +346,7 @@ impl Balance<'_> {
             diagnostic = diagnostic
                 .because(self.span(other, other + 1), "this `}` stands further left: it closes an outer block");
         }
-        self.found.push(diagnostic.fix("add `}`", self.span(end, end), "\n}"));
+        self.found.push(diagnostic.guess("add `}`", self.span(end, end), "\n}"));
     }
 }
 

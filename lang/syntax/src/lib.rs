@@ -5,6 +5,7 @@
 
 pub mod ast;
 mod brackets;
+pub mod classes;
 mod cursor;
 mod decode;
 mod dump;
@@ -12,6 +13,8 @@ pub mod fmt;
 mod grammar;
 mod lower;
 mod mistake;
+pub mod moved;
+mod parts;
 mod repair;
 mod scan;
 mod spot;
@@ -23,10 +26,11 @@ use pest::Parser;
 
 pub use decode::{NotText, decode};
 pub use dump::dump;
+pub use parts::Memo;
 
 use crate::ast::{Expr, ExprKind, File};
 use grammar::{Grammar, Rule};
-use repair::{Change, Offsets};
+use repair::Offsets;
 
 /// The deepest nesting of brackets.
 pub const MAX_NESTING: usize = 256;
@@ -39,10 +43,15 @@ const MAX_SHOWN: usize = 100;
 
 /// The tree of a file and what is wrong with its text. Total: what cannot be read becomes error nodes.
 pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
+    parse_again(file, text, &mut Memo::default())
+}
+
+/// The same of a file that may have been read before: what is as it was then is taken from the memo, which then knows this text.
+pub fn parse_again(file: FileId, text: &str, memo: &mut Memo) -> (File, Vec<Diagnostic>) {
     if text.len() > MAX_SIZE {
         return (nothing(), vec![too_large(Span::new(file, 0, 0), text.len())]);
     }
-    let (mut changes, mut found) = brackets::balance(file, text, &scan::scan(text));
+    let (changes, mut found) = brackets::balance(file, text, &scan::scan(text));
     found.extend(reserved_character(file, text));
     if changes.len() > brackets::MAX_CHANGES {
         return (nothing(), shown(file, text, found, 0));
@@ -54,21 +63,7 @@ pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
         found.push(too_deep(offsets.span(file, deepest, deepest + 1)));
         return (nothing(), shown(file, text, found, 0));
     }
-    let (mut tree, mut mistakes, mut hidden) = with_stack(depth, || read(file, &repaired, &offsets));
-    if !mistakes.is_empty() {
-        let mut holes = Vec::new();
-        for (end, word) in scan::dangling(&repaired, &scan) {
-            let at = offsets.user(end);
-            holes.push(Change { at, remove: 0, insert: MISSING_VALUE });
-            found.push(missing_value(Span::new(file, at, at), word));
-        }
-        if !holes.is_empty() {
-            holes.append(&mut changes);
-            holes.sort_by_key(|change| change.at);
-            let (repaired, offsets) = repair::apply(text, &holes);
-            (tree, mistakes, hidden) = with_stack(depth, || read(file, &repaired, &offsets));
-        }
-    }
+    let (tree, mistakes, hidden) = parts::read(file, &repaired, &scan, &offsets, memo);
     found.extend(mistakes);
     (tree, shown(file, text, found, hidden))
 }
@@ -84,21 +79,26 @@ pub fn parse_value(file: FileId, text: &str, start: usize) -> (Expr, Vec<Diagnos
     with_stack(depth, || lower::Lower::new(file, text, &Offsets::default()).value(start, text.len()))
 }
 
+/// What stands in brackets, with them, in the order of the closing ones; brackets that were left open stand for nothing.
+pub fn groups(text: &str) -> Vec<std::ops::Range<usize>> {
+    let mut open: Vec<(u8, usize)> = Vec::new();
+    let mut out = Vec::new();
+    for bracket in scan::scan(text).brackets {
+        match scan::closer(bracket.byte) {
+            Some(closer) => open.push((closer, bracket.at)),
+            None => {
+                let Some(index) = open.iter().rposition(|(closer, _)| *closer == bracket.byte) else { continue };
+                out.extend(open.get(index).map(|(_, start)| *start..bracket.at + 1));
+                open.truncate(index);
+            }
+        }
+    }
+    out
+}
+
 /// Whether a word can be a name of the language.
 pub fn is_name(word: &str) -> bool {
     Grammar::parse(Rule::ident, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
-}
-
-/// Reads a text whose brackets match.
-fn read(file: FileId, text: &str, offsets: &Offsets) -> (File, Vec<Diagnostic>, usize) {
-    match Grammar::parse(Rule::file, text).ok().and_then(|mut pairs| pairs.next()) {
-        Some(root) => lower::Lower::new(file, text, offsets).run(root),
-        None => {
-            let span = offsets.span(file, 0, 0);
-            let mistake = Diagnostic::error(codes::SYNTAX, span, "this file cannot be read", "it starts here");
-            (nothing(), vec![mistake], 0)
-        }
-    }
 }
 
 /// Runs `inside` where the stack holds for that many nested brackets, also without optimisation.
@@ -130,6 +130,10 @@ fn reserved_character(file: FileId, text: &str) -> Option<Diagnostic> {
     let at = text.find(MISSING_VALUE)?;
     let span = Span::new(file, at, at + MISSING_VALUE.len());
     Some(Diagnostic::error(codes::SYNTAX, span, "the file holds a character that is no text (U+001A)", "here"))
+}
+
+fn unreadable(span: Span) -> Diagnostic {
+    Diagnostic::error(codes::SYNTAX, span, "this file cannot be read", "it starts here")
 }
 
 fn missing_value(span: Span, word: &str) -> Diagnostic {

@@ -12,7 +12,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::deploy::{Binding, Carrier};
-use crate::port::Place;
+use crate::place::Place;
 
 const KEYS: [&str; 8] = ["port", "address", "http", "sila", "driver", "unit", "by", "tolerance"];
 const HAND: &str = "hand";
@@ -111,7 +111,8 @@ impl Reader<'_> {
                     None,
                 );
             }
-            let binding = Binding { instance, carrier: Carrier::Hand, tolerances: Vec::new() };
+            let at = Span::new(self.file, at.start, at.end);
+            let binding = Binding { instance, at, carrier: Carrier::Hand, tolerances: Vec::new() };
             return (self.found.len() == before).then_some(binding);
         }
         let places = [
@@ -156,8 +157,17 @@ impl Reader<'_> {
                     "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`".to_owned(),
                 ),
             };
-            self.wrong(said, &headline, "another kind of place", Some(help));
+            self.wrong(said.clone(), &headline, "another kind of place", Some(help));
+            return None;
         }
+        let at = Span::new(self.file, said.start, said.end);
+        let place = match place.checked() {
+            Ok(place) => place,
+            Err(no) => {
+                self.wrong(said, &format!("`{key}` cannot be there: {}", no.why), "no place", Some(no.help));
+                return None;
+            }
+        };
         if let Some((unit, at)) = &unit
             && let Err(why) = crate::codec::Codec::new(&self.program.drivers[driver].framing, Some(unit))
         {
@@ -165,7 +175,7 @@ impl Reader<'_> {
         }
         let tolerances = self.tolerances(key, driver, table);
         let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
-        (self.found.len() == before).then_some(Binding { instance, carrier, tolerances })
+        (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances })
     }
 
     fn driver(
@@ -228,7 +238,7 @@ impl Reader<'_> {
                     self.wrong(at.clone(), &headline, "bound here", Some(help));
                 }
                 let carrier = Carrier::Shared { driver: index, host };
-                all.push(Binding { instance: d.instance, carrier, tolerances: Vec::new() });
+                all.push(Binding { instance: d.instance, at: binding.at, carrier, tolerances: Vec::new() });
             }
         }
         all

@@ -10,6 +10,7 @@ pub mod emulate;
 pub mod http;
 pub mod link;
 pub mod pattern;
+pub mod place;
 pub mod play;
 pub mod port;
 #[cfg(feature = "sila")]

@@ -7,7 +7,8 @@ use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
 use crate::pattern::written;
-use crate::port::{self, Place, Port};
+use crate::place::{self, Place};
+use crate::port::{self, Port};
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,7 +43,20 @@ pub trait Overhear {
     fn back(&mut self, bytes: &[u8]);
     /// This is what an answer said that is put in later, under its word.
     fn kept(&mut self, word: &str, text: &str);
+    /// How long an answer is waited for from now on, where that is less than the driver says: it is to end.
+    fn patience(&self) -> Option<Duration> {
+        None
+    }
 }
+
+/// Longest wait for an answer once a run is to end.
+pub const STOPPING: Duration = Duration::from_secs(10);
+
+/// Longest wait for each answer while devices are made safe.
+pub const SECURING: Duration = Duration::from_secs(5);
+
+/// How often who waits for an answer looks whether it is to end.
+const LOOK: Duration = Duration::from_millis(50);
 
 /// A device that is spoken to.
 pub trait Line {
@@ -87,7 +101,7 @@ pub fn open(place: &Place, driver: &Driver, address: Option<&str>) -> Result<Box
     if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
         return sila(server, feature, driver.timeout);
     }
-    let opened = port::open(place, &driver.transport).map_err(|e| format!("cannot open `{place}`: {e}"));
+    let opened = port::open(place, driver).map_err(|e| place::trouble(place, &e));
     let link = opened.and_then(|port| Link::new(port, driver, address)).map_err(Trouble::Lost)?;
     Ok(Box::new(link))
 }
@@ -136,14 +150,20 @@ impl Link {
 
     #[allow(clippy::disallowed_methods, reason = "devices answer by the wall clock")]
     fn reply(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
-        let until = Instant::now() + self.timeout;
+        let begun = Instant::now();
+        let mut most = self.timeout;
+        let mut hurried = false;
         loop {
             if let Some(reply) = self.codec.take_reply(&mut self.buffer) {
                 return reply.map_err(|g| Trouble::Garbled(format!("to `{}` it answered what {}", shown(to), g.why)));
             }
-            let left = until.saturating_duration_since(Instant::now());
+            if let Some(patience) = ear.patience().filter(|_| !hurried) {
+                hurried = true;
+                most = most.min(begun.elapsed() + patience);
+            }
+            let left = most.saturating_sub(begun.elapsed());
             if left.is_zero() {
-                let seconds = self.timeout.as_secs_f64();
+                let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
                     [] => Trouble::Lost(format!("it did not answer `{}` within {seconds} s", shown(to))),
                     half => Trouble::Garbled(format!(
@@ -153,7 +173,8 @@ impl Link {
                     )),
                 });
             }
-            let bytes = self.port.receive(left).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
+            let bytes =
+                self.port.receive(left.min(LOOK)).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
             if !bytes.is_empty() {
                 ear.back(&bytes);
             }

@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 use matterix_ir::wire::{Driver, Exchange, Template};
 use matterix_ir::{NodeId, Program};
 
-use crate::link::{Line, Link, Overhear, Trouble};
-use crate::port::{self, Place};
+use crate::link::{Line, Link, Overhear, SECURING, STOPPING, Trouble};
+use crate::place::{self, Place};
+use crate::port;
 use crate::template;
 
 /// How often a device is asked whether it has come to the end.
@@ -40,15 +41,17 @@ pub fn play(
     cancel: &AtomicBool,
     ear: &mut dyn Overhear,
 ) -> Result<(), Unplayed> {
-    let opened = port::open(place, &driver.transport).and_then(|mut port| {
+    let opened = port::open(place, driver).and_then(|mut port| {
         port.attach(&sheet.name, sheet.bytes)?;
         Ok(port)
     });
     let lost = |why: String| Unplayed::Trouble(Trouble::Lost(why));
-    let port = opened.map_err(|e| lost(format!("cannot open `{place}`: {e}")))?;
+    let port = opened.map_err(|e| lost(place::trouble(place, &e)))?;
     let link = Link::new(port, driver, None).map_err(lost)?;
     let mut player = Player { program, driver, link, cancel };
+    let ear = &mut Hasty { ear, cancel, securing: false };
     let played = driver.play.iter().try_for_each(|exchange| player.exchange(exchange, ear));
+    ear.securing = true;
     if played.is_err() {
         for exchange in &driver.safe {
             let texts = texts(&exchange.sends);
@@ -59,6 +62,32 @@ pub fn play(
         }
     }
     played
+}
+
+/// Hears what another one hears, and waits no longer than seconds for each answer once it is to end.
+struct Hasty<'e> {
+    ear: &'e mut dyn Overhear,
+    cancel: &'e AtomicBool,
+    securing: bool,
+}
+
+impl Overhear for Hasty<'_> {
+    fn out(&mut self, bytes: &[u8]) {
+        self.ear.out(bytes);
+    }
+
+    fn back(&mut self, bytes: &[u8]) {
+        self.ear.back(bytes);
+    }
+
+    fn kept(&mut self, word: &str, text: &str) {
+        self.ear.kept(word, text);
+    }
+
+    fn patience(&self) -> Option<Duration> {
+        let stops = self.cancel.load(Ordering::Relaxed).then_some(STOPPING);
+        if self.securing { Some(SECURING) } else { stops }
+    }
 }
 
 struct Player<'p> {

@@ -4,10 +4,11 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-use matterix_ir::wire::Transport;
+use matterix_ir::wire::{Driver, Transport};
 use serial2::{CharSize, Parity, SerialPort, Settings, StopBits};
 
 use crate::http;
+use crate::place::Place;
 
 /// Bytes out and in.
 pub trait Port {
@@ -21,26 +22,6 @@ pub trait Port {
     }
 }
 
-/// Where a device is to be found.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A serial port or a pseudo-terminal, by its path.
-    Serial(String),
-    /// `HOST:PORT`.
-    Tcp(String),
-    /// A server of SiLA 2, `HOST:PORT`.
-    Sila(String),
-    /// A server at `HOST:PORT`.
-    Http(String),
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text) | Place::Http(text)) = self;
-        f.write_str(text)
-    }
-}
-
 /// Shortest wait that ports can be asked for.
 const LEAST: Duration = Duration::from_millis(1);
 
@@ -48,12 +29,12 @@ const LEAST: Duration = Duration::from_millis(1);
 const CONNECT: Duration = Duration::from_secs(5);
 
 /// Opens a line; a driver for a serial port may also speak over a network, to a converter or an emulator.
-pub fn open(place: &Place, transport: &Transport) -> io::Result<Box<dyn Port>> {
+pub fn open(place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
     match place {
-        Place::Serial(path) => Ok(Box::new(Serial(serial(path, transport)?))),
+        Place::Serial(path) => Ok(Box::new(Serial(serial(path, &driver.transport)?))),
         Place::Tcp(address) => Ok(Box::new(Tcp(connect(address)?))),
         Place::Sila(_) => Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
-        Place::Http(address) => Ok(Box::new(http::open(address, transport)?)),
+        Place::Http(address) => Ok(Box::new(http::open(address, driver)?)),
     }
 }
 
@@ -86,8 +67,10 @@ fn serial(path: &str, transport: &Transport) -> io::Result<SerialPort> {
 }
 
 pub(crate) fn connect(address: &str) -> io::Result<TcpStream> {
-    let all: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
-    let mut last = io::Error::new(ErrorKind::NotFound, "there is no such host");
+    let unknown = || io::Error::other("the host is unknown");
+    // Why a name is not found each system says in its own words.
+    let all: Vec<SocketAddr> = address.to_socket_addrs().map_err(|_| unknown())?.collect();
+    let mut last = unknown();
     for one in all {
         match TcpStream::connect_timeout(&one, CONNECT) {
             Ok(stream) => {

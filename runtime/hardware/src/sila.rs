@@ -65,6 +65,7 @@ impl Line for Server {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
+        self.0.wait_at_most(ear.patience());
         for text in texts {
             ear.out(text.as_bytes());
             let reply = self.0.say(text, !goes_on(driver, text)).map_err(|f| trouble(f, driver, ear))?;
@@ -83,6 +84,7 @@ impl Line for Server {
         driver: &Driver,
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
+        self.0.wait_at_most(ear.patience());
         ear.out(text.as_bytes());
         let reply = self.0.ask(text).map_err(|f| trouble(f, driver, ear))?;
         ear.back(reply.as_bytes());
@@ -96,6 +98,7 @@ impl Line for Server {
         driver: &Driver,
         ear: &mut dyn Overhear,
     ) -> Result<bool, Trouble> {
+        self.0.wait_at_most(ear.patience());
         let Some(expects) = &until.expects else {
             return self.0.is_done(text).map_err(|f| trouble(f, driver, ear));
         };

@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use matterix_ir::bodies::{Bodies, Machine};
+use matterix_ir::bodies::{Bodies, Machine, Standing};
 use matterix_ir::mesh::Mesh;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::Shape;
 use matterix_recording::{Recording, Topic, list, number, text};
-use matterix_solids::{Body, Isometry, Made, isometry};
+use matterix_solids::{Body, Isometry, MESH_CELLS, Made, isometry};
 use serde::Deserialize;
 use serde_json::Value;
 
@@ -33,6 +33,8 @@ impl std::error::Error for Unreadable {}
 pub(crate) struct Film {
     pub(crate) things: Vec<Thing>,
     pub(crate) robots: Vec<Robot>,
+    /// What has a place of its own when the run begins.
+    pub(crate) standing: Vec<Standing>,
 }
 
 /// A rigid thing.
@@ -42,6 +44,8 @@ pub(crate) struct Thing {
     pub(crate) whole: String,
     /// Nothing for what only carries others.
     pub(crate) body: Option<Body>,
+    /// How far its pieces may stand out of it, m: a mesh is taken apart by cells.
+    pub(crate) coarse: f64,
     /// Its named points, relative to it.
     pub(crate) points: Vec<Isometry>,
     way: Vec<(f64, Isometry)>,
@@ -106,6 +110,7 @@ impl Film {
                     rooms: thing.rooms.as_slice().into(),
                     collision: &thing.collision,
                 }),
+                coarse: thing.hull().map(|(shape, _)| coarse(shape)).fold(0.0, f64::max),
                 points: points.get(&thing.name).cloned().unwrap_or_default(),
                 way: ways.get(&thing.name).cloned().unwrap_or_default(),
             })
@@ -115,14 +120,26 @@ impl Film {
             is_tree(&machine)?;
             robots.push(robot(machine, &recording, &ways, &things)?);
         }
-        Ok(Film { things, robots })
+        Ok(Film { things, robots, standing: bodies.standing })
     }
 }
 
 impl Thing {
+    /// When and where it was first said to be.
+    pub(crate) fn first(&self) -> Option<(f64, Isometry)> {
+        self.way.first().copied()
+    }
+
     /// Where it was last said to be.
     pub(crate) fn at(&self, time: f64) -> Option<Isometry> {
         last(&self.way, time)
+    }
+}
+
+fn coarse(shape: &Shape) -> f64 {
+    match shape {
+        Shape::Mesh(_) => shape.size().into_iter().fold(0.0, f64::max) / MESH_CELLS,
+        _ => 0.0,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Judges what a recording says robots did, apart from what planned it.
+//! Judges what a recording says robots did, apart from what planned it, and how things stood before.
 //!
 //! It reads the file alone: shapes and joints (`/bodies`), joints over time (`/joints`), frames (`/tf`) and grips
 //! (`/grips`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
@@ -6,6 +6,7 @@
 mod film;
 mod kinematics;
 mod limits;
+mod standing;
 mod sweep;
 mod verdict;
 
@@ -27,6 +28,7 @@ pub const GRIP: f64 = 2e-3;
 pub fn judge(file: &[u8]) -> Result<Verdict, Unreadable> {
     let film = Film::read(file)?;
     let mut verdict = Verdict::default();
+    verdict.wrong.extend(standing::judge(&film));
     for index in 0..film.robots.len() {
         let mut looked = Looked { robot: film.robots[index].name.clone(), ..Looked::default() };
         limits::judge(&film.robots[index], &mut looked, &mut verdict.wrong);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
-use matterix_ir::bodies::{Bodies, Machine, Thing};
+use matterix_ir::bodies::{Bodies, Machine, Standing, Thing};
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::{Joint, JointKind, JointLimits, Link, Piece, Robot, Solid};
 use matterix_ir::scene::Shape;
@@ -42,6 +42,7 @@ struct Run {
     /// Added to where the sledge is said to be, m.
     astray: f64,
     things: Vec<(Thing, [f64; 3])>,
+    standing: Vec<Standing>,
 }
 
 impl Run {
@@ -61,7 +62,8 @@ impl Run {
         };
         let machine = Machine { name: "slide".into(), robot: slide(), tip: 1, tools: 2 };
         let things = self.things.iter().map(|(thing, _)| thing.clone()).collect();
-        push("/bodies", 0.0, serde_json::to_value(Bodies { things, machines: vec![machine] }).expect("JSON"));
+        let standing = self.standing.clone();
+        push("/bodies", 0.0, serde_json::to_value(Bodies { things, machines: vec![machine], standing }).expect("JSON"));
         let frame = |name: &str, [x, y, z]: [f64; 3]| {
             json!({ "parent_frame_id": "lab", "child_frame_id": name, "translation": { "x": x, "y": y, "z": z },
                 "rotation": { "x": 0, "y": 0, "z": 0, "w": 1 } })
@@ -93,13 +95,13 @@ fn gently(time: f64) -> [f64; 3] {
 }
 
 fn wrong(law: fn(f64) -> [f64; 3], astray: f64, things: Vec<(Thing, [f64; 3])>) -> Vec<Wrong> {
-    judge(&Run { law, astray, things }.file()).expect("a verdict").wrong
+    judge(&Run { law, astray, things, standing: Vec::new() }.file()).expect("a verdict").wrong
 }
 
 #[test]
 fn a_gentle_motion_beside_things_is_right() {
     let post = thing("post", Shape::Box([0.02, 0.02, 0.5]));
-    let run = Run { law: gently, astray: 0.0, things: vec![(post, [0.25, 0.0615, 0.0])] };
+    let run = Run { law: gently, astray: 0.0, things: vec![(post, [0.25, 0.0615, 0.0])], standing: Vec::new() };
     let verdict = judge(&run.file()).expect("a verdict");
     assert_eq!(verdict.wrong, []);
     let looked = &verdict.looked[0];
@@ -127,6 +129,31 @@ fn hollow_things_are_met_at_their_walls_only() {
     assert_eq!(wrong(little, 0.0, vec![(tub(wide.clone()), [0.05, 0.0, 0.0])]), []);
     assert_eq!(wrong(little, 0.0, vec![(tub(Vec::new()), [0.05, 0.0, 0.0])]).len(), 1);
     assert_eq!(wrong(gently, 0.0, vec![(tub(wide), [0.05, 0.0, 0.0])]).len(), 1);
+}
+
+#[test]
+fn what_stands_in_something_from_the_start_is_found() {
+    let standing = |name: &str, carriers: &[&str], told| Standing {
+        name: name.into(),
+        carriers: carriers.iter().map(|c| (*c).to_string()).collect(),
+        told,
+        loose: true,
+    };
+    let met = |apart: f64, one: Standing, other: Standing| {
+        let cube = |name| thing(name, Shape::Box([0.1; 3]));
+        let things = vec![(cube("one"), [2.0, 0.0, 0.0]), (cube("other"), [2.0 + apart, 0.0, 0.05])];
+        let run = Run { law: gently, astray: 0.0, things, standing: vec![one, other] };
+        judge(&run.file()).expect("a verdict").wrong
+    };
+    let (one, other) = (|| standing("one", &["table"], true), || standing("other", &["table"], true));
+    let found = met(0.09, one(), other());
+    let [Wrong::Meets { mine, other: met_by, depth, .. }] = found.as_slice() else { panic!("{found:?}") };
+    assert_eq!((mine.as_str(), met_by.as_str()), ("other", "one"));
+    assert!((depth - 0.01).abs() < 1e-6, "{depth}");
+    assert_eq!(met(0.0985, one(), other()), [], "shapes are nominal");
+    assert_eq!(met(0.09, one(), standing("other", &["one.place", "one"], true)), [], "it stands there");
+    assert_eq!(met(0.09, one(), standing("other", &["table"], false)), [], "it is somewhere on the table");
+    assert_eq!(met(0.09, one(), standing("other", &["stand"], false)).len(), 1, "it has that for itself");
 }
 
 #[test]
@@ -164,7 +191,7 @@ fn damaged_files_are_refused() {
     for bytes in [b"".as_slice(), b"hello", b"\x89MCAP0\r\n"] {
         assert!(judge(bytes).is_err());
     }
-    let whole = Run { law: gently, astray: 0.0, things: Vec::new() }.file();
+    let whole = Run { law: gently, astray: 0.0, things: Vec::new(), standing: Vec::new() }.file();
     for length in (0..whole.len()).step_by(97) {
         let _ = judge(&whole[..length]);
     }

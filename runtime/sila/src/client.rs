@@ -44,6 +44,8 @@ pub struct Client {
     runtime: Runtime,
     grpc: Grpc<Channel>,
     timeout: Duration,
+    /// As it was given.
+    usual: Duration,
     /// The one that is meant where a text names none goes first.
     features: Vec<Feature>,
     running: BTreeMap<(usize, String), Running>,
@@ -85,6 +87,7 @@ impl Client {
             runtime,
             grpc,
             timeout,
+            usual: timeout,
             features,
             running: BTreeMap::new(),
             last: BTreeMap::new(),
@@ -109,6 +112,11 @@ impl Client {
             }
         }
         Ok(client)
+    }
+
+    /// From here on no call lasts longer than this, where that is less than was given.
+    pub fn wait_at_most(&mut self, time: Option<Duration>) {
+        self.timeout = time.map_or(self.usual, |time| time.min(self.usual));
     }
 
     /// The feature that is meant where a text names none.

@@ -89,6 +89,30 @@ impl Body {
         self.around.mins.abs().max(self.around.maxs.abs()).length()
     }
 
+    /// The least and the greatest corner of a box around it as it is placed, m.
+    pub fn bounds(&self, at: &Isometry) -> [[f64; 3]; 2] {
+        let around = self.pieces.iter().map(|p| p.shape.compute_aabb(&(*at * p.at))).reduce(|a, b| a.merged(&b));
+        let around = around.unwrap_or_else(|| self.around.transform_by(at));
+        [around.mins.to_array(), around.maxs.to_array()]
+    }
+
+    /// Whether two bodies reach deeper into each other than this, m; quicker than where and how deep.
+    pub fn meets(&self, at: &Isometry, other: &Body, other_at: &Isometry, deeper: f64) -> bool {
+        let between = at.inv_mul(other_at);
+        if !self.around.intersects(&other.around.transform_by(&between)) {
+            return false;
+        }
+        other.pieces.iter().any(|theirs| {
+            let box_of_theirs = theirs.around.transform_by(&between);
+            if !box_of_theirs.intersects(&self.around) {
+                return false;
+            }
+            let theirs_at = between * theirs.at;
+            let near = self.pieces.iter().filter(|mine| mine.around.intersects(&box_of_theirs));
+            near.into_iter().any(|mine| is_deep(mine, theirs, &theirs_at, deeper))
+        })
+    }
+
     /// The nearest or deepest touch of two bodies, if they are no farther apart than `within`, m.
     pub fn touch(&self, at: &Isometry, other: &Body, other_at: &Isometry, within: f64) -> Option<Touch> {
         // The other in the frame of this one.
@@ -131,6 +155,16 @@ fn contact(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, within: f64) ->
         (Some(a), Some(b)) => Some(if a.dist < b.dist { b } else { a }),
         (a, b) => a.or(b),
     }
+}
+
+/// Whether [`contact`] is deeper than this, m.
+fn is_deep(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, deeper: f64) -> bool {
+    let one = query::contact(&mine.at, mine.shape.as_ref(), theirs_at, theirs.shape.as_ref(), 0.0).ok().flatten();
+    if one.is_some_and(|c| c.dist >= -deeper) {
+        return false;
+    }
+    let other = query::contact(theirs_at, theirs.shape.as_ref(), &mine.at, mine.shape.as_ref(), 0.0).ok().flatten();
+    other.map_or(one.is_some(), |c| c.dist < -deeper)
 }
 
 fn push(at: Isometry, shape: SharedShape, pieces: &mut Vec<Convex>) {

@@ -13,5 +13,6 @@ pub mod turned;
 
 pub use body::{Body, Touch};
 pub use made::{Bodies, Made};
+pub use mesh::MESH_CELLS;
 pub use parry3d_f64::math::{Pose as Isometry, Vector};
 pub use place::{isometry, pose};

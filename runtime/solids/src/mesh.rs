@@ -8,6 +8,8 @@ use parry3d_f64::transformation::vhacd::{VHACD, VHACDParameters};
 
 /// Cells along the longest edge of a mesh by which it is taken apart; pieces stand out of it by one cell at most.
 const CELLS: u32 = 96;
+/// The same, as a number to divide by.
+pub const MESH_CELLS: f64 = CELLS as f64;
 
 /// A mesh that fills its hull up to this share is taken for convex.
 const CONVEX: f64 = 0.99;

@@ -32,7 +32,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::codes::{self, Code};
-use matterix_ir::plan::{Plan, StepId};
+use matterix_ir::plan::{LONGEST_RUN, Plan, StepId};
 use matterix_ir::scene::Scene;
 use matterix_ir::{NodeId, Unit};
 use serde::{Deserialize, Serialize};
@@ -78,13 +78,7 @@ pub struct Looks<'c> {
 impl Default for Limits<'_> {
     /// 30 days, a million steps.
     fn default() -> Self {
-        Limits {
-            horizon: 30.0 * 86_400.0,
-            steps_per_instant: 100_000,
-            cancel: None,
-            turns: &[],
-            looks: Looks::default(),
-        }
+        Limits { horizon: LONGEST_RUN, steps_per_instant: 100_000, cancel: None, turns: &[], looks: Looks::default() }
     }
 }
 

@@ -156,7 +156,7 @@ impl Executor<'_, '_> {
         }
         let what = what.unwrap_or_else(|| "the run".to_owned());
         let message = format!("{what} is still waited for after {days} days of lab time");
-        let help = vec!["give it a `timeout`, or raise the longest time a run may take".to_owned()];
+        let help = vec!["give it a `timeout`".to_owned()];
         Fault { code: codes::WAITS_FOR_EVER, span, time: self.now, message, help }
     }
 

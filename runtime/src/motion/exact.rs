@@ -1,7 +1,7 @@
 //! The narrow phase: a robot and what is around it in their true shapes, asked where balls collide.
 
 use std::borrow::Cow;
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell};
 use std::collections::BTreeSet;
 
 use matterix_ir::scene::{InstanceId, Scene};
@@ -27,6 +27,8 @@ pub struct Exact<'s> {
     figure: &'s Figure,
     surroundings: &'s Surroundings,
     parts: OnceCell<Parts<'s>>,
+    /// What moves and what around it met last, by index.
+    last: Cell<Option<[usize; 2]>>,
 }
 
 #[derive(Debug, Default)]
@@ -35,12 +37,16 @@ struct Parts<'s> {
     mine: Vec<Option<(usize, Isometry, &'s Body)>>,
     /// Each with the index of the first solid of the surroundings that is of the same thing, or of the same link of it.
     around: Vec<(usize, Isometry, Cow<'s, Body>)>,
+    /// How far what moves reaches from its origin, m.
+    reach: Vec<f64>,
+    /// The boxes around what is around: least and greatest corner, m.
+    boxes: Vec<[[f64; 3]; 2]>,
 }
 
 impl<'s> Exact<'s> {
     /// What the balls of `figure` and the solids of `surroundings` stand for.
     pub fn of(stage: &'s Stage<'_>, robot: InstanceId, figure: &'s Figure, surroundings: &'s Surroundings) -> Self {
-        Exact { stage, robot, figure, surroundings, parts: OnceCell::new() }
+        Exact { stage, robot, figure, surroundings, parts: OnceCell::new(), last: Cell::new(None) }
     }
 
     fn parts(&self) -> &Parts<'s> {
@@ -89,7 +95,9 @@ impl<'s> Exact<'s> {
             let body = stage.bodies().get(id.0 as usize).and_then(Option::as_ref);
             around.extend(body.map(|body| (index, isometry(&at), Cow::Borrowed(body))));
         }
-        Some(Parts { mine, around })
+        let reach = mine.iter().map(|mine| mine.map_or(0.0, |(.., body)| body.reach())).collect();
+        let boxes = around.iter().map(|(_, at, body): &(_, _, Cow<'_, Body>)| body.bounds(at)).collect();
+        Some(Parts { mine, around, reach, boxes })
     }
 
     /// Every touch that counts but for those that are spared, deepest first.
@@ -99,21 +107,36 @@ impl<'s> Exact<'s> {
             if !spared(link, &other) {
                 out.push(Contact { link, other, point: Point3::from(touch.point), depth: -touch.distance });
             }
-            false
         });
         out.sort_by(|a, b| b.depth.total_cmp(&a.depth));
         out
     }
 
-    /// Every touch that counts, until `tell` says that it is enough.
-    fn look(&self, q: &[f64], mut tell: impl FnMut(u32, Other, Touch) -> bool) {
+    /// What moves, where it is.
+    fn placed(&self, q: &[f64]) -> Vec<Option<(Isometry, &'s Body)>> {
         let links: Vec<Isometry> = self.figure.poses(q).iter().map(|p| isometry(&placement(p))).collect();
-        let parts = self.parts();
-        let placed: Vec<Option<(Isometry, &Body)>> = parts
-            .mine
-            .iter()
-            .map(|mine| mine.and_then(|(link, inner, body)| Some((*links.get(link)? * inner, body))))
-            .collect();
+        let of = |(link, inner, body): (usize, Isometry, &'s Body)| Some((*links.get(link)? * inner, body));
+        self.parts().mine.iter().map(|mine| mine.and_then(of)).collect()
+    }
+
+    /// Whether what moves reaches into something around, both by index.
+    fn reaches(&self, placed: &[Option<(Isometry, &Body)>], link: usize, which: usize) -> bool {
+        let (parts, Some(Some((at, body)))) = (self.parts(), placed.get(link)) else { return false };
+        let (Some(reach), Some((index, other_at, other))) = (parts.reach.get(link), parts.around.get(which)) else {
+            return false;
+        };
+        let [low, high] = parts.boxes[which];
+        let middle = at.translation.to_array();
+        if (0..3).any(|k| middle[k] + reach < low[k] || middle[k] - reach > high[k]) {
+            return false;
+        }
+        let stands = self.figure.is_still(link as u32) && self.surroundings.world.beneath.contains(index);
+        !stands && body.meets(at, other, other_at, TOUCH)
+    }
+
+    /// Every touch that counts.
+    fn look(&self, q: &[f64], mut tell: impl FnMut(u32, Other, Touch)) {
+        let (parts, placed) = (self.parts(), self.placed(q));
         let counts = |touch: Option<Touch>| touch.filter(|t| t.distance < -TOUCH);
         for (link, mine) in placed.iter().enumerate() {
             let Some((at, body)) = mine else { continue };
@@ -122,9 +145,8 @@ impl<'s> Exact<'s> {
                 if stands && self.surroundings.world.beneath.contains(index) {
                     continue;
                 }
-                let found = counts(body.touch(at, other, other_at, 0.0));
-                if found.is_some_and(|touch| tell(link as u32, Other::Body(*index), touch)) {
-                    return;
+                if let Some(touch) = counts(body.touch(at, other, other_at, 0.0)) {
+                    tell(link as u32, Other::Body(*index), touch);
                 }
             }
         }
@@ -134,9 +156,8 @@ impl<'s> Exact<'s> {
             else {
                 continue;
             };
-            let found = counts(body.touch(at, other, other_at, 0.0));
-            if found.is_some_and(|touch| tell(*a, Other::Link(*b), touch)) {
-                return;
+            if let Some(touch) = counts(body.touch(at, other, other_at, 0.0)) {
+                tell(*a, Other::Link(*b), touch);
             }
         }
     }
@@ -148,12 +169,23 @@ impl Referee for Exact<'_> {
     }
 
     fn is_free(&self, q: &[f64]) -> bool {
-        let mut free = true;
-        self.look(q, |_, _, _| {
-            free = false;
-            true
-        });
-        free
+        let placed = self.placed(q);
+        // What a configuration meets, the next one near it mostly meets as well.
+        let last = self.last.get().filter(|[link, which]| self.reaches(&placed, *link, *which));
+        if last.is_some() {
+            return false;
+        }
+        for link in 0..placed.len() {
+            if let Some(which) = (0..self.parts().around.len()).find(|which| self.reaches(&placed, link, *which)) {
+                self.last.set(Some([link, which]));
+                return false;
+            }
+        }
+        let side = |link: u32| placed.get(link as usize).and_then(Option::as_ref);
+        self.figure.apart().iter().all(|[a, b]| match (side(*a), side(*b)) {
+            (Some((at, body)), Some((other_at, other))) => !body.meets(at, other, other_at, TOUCH),
+            _ => true,
+        })
     }
 
     fn resolution(&self) -> f64 {

@@ -6,7 +6,7 @@ use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointKind;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::pose::{distance, pose};
-use matterix_motion::spheres::{Checker, Figure, Held};
+use matterix_motion::spheres::{Checker, Contact, Figure, Held};
 use matterix_motion::{Chain, Variable};
 
 use super::approach::is_clear;
@@ -22,6 +22,8 @@ use super::way::timed;
 const STEP: f64 = 0.01;
 /// Radius of what hangs below the tool, distance of the balls that stand for it, and fineness of the way across, m.
 const HANGING: f64 = 0.004;
+/// Places of a way at most at which it is asked what is in the way.
+const MOST: f64 = 1000.0;
 
 impl Actor {
     /// Whether all that moves its tip slides, so that the tip never turns.
@@ -160,9 +162,12 @@ impl Stage<'_> {
                 return Ok(height);
             }
             if height == top {
-                let mut over = there.to_vec();
-                over[last] = top;
-                let contacts = figure.contacts(&around.world, &over);
+                let [from, to] = [now, there].map(|q| {
+                    let mut q = q.to_vec();
+                    q[last] = top;
+                    q
+                });
+                let contacts = first(&from, &to, |q| figure.contacts(&around.world, q));
                 return Err(self.meeting(&figure, &around, &contacts, false));
             }
             height = lift(height + up * STEP);
@@ -186,7 +191,8 @@ impl Stage<'_> {
         if is_clear(&mut checker, from, to) || checker.ask(true) && is_clear(&mut checker, from, to) {
             return Ok(());
         }
-        Err(self.meeting(&figure, &around, &checker.contacts(to), false))
+        let contacts = first(to, from, |q| checker.contacts(q));
+        Err(self.meeting(&figure, &around, &contacts, false))
     }
 
     /// The direction in which the last joint of a gantry raises its tip, and how far that goes.
@@ -200,6 +206,17 @@ impl Stage<'_> {
         let limits = actor.chain.variables().get(last).map(|v| [v.limits.lower, v.limits.upper]).unwrap_or_default();
         if rises { (1.0, limits[1]) } else { (-1.0, limits[0]) }
     }
+}
+
+/// What is met first on a straight way; nothing where none of the places looked at has a contact.
+fn first(from: &[f64], to: &[f64], contacts: impl Fn(&[f64]) -> Vec<Contact>) -> Vec<Contact> {
+    let far = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+    let steps = (far / HANGING).ceil().clamp(1.0, MOST) as u32;
+    let at = |step: u32| {
+        let share = f64::from(step) / f64::from(steps);
+        from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect::<Vec<f64>>()
+    };
+    (0..=steps).map(|step| contacts(&at(step))).find(|met| !met.is_empty()).unwrap_or_default()
 }
 
 /// How far to go along each of three lines to get there; none where they lie in a plane or are not three.

@@ -569,6 +569,11 @@ impl Actor {
         self.bodies.get_or_init(|| Body::of_links(&self.assembly.robot))
     }
 
+    /// Whether its tool is described: a link other than the one that carries tools, or joints beside those that move the tip.
+    pub fn has_tool(&self) -> bool {
+        self.assembly.tip != self.assembly.flange || self.arm.len() < self.joints.len()
+    }
+
     /// What finds postures that bring its tip to a pose.
     pub fn solver(&self) -> Solver {
         Solver::new(Chain::clone(&self.chain))

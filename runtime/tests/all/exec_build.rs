@@ -54,6 +54,7 @@ impl Lab {
             support: None,
             pose: Pose::default(),
             placed: true,
+            at: None,
             frames: Vec::new(),
             shape: None,
             solids: Vec::new(),
@@ -136,8 +137,14 @@ impl Lab {
     }
 
     pub fn condition(&mut self, node: NodeId, text: &str, compared: Option<(NodeId, NodeId)>) -> Condition {
-        let comparison =
-            |(value, low)| Comparison { text: "a".into(), value, low: Some(low), high: None, unit: unit() };
+        let comparison = |(value, low)| Comparison {
+            text: "a".into(),
+            value,
+            low: Some(low),
+            high: None,
+            strict: true,
+            unit: unit(),
+        };
         let compared = compared.into_iter().map(comparison).collect();
         Condition {
             node,

@@ -52,6 +52,19 @@ pub(super) fn table(points: &Points, texts: &mut Texts<'_>) -> String {
 
 /// Everything that is known after one statement.
 pub(super) fn all(points: &Points, index: usize, texts: &mut Texts<'_>) -> String {
+    after(points, index, |_| true, texts)
+}
+
+/// The same of the things that the statement changes, or whose names stand in it.
+pub(super) fn brief(points: &Points, index: usize, texts: &mut Texts<'_>) -> String {
+    let label = points.points.get(index).map_or("", |point| point.label.as_str());
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let words: Vec<&str> = label.split(|c| !word(c)).collect();
+    let named = |thing: &Thing| words.contains(&thing.name.split(|c| !word(c)).next().unwrap_or_default());
+    after(points, index, |thing| thing.changed() || named(thing), texts)
+}
+
+fn after(points: &Points, index: usize, show: impl Fn(&Thing) -> bool, texts: &mut Texts<'_>) -> String {
     let mut out = format!("{} in {}\n", points.workflow, points.lab);
     let Some(point) = points.points.get(index) else { return out };
     let label = harmless_line(&point.label);
@@ -64,7 +77,8 @@ pub(super) fn all(points: &Points, index: usize, texts: &mut Texts<'_>) -> Strin
     let often = if point.repeated { "each time, " } else { "" };
     head(&place, &label, &format!("{often}{}", time(&after.elapsed)), &mut out);
     write(after.kept.iter().map(|f| (f.name.clone(), value(&f.value))).collect(), usize::MAX, &mut out);
-    let (holding, others): (Vec<&Thing>, Vec<&Thing>) = after.things.iter().partition(|t| !t.species.is_empty());
+    let shown = after.things.iter().filter(|thing| show(thing));
+    let (holding, others): (Vec<&Thing>, Vec<&Thing>) = shown.partition(|t| !t.species.is_empty());
     write(holding.into_iter().filter_map(|t| held(t, |_| true)).collect(), usize::MAX, &mut out);
     write(others.into_iter().filter_map(|t| said_of(t, |_| true, usize::MAX)).collect(), usize::MAX, &mut out);
     out

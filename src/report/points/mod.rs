@@ -7,7 +7,7 @@ mod things;
 mod values;
 
 use matterix_ir::Sources;
-use matterix_ir::points::Points;
+use matterix_ir::points::{Fact, Points, Value};
 
 pub use at::{Found, Place};
 
@@ -21,6 +21,23 @@ pub fn table(points: &Points, sources: &Sources) -> String {
 /// Everything that is known after one statement, by its index.
 pub fn all(points: &Points, index: usize, sources: &Sources) -> String {
     human::all(points, index, &mut Texts::new(sources))
+}
+
+/// What is known after one statement of the things that it changes or names.
+pub fn brief(points: &Points, index: usize, sources: &Sources) -> String {
+    human::brief(points, index, &mut Texts::new(sources))
+}
+
+/// Things with what is known of each in a few words: `plate[A1 .. H1].contents 100 uL`.
+pub fn amounts(held: &[(&str, &Fact)]) -> String {
+    let rows = held.iter().map(|(name, fact)| (name.to_string(), values::value(&fact.value))).collect();
+    let said = things::together(rows);
+    said.iter().map(|(names, value)| format!("{names} {value}")).collect::<Vec<_>>().join(", ")
+}
+
+/// A time since the beginning.
+pub fn time(elapsed: &Value) -> String {
+    values::time(elapsed)
 }
 
 /// One JSON object on a line: what each statement changes, or everything that is known after one.

@@ -43,6 +43,12 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\nport = \"x\"\ntolerance = { colour = \"5 g\" }", "does not tell `colour`"),
         ("[beaker]\nport = \"x\"", "no driver says"),
         ("[plate", "not TOML"),
+        ("[plate]\naddress = \"nonsense\"", "the port of `nonsense` is missing"),
+        ("[plate]\naddress = \"127.0.0.1:70000\"", "`70000` is no port"),
+        ("[plate]\naddress = \"127.0.0.1:0\"", "`0` is no port"),
+        ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not spoken here"),
+        ("[plate]\nport = \"\"", "a serial port has a path"),
+        ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
     ];
     for (index, (bindings, wanted)) in cases.iter().enumerate() {
         let err = found(&format!("binding_{index}"), HEAT, bindings);
@@ -54,8 +60,39 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
 #[test]
 fn a_step_that_nobody_is_told_of_is_found_first() {
     let err = found("undriven", HEAT, "");
-    assert_eq!(err.matches("error[undriven]").count(), 4, "{err}");
-    assert!(err.contains("`IkaNamur`"), "{err}");
+    assert_eq!(err.matches("error[undriven]").count(), 1, "one device, one finding: {err}");
+    assert!(err.contains("lab.mtx:10") && err.contains("nor at 3 other places"), "{err}");
+    assert!(err.contains("[plate]\n") && err.contains("port = \"/dev/ttyUSB0\""), "{err}");
+}
+
+#[test]
+fn the_device_that_would_be_told_is_the_one_to_bind() {
+    let dir = bench("undriven_pump", include_str!("../../deploy/dose.mtx"), "pump", "");
+    write(&dir, "lab.toml", "");
+    let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
+    assert_eq!(ended.err.matches("error[undriven]").count(), 1, "{}", ended.err);
+    for said in ["`pump`", "[pump]\n", "driver = \"CavroDt\"", "driver = \"CavroOem\""] {
+        assert!(ended.err.contains(said), "{said}: {}", ended.err);
+    }
+}
+
+#[test]
+fn what_is_said_of_some_devices_only_is_known_before() {
+    let driver = |condition: &str| {
+        let line = "serial(baud: 9600, frame: \"7E1\", framing: namur, timeout: 1 s)";
+        format!("driver Own for IkaRetControl over {line} {{\n    open while {condition} sends \"OWN\"\n}}\nworkflow")
+    };
+    let dry = |name: &str, condition: &str| {
+        let dir = bench(name, &HEAT.replace("workflow", &driver(condition)), "plate", "");
+        write(&dir, "lab.toml", "[plate]\nport = \"x\"\ndriver = \"Own\"");
+        matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"])
+    };
+    let later = dry("open_while_later", "temperature > 30 degC");
+    assert!(later.err.contains("error[driver-line]") && later.err.contains("lab.mtx:11:16"), "{}", later.err);
+    for (name, condition) in [("open_while_so", "mass > 1 kg"), ("open_while_not", "mass > 100 kg")] {
+        let ended = dry(name, condition);
+        assert!(!ended.err.contains("driver-line") && ended.err.contains("undriven"), "{}", ended.err);
+    }
 }
 
 #[test]

@@ -72,7 +72,8 @@ impl Tap {
     }
 }
 
-fn pass(mut from: TcpStream, mut to: TcpStream, noted: Option<Arc<Mutex<Vec<u8>>>>) {
+/// Passes on what comes, and notes it.
+pub(super) fn pass(mut from: TcpStream, mut to: TcpStream, noted: Option<Arc<Mutex<Vec<u8>>>>) {
     let mut buffer = [0; 4096];
     while let Ok(n @ 1..) = from.read(&mut buffer) {
         if to.write_all(&buffer[..n]).is_err() {

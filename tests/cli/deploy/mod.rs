@@ -5,6 +5,7 @@ mod faulty;
 mod kills;
 mod server;
 mod stop;
+mod unreached;
 mod whole;
 
 use std::io::{BufRead, BufReader, Read, Write};

@@ -185,6 +185,25 @@ fn a_plan_completes_on_the_emulated_robot_as_in_the_recording() {
 }
 
 #[test]
+fn labware_of_ones_own_is_given_to_the_robot_first() {
+    let dir = bench("own_labware", "");
+    write(&dir, "plate.json", crate::emit::own_plate());
+    let lab = TRANSFER.replace("lab deck {", "asset Own from labware \"plate.json\"\n\nlab deck {");
+    write(&dir, "lab.mtx", lab.replace("plate = Corning96", "plate = Own"));
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let journal = std::fs::read_to_string(dir.join("journal")).expect("a journal");
+    let sent: Vec<&str> = journal.lines().filter(|l| l.contains("\"event\":\"out\"")).collect();
+    let given = |line: &&str| line.contains("/labware_definitions {") && line.contains("house");
+    let (given, loaded) =
+        (sent.iter().position(given), sent.iter().position(|l| l.contains("flat_96") && l.contains("loadLabware")));
+    assert!(given.is_some() && given < loaded, "{journal}");
+    assert_eq!(sent.iter().filter(|l| l.contains("labware_definitions")).count(), 1, "what it knows it is not given");
+}
+
+#[test]
 fn what_a_robot_cannot_do_its_emulator_refuses() {
     // The file of the emulated lab has no liquid.
     let dir = bench("empty", "");
@@ -204,6 +223,31 @@ fn a_line_of_another_kind_is_refused() {
     let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
     assert_eq!(ended.code, 1);
     assert!(ended.err.contains("speaks over HTTP") && ended.err.contains("write `http ="), "{}", ended.err);
+}
+
+#[test]
+fn where_no_server_can_be_is_found_before_anything_is_opened() {
+    let dir = bench("nonsense", "");
+    let cases =
+        [("nonsense", "the port of `nonsense` is missing"), ("https://robot:31950", "`https://` is not spoken here")];
+    for (place, said) in cases {
+        write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{place}\"\n"));
+        let ended = deploy(&dir, &["--mode", "real"]);
+        assert_eq!(ended.code, 1);
+        assert!(ended.err.contains("error[binding]") && ended.err.contains(said), "{}", ended.err);
+        assert!(ended.err.contains("lab.toml:2:8"), "{}", ended.err);
+        assert!(!dir.join("journal").exists());
+    }
+}
+
+#[test]
+fn what_to_write_for_a_device_is_said_by_its_driver() {
+    let dir = bench("unbound", "");
+    write(&dir, "lab.toml", "");
+    let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);
+    assert_eq!(ended.code, 1);
+    assert_eq!(ended.err.matches("error[undriven]").count(), 1, "{}", ended.err);
+    assert!(ended.err.contains("[ot2]\n") && ended.err.contains("http = \"HOST:PORT\""), "{}", ended.err);
 }
 
 #[test]
@@ -236,4 +280,42 @@ fn what_no_server_understands_is_found_before_anything_is_sent() {
     );
     let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
     assert_eq!(ended.code, 0, "{}", ended.out);
+}
+
+#[test]
+fn an_emitted_protocol_is_uploaded_and_played() {
+    let dir = bench("play", "");
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n", emulated.address));
+    for target in ["opentrons-json", "opentrons-python"] {
+        let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", target, "--play", "lab.toml"]);
+        assert_eq!(ended.code, 0, "{target}: {}{}", ended.out, ended.err);
+        assert!(ended.err.contains("`ot2` has run it to its end"), "{target}: {}", ended.err);
+    }
+}
+
+#[test]
+fn what_a_server_says_against_a_protocol_is_shown_where_it_is_bound() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            // The form is not read: what comes of it is the same.
+            let mut buffer = [0; 1 << 16];
+            let _ = stream.read(&mut buffer);
+            let body = "{\"errors\":[{\"id\":\"ProtocolFilesInvalid\",\"detail\":\"no metadata\"}]}";
+            let _ = stream.write_all(
+                format!("HTTP/1.1 422 x\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{body}", body.len())
+                    .as_bytes(),
+            );
+        }
+    });
+    let dir = bench("play_refused", &address);
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
+    assert_eq!(ended.code, 1, "{}", ended.err);
+    assert!(ended.err.contains("ProtocolFilesInvalid") && ended.err.contains("no metadata"), "{}", ended.err);
+    assert!(ended.err.contains("lab.toml:2:8"), "{}", ended.err);
+    write(&dir, "lab.toml", "[ot2]\nhttp = \"127.0.0.1:1\"\n");
+    let ended = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
+    assert!(ended.err.contains("nothing listens") && ended.err.contains("lab.toml:2:8"), "{}", ended.err);
 }

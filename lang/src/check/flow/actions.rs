@@ -258,7 +258,7 @@ impl Flow<'_, '_> {
                 }
             }
             (Some(takes), None) => {
-                let time = self.eval(takes.nominal, &facts);
+                let time = self.duration(takes.nominal, &facts);
                 self.pass(&time, &mut facts);
             }
             (None, None) => {}

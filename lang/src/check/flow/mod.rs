@@ -12,6 +12,7 @@ mod eval;
 mod evolve;
 mod facts;
 mod history;
+mod lasting;
 mod otherwise;
 mod points;
 mod report;

@@ -275,7 +275,7 @@ impl Flow<'_, '_> {
         self.found(d, about);
     }
 
-    fn at_site(&self, code: Code, headline: String, said: String, some: bool) -> Diagnostic {
+    pub(super) fn at_site(&self, code: Code, headline: String, said: String, some: bool) -> Diagnostic {
         let mut d = Diagnostic::error(code, self.site(), headline, said);
         d.severity = severity(code, some);
         for site in self.sites.iter().rev().skip(1).filter(|s| s.calls).take(2) {
@@ -294,8 +294,8 @@ impl Flow<'_, '_> {
             let show = |k: &Known| shown(k, |v| c.unit.show(v));
             let limits = match (low, high) {
                 (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
-                (Some(l), None) => format!("at least {}", show(&l)),
-                (None, Some(h)) => format!("at most {}", show(&h)),
+                (Some(l), None) => format!("{} {}", if c.strict { "must be more than" } else { "at least" }, show(&l)),
+                (None, Some(h)) => format!("{} {}", if c.strict { "must be less than" } else { "at most" }, show(&h)),
                 (None, None) => continue,
             };
             out.push(format!("`{}` is {}, {limits}", c.text, show(&value)));

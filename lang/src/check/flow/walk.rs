@@ -33,7 +33,11 @@ impl Flow<'_, '_> {
             self.sites.push(Site { span: node.span, label: node.label.clone(), calls });
         }
         let noted = self.begin(id, node, &facts);
+        let (began, _) = facts.time.bounds();
         let after = self.step(id, facts);
+        if let Some(after) = after.as_ref().filter(|_| own) {
+            self.outlasts(began, after);
+        }
         if let Some(begun) = noted {
             self.end(node, begun, after.as_ref());
         }
@@ -83,14 +87,14 @@ impl Flow<'_, '_> {
                 Some(facts)
             }
             Step::Wait { duration } => {
-                let time = self.eval(*duration, &facts);
+                let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
                 Some(facts)
             }
             Step::WaitUntil { condition, timeout } => self.wait_until(condition, *timeout, facts),
             Step::Hold { condition, duration, timeout } => {
                 let mut facts = self.wait_until(condition, *timeout, facts)?;
-                let time = self.eval(*duration, &facts);
+                let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
                 self.assume(condition.node, true, &mut facts);
                 Some(facts)
@@ -119,11 +123,11 @@ impl Flow<'_, '_> {
             }
             Step::If { condition, then, otherwise } => self.choice(id, condition, *then, *otherwise, facts),
             Step::Repeat { times, body } => {
-                let times = self.eval(*times, &facts);
+                let times = self.turns(*times, &facts);
                 self.repeat(id, &times, *body, facts)
             }
             Step::RepeatWhile { condition, max, body } => {
-                let max = self.eval(*max, &facts);
+                let max = self.turns(*max, &facts);
                 self.repeat_while(id, condition, &max, *body, facts)
             }
             Step::Claim { body, .. } => self.walk(*body, facts),
@@ -162,7 +166,7 @@ impl Flow<'_, '_> {
         let parts = self.parts(condition.node);
         let shared = self.is_shared(condition.node);
         let longest = match timeout {
-            Some(node) => self.eval(node, &facts).bounds().1,
+            Some(node) => self.duration(node, &facts).bounds().1,
             None => f64::INFINITY,
         };
         if let Some(wait) = self.until(condition.node, &facts).filter(|wait| *wait <= longest) {

@@ -1,6 +1,7 @@
 //! D3: a command or skill whose time cannot lie within its own bounds.
 
 use matterix_ir::plan::{Plan, Step, StepId, Takes};
+use matterix_ir::quantity::show_duration;
 use matterix_ir::{Diagnostic, codes};
 use matterix_timing::{Interval, Known, ROUNDING, Timing};
 
@@ -32,21 +33,21 @@ fn finding(
     let nominal = known.number(takes.nominal);
     let what = &plan.get(step).label;
     let allowed = match bounds.max.is_finite() {
-        true => format!("{} .. {}", show::duration(bounds.min), show::duration(bounds.max)),
-        false => format!("at least {}", show::duration(bounds.min)),
+        true => format!("{} .. {}", show_duration(bounds.min), show_duration(bounds.max)),
+        false => format!("at least {}", show_duration(bounds.min)),
     };
     let outside = |i: Interval| i.min > bounds.max + ROUNDING || i.max < bounds.min - ROUNDING;
     let (headline, help) = match real {
         Some(real) if outside(real) => {
             let (how, time) = if real.min > bounds.max { ("at least", real.min) } else { ("at most", real.max) };
-            let time = show::duration(time);
+            let time = show_duration(time);
             (
                 format!("the steps of `{what}` take {how} {time}, its bounds are {allowed}"),
                 "give `takes` bounds that its steps can keep, or change the steps",
             )
         }
         _ if outside(nominal) => {
-            let time = show::duration(if nominal.min > bounds.max { nominal.min } else { nominal.max });
+            let time = show_duration(if nominal.min > bounds.max { nominal.min } else { nominal.max });
             (
                 format!("`{what}` takes {time}, its bounds are {allowed}"),
                 "change the parameter that its time follows from, or the bounds in its `takes`",

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Plan, StepId};
+use matterix_ir::quantity::show_duration;
 use matterix_ir::{Diagnostic, Severity, codes};
 use matterix_timing::network::{BEGIN, WHOLE};
 use matterix_timing::{Edge, Network, Scope, Timing, Why};
@@ -43,7 +44,7 @@ fn finding(plan: &Plan, timing: &Timing, cycle: &[Edge], blamed: &Edge) -> Diagn
     let step = blamed.reason.step;
     let node = plan.get(step);
     let spent: f64 = cycle.iter().filter(|e| e.weight > 0.0).map(|e| e.weight).sum();
-    let (spent, allowed) = (show::duration(spent), show::duration(-blamed.weight));
+    let (spent, allowed) = (show_duration(spent), show_duration(-blamed.weight));
     let (code, headline, label, failure) = match blamed.reason.why {
         Why::Timeout(_) => (
             codes::WINDOW_UNMEETABLE,
@@ -70,7 +71,7 @@ fn finding(plan: &Plan, timing: &Timing, cycle: &[Edge], blamed: &Edge) -> Diagn
         d.severity = Severity::Warning;
     }
     for (step, seconds, why) in causes(plan, timing, cycle, own) {
-        let time = show::duration(seconds);
+        let time = show_duration(seconds);
         let text = match why {
             Why::NotBefore(_) => format!("not before {time} have passed"),
             _ => format!("takes at least {time}"),

@@ -155,12 +155,16 @@ impl<'a> Planner<'a, '_> {
         self.repeated(wires);
         // What stands where a message has no word for it is not on this line.
         let lenient = std::mem::replace(&mut self.lenient, driver.host.is_some());
+        let mut opens = 0;
         for w in wires {
-            self.line(w, instance, module, &mut driver);
+            let applies = self.applies(w, instance, module);
+            opens += usize::from(applies && matches!(&w.kind, WireKind::Fixed { when, .. } if when.text == "open"));
+            if applies {
+                self.line(w, instance, module, &mut driver);
+            }
         }
         self.lenient = lenient;
-        let opens = wires.iter().filter(|w| matches!(&w.kind, WireKind::Fixed { when, .. } if when.text == "open"));
-        if driver.host.is_some() && driver.open.len() < opens.count() {
+        if driver.host.is_some() && driver.open.len() < opens {
             return None;
         }
         for w in under.map_or(&[][..], |u| u.wires) {
@@ -172,11 +176,26 @@ impl<'a> Planner<'a, '_> {
         Some(driver)
     }
 
+    /// Whether a line that is said of some devices only is said of this one; what is decided later is reported.
+    fn applies(&mut self, w: &'a Wire, instance: InstanceId, module: usize) -> bool {
+        let WireKind::Fixed { condition: Some(condition), .. } = &w.kind else { return true };
+        let Some(node) = self.lab.truth(condition, &mut Scope::of(instance, module)) else { return false };
+        match self.lab.known(node) {
+            Some(holds) => holds != 0.0 || self.lab.prototype,
+            None if self.lab.prototype => true,
+            None => {
+                let headline = "what is said apart from commands is known before anything runs";
+                self.wrong(condition.span, headline, "changes in a run", "let it depend on what is given only");
+                false
+            }
+        }
+    }
+
     fn line(&mut self, w: &'a Wire, instance: InstanceId, module: usize, driver: &mut Driver) {
         let mut scope = Scope::of(instance, module);
         match &w.kind {
             WireKind::Error => {}
-            WireKind::Fixed { when, exchange } => {
+            WireKind::Fixed { when, exchange, .. } => {
                 let Some(exchange) = self.exchange(exchange, w.span, &mut scope) else { return };
                 match when.text.as_str() {
                     "open" => driver.open.push(exchange),

@@ -317,7 +317,9 @@ fn wire(wire: &Wire) -> Sexp {
             .with([filled(asks), quoted(&expects.text)]),
         WireKind::Reply { text, fails } => node("reply").with([quoted(text), name(fails)]),
         WireKind::Answers { asked, with } => node("answers").with([quoted(&asked.text), filled(with)]),
-        WireKind::Fixed { when, exchange: said } => node(&when.text).with(exchange(said)),
+        WireKind::Fixed { when, condition, exchange: said } => {
+            node(&when.text).with(maybe("while", condition.as_ref())).with(exchange(said))
+        }
         WireKind::Alive { condition, every, by, otherwise } => {
             node("alive").with([expr(condition), expr(every), verb("by", by), verb("else", otherwise)])
         }

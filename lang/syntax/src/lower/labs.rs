@@ -215,7 +215,8 @@ impl Lower<'_> {
         match rule {
             Rule::wire_fixed => {
                 let when = kids.eat(Rule::wire_when).map(|n| self.name(&n));
-                WireKind::Fixed { when: when.unwrap_or_else(|| nameless(span)), exchange: self.exchange(kids) }
+                let (when, condition) = (when.unwrap_or_else(|| nameless(span)), self.while_in(kids));
+                WireKind::Fixed { when, condition, exchange: self.exchange(kids) }
             }
             Rule::wire_alive => {
                 kids.has(Rule::kw_while);
@@ -230,17 +231,19 @@ impl Lower<'_> {
             },
             Rule::wire_reading => WireKind::Reading {
                 path: self.path_in(kids),
-                condition: kids.eat(Rule::wire_while).map(|n| {
-                    let kids = &mut Kids::of(n);
-                    kids.has(Rule::kw_while);
-                    self.expr_in(kids)
-                }),
+                condition: self.while_in(kids),
                 asks: self.said(kids, span),
                 expects: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
             },
             Rule::wire_command => WireKind::Command { sig: self.sig_in(kids), exchange: self.exchange(kids) },
             _ => WireKind::Error,
         }
+    }
+
+    fn while_in(&mut self, kids: &mut Kids) -> Option<Expr> {
+        let kids = &mut Kids::of(kids.eat(Rule::wire_while)?);
+        kids.has(Rule::kw_while);
+        Some(self.expr_in(kids))
     }
 
     fn verb_in(&mut self, kids: &mut Kids) -> Vec<Name> {

@@ -50,9 +50,10 @@ impl<'a> Lower<'a> {
 
     /// The tree, and what is wrong with the text in the order of the text.
     ///
-    /// The last number counts the mistakes that were not looked into.
-    pub(super) fn run(mut self, root: Node) -> (File, Vec<Diagnostic>, usize) {
-        let file = self.file(root);
+    /// The last number counts the mistakes that were not looked into. `known` is the version where the text is a part of a file behind its
+    /// header.
+    pub(super) fn run(mut self, root: Node, known: Option<Option<u32>>) -> (File, Vec<Diagnostic>, usize) {
+        let file = self.file(root, known);
         let (found, hidden) = self.mistakes.finish();
         (file, found, hidden)
     }
@@ -77,9 +78,9 @@ impl<'a> Lower<'a> {
         Some(value)
     }
 
-    fn file(&mut self, root: Node) -> File {
+    fn file(&mut self, root: Node, known: Option<Option<u32>>) -> File {
         let mut kids = Kids::of(root);
-        let version = self.header(&mut kids);
+        let version = known.unwrap_or_else(|| self.header(&mut kids));
         let mut items: Vec<Item> = Vec::new();
         let mut before = None;
         while let Some(node) = kids.take() {
@@ -98,7 +99,7 @@ impl<'a> Lower<'a> {
             }
             before = Some(start);
         }
-        File { version, docs: self.file_docs(), items }
+        File { version, docs: Vec::new(), items }
     }
 
     fn header(&mut self, kids: &mut Kids) -> Option<u32> {
@@ -161,11 +162,6 @@ impl<'a> Lower<'a> {
         docs
     }
 
-    /// The `//!` lines.
-    fn file_docs(&self) -> Vec<String> {
-        self.text.lines().filter_map(|line| doc_line(line, "//!")).collect()
-    }
-
     fn too_many_branches(&mut self, span: Span) {
         let headline = format!("more than {MAX_BRANCHES} branches in one `if`");
         self.report(Diagnostic::error(codes::SYNTAX, span, headline, "one too many"));
@@ -177,6 +173,11 @@ impl<'a> Lower<'a> {
             _ => self.item_form(node),
         }
     }
+}
+
+/// The `//!` lines.
+pub(super) fn file_docs(text: &str) -> Vec<String> {
+    text.lines().filter_map(|line| doc_line(line, "//!")).collect()
 }
 
 /// What stands after the marker and one blank, if the line is such a comment.

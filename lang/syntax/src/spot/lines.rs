@@ -17,6 +17,16 @@ pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
     Some(Mistake::new(headline, "this reads as a value").help(help))
 }
 
+/// `needs cond because "..."`: only a failure with a name is explained.
+pub(super) fn because(spot: &Spot) -> Option<Mistake> {
+    let asks = matches!(spot.form(), "needs" | "presumes" | "keeps" | "ends");
+    if spot.only == Rule::only_stmt || spot.token != "because" || !asks {
+        return None;
+    }
+    let mistake = Mistake::new("`because` explains a failure, and none is named", "nothing to explain");
+    Some(mistake.help("name the failure before it: `else not_enough because \"...\"`"))
+}
+
 pub(super) fn reserved(spot: &Spot) -> Option<Mistake> {
     let names = spot
         .expected
@@ -69,7 +79,7 @@ pub(super) fn unknown_item(spot: &Spot) -> Option<Mistake> {
 fn unknown(spot: &Spot, word: &str, meant: Option<&str>, what: &str, words: &[&str]) -> Mistake {
     let headline = format!("`{word}` does not start a {what}");
     match meant {
-        Some(meant) => Mistake::new(headline, format!("did you mean `{meant}`?")).fix(
+        Some(meant) => Mistake::new(headline, format!("did you mean `{meant}`?")).guess(
             format!("write `{meant}`"),
             spot.at,
             spot.at + word.len(),

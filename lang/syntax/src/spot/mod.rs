@@ -33,8 +33,8 @@ pub(super) struct Mistake {
     headline: String,
     label: String,
     help: Option<String>,
-    /// Title, range and text of a correction.
-    fix: Option<(String, usize, usize, String)>,
+    /// Title, range and text of a correction, and whether it leaves no doubt.
+    fix: Option<(String, usize, usize, String, bool)>,
 }
 
 impl Mistake {
@@ -48,7 +48,12 @@ impl Mistake {
     }
 
     fn fix(mut self, title: impl Into<String>, start: usize, end: usize, text: impl Into<String>) -> Self {
-        self.fix = Some((title.into(), start, end, text.into()));
+        self.fix = Some((title.into(), start, end, text.into(), true));
+        self
+    }
+
+    fn guess(mut self, title: impl Into<String>, start: usize, end: usize, text: impl Into<String>) -> Self {
+        self.fix = Some((title.into(), start, end, text.into(), false));
         self
     }
 }
@@ -63,6 +68,7 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::reaction_arrow,
     signs::equals,
     signs::assignment,
+    lines::because,
     values::decimal_comma,
     values::bare_point,
     values::split_unit,
@@ -103,7 +109,8 @@ impl<'a> Spot<'a> {
             diagnostic = diagnostic.help(help);
         }
         match mistake.fix {
-            Some((title, start, end, text)) => diagnostic.fix(title, span(start, end), text),
+            Some((title, start, end, text, true)) => diagnostic.fix(title, span(start, end), text),
+            Some((title, start, end, text, false)) => diagnostic.guess(title, span(start, end), text),
             None => diagnostic,
         }
     }

@@ -116,7 +116,12 @@ pub(super) fn reaction_arrow(spot: &Spot) -> Option<Mistake> {
     ];
     let (sign, ours) = SIGNS.iter().find(|(sign, _)| spot.after.starts_with(sign))?;
     let mistake = Mistake::new(format!("a reaction is written with `{ours}`"), format!("write `{ours}`"));
-    Some(mistake.fix(format!("write `{ours}`"), spot.at, spot.at + sign.len(), *ours))
+    let (title, end) = (format!("write `{ours}`"), spot.at + sign.len());
+    // An equals sign may stand for either arrow.
+    Some(match sign.starts_with("=") && !sign.ends_with('>') {
+        true => mistake.guess(title, spot.at, end, *ours),
+        false => mistake.fix(title, spot.at, end, *ours),
+    })
 }
 
 /// `=` for `==` in a condition, `==` for `=` in a definition.
@@ -153,5 +158,5 @@ pub(super) fn assignment(spot: &Spot) -> Option<Mistake> {
     }
     let (name, sign) = (spot.before, spot.token);
     let mistake = Mistake::new(format!("a step cannot change `{name}`"), "`let` gives a name to a value");
-    Some(mistake.fix(format!("write `let {name} {sign} ...`"), spot.start, spot.start, "let "))
+    Some(mistake.guess(format!("write `let {name} {sign} ...`"), spot.start, spot.start, "let "))
 }

@@ -8,7 +8,7 @@ pub(super) fn decimal_comma(spot: &Spot) -> Option<Mistake> {
         return None;
     }
     let mistake = Mistake::new("a number is written with a decimal point", "write `.`");
-    Some(mistake.fix("write a point", spot.at, spot.at + 1, "."))
+    Some(mistake.guess("write a point", spot.at, spot.at + 1, "."))
 }
 
 /// `.5` and `5.`.

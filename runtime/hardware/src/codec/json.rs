@@ -110,12 +110,12 @@ impl Json {
     pub(super) fn found(&self, template: &Template, request: &str) -> Option<Vec<Found>> {
         let (method, rest) = request.split_once(' ')?;
         let (target, body) = rest.split_once(' ').unwrap_or((rest, "{}"));
-        let body: Value = serde_json::from_str(body).ok()?;
         let text = template.with(MARK);
         let wanted = message::request(&text).ok()?;
-        if wanted.method != method {
+        if wanted.method != method || wanted.file != body.strip_prefix('@') {
             return None;
         }
+        let body: Value = if wanted.file.is_some() { Value::Null } else { serde_json::from_str(body).ok()? };
         let mut values = template.pieces.iter().filter(|p| !matches!(p, Piece::Plain(_)));
         let mut out = Vec::new();
         let (wanted_path, path): (Vec<&str>, Vec<&str>) =
@@ -131,6 +131,7 @@ impl Json {
             let is_empty = is.as_object().is_some_and(Map::is_empty);
             match field.value {
                 "{}" if is_empty || is.is_object() => {}
+                whole if is.is_object() && serde_json::from_str::<Value>(whole).is_ok_and(|whole| whole == *is) => {}
                 wanted => out.extend(self.value(wanted, &plain(is), &mut values)?),
             }
         }

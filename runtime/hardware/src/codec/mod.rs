@@ -8,7 +8,7 @@ use cavro::Cavro;
 pub use json::{Json, LONGEST as LONGEST_JSON};
 use line::Line;
 use matterix_ir::Unit;
-use matterix_ir::wire::{JSON, Pattern, Template};
+use matterix_ir::wire::{JSON, Pattern, Slot, Template};
 
 use crate::pattern;
 use crate::template::{self, Found};
@@ -174,6 +174,18 @@ impl Codec {
             Codec::Json(json) => json.rendered(pattern, number),
             _ => pattern::rendered(pattern, number),
         }
+    }
+
+    /// The device's end: an answer that means a failure, by its name and in words where it has room for them.
+    pub fn refused(&mut self, pattern: &Pattern, failure: &str, why: &str) -> String {
+        let Codec::Json(json) = self else { return pattern::rendered(pattern, |_| "0".to_owned()) };
+        let last = pattern.slots.iter().rposition(|s| *s == Slot::Any);
+        let worded = pattern.slots.iter().enumerate().map(|(i, slot)| match slot {
+            Slot::Any if Some(i) == last => Slot::Plain(format!("'{}'", why.replace('\'', "\""))),
+            Slot::Any => Slot::Plain(failure.to_owned()),
+            other => other.clone(),
+        });
+        json.rendered(&Pattern { slots: worded.collect(), span: pattern.span }, |_| "0".to_owned())
     }
 
     /// Whether a word that is known without operands means this one, which may have some.

@@ -192,7 +192,7 @@ impl Backend for Hardware<'_, '_> {
         let Some(running) = self.running.remove(&ticket) else { return };
         self.twin.halt(running.twin);
         let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
-        if running.ready || !self.is_live() {
+        if running.ready || !self.is_live() || self.unreached.is_some() {
             return;
         }
         for exchange in &driver.halt {

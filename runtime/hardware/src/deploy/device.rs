@@ -1,14 +1,17 @@
 //! Devices of a lab as they are bound: to a line, or to a person's hands.
 
-use matterix_ir::Program;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Driver;
+use matterix_ir::{Program, Span};
 
 use super::Trace;
 use super::journal::{Entry, Journal};
 use crate::codec::{Codec, shown};
-use crate::link::{Line, Overhear};
-use crate::port::Place;
+use crate::link::{Line, Overhear, SECURING, STOPPING};
+use crate::place::Place;
 
 /// What carries out what a device is told.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +41,8 @@ pub enum Carrier {
 pub struct Binding {
     /// The instance.
     pub instance: InstanceId,
+    /// Where the bindings say so.
+    pub at: Span,
     /// What carries it out.
     pub carrier: Carrier,
     /// By how much what it tells may differ from the twin: member, SI.
@@ -58,6 +63,8 @@ pub struct Device<'m> {
     pub link: Option<Box<dyn Line>>,
     /// Frames for a dry run.
     pub codec: Option<Codec>,
+    /// Something was said over its line.
+    pub said: bool,
     /// Why nothing more is said to it.
     pub lost: Option<String>,
     /// When what keeps its watchdog quiet was last said, by line of the driver, s.
@@ -85,7 +92,7 @@ impl<'m> Device<'m> {
         };
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
-        Ok(Device { name, binding, driver, host, link: None, codec, lost: None, beats })
+        Ok(Device { name, binding, driver, host, link: None, codec, said: false, lost: None, beats })
     }
 }
 
@@ -95,6 +102,8 @@ pub(super) struct Ear<'e, 't> {
     pub device: &'e str,
     pub journal: &'e mut Journal,
     pub trace: &'e mut Trace<'t>,
+    pub cancel: &'e AtomicBool,
+    pub securing: bool,
 }
 
 impl Overhear for Ear<'_, '_> {
@@ -111,5 +120,13 @@ impl Overhear for Ear<'_, '_> {
     fn kept(&mut self, word: &str, text: &str) {
         let (word, text) = (word.to_owned(), text.to_owned());
         self.journal.note(&Entry::Kept { t: self.time, device: self.device.to_owned(), word, text });
+    }
+
+    fn patience(&self) -> Option<Duration> {
+        match (self.securing, self.cancel.load(Ordering::Relaxed)) {
+            (true, _) => Some(SECURING),
+            (false, true) => Some(STOPPING),
+            (false, false) => None,
+        }
     }
 }

@@ -12,6 +12,7 @@ use matterix_runtime::fault::Fault;
 
 use super::Trace;
 use super::device::Device;
+use super::exposed::Exposed;
 use super::journal::{Entry, Journal};
 use super::observe::Observed;
 use crate::link::Trouble;
@@ -37,6 +38,19 @@ pub struct Settings<'t> {
     pub cancel: &'t AtomicBool,
     /// Asks a person; false where they say no.
     pub person: &'t dyn Fn(&str) -> bool,
+    /// Kept up to date with what is told to devices.
+    pub exposed: &'t Exposed,
+}
+
+/// A device that could not be reached before anything was said to any.
+#[derive(Clone, Debug)]
+pub struct Unreached {
+    /// Its name.
+    pub device: String,
+    /// Where it is bound.
+    pub at: Span,
+    /// What is there instead.
+    pub trouble: Trouble,
 }
 
 /// An operation that goes on.
@@ -70,6 +84,10 @@ pub struct Hardware<'m, 't> {
     pub(super) resuming: bool,
     /// It was refused to go on: what is there is not known well enough for anything but making it safe.
     pub(super) refused: std::cell::Cell<bool>,
+    /// Going on after a journal, this device did not answer when it was first asked.
+    pub(super) unreached: Option<Unreached>,
+    /// Devices are being made safe.
+    pub(super) securing: bool,
     /// When it was cut off, s since 1970.
     pub(super) left_at: f64,
     /// What answers to an earlier process said: the device whose line it was, the word, the text.
@@ -120,6 +138,8 @@ impl<'m, 't> Hardware<'m, 't> {
             replay: VecDeque::new(),
             resuming: false,
             refused: std::cell::Cell::new(false),
+            unreached: None,
+            securing: false,
             left_at: 0.0,
             kept: Vec::new(),
             commanded: BTreeSet::new(),
@@ -134,6 +154,11 @@ impl<'m, 't> Hardware<'m, 't> {
     /// What devices tell, and the devices.
     pub fn view(&self) -> (&Observed, &[Device<'m>]) {
         (&self.observed, &self.devices)
+    }
+
+    /// The device that did not answer when a journal was to be gone on with: nothing was said to any, and nothing may be.
+    pub fn unreached(&self) -> Option<&Unreached> {
+        self.unreached.as_ref()
     }
 
     /// The twin.

@@ -179,6 +179,11 @@ impl Journal {
         Ok((Journal { file: Some(file), broken: None }, entries))
     }
 
+    /// Nothing more is written: it is left as it is.
+    pub fn seal(&mut self) {
+        self.file = None;
+    }
+
     /// Writes a line that may get lost with the machine.
     pub fn note(&mut self, entry: &Entry) {
         let Some(file) = self.file.as_mut().filter(|_| self.broken.is_none()) else { return };

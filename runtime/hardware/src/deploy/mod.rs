@@ -3,6 +3,7 @@
 mod alive;
 mod backend;
 mod device;
+mod exposed;
 mod hardware;
 mod journal;
 mod observe;
@@ -10,10 +11,12 @@ mod preflight;
 mod replay;
 mod sense;
 mod speak;
+mod unbound;
 mod values;
 
 pub use device::{Binding, Carrier, Device};
-pub use hardware::{Hardware, Mode, Settings};
+pub use exposed::Exposed;
+pub use hardware::{Hardware, Mode, Settings, Unreached};
 pub use journal::{Entry, Journal, JournalError, digest};
 pub use preflight::preflight;
 

@@ -1,20 +1,27 @@
 //! What must be known before anything moves: who carries out each step, and what its conditions are judged by.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::{Operation, Plan, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
 
 use super::device::{Carrier, Device};
 use super::observe::Observed;
+use super::unbound::{key, lines};
 
 /// Findings about a plan on these devices.
 pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed) -> Vec<Diagnostic> {
     let mut found = Vec::new();
+    let mut unbound: BTreeMap<InstanceId, Vec<StepId>> = BTreeMap::new();
     for (id, step) in reachable(&program.plan) {
         let node = program.plan.get(id);
         match step {
             Step::Operation(operation) if carrier(id, operation, devices).is_none() => {
+                if let Some(key) = key(program, devices, id, operation) {
+                    unbound.entry(key).or_default().push(id);
+                    continue;
+                }
                 found.push(undriven(program, node.span, &node.label, operation, devices));
             }
             Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } | Step::Keep { condition, .. } => {
@@ -30,6 +37,7 @@ pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed)
             _ => {}
         }
     }
+    found.extend(unbound.into_iter().map(|(key, steps)| not_bound(program, key, &steps)));
     let mut seen = BTreeSet::new();
     found.retain(|d| seen.insert((d.code.name, d.span(), d.headline.clone())));
     found
@@ -61,6 +69,22 @@ fn reachable(plan: &Plan) -> Vec<(StepId, &Step)> {
     out
 }
 
+/// A device that the workflow uses and the bindings do not have, at the first step that needs it.
+fn not_bound(program: &Program, key: InstanceId, steps: &[StepId]) -> Diagnostic {
+    let name = &program.scene.get(key).name;
+    let mut at: Vec<(Span, &str)> = steps.iter().map(|id| program.plan.get(*id)).map(|n| (n.span, &*n.label)).collect();
+    at.sort();
+    at.dedup_by_key(|(span, _)| *span);
+    let (span, label) = at.first().copied().unwrap_or_default();
+    let headline = format!("nothing carries out `{label}`: the bindings do not say where `{name}` is");
+    let told = match at.len() {
+        0 | 1 => "nobody is told".to_owned(),
+        2 => "nobody is told this, nor at another place".to_owned(),
+        n => format!("nobody is told this, nor at {} other places", n - 1),
+    };
+    Diagnostic::error(codes::UNDRIVEN, span, headline, told).help(lines(program, key))
+}
+
 fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, devices: &[Device<'_>]) -> Diagnostic {
     let name = operation.device.map(|id| program.scene.get(id).name.as_str());
     let bound = devices.iter().find(|d| Some(d.binding.instance) == operation.device);
@@ -75,14 +99,7 @@ fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, d
         (None, _) => format!("nothing carries out `{label}`"),
     };
     let d = Diagnostic::error(codes::UNDRIVEN, span, headline, "nobody is told");
-    let d = d.help("add a line to its driver, or let a person do it: `by = \"hand\"` in the bindings");
-    let offered: Vec<String> = program
-        .drivers
-        .iter()
-        .filter(|d| Some(d.instance) == operation.device)
-        .map(|d| format!("`{}`", d.name))
-        .collect();
-    if bound.is_none() && !offered.is_empty() { d.help(format!("it has the driver {}", offered.join(", "))) } else { d }
+    d.help("add a line to its driver, or let a person do it: `by = \"hand\"` in the bindings")
 }
 
 fn unobserved(program: &Program, observed: &Observed, node: NodeId, span: Span, text: &str) -> Option<Diagnostic> {

@@ -1,59 +1,74 @@
 //! Opening lines, holding what devices tell against the twin, going on after a journal, and leaving devices safe.
 
-use matterix_ir::codes;
-use matterix_ir::wire::Driver;
+use std::sync::atomic::Ordering;
+
+use matterix_ir::wire::{Driver, Exchange};
+use matterix_ir::{Span, codes};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
 use super::device::Carrier;
-use super::hardware::{Hardware, Mode, wall};
+use super::hardware::{Hardware, Mode, Unreached, wall};
 use super::journal::Entry;
 use crate::link::{self, Line, Trouble};
-use crate::port::Place;
+use crate::place::Place;
 
 /// Rounding, in units of the last digit that a device tells.
 const ROUNDING: f64 = 0.51;
 
 impl Hardware<'_, '_> {
-    /// Opens all lines and says what drivers say then. On going on after a journal, only what moves and resets nothing.
-    pub fn open(&mut self, again: bool) -> Result<(), Fault> {
+    /// Opens all lines and says nothing; devices that cannot be reached.
+    pub fn connect(&mut self) -> Vec<Unreached> {
+        let mut unreached = Vec::new();
         for index in 0..self.devices.len() {
-            let device = &self.devices[index];
-            let (Some(driver), name) = (device.driver, device.name) else { continue };
-            if let (Carrier::Line { place, address, .. }, false) = (device.binding.carrier.clone(), self.is_dry()) {
-                match self.linked(index, driver, &place, address.as_deref()) {
-                    Ok(link) => self.devices[index].link = Some(link),
-                    Err(trouble) => return Err(self.trouble(index, &trouble, driver.span)),
-                }
+            let Some(driver) = self.devices[index].driver.filter(|_| !self.is_dry()) else { continue };
+            let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() else { continue };
+            match self.linked(index, driver, &place, address.as_deref()) {
+                Ok(link) => self.devices[index].link = Some(link),
+                Err(trouble) => unreached.push(self.not_reached(index, trouble)),
             }
-            for exchange in driver.open.iter().filter(|_| !again) {
-                let texts = self.texts(&exchange.sends);
-                self.say(index, &texts, exchange.expects.as_ref(), exchange.span)?;
-                let Some(until) = exchange.until.as_ref().filter(|_| !self.is_dry()) else { continue };
-                let text = self.texts(std::slice::from_ref(&until.asks)).concat();
-                let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
-                let mut ready = false;
-                for _ in 0..tries {
-                    let asked = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
-                    ready = asked.map_err(|trouble| self.trouble(index, &trouble, exchange.span))?;
-                    if ready {
-                        break;
-                    }
-                    std::thread::sleep(std::time::Duration::from_millis(100));
-                }
-                if !ready {
-                    let message = format!("`{name}` was not ready in time");
-                    return Err(self.fault(codes::DEVICE_LOST, exchange.span, message));
-                }
+        }
+        unreached
+    }
+
+    fn not_reached(&self, index: usize, trouble: Trouble) -> Unreached {
+        let device = &self.devices[index];
+        Unreached { device: device.name.to_owned(), at: device.binding.at, trouble }
+    }
+
+    /// Says over open lines what drivers say first; what went wrong, and where the device is bound.
+    pub fn open(&mut self) -> Result<(), (Fault, Span)> {
+        for index in 0..self.devices.len() {
+            let (driver, at) = (self.devices[index].driver, self.devices[index].binding.at);
+            for exchange in driver.iter().flat_map(|driver| &driver.open) {
+                self.first(index, exchange).map_err(|fault| (fault, at))?;
             }
         }
         self.set_clock();
-        if !again {
-            let t = self.twin.now();
-            self.keep(&Entry::Opened { t })?;
+        let t = self.twin.now();
+        self.keep(&Entry::Opened { t }).map_err(|fault| (fault, Span::default()))
+    }
+
+    fn first(&mut self, index: usize, exchange: &Exchange) -> Result<(), Fault> {
+        let texts = self.texts(&exchange.sends);
+        self.say(index, &texts, exchange.expects.as_ref(), exchange.span)?;
+        let Some(until) = exchange.until.as_ref().filter(|_| !self.is_dry()) else { return Ok(()) };
+        let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+        let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
+        for _ in 0..tries {
+            let asked = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
+            if asked.map_err(|trouble| self.trouble(index, &trouble, exchange.span))? {
+                return Ok(());
+            }
+            if self.settings.cancel.load(Ordering::Relaxed) {
+                let message = format!("`{}` was not waited for: it was stopped by a person", self.devices[index].name);
+                return Err(self.fault(codes::RUN_FAILED, exchange.span, message));
+            }
+            std::thread::sleep(std::time::Duration::from_millis(100));
         }
-        Ok(())
+        let message = format!("`{}` was not ready in time", self.devices[index].name);
+        Err(self.fault(codes::DEVICE_LOST, exchange.span, message))
     }
 
     /// A new line to a device, with what answers over an earlier one said.
@@ -89,6 +104,10 @@ impl Hardware<'_, '_> {
             }
         }
         self.left_at = last.unwrap_or_else(wall);
+        for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
+            device.said = true;
+            self.settings.exposed.told(device.name);
+        }
         self.replay = entries.into();
         self.resuming = true;
     }
@@ -100,6 +119,9 @@ impl Hardware<'_, '_> {
         }
         self.catch_up(out).map_err(|fault| {
             self.refused.set(true);
+            if self.unreached.is_some() {
+                self.journal.seal();
+            }
             let code = if fault.code == codes::DIVERGED { codes::JOURNAL_MISMATCH } else { fault.code };
             Fault { code, ..fault }
         })
@@ -128,9 +150,7 @@ impl Hardware<'_, '_> {
         while self.twin.now() < then {
             self.twin.advance(then, &[], out)?;
         }
-        self.open(true)?;
-        let (t, wall) = (self.twin.now(), wall());
-        self.keep(&Entry::Resumed { t, wall })?;
+        self.set_clock();
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
             for (line, told) in driver.told.iter().enumerate() {
@@ -138,7 +158,15 @@ impl Hardware<'_, '_> {
                 if !holds {
                     continue;
                 }
-                let value = self.tell(device, line)?;
+                let value = match self.tell(device, line) {
+                    Err(fault) if fault.code == codes::DEVICE_LOST => {
+                        let why = self.devices[self.line_of(device)].lost.clone();
+                        let trouble = Trouble::Lost(why.unwrap_or_else(|| fault.message.clone()));
+                        self.unreached = Some(self.not_reached(device, trouble));
+                        return Err(fault);
+                    }
+                    told => told?,
+                };
                 if told.state.is_some_and(|s| !self.commanded.contains(&s)) {
                     continue;
                 }
@@ -152,7 +180,9 @@ impl Hardware<'_, '_> {
                 }
             }
         }
-        Ok(())
+        // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
+        let (t, wall) = (self.twin.now(), wall());
+        self.keep(&Entry::Resumed { t, wall })
     }
 
     /// What is told of what was commanded must be that.
@@ -213,32 +243,42 @@ impl Hardware<'_, '_> {
         }
     }
 
-    /// After a run that did not end well: every device is told what makes it safe, whatever became of the others.
-    pub fn secure(&mut self) -> Vec<String> {
+    /// After a run that did not end well: every device to which something was said is told what makes it safe, whatever became
+    /// of the others, and for each answer there are seconds only. Where each is bound that is not known to be safe, and why.
+    pub fn secure(&mut self) -> Vec<(Span, String)> {
+        self.securing = true;
         let mut troubles = Vec::new();
         for index in 0..self.devices.len() {
-            let Some(driver) = self.devices[index].driver else { continue };
-            if self.devices[index].link.is_none() && !self.is_dry() && !driver.safe.is_empty() {
+            let (Some(driver), line) = (self.devices[index].driver, self.line_of(index)) else { continue };
+            if driver.safe.is_empty() || !self.devices[line].said && !self.is_dry() {
+                continue;
+            }
+            if let (Carrier::Line { place, address, .. }, None, false) =
+                (self.devices[index].binding.carrier.clone(), &self.devices[index].link, self.is_dry())
+            {
                 // A line that was lost may be there again.
-                if let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() {
-                    self.devices[index].link = self.linked(index, driver, &place, address.as_deref()).ok();
-                    if self.devices[index].link.is_some() {
-                        self.devices[index].lost = None;
-                    }
+                match self.linked(index, driver, &place, address.as_deref()) {
+                    Ok(link) => (self.devices[index].link, self.devices[index].lost) = (Some(link), None),
+                    Err(trouble) => self.devices[index].lost = Some(trouble.text().to_owned()),
                 }
             }
-            let line = self.line_of(index);
+            let before = troubles.len();
+            let at = self.devices[index].binding.at;
             for exchange in &driver.safe {
                 let texts = self.texts(&exchange.sends);
                 if self.devices[line].link.as_ref().is_some_and(|link| link.lacks(&texts)) {
                     continue;
                 }
                 if let Err(fault) = self.say(index, &texts, exchange.expects.as_ref(), exchange.span) {
-                    troubles.push(fault.message);
+                    troubles.push((at, fault.message));
                     break;
                 }
             }
+            if troubles.len() == before {
+                self.settings.exposed.safe(self.devices[line].name);
+            }
         }
+        self.securing = false;
         troubles
     }
 

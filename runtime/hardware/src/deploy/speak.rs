@@ -50,6 +50,9 @@ impl<'m> Hardware<'m, '_> {
             }
             return Ok(Vec::new());
         }
+        let line = self.line_of(index);
+        self.devices[line].said = true;
+        self.settings.exposed.told(self.devices[line].name);
         self.over(index, |link, driver, ear| link.say(texts, expects, driver, ear))
     }
 
@@ -64,7 +67,9 @@ impl<'m> Hardware<'m, '_> {
         let (Some(link), Some(driver)) = (self.devices[line].link.as_deref_mut(), driver) else {
             return Err(Trouble::Lost("its line is not open".to_owned()));
         };
-        act(link, driver, &mut Ear { time, device, journal: &mut self.journal, trace: &mut *self.trace })
+        let (cancel, securing) = (self.settings.cancel, self.securing);
+        let (journal, trace) = (&mut self.journal, &mut *self.trace);
+        act(link, driver, &mut Ear { time, device, journal, trace, cancel, securing })
     }
 
     /// Asks a device for a quantity, SI.

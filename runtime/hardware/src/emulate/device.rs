@@ -17,6 +17,9 @@ const NOT_UNDERSTOOD: &str = "not_understood";
 /// The failure that a driver gives to what comes while its device is busy.
 const BUSY: &str = "busy";
 
+/// Most characters of a message that is not understood.
+const SHOWN: usize = 200;
+
 /// A device in its lab.
 pub struct Emulator<'m> {
     sim: Sim<'m>,
@@ -98,7 +101,7 @@ impl<'m> Emulator<'m> {
                     continue;
                 }
                 Ok(Request::Other) => continue,
-                Err(_) => self.refuse(NOT_UNDERSTOOD),
+                Err(garbled) => self.refuse(NOT_UNDERSTOOD, &garbled.why),
             };
             if let Some(reply) = reply {
                 let reply = Reply { busy: !self.running.is_empty(), ..reply };
@@ -107,6 +110,12 @@ impl<'m> Emulator<'m> {
             }
         }
         Ok(out)
+    }
+
+    /// An answer to what is no message at all; none where the driver knows none.
+    pub fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
+        let reply = self.refuse(NOT_UNDERSTOOD, why)?;
+        Some(self.codec.answer(&reply))
     }
 
     /// Does what a string of commands says; what is answered, if something is.
@@ -125,7 +134,8 @@ impl<'m> Emulator<'m> {
         if let Some(told) = self.asked(word) {
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
-        let endings = self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open));
+        let endings =
+            self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open).chain(&d.play));
         let endings: Vec<_> = endings.filter_map(|e| e.until.as_ref()).collect();
         let answer = self.answer(word);
         for until in endings {
@@ -153,7 +163,7 @@ impl<'m> Emulator<'m> {
                 return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p))));
             }
         }
-        Ok(self.refuse(NOT_UNDERSTOOD))
+        Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver says nothing like `{}`", cut(word))))
     }
 
     /// An answer without numbers of its own.
@@ -230,22 +240,23 @@ impl<'m> Emulator<'m> {
             let expects = part.exchange.expects.as_ref();
             return Ok(Some(expects.map(|p| Reply::of(self.plain(p)))));
         }
-        let mut why = NOT_UNDERSTOOD;
+        let mut why = (NOT_UNDERSTOOD, format!("nothing here is meant by `{}`", cut(word)));
         for (served, all) in complete {
             if !solve(served, &all, self.sim.engine()) {
                 continue;
             }
             let needs = served.operation.needs.iter().find(|n| self.sim.engine().eval(n.node) == 0.0);
             if let Some(need) = needs {
-                why = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
+                let failure = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
+                why = (failure, format!("`{}` does not hold", need.text));
                 continue;
             }
             if served.exchange.until.is_some() && !self.running.is_empty() {
-                return Ok(Some(self.refuse(BUSY)));
+                return Ok(Some(self.refuse(BUSY, "it is busy")));
             }
             return self.begin(served, &all).map(Some);
         }
-        Ok(Some(self.refuse(why)))
+        Ok(Some(self.refuse(why.0, &why.1)))
     }
 
     fn begin(&mut self, served: &'m Served, found: &[Found]) -> Result<Option<Reply>, Fault> {
@@ -288,17 +299,22 @@ impl<'m> Emulator<'m> {
     }
 
     /// The answer that means a failure; none where the driver knows none, as devices do that ignore what they do not understand.
-    fn refuse(&mut self, failure: &str) -> Option<Reply> {
+    fn refuse(&mut self, failure: &str, why: &str) -> Option<Reply> {
         let named = |name: &str| self.drivers.iter().flat_map(|d| &d.refusals).find(|r| r.failure == name);
         let refusal = named(failure).or_else(|| named(NOT_UNDERSTOOD))?;
-        let text = self.plain(&refusal.reply);
+        let text = self.codec.refused(&refusal.reply, &refusal.failure, why);
         Some(Reply { is_error: self.codec.acknowledges(), ..Reply::of(text) })
     }
 }
 
+/// The beginning of a message, for people.
+fn cut(word: &str) -> &str {
+    word.char_indices().nth(SHOWN).map_or(word, |(at, _)| &word[..at])
+}
+
 /// What is said apart from commands, and whether it breaks off what the device does.
 fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
-    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).map(|e| (e, false));
+    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).chain(&driver.play).map(|e| (e, false));
     driver.halt.iter().map(|e| (e, true)).chain(quiet)
 }
 

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 
 use tiny_http::{Header, Request, Response, Server};
 
-use super::Emulator;
 use super::serve::{Clock, Stop, TICK, turn};
+use super::{Emulator, form};
 use crate::codec::LONGEST_JSON;
 
 /// Serves a port of this machine; `ready` is given its address. Requests without the header are refused.
@@ -28,7 +28,10 @@ pub fn serve_http(
         };
         let (status, body) = match asked(&mut request, header) {
             Ok(line) => parts(&turn(emulator, &clock, line.as_bytes())?),
-            Err(status) => (status, "{}".to_owned()),
+            Err((status, why)) => {
+                let line = emulator.complaint(&why).unwrap_or_default();
+                (status, parts(&line).1)
+            }
         };
         // Who asked may be gone.
         let _ = request.respond(answer(status, body));
@@ -36,22 +39,28 @@ pub fn serve_http(
     Ok(())
 }
 
-/// A request as a line, or the status it is refused with.
-fn asked(request: &mut Request, header: Option<&(String, String)>) -> Result<String, u16> {
+/// A request as a line, or the status it is refused with, and why.
+fn asked(request: &mut Request, header: Option<&(String, String)>) -> Result<String, (u16, String)> {
     let has = |name: &str, value: &str| {
         let is_it = |h: &Header| h.field.as_str().as_str().eq_ignore_ascii_case(name) && h.value.as_str() == value;
         request.headers().iter().any(is_it)
     };
-    if header.is_some_and(|(name, value)| !has(name, value)) {
-        return Err(422);
+    if let Some((name, value)) = header.filter(|(name, value)| !has(name, value)) {
+        return Err((422, format!("the header `{name}: {value}` is missing")));
     }
+    let mut kinds = request.headers().iter().filter(|h| h.field.equiv("Content-Type"));
+    let kind = kinds.next().map(|h| h.value.as_str().to_owned()).unwrap_or_default();
     let mut bytes = Vec::new();
-    request.as_reader().take(LONGEST_JSON as u64).read_to_end(&mut bytes).map_err(|_| 400_u16)?;
+    request.as_reader().take(LONGEST_JSON as u64).read_to_end(&mut bytes).map_err(|e| (400, e.to_string()))?;
     let body = match bytes.as_slice() {
         [] => String::new(),
+        bytes if kind.starts_with(form::KIND) => {
+            let field = form::field(&kind, bytes).map_err(|why| (422, why))?;
+            format!(" @{field}")
+        }
         bytes => {
-            let value: serde_json::Value = serde_json::from_slice(bytes).map_err(|_| 400_u16)?;
-            format!(" {value}")
+            let value: Result<serde_json::Value, _> = serde_json::from_slice(bytes);
+            format!(" {}", value.map_err(|e| (400, format!("the body is not JSON: {e}")))?)
         }
     };
     Ok(format!("{} {}{body}\n", request.method(), request.url()))

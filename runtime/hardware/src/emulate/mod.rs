@@ -1,6 +1,7 @@
 //! A device that answers as a real one would: the model of the library behind the wire of its driver, read the other way round.
 
 mod device;
+mod form;
 mod http;
 mod serve;
 mod solve;

@@ -32,9 +32,7 @@ const REFUSED: usize = 40;
 
 impl<'p, 's> Looker<'p, 's> {
     pub fn new(program: &'p Program, stage: &Stage<'p>, memory: Memory<'s>) -> Self {
-        // A tool is another link than the one that carries tools, or has joints beside those that move the tip.
-        let tool = |a: &&crate::motion::Actor| a.assembly.tip != a.assembly.flange || a.arm.len() < a.joints.len();
-        let equipped = stage.actors.iter().filter(|(_, a)| tool(a)).map(|(id, _)| *id).collect();
+        let equipped = stage.actors.iter().filter(|(_, actor)| actor.has_tool()).map(|(id, _)| *id).collect();
         Looker { program, memory, equipped, left: MOST }
     }
 

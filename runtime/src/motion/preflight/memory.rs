@@ -56,9 +56,7 @@ impl<'s> Memory<'s> {
     /// What is known of a lab.
     pub fn of(scene: &Scene, store: &'s dyn Store) -> Self {
         let lab = digest_of(scene);
-        let outcomes = store.load(&lab).and_then(|bytes| seal::opened::<Kept>(&bytes));
-        let outcomes =
-            outcomes.filter(|k| k.made_by == MADE_BY && k.lab == lab).map(|k| k.outcomes).unwrap_or_default();
+        let outcomes = store.load(&lab).map(|bytes| known(&bytes, &lab)).unwrap_or_default();
         Memory { store, lab, outcomes, asked: RefCell::default(), news: false }
     }
 
@@ -115,17 +113,24 @@ impl<'s> Memory<'s> {
             return;
         }
         let mut outcomes = self.asked.into_inner();
-        for (key, outcome) in self.outcomes {
-            if outcomes.len() >= MOST {
-                break;
+        seal::add(self.store, &self.lab, |now| {
+            // Another workflow of the lab may have been looked at meanwhile.
+            let others = now.map(|bytes| known(&bytes, &self.lab)).unwrap_or_default();
+            for (key, outcome) in others.into_iter().chain(self.outcomes) {
+                if outcomes.len() >= MOST {
+                    break;
+                }
+                outcomes.entry(key).or_insert(outcome);
             }
-            outcomes.entry(key).or_insert(outcome);
-        }
-        let kept = Kept { made_by: MADE_BY.to_string(), lab: self.lab, outcomes };
-        if let Some(bytes) = seal::closed(&kept) {
-            self.store.save(&kept.lab, &bytes);
-        }
+            seal::closed(&Kept { made_by: MADE_BY.to_string(), lab: self.lab.clone(), outcomes })
+        });
     }
+}
+
+/// The outcomes that are kept of a lab.
+fn known(bytes: &[u8], lab: &str) -> BTreeMap<String, Outcome> {
+    let kept = seal::opened::<Kept>(bytes).filter(|k| k.made_by == MADE_BY && k.lab == lab);
+    kept.map(|k| k.outcomes).unwrap_or_default()
 }
 
 /// What a lab is known by: everything of it but where in the text it stands.

@@ -6,7 +6,7 @@ mod look;
 mod memory;
 mod more;
 mod offer;
-mod seal;
+pub mod seal;
 mod starts;
 mod told;
 pub(super) mod values;
@@ -18,21 +18,27 @@ use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Scene};
 use matterix_ir::{Diagnostic, Program};
 
+use super::overlap::{self, overlaps};
 use super::stage::Stage;
 use super::together::together;
 pub use seal::{Nowhere, Store};
 
-/// What would go wrong with the motions of a program. Empty for labs without robots that have joints. What was found
-/// before is taken from `store`, what is new goes there.
+/// What would go wrong with the motions of a program, or stands in one place before anything moves. What was found before
+/// is taken from `store`, what is new goes there.
 pub fn preflight(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     if program.scene.instances.iter().all(|i| i.articulation.is_none()) {
-        return Vec::new();
+        return overlaps(program);
     }
     verdicts::of(program, store, || look(program, store))
 }
 
 fn look(program: &Program, store: &dyn Store) -> Vec<Diagnostic> {
     let Ok(stage) = Stage::new(program) else { return Vec::new() };
+    // Of what is in something before it moves no way leads anywhere.
+    let standing = overlap::found(stage.clone());
+    if !standing.is_empty() {
+        return standing;
+    }
     if stage.actors.is_empty() {
         return Vec::new();
     }

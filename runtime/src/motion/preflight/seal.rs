@@ -1,13 +1,14 @@
 //! Where what was found out is kept, and the form it is kept in: one line of a checksum, then JSON.
 
 use std::hash::Hasher;
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use siphasher::sip128::{Hasher128, SipHasher13};
 
 /// Keeps bytes under a name for another time. Nothing depends on it but the time that a check takes.
-pub trait Store {
+pub trait Store: Sync {
     /// What was kept under a name, if it still is.
     fn load(&self, name: &str) -> Option<Vec<u8>>;
     /// Keeps bytes under a name.
@@ -30,6 +31,17 @@ impl Store for Nowhere {
 
     fn keeps(&self) -> bool {
         false
+    }
+}
+
+/// One at a time adds to what is kept: workflows are looked at on several threads.
+static ADDING: Mutex<()> = Mutex::new(());
+
+/// What is kept under a name, made anew from what is there now.
+pub fn add(store: &dyn Store, name: &str, made: impl FnOnce(Option<Vec<u8>>) -> Option<Vec<u8>>) {
+    let _alone = ADDING.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(bytes) = made(store.load(name)) {
+        store.save(name, &bytes);
     }
 }
 

@@ -35,7 +35,7 @@ pub fn finding(
         }
         Refused::OutOfReach(far, _) => {
             let label = match far * 1e3 {
-                mm if mm >= 1.0 => format!("its gripper stays {mm:.0} mm away"),
+                mm if mm >= 1.0 => format!("{} stays {mm:.0} mm away", tip(stage, robot)),
                 _ => "it gets there, but not turned like this".to_string(),
             };
             let headline = match goal {
@@ -90,7 +90,8 @@ pub fn finding(
     };
     let mut shown = Vec::new();
     let gap = more.passage.iter().flat_map(|p| p.gap.iter().flat_map(|(pair, _)| *pair).chain(p.by));
-    for id in with.into_iter().chain(gap).chain(goal) {
+    // Parts stand where the whole of it does: a well, a tip, a slot.
+    for id in with.into_iter().chain(gap).chain(goal).map(|id| stage.whole(id)) {
         let at = scene.get(id).span;
         if at == span || shown.contains(&at) {
             continue;
@@ -118,6 +119,12 @@ fn met(stage: &Stage<'_>, meeting: &Meeting, arm: &str, goal: Option<InstanceId>
     let part = meeting.part.as_ref().map_or("it".to_string(), |part| format!("its `{part}`"));
     let depth = (meeting.depth * 1e3).max(1.0);
     (headline, format!("`{mine}` meets {part} at {}, {depth:.0} mm deep", meeting.place()))
+}
+
+/// What of a robot is brought to a goal, in words.
+fn tip(stage: &Stage<'_>, robot: InstanceId) -> &'static str {
+    let grips = stage.actor_of(robot).and_then(|id| stage.actors.get(&id)).is_some_and(|actor| actor.fingers.is_some());
+    if grips { "its gripper" } else { "it" }
 }
 
 /// What closes the way of a robot that drives.

@@ -39,16 +39,17 @@ fn key(program: &Program) -> Option<String> {
 pub fn of(program: &Program, store: &dyn Store, look: impl FnOnce() -> Vec<Diagnostic>) -> Vec<Diagnostic> {
     let Some(key) = store.keeps().then(|| key(program)).flatten() else { return look() };
     let name = format!("{NAME}{}", &key[..DIGITS]);
-    let kept = store.load(&name).and_then(|bytes| seal::opened::<Kept>(&bytes)).filter(|k| k.made_by == MADE_BY);
-    let mut verdicts = kept.map(|k| k.verdicts).unwrap_or_default();
-    if let Some((_, found)) = verdicts.iter().find(|(k, _)| *k == key) {
-        return found.clone();
+    let verdicts = |bytes: Vec<u8>| seal::opened::<Kept>(&bytes).filter(|k| k.made_by == MADE_BY).map(|k| k.verdicts);
+    let known = store.load(&name).and_then(verdicts).unwrap_or_default();
+    if let Some((_, found)) = known.into_iter().find(|(k, _)| *k == key) {
+        return found;
     }
     let found = look();
-    verdicts.insert(0, (key, found.clone()));
-    verdicts.truncate(MOST);
-    if let Some(bytes) = seal::closed(&Kept { made_by: MADE_BY.to_string(), verdicts }) {
-        store.save(&name, &bytes);
-    }
+    seal::add(store, &name, |now| {
+        let mut verdicts = now.and_then(verdicts).unwrap_or_default();
+        verdicts.insert(0, (key, found.clone()));
+        verdicts.truncate(MOST);
+        seal::closed(&Kept { made_by: MADE_BY.to_string(), verdicts })
+    });
     found
 }

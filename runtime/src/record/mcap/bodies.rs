@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
-use matterix_ir::bodies::{Bodies, Machine, Thing};
-use matterix_ir::scene::InstanceId;
+use matterix_ir::bodies::{Bodies, Machine, Standing, Thing};
+use matterix_ir::scene::{InstanceId, frame};
 use mcap::McapResult;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -73,7 +73,18 @@ pub(super) fn write<W: Write + Seek>(stage: &Stage<'_>, sink: &mut Sink<W>) -> M
             ("tools", index),
         ],
     );
-    let schema = object("matterix.Bodies", [("things", list(thing)), ("machines", list(machine))]);
+    let truth = |about: &str| json!({ "description": about, "type": "boolean" });
+    let standing = object(
+        "matterix.Standing",
+        [
+            ("name", text("Its name")),
+            ("carriers", list(text("What it stands on, then what carries that"))),
+            ("told", truth("Whether the text gives its place on that")),
+            ("loose", truth("Whether it can be gripped or has joints")),
+        ],
+    );
+    let parts = [("things", list(thing)), ("machines", list(machine)), ("standing", list(standing))];
+    let schema = object("matterix.Bodies", parts);
     let channel = sink.channel("/bodies", "matterix.Bodies", &schema, &BTreeMap::new())?;
     sink.push(channel, 0.0, &bodies)
 }
@@ -109,7 +120,28 @@ fn bodies(stage: &Stage<'_>) -> Bodies {
             tools: assembly.map_or(robot.links.len() as u32, |a| a.tools),
         });
     }
+    out.standing = standing(stage);
     out
+}
+
+/// What has a place of its own in the lab.
+fn standing(stage: &Stage<'_>) -> Vec<Standing> {
+    let ids = (0..stage.scene.instances.len() as u32).map(InstanceId);
+    let known = |id: InstanceId| stage.scene.get(id).placed;
+    let placed = ids.filter(|id| stage.scene.get(*id).owner.is_none());
+    placed
+        .filter(|id| known(*id) && stage.carriers(*id).into_iter().all(known))
+        .map(|id| {
+            let own = stage.scene.get(id);
+            let graspable = own.frames.iter().any(|f| f.name == frame::GRASP);
+            Standing {
+                name: own.name.clone(),
+                carriers: stage.carriers(id).into_iter().map(|c| stage.scene.get(c).name.clone()).collect(),
+                told: own.at.is_some(),
+                loose: graspable || own.articulation.is_some(),
+            }
+        })
+        .collect()
 }
 
 /// A thing, its parts and what stands on any of these, by name.

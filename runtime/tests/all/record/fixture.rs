@@ -46,6 +46,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         support: support.map(InstanceId),
         pose: Pose::at(at),
         placed: true,
+        at: None,
         frames: vec![],
         shape,
         solids: Vec::new(),

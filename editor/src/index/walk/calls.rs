@@ -1,0 +1,206 @@
+//! Calls of skills and commands, and jobs.
+
+use matterix_ir::Span;
+use matterix_lang::ast::{Call, ExprKind, Name, NamedExpr};
+use matterix_lang::meanings::Sort;
+use matterix_lang::names::verb_text;
+
+use super::super::collect::verb_span;
+use super::Walk;
+use crate::index::{DefId, Index, Kind, Meaning};
+
+/// What a verb can mean in a call, with the number of its words.
+struct Verb {
+    def: DefId,
+    words: usize,
+}
+
+impl Walk<'_> {
+    /// A call; gives the skill or command it means.
+    pub(super) fn call(&mut self, call: &Call) -> Option<DefId> {
+        let verb = self.verb(call);
+        let count = verb.as_ref().map_or(call.words.len(), |v| v.words);
+        let def = verb.as_ref().map(|v| v.def);
+        if let Some(span) = verb_span(&call.words[..count]) {
+            self.maybe(span, def);
+            if let Some(def) = def {
+                self.index.own.calls.push((span, self.item, def));
+            }
+        }
+        let params = def.map(|d| self.index.def(d).inside.clone()).unwrap_or_default();
+        let first = params.iter().copied().find(|p| {
+            let p = self.index.def(*p);
+            p.kind == Kind::Parameter && p.label.is_none()
+        });
+        let words = first.map(|p| self.index.def(p).words.clone()).unwrap_or_default();
+        for word in call.words.iter().skip(count) {
+            self.name(word, &words);
+        }
+        if let Some(object) = &call.object {
+            self.expr_among(object, &words);
+        }
+        for (label, e) in &call.labelled {
+            let group: Vec<DefId> = params
+                .iter()
+                .copied()
+                .filter(|p| self.index.def(*p).label.as_deref() == Some(label.text.as_str()))
+                .collect();
+            match group.first() {
+                Some(param) => self.known(label.span, *param),
+                None => self.language(label.span, "the device that does it"),
+            }
+            match (&*e.kind, group.as_slice()) {
+                (ExprKind::Tuple(items, None), [_, _, ..]) if items.len() == group.len() => {
+                    for (item, param) in items.iter().zip(&group) {
+                        let words = self.index.def(*param).words.clone();
+                        self.expr_among(item, &words);
+                    }
+                }
+                _ => {
+                    let words = group.first().map(|p| self.index.def(*p).words.clone()).unwrap_or_default();
+                    self.expr_among(e, &words);
+                }
+            }
+        }
+        self.options(&call.options, &params);
+        def
+    }
+
+    /// What stands in braces: values of options or parameters.
+    pub(super) fn options(&mut self, options: &[NamedExpr], params: &[DefId]) {
+        for o in options {
+            let param = params.iter().copied().find(|p| self.index.def(*p).name == o.name.text);
+            self.maybe(o.name.span, param);
+            let words = param.map(|p| self.index.def(p).words.clone()).unwrap_or_default();
+            self.expr_among(&o.value, &words);
+        }
+    }
+
+    fn verb(&mut self, call: &Call) -> Option<Verb> {
+        for words in (1..=call.words.len()).rev() {
+            let noted = verb_span(&call.words[..words]).and_then(|s| self.index.meanings.names.get(&s));
+            if let Some(def) = noted.and_then(|s| self.index.declared_at(*s)) {
+                return Some(Verb { def, words });
+            }
+        }
+        for words in (1..=call.words.len()).rev() {
+            let rest = call.words.len() - words;
+            if rest > 1 || (rest == 1 && call.object.is_some()) {
+                continue;
+            }
+            let all = self.index.meant_by(self.at, &verb_text(&call.words[..words]));
+            if all.is_empty() {
+                continue;
+            }
+            let device = |this: &mut Self, command: DefId| -> Sort {
+                let takes = this.index.def(command).inside.iter().any(|p| {
+                    let p = this.index.def(*p);
+                    p.kind == Kind::Parameter && p.label.is_none()
+                });
+                let by = call.labelled.iter().find(|(l, _)| l.text == "by").map(|b| &b.1);
+                let word = call.words.get(words);
+                match (takes, word, &call.object, by) {
+                    (false, Some(word), _, _) => this.quietly(|w| w.name(word, &[]).sort),
+                    (false, None, Some(object), _) => this.quietly(|w| w.expr(object).sort),
+                    (_, _, _, Some(by)) => this.quietly(|w| w.expr(by).sort),
+                    _ => Sort::Any,
+                }
+            };
+            let mut best: Option<(usize, DefId)> = None;
+            for def in &all {
+                let lacking = match self.index.def(*def).kind {
+                    Kind::Command => {
+                        let device = device(self, *def);
+                        if self.index.can(&device, *def) { 0 } else { 100 }
+                    }
+                    _ => 0,
+                };
+                let misfit = lacking + self.misfit(*def, call);
+                if best.is_none_or(|(least, _)| misfit < least) {
+                    best = Some((misfit, *def));
+                }
+            }
+            return best.map(|(_, def)| Verb { def, words });
+        }
+        None
+    }
+
+    /// How badly a call's prepositions fit.
+    fn misfit(&self, def: DefId, call: &Call) -> usize {
+        let labels: Vec<&str> =
+            self.index.def(def).inside.iter().filter_map(|p| self.index.def(*p).label.as_deref()).collect();
+        let takes = self.index.def(def).inside.iter().any(|p| {
+            let p = self.index.def(*p);
+            p.kind == Kind::Parameter && p.label.is_none()
+        });
+        let object = call.object.is_some() || call.words.len() > self.index.def(def).name.split(' ').count();
+        // `by` names the device of a command whose object is something else.
+        let command = self.index.def(def).kind == Kind::Command && (takes || !object);
+        let unknown =
+            call.labelled.iter().filter(|(l, _)| !labels.contains(&l.text.as_str()) && !(command && l.text == "by"));
+        let missing = labels.iter().filter(|l| !call.labelled.iter().any(|(c, _)| c.text == **l));
+        unknown.count() + missing.count()
+    }
+
+    /// Looks at an expression without noting what its names stand for.
+    fn quietly<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
+        let before = self.index.own.uses.get(&self.file).map_or(0, Vec::len);
+        let result = look(self);
+        if let Some(uses) = self.index.own.uses.get_mut(&self.file) {
+            uses.truncate(before);
+        }
+        result
+    }
+
+    /// The name of a job that is started.
+    pub(super) fn job(&mut self, name: &Name, whole: Span) {
+        let known = self.jobs().into_iter().find(|d| self.index.def(*d).name == name.text);
+        let id = known.unwrap_or_else(|| {
+            let def = super::bare(&name.text, Kind::Job, name.span, whole);
+            let id = self.index.add(def);
+            let item = self.item;
+            if let Some(def) = self.index.own_mut(id) {
+                def.owner = item;
+            }
+            id
+        });
+        self.known(name.span, id);
+    }
+
+    /// The name of a job that is waited for.
+    pub(super) fn awaited(&mut self, name: &Name) {
+        let known = self.jobs().into_iter().find(|d| self.index.def(*d).name == name.text);
+        self.maybe(name.span, known);
+    }
+
+    /// The jobs of the item.
+    fn jobs(&self) -> Vec<DefId> {
+        let of = |d: &crate::index::Def| d.kind == Kind::Job && d.owner == self.item;
+        self.index.own_defs().filter(|(_, d)| of(d)).map(|d| d.0).collect()
+    }
+
+    /// A verb as a driver or an `alive` line names it.
+    pub(super) fn verb_of(&mut self, words: &[Name], device: &Sort) -> Option<DefId> {
+        let span = verb_span(words)?;
+        let all: Vec<DefId> = self.index.verbs(&verb_text(words)).collect();
+        let def = all.iter().copied().find(|d| self.index.can(device, *d)).or(all.first().copied());
+        self.note(span, def.map_or(Meaning::Unknown, Meaning::Def));
+        def
+    }
+}
+
+impl Index {
+    /// What a verb may mean in a module: the skill that is seen, and commands.
+    pub(crate) fn meant_by(&self, at: usize, verb: &str) -> Vec<DefId> {
+        let skill = self.lookup(at, verb).filter(|d| self.def(*d).kind == Kind::Skill);
+        let commands = self.verbs(verb).filter(|d| self.def(*d).kind == Kind::Command);
+        skill.into_iter().chain(commands).collect()
+    }
+
+    /// Whether a thing has the capability of a command.
+    pub(crate) fn can(&self, device: &Sort, command: DefId) -> bool {
+        let (Sort::Thing(kinds, _), Some(owner)) = (device, self.def(command).owner) else { return false };
+        let Some(owner) = self.decl_of(owner) else { return false };
+        kinds.iter().any(|k| self.ancestors(*k).contains(&owner))
+    }
+}

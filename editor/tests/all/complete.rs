@@ -1,0 +1,147 @@
+//! What can be written at `$0`, in texts that are not whole there.
+
+use matterix_editor::complete::{complete, signature};
+
+use crate::names::LAB;
+use crate::support::{Files, analysed, marked};
+
+/// The best labels at `$0` in a line of the workflow of the lab; the analysis is that of the text with the line.
+fn offers(line: &str) -> Vec<String> {
+    in_text(&LAB.replace("    for x in", &format!("    {line}\n    for x in")))
+}
+
+fn in_text(text: &str) -> Vec<String> {
+    let (text, places) = marked(text);
+    let (analysis, index) = analysed("cook.mtx", &text, &Files::default());
+    let mut found = complete(&index, analysis.root, &text, places[0]).all;
+    found.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| a.label.cmp(&b.label)));
+    found.into_iter().map(|c| c.label).collect()
+}
+
+#[track_caller]
+fn has(found: &[String], wanted: &[&str], not: &[&str]) {
+    for w in wanted {
+        assert!(found.iter().any(|f| f == w), "`{w}` is not among {found:?}");
+    }
+    for w in not {
+        assert!(!found.iter().any(|f| f == w), "`{w}` is among {found:?}");
+    }
+}
+
+#[test]
+fn steps_begin_with_verbs_and_words() {
+    let found = offers("$0");
+    has(&found, &["heat", "swing", "bring", "wait", "let", "expect"], &["centrifuge", "ambient"]);
+    has(&offers("br$0"), &["bring"], &["heat"]);
+    has(&offers("stop $0"), &["heating"], &["bring"]);
+}
+
+#[test]
+fn arguments_are_what_the_call_asks_for() {
+    let found = offers("bring $0");
+    assert_eq!(found[0], "beaker", "{found:?}");
+    has(&offers("bring beaker $0"), &["to", "with", "{ }"], &["from"]);
+    has(&offers("bring beaker to 40 degC $0"), &["with"], &["to"]);
+    let found = offers("bring beaker to 40 degC with $0");
+    assert_eq!(found[0], "plate", "{found:?}");
+    has(&offers("bring beaker to 40 degC with plate { $0 }"), &["limit"], &["beaker"]);
+    has(&offers("swing crate to $0")[..2], &["open", "closed"], &[]);
+}
+
+#[test]
+fn units_are_those_of_what_is_expected() {
+    let found = offers("bring beaker to 40 $0");
+    assert_eq!(found[0], "degC", "{found:?}");
+    has(&found, &["K"], &["mL", "s"]);
+    has(&offers("wait 10 $0"), &["s", "min", "h", "ms"], &["degC"]);
+    has(&offers("expect beaker.contents.volume > 3 $0"), &["mL", "L", "uL"], &["degC", "s"]);
+    has(&offers("expect elapsed > 3 m$0"), &["min", "ms"], &["mL"]);
+    has(&offers("let x = beaker.contents.temperature as $0"), &["degC"], &["mL"]);
+}
+
+#[test]
+fn members_stand_behind_a_dot() {
+    has(&offers("expect beaker.$0"), &["contents", "volume", "temperature", "mass"], &["heat"]);
+    has(&offers("expect beaker.contents.t$0"), &["temperature"], &["mass"]);
+    has(&offers("expect crate.$0"), &["lid"], &["contents"]);
+    has(&offers("expect crate.lid == $0")[..2], &["open", "closed"], &[]);
+    has(&offers("expect crate is $0"), &["open", "closed"], &[]);
+    has(&offers("expect look.$0"), &["start", "end", "elapsed"], &[]);
+    has(&offers("note \"{crate.$0}\""), &["lid"], &[]);
+}
+
+#[test]
+fn species_and_places_stand_in_brackets() {
+    has(&offers("expect beaker[$0"), &["water", "EtOH"], &["heat"]);
+    let text = "mtx 1\nuse std::opentrons::{Corning96, OT2}\nlab deck {\n    ambient: 22 degC\n    ot2 = OT2 at (0, 0, 0) m\n    plate = Corning96 on ot2.slot[$0\n}\n";
+    let whole = text.replace("$0", "2]");
+    let (analysis, index) = analysed("a.mtx", &whole, &Files::default());
+    let (broken, places) = marked(text);
+    let found = complete(&index, analysis.root, &broken, places[0]);
+    let labels: Vec<&str> = found.all.iter().map(|c| c.label.as_str()).collect();
+    assert!(labels.contains(&"1") && labels.contains(&"11"), "{labels:?}");
+    let text = whole + "workflow w in deck {\n    expect plate[$0\n}\n";
+    has(&in_text(&text), &["A1", "H12"], &[]);
+}
+
+#[test]
+fn labs_are_made_of_assets() {
+    let lab = |line: &str| in_text(&LAB.replace("    crate = Crate", &format!("    {line}\n    crate = Crate")));
+    has(&lab("other = $0"), &["Crate", "Beaker250mL", "OpticalTable"], &["Body"]);
+    has(&lab("other = Crate $0"), &["at", "on"], &["heat"]);
+    has(&lab("other = Crate on $0"), &["plate"], &["Crate"]);
+    has(&lab("other = Crate { $0 }"), &["lid", "mass"], &["temperature"]);
+    has(&lab("other = Crate { lid: $0 }")[..2], &["open", "closed"], &[]);
+    has(&lab("other = Beaker250mL on plate holding 3 g of $0"), &["water"], &["plate"]);
+    has(&lab("$0"), &["ambient", "include", "between"], &["heat"]);
+}
+
+#[test]
+fn files_begin_with_items() {
+    has(&in_text(&format!("{LAB}\n$0")), &["lab", "workflow", "skill", "use"], &["heat"]);
+    has(&in_text("mtx 1\nuse std::$0\n"), &["heating", "robots"], &[]);
+    has(&in_text("mtx 1\nuse std::heating::$0\n"), &["IkaRetControl"], &["FrankaPanda"]);
+    has(&in_text("mtx 1\nuse std::heating::{$0}\n"), &["IkaRetControl"], &["FrankaPanda"]);
+    has(&in_text(&format!("{LAB}\nworkflow w in $0")), &["bench"], &["Crate"]);
+    has(&in_text("mtx 1\nasset A: $0"), &["Vessel", "Body"], &["heat"]);
+    has(&in_text("mtx 1\ncapability A {\n    $0\n}"), &["state", "param", "command"], &["heat"]);
+    has(&in_text("mtx 1\ncapability A {\n    param x: $0\n}"), &["Temperature", "Bool"], &[]);
+    has(&in_text("mtx 1\nspecies A { $0 }"), &["formula", "density"], &[]);
+}
+
+#[test]
+fn nothing_is_offered_in_comments_and_texts() {
+    assert!(offers("// hea$0").is_empty());
+    assert!(offers("note \"hea$0\"").is_empty());
+}
+
+#[test]
+fn what_was_known_before_a_change_still_counts() {
+    let (analysis, index) = analysed("cook.mtx", LAB, &Files::default());
+    let (text, places) = marked(
+        &LAB.replace("    swing crate to open\n", "    swing crate to open\n    let y = rise + beaker.contents.$0"),
+    );
+    let found = complete(&index, analysis.root, &text, places[0]);
+    assert!(found.all.iter().any(|c| c.label == "temperature"));
+}
+
+#[test]
+fn signatures_say_which_part_is_written() {
+    let at = |line: &str| {
+        let (text, places) =
+            marked(&LAB.replace("    swing crate to open\n", &format!("    swing crate to open\n    {line}\n")));
+        let (analysis, index) = analysed("cook.mtx", &text, &Files::default());
+        let found = signature(&index, analysis.root, &text, places[0])?;
+        let part = found.active.map(|a| found.label[found.parts[a].0.clone()].to_string());
+        Some((found.label, part))
+    };
+    let form = "bring V to T with P { limit }".to_string();
+    assert_eq!(at("bring beak$0"), Some((form.clone(), Some("V".into()))));
+    assert_eq!(at("bring beaker to 3$0"), Some((form.clone(), Some("T".into()))));
+    assert_eq!(at("bring beaker to 3 degC with $0"), Some((form.clone(), Some("P".into()))));
+    assert_eq!(at("bring beaker to 3 degC with plate { limit: $0 }"), Some((form, Some("limit".into()))));
+    let (label, part) = at("let y = clamp(1, $0)").expect("a function");
+    assert!(label.starts_with("clamp(x, low, high)"), "{label}");
+    assert_eq!(part.as_deref(), Some("low"));
+    assert_eq!(at("note \"bring $0\""), None);
+}

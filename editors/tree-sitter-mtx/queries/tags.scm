@@ -1,0 +1,12 @@
+(workflow name: (identifier) @name) @definition.function
+(test name: (identifier) @name) @definition.function
+(function name: (identifier) @name) @definition.function
+(skill verb: (verb) @name) @definition.function
+(command verb: (verb) @name) @definition.method
+(capability name: (identifier) @name) @definition.interface
+(asset name: (identifier) @name) @definition.class
+(lab name: (identifier) @name) @definition.module
+(constant name: (identifier) @name) @definition.constant
+(solution name: (identifier) @name) @definition.constant
+(reaction name: (identifier) @name) @definition.constant
+(species_declaration name: (species) @name) @definition.constant

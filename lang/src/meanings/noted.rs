@@ -1,0 +1,69 @@
+//! What was noted of items that may have moved since: it is kept as it was noted, and put where the items are now when it is asked for.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use matterix_ir::{FileId, Span};
+
+use super::{Meanings, Seeing};
+use crate::names::Module;
+use crate::syntax::moved::Moved;
+
+/// What was noted, and where the items it is about are now.
+#[derive(Clone, Debug, Default)]
+pub struct Noted {
+    of: Arc<Meanings>,
+    /// Items as they stood, by file and start, and as they stand.
+    items: BTreeMap<(FileId, u32), (u32, Span)>,
+}
+
+impl Noted {
+    /// What was noted of texts as they are.
+    pub fn of(seeing: Seeing, modules: &[Arc<Module>]) -> Option<Noted> {
+        let of = Arc::new(*seeing?);
+        let mut noted = Noted { of, items: BTreeMap::new() };
+        let own = modules.iter().filter(|m| !m.is_library()).flat_map(|m| &m.tree.items);
+        let all: BTreeMap<(FileId, u32), Span> = own.map(|i| ((i.span.file, i.span.start), i.span)).collect();
+        let named = noted.of.names.iter().flat_map(|(a, b)| [a, b]).chain(noted.of.values.keys());
+        for span in named {
+            let around = all.range(..=(span.file, span.start)).next_back();
+            if let Some((key, item)) = around.filter(|(_, i)| i.file == span.file && span.end <= i.end) {
+                noted.items.insert(*key, (item.end, *item));
+            }
+        }
+        Some(noted)
+    }
+
+    /// Where a place is now.
+    fn place(&self, span: Span) -> Span {
+        let around = self.items.range(..=(span.file, span.start)).next_back();
+        match around.filter(|((file, _), (end, _))| *file == span.file && span.end <= *end) {
+            Some(((_, start), (_, now))) => {
+                let at = |place: u32| now.start + (place - start);
+                Span { start: at(span.start), end: at(span.end), ..span }
+            }
+            None => span,
+        }
+    }
+
+    /// Adds it to what is known. What both know is what was known already.
+    pub(super) fn join_into(&self, all: &mut Meanings) {
+        for (name, declared) in &self.of.names {
+            all.names.entry(self.place(*name)).or_insert_with(|| self.place(*declared));
+        }
+        for (span, seen) in &self.of.values {
+            all.see(self.place(*span), seen.clone());
+        }
+        for (lab, things) in &self.of.things {
+            all.things.insert(lab.clone(), things.clone());
+        }
+    }
+}
+
+impl Moved for Noted {
+    fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
+        for (_, now) in self.items.values_mut() {
+            now.moved(to);
+        }
+    }
+}

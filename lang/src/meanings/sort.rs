@@ -1,0 +1,162 @@
+//! What kind of value something is, apart from the lab in which it was evaluated.
+
+use std::sync::Arc;
+
+use crate::elaborate::Elaborator;
+use crate::eval::{Type, Value};
+use crate::names::DeclId;
+use crate::units::Dimension;
+
+/// What kind of value something is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sort {
+    /// Nothing is known.
+    Any,
+    /// A quantity: the dimension of a difference, and whether it is a point on a scale.
+    Quantity(Dimension, bool),
+    /// A truth value.
+    Truth,
+    /// A text.
+    Text,
+    /// One of these words.
+    Word(Arc<[String]>),
+    /// From one to another.
+    Range(Box<Sort>),
+    /// Several of different kinds.
+    Tuple(Vec<Sort>),
+    /// Several of one kind.
+    List(Box<Sort>),
+    /// A thing with all of these kinds; by its full name where it is one of a lab.
+    Thing(Vec<DeclId>, Option<String>),
+    /// A named point of a thing.
+    Frame,
+    /// Three numbers: red, green, blue.
+    Color,
+    /// A species.
+    Species,
+    /// A reaction.
+    Reaction,
+    /// What a vessel is made of.
+    Material,
+    /// A concentration whose kind is not said.
+    Concentration,
+    /// A recipe.
+    Solution,
+    /// A lab in a lab, by its full name.
+    Lab(String),
+    /// A capability or asset type itself.
+    Kind(DeclId),
+    /// A function or relation.
+    Function(DeclId),
+    /// A function of the compiler on a value.
+    Method,
+    /// A named step of a workflow.
+    Step,
+    /// No thing.
+    Nothing,
+    /// No limit.
+    Unlimited,
+}
+
+impl Sort {
+    /// A plain number.
+    pub fn number() -> Sort {
+        Sort::Quantity(Dimension::one(), false)
+    }
+
+    /// That of a type as it is declared.
+    pub fn of_type(ty: &Type) -> Sort {
+        match ty {
+            Type::Any => Sort::Any,
+            Type::Quantity { dimension, point, .. } => Sort::Quantity(dimension.clone(), *point),
+            Type::Int => Sort::number(),
+            Type::Bool => Sort::Truth,
+            Type::Text => Sort::Text,
+            Type::Enum(words) => Sort::Word(words.clone()),
+            Type::Species => Sort::Species,
+            Type::Reaction => Sort::Reaction,
+            Type::Material { .. } => Sort::Material,
+            Type::Frame => Sort::Frame,
+            Type::Color => Sort::Color,
+            Type::Range(inner) => Sort::Range(Box::new(Sort::of_type(inner))),
+            Type::List(inner) => Sort::List(Box::new(Sort::of_type(inner))),
+            Type::Instance { kinds, .. } => Sort::Thing(kinds.to_vec(), None),
+        }
+    }
+
+    /// What holds for another one as well: of a thing that is not always the same only its kinds, where they are.
+    pub fn join(&mut self, other: Sort) {
+        match (&mut *self, other) {
+            (Sort::Any, known) => *self = known,
+            (Sort::Nothing | Sort::Unlimited, known @ (Sort::Thing(..) | Sort::Quantity(..))) => *self = known,
+            (Sort::Thing(kinds, name), Sort::Thing(others, other)) => {
+                if *name != other {
+                    *name = None;
+                }
+                // The stand-in that a declaration was checked with has the kinds that all have.
+                if *kinds != others && others.len() == 1 && other.is_none() {
+                    *kinds = others;
+                }
+            }
+            (Sort::List(inner), Sort::List(other)) => inner.join(*other),
+            (Sort::Quantity(dimension, _), Sort::Quantity(other, _)) if dimension.is_any() => *dimension = other,
+            _ => {}
+        }
+    }
+}
+
+impl Elaborator<'_> {
+    /// What kind of value this is; none for a mistake.
+    pub fn sort_of(&self, value: &Value) -> Option<Sort> {
+        let all = |items: &[Value]| items.iter().map(|i| self.sort_of(i).unwrap_or(Sort::Any)).collect::<Vec<_>>();
+        Some(match value {
+            Value::Error => return None,
+            Value::Num(n) => Sort::Quantity(n.dimension.clone(), n.point),
+            Value::Bool(_) => Sort::Truth,
+            Value::Text(_) => Sort::Text,
+            Value::Enum(_, words) => Sort::Word(words.clone()),
+            Value::Range(low, _) => Sort::Range(Box::new(Sort::Quantity(low.dimension.clone(), low.point))),
+            Value::Tuple(items) => Sort::Tuple(all(items)),
+            Value::List(items) => {
+                let first = items.first().and_then(|i| self.sort_of(i)).unwrap_or(Sort::Any);
+                Sort::List(Box::new(unnamed(first)))
+            }
+            Value::Instance(id) | Value::Qualified(id, _) => {
+                let thing = &self.instances[id.0 as usize];
+                let kinds = match value {
+                    Value::Qualified(_, kind) => vec![*kind],
+                    _ => thing.kinds.clone(),
+                };
+                Sort::Thing(kinds, (!self.prototype).then(|| thing.name.clone()))
+            }
+            Value::InstanceNode(_) => Sort::Thing(Vec::new(), None),
+            Value::Nothing => Sort::Nothing,
+            Value::Unlimited => Sort::Unlimited,
+            Value::Grid(id, grid) => {
+                let grid = self.instances[id.0 as usize].grids.get(*grid);
+                let child = grid.and_then(|g| g.children.values().next());
+                let kinds = child.map_or_else(Vec::new, |c| self.instances[c.0 as usize].kinds.clone());
+                Sort::List(Box::new(Sort::Thing(kinds, None)))
+            }
+            Value::Species(_) => Sort::Species,
+            Value::Included(lab) => Sort::Lab(lab.clone()),
+            Value::Reaction(_) => Sort::Reaction,
+            Value::Concentration(..) => Sort::Concentration,
+            Value::Frame(..) => Sort::Frame,
+            Value::Kind(id) => Sort::Kind(*id),
+            Value::Solution(_) => Sort::Solution,
+            Value::Material(_) => Sort::Material,
+            Value::Function(id) => Sort::Function(*id),
+            Value::Step(..) => Sort::Step,
+            Value::Method(..) => Sort::Method,
+        })
+    }
+}
+
+/// A thing of which only the kinds are kept, as it stands for others like it.
+fn unnamed(sort: Sort) -> Sort {
+    match sort {
+        Sort::Thing(kinds, _) => Sort::Thing(kinds, None),
+        other => other,
+    }
+}

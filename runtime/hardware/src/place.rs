@@ -1,0 +1,188 @@
+//! Where a device is to be found: how bindings write it, and what is said of a place where nobody answers.
+
+use std::io::{self, ErrorKind};
+use std::net::{Ipv4Addr, Ipv6Addr};
+
+/// Where a device is to be found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A serial port or a pseudo-terminal, by its path.
+    Serial(String),
+    /// `HOST:PORT`.
+    Tcp(String),
+    /// A server of SiLA 2, `HOST:PORT`.
+    Sila(String),
+    /// A server at `HOST:PORT`.
+    Http(String),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text) | Place::Http(text)) = self;
+        f.write_str(text)
+    }
+}
+
+/// A place that cannot be one: what is wrong with it, and how it is written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NoPlace {
+    /// In words.
+    pub why: String,
+    /// What to write.
+    pub help: String,
+}
+
+/// What a server may be written with in front of it.
+const HTTP: &str = "http://";
+
+impl Place {
+    /// The key of a binding that it is written with.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Place::Serial(_) => "port",
+            Place::Tcp(_) => "address",
+            Place::Sila(_) => "sila",
+            Place::Http(_) => "http",
+        }
+    }
+
+    /// The place as it is connected to, or why there can be none.
+    pub fn checked(self) -> Result<Place, NoPlace> {
+        match self {
+            Place::Serial(path) => serial(&path).map(|()| Place::Serial(path)),
+            Place::Tcp(text) => endpoint(&text, "address").map(|()| Place::Tcp(text)),
+            Place::Sila(text) => endpoint(&text, "sila").map(|()| Place::Sila(text)),
+            Place::Http(text) => {
+                let bare = text.strip_prefix(HTTP).map_or(text.as_str(), |t| t.strip_suffix('/').unwrap_or(t));
+                endpoint(bare, "http").map(|()| Place::Http(bare.to_owned()))
+            }
+        }
+    }
+}
+
+fn serial(path: &str) -> Result<(), NoPlace> {
+    let as_path = || "write the path of the port, as in `port = \"/dev/ttyUSB0\"`".to_owned();
+    if path.trim().is_empty() {
+        return Err(NoPlace { why: "a serial port has a path".to_owned(), help: as_path() });
+    }
+    match path.split_once("://") {
+        Some((scheme, _)) => Err(NoPlace {
+            why: format!("a serial port is a path, and `{scheme}://` begins none"),
+            help: "what is reached over a network has `address = \"HOST:PORT\"`".to_owned(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// `HOST:PORT`, the host by name, by number, or by a number of IPv6 in brackets.
+fn endpoint(text: &str, key: &str) -> Result<(), NoPlace> {
+    let wrong = |why: String, help: String| Err(NoPlace { why, help });
+    let form = || format!("write `{key} = \"HOST:PORT\"`");
+    if let Some((scheme, rest)) = text.split_once("://") {
+        let rest = rest.split('/').next().unwrap_or_default();
+        return wrong(format!("`{scheme}://` is not spoken here"), format!("write `{key} = \"{rest}\"`"));
+    }
+    let (host, port) = match text.strip_prefix('[').and_then(|t| t.split_once(']')) {
+        Some((host, rest)) => (host, rest.strip_prefix(':')),
+        None => text.rsplit_once(':').map_or((text, None), |(host, port)| (host, Some(port))),
+    };
+    if text.parse::<Ipv6Addr>().is_ok() || (host.contains(':') && !text.starts_with('[')) {
+        return wrong(
+            "an address of IPv6 stands in brackets".to_owned(),
+            format!("write `{key} = \"[ADDRESS]:PORT\"`"),
+        );
+    }
+    if host.is_empty() {
+        return wrong("no host is named".to_owned(), form());
+    }
+    let is_number = host.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    let named = |b: u8| b.is_ascii_alphanumeric() || b"-._".contains(&b);
+    let known = match text.starts_with('[') {
+        true => host.parse::<Ipv6Addr>().is_ok(),
+        false if is_number => host.parse::<Ipv4Addr>().is_ok(),
+        false => host.bytes().all(named) || !host.is_ascii() && !host.contains(char::is_whitespace),
+    };
+    if !known {
+        return wrong(format!("`{host}` is neither the name nor the number of a host"), form());
+    }
+    let Some(port) = port.filter(|port| !port.is_empty()) else {
+        let bare = text.trim_end_matches(':');
+        return wrong(format!("the port of `{host}` is missing"), format!("write `{key} = \"{bare}:PORT\"`"));
+    };
+    let is_port = port.bytes().all(|b| b.is_ascii_digit());
+    match port.parse::<u16>().ok().filter(|n| is_port && *n > 0) {
+        Some(_) => Ok(()),
+        None => wrong(format!("`{port}` is no port, which is a number from 1 to 65535"), form()),
+    }
+}
+
+/// What is at a place that could not be opened, in words.
+pub fn trouble(place: &Place, error: &io::Error) -> String {
+    match (error.kind(), place) {
+        (ErrorKind::ConnectionRefused, _) => format!("nothing listens at `{place}`: the connection was refused"),
+        (ErrorKind::TimedOut, _) => format!("nobody answers at `{place}`: it timed out"),
+        (ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable, _) => format!("no way leads to `{place}`"),
+        (ErrorKind::NotFound, Place::Serial(_)) => format!("there is no port `{place}`"),
+        (ErrorKind::PermissionDenied, Place::Serial(_)) => {
+            format!("the port `{place}` may not be opened by this user")
+        }
+        (ErrorKind::ResourceBusy, Place::Serial(_)) => format!("another program has the port `{place}`"),
+        // An error that says what it is needs no second saying.
+        _ => format!("`{place}` cannot be opened: {}", plain(error)),
+    }
+}
+
+/// An error of the system without its number.
+fn plain(error: &io::Error) -> String {
+    let text = error.to_string();
+    let end = text.rfind(" (os error").unwrap_or(text.len());
+    let text = &text[..end];
+    let mut rest = text.chars();
+    match (rest.next(), rest.clone().next()) {
+        (Some(first), Some(second)) if second.is_lowercase() => first.to_lowercase().chain(rest).collect(),
+        _ => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Place;
+
+    #[test]
+    fn places_are_hosts_with_ports_and_paths() {
+        let good = ["127.0.0.1:1", "localhost:65535", "robot.lab:31950", "[::1]:80", "my_host-2:7"];
+        for text in good {
+            assert!(Place::Tcp(text.to_owned()).checked().is_ok(), "{text}");
+        }
+        let http = |text: &str| Place::Http(text.to_owned()).checked();
+        assert_eq!(http("http://robot:31950/"), Ok(Place::Http("robot:31950".to_owned())));
+        assert!(Place::Serial("COM3".to_owned()).checked().is_ok());
+    }
+
+    #[test]
+    fn what_is_no_place_is_said_to_be_none() {
+        let cases = [
+            ("nonsense", "the port of `nonsense` is missing"),
+            ("robot:", "the port of `robot` is missing"),
+            ("robot:0", "`0` is no port"),
+            ("robot:65536", "`65536` is no port"),
+            ("robot:+7", "`+7` is no port"),
+            ("robot:http", "`http` is no port"),
+            (":31950", "no host"),
+            ("", "no host"),
+            ("300.1.1.1:80", "neither the name nor the number"),
+            ("a robot:80", "neither the name nor the number"),
+            ("::1", "in brackets"),
+            ("[robot]:80", "neither the name nor the number"),
+            ("https://robot:80", "`https://` is not spoken here"),
+            ("robot:80/runs", "`80/runs` is no port"),
+        ];
+        for (text, wanted) in cases {
+            let why = Place::Http(text.to_owned()).checked().expect_err(text).why;
+            assert!(why.contains(wanted), "{text}: {why}");
+        }
+        for text in ["", "tcp://robot:80"] {
+            assert!(Place::Serial(text.to_owned()).checked().is_err(), "{text}");
+        }
+    }
+}

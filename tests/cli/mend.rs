@@ -1,0 +1,87 @@
+//! Corrections that `check --fix` makes, findings as SARIF, and looking again when files change.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+use crate::harness::{command, folder, matterixc_in, write};
+
+const WRONG: &str = "mtx 1\nuse std::glassware::Beaker250mL\n\nlab bench {\n    ambient: 22 degC\n    \
+    table = OpticalTable at (0, 0, 0) m\n    b = Beaker250mL on table holding 100 g of watr # µL 😀 of = it\n}\n\
+    workflow w in bench {\n    expect b.contents.mass = 100 g +- 1 g\n    wait 5. s\n}\n";
+
+#[test]
+fn what_leaves_no_doubt_is_mended_and_the_rest_is_left() {
+    let dir = folder("mend_sure");
+    write(&dir, "w.mtx", WRONG);
+    let ended = matterixc_in(&dir, &["check", "w.mtx", "--fix", "--format", "concise"]);
+    assert_eq!(ended.code, 1);
+    let done = "w.mtx:7:52: fixed: write `//`\nw.mtx:10:28: fixed: write `==`\nw.mtx:11:11: fixed: remove the point\n";
+    assert_eq!(ended.err, done);
+    assert_eq!(ended.out, "w.mtx:7:47: error[unknown-name]: there is no species or solution `watr`\n1 error\n");
+    let mended = WRONG.replace("# µL", "// µL").replace("mass = 100", "mass == 100").replace("5. s", "5 s");
+    assert_eq!(fs::read_to_string(dir.join("w.mtx")).expect("the file"), mended);
+
+    let ended = matterixc_in(&dir, &["check", "w.mtx", "--fix=all"]);
+    assert_eq!((ended.code, ended.out.as_str()), (0, "no findings\n"), "{}", ended.err);
+    assert_eq!(fs::read_to_string(dir.join("w.mtx")).expect("the file"), mended.replace("watr", "water"));
+}
+
+#[test]
+fn a_file_that_needs_nothing_is_not_written() {
+    let dir = folder("mend_nothing");
+    let path = write(&dir, "w.mtx", "mtx 1\nlab bench { ambient: 22 degC }\n");
+    let before = fs::metadata(&path).and_then(|m| m.modified()).expect("the file");
+    assert_eq!(matterixc_in(&dir, &["check", "w.mtx", "--fix"]).code, 0);
+    assert_eq!(fs::metadata(&path).and_then(|m| m.modified()).expect("the file"), before);
+}
+
+#[test]
+fn a_document_in_sarif_says_where_why_and_how_to_mend() {
+    let dir = folder("mend_sarif");
+    write(&dir, "über w.mtx", WRONG.replace("# µL 😀 of = it", "").replace("100 g of watr", "\"😀\" of water"));
+    write(&dir, "clean.mtx", "mtx 1\nlab bench { ambient: 22 degC }\n");
+    let ended = matterixc_in(&dir, &["check", "über w.mtx", "clean.mtx", "--format", "sarif"]);
+    assert_eq!(ended.code, 1);
+    let log: serde_json::Value = serde_json::from_str(&ended.out).expect("one document");
+    assert_eq!(log["version"], "2.1.0");
+    let run = &log["runs"][0];
+    assert_eq!(run["columnKind"], "utf16CodeUnits");
+    let results = run["results"].as_array().expect("results");
+    assert!(results.len() >= 2, "{results:?}");
+    for result in results {
+        let rule = result["ruleIndex"].as_u64().expect("an index") as usize;
+        assert_eq!(run["tool"]["driver"]["rules"][rule]["id"], result["ruleId"]);
+        let place = &result["locations"][0]["physicalLocation"];
+        assert_eq!(place["artifactLocation"]["uri"], "%C3%BCber%20w.mtx");
+    }
+    let equals = results.iter().find(|r| r["fixes"][0]["description"]["text"] == "write `==`").expect("the slip");
+    let change = &equals["fixes"][0]["artifactChanges"][0]["replacements"][0];
+    assert_eq!(change["insertedContent"]["text"], "==");
+    assert_eq!(change["deletedRegion"]["startColumn"], 28);
+
+    let none = matterixc_in(&dir, &["check", "clean.mtx", "--format", "sarif"]);
+    let log: serde_json::Value = serde_json::from_str(&none.out).expect("one document");
+    assert_eq!((none.code, log["runs"][0]["results"].as_array().map(Vec::len)), (0, Some(0)));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_is_looked_at_again_when_it_changes() {
+    let dir = folder("mend_watch");
+    let text = "mtx 1\nlab bench { ambient: 22 degC }\nworkflow w in bench { wait 1 min }\n";
+    write(&dir, "w.mtx", text);
+    let mut command = command();
+    command.args(["check", "w.mtx", "--watch"]).current_dir(&dir).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = command.spawn().expect("the command starts");
+    let mut lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    let mut until = |what: &str| lines.any(|line| line.contains(what));
+    assert!(until("no findings"));
+    write(&dir, "w.mtx", text.replace("1 min", "1 mL"));
+    assert!(until("unit-mismatch"));
+    write(&dir, "w.mtx", text);
+    assert!(until("no findings"));
+    let id = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("it runs");
+    assert_eq!(child.wait().expect("it ends").code(), Some(0));
+}

@@ -1,0 +1,212 @@
+"""Workflows on the server of Opentrons' robot itself, from its source, with simulated hardware.
+
+usage: real_server.py MATTERIXC FOLDER SOURCE PYTHON FILE.mtx...
+
+The server is not on PyPI. SOURCE is a checkout of https://github.com/Opentrons/opentrons at the tag v8.1.0, of which `robot-server` and
+`server-utils` are used; PYTHON is a Python 3.10 with opentrons==8.1.0, fastapi==0.99.1, uvicorn==0.27.0.post1, anyio==3.7.1,
+python-multipart==0.0.6, pydantic==1.10.12, python-dotenv==1.0.1, sqlalchemy==1.4.51, wsproto==1.2.0, paho-mqtt==1.6.1 and aiohttp.
+
+Each workflow is deployed on a robot with its pipettes, and the server is asked what it did: every command has succeeded, and moves
+the volumes that the emitted form says. Then emitted protocols are uploaded and played, labware of one's own is given to it, a pipette
+is another one, and a person stops a run.
+"""
+
+import collections
+import contextlib
+import json
+import os
+import pathlib
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+
+COMMAND, FOLDER, SOURCE, PYTHON, *FILES = sys.argv[1:]
+COMMAND, SOURCE = os.path.abspath(COMMAND), os.path.abspath(SOURCE)
+SPEED = "20"
+ADDRESS = ""
+BAD = []
+
+
+def pipettes(text):
+    """Those of a workflow, by mount."""
+    global ADDRESS
+    ADDRESS = "127.0.0.1:1"
+    said = ran(place(f"dry{len(os.listdir(FOLDER))}", text), "deploy", "lab.mtx", "--bind", "lab.toml").stdout
+    found = re.findall(r'pipetteName\\":\\"(\w+)\\",\\"mount\\":\\"(\w+)', said)
+    return {mount: {"model": name.replace("_gen2", "_v2.1"), "id": mount} for name, mount in found}
+
+
+@contextlib.contextmanager
+def robot(attached):
+    """A robot with these pipettes and a heater-shaker."""
+    global ADDRESS
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    modules = {"heatershaker": [{"model": "heaterShakerModuleV1", "serial_number": "hs", "calls": []}]}
+    simulated = pathlib.Path(FOLDER) / f"{port}.json"
+    simulated.write_text(json.dumps({"machine": "OT-2 Standard", "attached_instruments": attached, "attached_modules": modules}))
+    environment = os.environ | {
+        "PYTHONPATH": f"{SOURCE}/robot-server:{SOURCE}/server-utils",
+        "ENABLE_VIRTUAL_SMOOTHIE": "true",
+        "OT_API_CONFIG_DIR": os.path.abspath(f"{FOLDER}/{port}"),
+        "OT_ROBOT_SERVER_persistence_directory": "automatically_make_temporary",
+        "OT_ROBOT_SERVER_simulator_configuration_file_path": os.path.abspath(simulated),
+    }
+    arguments = ["-m", "uvicorn", "robot_server.app:app", "--port", str(port), "--ws", "wsproto"]
+    with open(f"{FOLDER}/{port}.log", "w") as log:
+        process = subprocess.Popen([PYTHON, *arguments], env=environment, stdout=log, stderr=log)
+    ADDRESS = f"127.0.0.1:{port}"
+    try:
+        until = time.monotonic() + 120
+        while True:
+            with contextlib.suppress(OSError, urllib.error.HTTPError):
+                # The database is there after the modules, as a rule.
+                ask("/runs")
+                if ask("/modules"):
+                    break
+            if time.monotonic() > until:
+                raise SystemExit(f"the server does not start: see {FOLDER}/{port}.log")
+            time.sleep(0.5)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def verdict(what, good, said=""):
+    print(f"{'ok ' if good else 'BAD'} {what}{': ' + said if said else ''}", flush=True)
+    if not good:
+        BAD.append(what)
+
+
+def ask(path):
+    request = urllib.request.Request(f"http://{ADDRESS}{path}", headers={"Opentrons-Version": "4"})
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        return json.load(answer)["data"]
+
+
+def place(name, text, **files):
+    folder = pathlib.Path(FOLDER) / name
+    folder.mkdir(parents=True)
+    (folder / "lab.mtx").write_text(text)
+    (folder / "lab.toml").write_text(f'[ot2]\nhttp = "{ADDRESS}"\n')
+    for file, content in files.items():
+        (folder / f"{file}.json").write_text(content)
+    return folder
+
+
+DEPLOY = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SPEED]
+
+
+def ran(folder, *arguments):
+    return subprocess.run([COMMAND, *arguments], cwd=folder, capture_output=True, text=True, timeout=1200)
+
+
+def told(folder):
+    """What the server says of the commands of the run that the journal names."""
+    entries = map(json.loads, (folder / "journal").read_text().splitlines())
+    run = next(e["text"] for e in entries if e["event"] == "kept" and e["word"] == "run")
+    listed = ask(f"/runs/{run}/commands?cursor=0&pageLength=10000")
+    # The list leaves out results.
+    return [ask(f"/runs/{run}/commands/{c['id']}") for c in listed], ask(f"/runs/{run}")["status"]
+
+
+def volumes(commands):
+    """What comes into each well, less what goes out, uL."""
+    net, tip = collections.Counter(), collections.Counter()
+    for kind, p in commands:
+        where = (re.sub(r"\W", "_", p.get("labwareId") or ""), p.get("wellName"))
+        pipette = re.sub(r"\W", "_", p.get("pipetteId") or "")
+        match kind:
+            case "aspirate":
+                net[where] -= p["volume"]
+                tip[pipette] += p["volume"]
+            case "dispense":
+                net[where] += p["volume"]
+                tip[pipette] -= p["volume"]
+            case "blowout":
+                net[where] += tip.pop(pipette, 0)
+            case "dropTip" | "dropTipInPlace":
+                tip.pop(pipette, None)
+    return net
+
+
+def whole(file):
+    name = pathlib.Path(file).stem
+    folder = place(name, pathlib.Path(file).read_text())
+    ended = ran(folder, *DEPLOY)
+    done, _ = told(folder)
+    emitted = json.loads(ran(folder, "emit", "lab.mtx", "--target", "opentrons-json").stdout)
+    expected = volumes((c["commandType"], c["params"]) for c in emitted["commands"])
+    got = volumes((c["commandType"], c["params"] | (c.get("result") or {})) for c in done)
+    apart = max((abs(expected[k] - got[k]) for k in {**expected, **got}), default=0)
+    good = ended.returncode == 0 and all(c["status"] == "succeeded" for c in done) and apart <= 1e-9
+    moves = sum(c["commandType"] in ("aspirate", "dispense", "blowout") for c in done)
+    said = f"{len(done)} commands, {moves} move liquid, {len(got)} wells, largest difference {apart:g} uL"
+    verdict(f"{name} on the robot's server", good, said if good else ended.stderr[-1500:])
+
+
+def played(text):
+    folder = place("played", text)
+    for target in ("opentrons-json", "opentrons-python"):
+        ended = ran(folder, "emit", "lab.mtx", "--target", target, "--play", "lab.toml")
+        status = ask("/runs")[-1]["status"]
+        good = ended.returncode == 0 and status == "succeeded"
+        verdict(f"{target}, uploaded and played", good, status if good else ended.stderr[-1500:])
+
+
+def own_labware(text):
+    assets = pathlib.Path(__file__).parents[2] / "assets" / "labware"
+    definition = json.loads((assets / "corning_96_wellplate_360ul_flat.json").read_text())
+    definition |= {"namespace": "house", "version": 7}
+    definition["parameters"]["loadName"] = "flat_96"
+    text = text.replace("plate = Corning96", "plate = Own")
+    text = text.replace("lab deck {", 'asset Own from labware "plate.json"\n\nlab deck {')
+    folder = place("own", text, plate=json.dumps(definition))
+    ended = ran(folder, *DEPLOY)
+    done, _ = told(folder)
+    loaded = [c["params"]["loadName"] for c in done if c["commandType"] == "loadLabware" and c["status"] == "succeeded"]
+    verdict("labware of one's own", ended.returncode == 0 and "flat_96" in loaded, ended.stderr[-1500:] if ended.returncode else "")
+
+
+def stopped(text):
+    folder = place("stopped", text.replace("    blow out", "    wait 5 min\n    blow out"))
+    process = subprocess.Popen([COMMAND, *DEPLOY[:-1], "1"], cwd=folder, stderr=subprocess.PIPE, text=True)
+    journal = folder / "journal"
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not (journal.exists() and '"dispense' in journal.read_text()):
+        time.sleep(0.2)
+    begun = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    said = process.communicate(timeout=120)[1]
+    took = time.monotonic() - begun
+    _, status = told(folder)
+    good = process.returncode == 1 and "stopped by a person" in said and status == "stopped"
+    verdict("a run that a person stops", good, f"{status} after {took:.1f} s" if good else f"{status} {said[-1500:]}")
+
+
+def another(text):
+    folder = place("another", text)
+    ended = ran(folder, *DEPLOY)
+    flat = " ".join(ended.stderr.split())
+    good = ended.returncode == 1 and "expected instrument" in flat and "lab.toml:2:8" in flat
+    verdict("a pipette that is another one, in the server's words", good, "" if good else ended.stderr[-1500:])
+
+
+os.makedirs(FOLDER)
+for file in FILES:
+    with robot(pipettes(pathlib.Path(file).read_text())):
+        whole(file)
+FIRST = pathlib.Path(FILES[0]).read_text()
+with robot(pipettes(FIRST)):
+    played(FIRST)
+    own_labware(FIRST)
+    another(FIRST.replace("P300Single", "P20Single"))
+    stopped(FIRST)
+sys.exit(1 if BAD else 0)
