@@ -6,31 +6,54 @@ use super::markdown::{cell, code, line, table};
 use super::{Library, Module};
 
 /// How a command of a device, or a skill where there is none, is called, with names of parameters in capitals.
-pub fn form(sig: &Sig, clauses: &[Clause], device: Option<&str>) -> String {
+pub fn form(library: &Library, sig: &Sig, clauses: &[Clause], device: Option<&str>) -> String {
     let group = |params: &[Param]| match params {
-        [one] => one.name.text.to_uppercase(),
+        [one] => capitals(&one.name.text),
         several => {
-            format!("({})", several.iter().map(|p| p.name.text.to_uppercase()).collect::<Vec<_>>().join(", "))
+            format!("({})", several.iter().map(|p| capitals(&p.name.text)).collect::<Vec<_>>().join(", "))
         }
     };
-    let device = device.map(str::to_uppercase);
+    let device = device.map(capitals);
+    let behind = device.is_some() && (!sig.params.is_empty() || stands_behind(library, sig));
     let mut out = verb(&sig.verb);
     if !sig.params.is_empty() {
         out += &format!(" {}", group(&sig.params));
-    } else if let Some(device) = &device {
+    } else if let Some(device) = device.as_ref().filter(|_| !behind) {
         out += &format!(" {device}");
     }
     for (label, params) in &sig.labelled {
         out += &format!(" {} {}", label.text, group(params));
     }
-    if let (Some(device), false) = (&device, sig.params.is_empty()) {
+    if let Some(device) = device.filter(|_| behind) {
         out += &format!(" by {device}");
     }
     let must: Vec<String> = options(clauses)
         .filter(|p| p.default.is_none())
-        .map(|p| format!("{}: {}", p.name.text, p.name.text.to_uppercase()))
+        .map(|p| format!("{}: {}", p.name.text, capitals(&p.name.text)))
         .collect();
     if must.is_empty() { out } else { format!("{out} {{ {} }}", must.join(", ")) }
+}
+
+/// A name as it stands for a value: `SolidDispenser` is SOLID_DISPENSER.
+fn capitals(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars() {
+        if c.is_uppercase() && out.ends_with(|last: char| !last.is_numeric() && last != '_') {
+            out.push('_');
+        }
+        out.extend(c.to_uppercase());
+    }
+    out
+}
+
+/// Whether the device of a command that may be its object stands after `by` where the library calls it, or has to: a verb
+/// that begins with `return` is one only before a preposition.
+fn stands_behind(library: &Library, sig: &Sig) -> bool {
+    let verb = verb(&sig.verb);
+    let first = sig.labelled.first().map(|(label, _)| label.text.as_str());
+    let called: Vec<String> = first.into_iter().chain(["by"]).map(|label| format!("{verb} {label} ")).collect();
+    let calls = |text: &str| called.iter().any(|c| text.contains(c));
+    sig.verb.first().is_some_and(|w| w.text == "return") || library.modules.iter().any(|m| calls(m.text))
 }
 
 /// The words of a verb.
@@ -45,10 +68,17 @@ fn options(clauses: &[Clause]) -> impl Iterator<Item = &Param> {
     })
 }
 
-/// All that is known of a command or a skill, below its heading.
-pub fn body(library: &Library, module: &Module, docs: &[String], sig: &Sig, clauses: &[Clause]) -> String {
+/// All that is known of a command or a skill, below its heading; beside its documentation stands the device that a command is of.
+pub fn body(
+    library: &Library,
+    module: &Module,
+    member: (&[String], Option<&str>),
+    sig: &Sig,
+    clauses: &[Clause],
+) -> String {
+    let (docs, device) = member;
     let mut out = String::new();
-    let about = if docs.is_empty() { in_words(clauses) } else { line(docs) };
+    let about = if docs.is_empty() { in_words(clauses, device) } else { line(docs) };
     if !about.is_empty() {
         out += &format!("{about}\n\n");
     }
@@ -61,7 +91,8 @@ pub fn body(library: &Library, module: &Module, docs: &[String], sig: &Sig, clau
 }
 
 /// What a person is told to do, where nothing else describes it.
-fn in_words(clauses: &[Clause]) -> String {
+fn in_words(clauses: &[Clause], device: Option<&str>) -> String {
+    let device = device.map(capitals);
     let mut out = String::new();
     for clause in clauses {
         let ClauseKind::Says { text, when: None } = &clause.kind else { continue };
@@ -69,8 +100,8 @@ fn in_words(clauses: &[Clause]) -> String {
             match part {
                 TextPart::Plain(plain) => out += plain,
                 TextPart::Value { value, .. } => match &*value.kind {
-                    crate::ast::ExprKind::Name(name) if name.text == "self" => out += "it",
-                    crate::ast::ExprKind::Name(name) => out += &name.text.to_uppercase(),
+                    crate::ast::ExprKind::Name(name) if name.text == "self" => out += device.as_deref().unwrap_or("it"),
+                    crate::ast::ExprKind::Name(name) => out += &capitals(&name.text),
                     _ => out += "...",
                 },
             }
@@ -146,9 +177,10 @@ fn facts(module: &Module, sig: &Sig, clauses: &[Clause]) -> Vec<String> {
 }
 
 /// The commands and skills of a module with their forms and what they are for, as rows of a table.
-pub fn list(module: &Module) -> String {
-    let row = |form: String, docs: &[String], clauses: &[Clause]| {
-        let about = if docs.is_empty() { in_words(clauses).replace('|', "\\|") } else { cell(docs) };
+pub fn list(library: &Library, module: &Module) -> String {
+    let row = |docs: &[String], sig: &Sig, clauses: &[Clause], device: Option<&str>| {
+        let form = form(library, sig, clauses, device);
+        let about = if docs.is_empty() { in_words(clauses, device).replace('|', "\\|") } else { cell(docs) };
         format!("| `{form}` | {about} |\n")
     };
     let mut rows = String::new();
@@ -157,11 +189,11 @@ pub fn list(module: &Module) -> String {
             ItemKind::Capability { name, members, .. } => {
                 for member in members {
                     if let MemberKind::Command { sig, clauses } = &member.kind {
-                        rows += &row(form(sig, clauses, Some(&name.text)), &member.docs, clauses);
+                        rows += &row(&member.docs, sig, clauses, Some(&name.text));
                     }
                 }
             }
-            ItemKind::Skill { sig, clauses, .. } => rows += &row(form(sig, clauses, None), &item.docs, clauses),
+            ItemKind::Skill { sig, clauses, .. } => rows += &row(&item.docs, sig, clauses, None),
             _ => {}
         }
     }

@@ -38,7 +38,7 @@ pub fn pages() -> Vec<Page> {
 /// Every command and skill of the library with its form, by module, for a page that has everything in one place.
 pub fn verbs() -> String {
     let library = Library::read();
-    library.modules.iter().map(calls::list).collect()
+    library.modules.iter().map(|module| calls::list(&library, module)).collect()
 }
 
 /// The dimensions of the library, each with its units, for a page that has everything in one place.
@@ -137,7 +137,7 @@ mod tests {
         for wanted in [
             "### `Heater`",
             "`heat HEATER to T`",
-            "| `to` | `t` | `Temperature` | degC |  |",
+            "| `to` | `t` | `Temperature` | degC |",
             "`t in limits`, else `out_of_range`: choose a set point within its limits",
         ] {
             assert!(thermal.text.contains(wanted), "{wanted}\n{}", thermal.text);

@@ -27,8 +27,8 @@ pub fn page(library: &Library, module: &Module) -> String {
         for item in &module.tree.items {
             match &item.kind {
                 ItemKind::Skill { external, sig, clauses, .. } if *external == primitive => {
-                    text += &format!("### `{}`\n\n", calls::form(sig, clauses, None));
-                    text += &calls::body(library, module, &item.docs, sig, clauses);
+                    text += &format!("### `{}`\n\n", calls::form(library, sig, clauses, None));
+                    text += &calls::body(library, module, (&item.docs, None), sig, clauses);
                 }
                 _ => {}
             }

@@ -49,8 +49,8 @@ pub fn capability(library: &Library, module: &Module, item: &Item) -> String {
     }
     for member in members {
         if let MemberKind::Command { sig, clauses } = &member.kind {
-            out += &format!("#### `{}`\n\n", calls::form(sig, clauses, Some(&name.text)));
-            out += &calls::body(library, module, &member.docs, sig, clauses);
+            out += &format!("#### `{}`\n\n", calls::form(library, sig, clauses, Some(&name.text)));
+            out += &calls::body(library, module, (&member.docs, Some(&name.text)), sig, clauses);
         }
     }
     out

@@ -54,6 +54,8 @@ impl Grammar {
     pub fn show(&self, text: &str) -> String {
         let mut reached = BTreeSet::new();
         self.reach("file", &mut reached);
+        let mut loose = BTreeSet::new();
+        self.loosen("file", &mut loose);
         let mut out = String::new();
         let mut heading = None;
         for line in text.lines() {
@@ -69,8 +71,8 @@ impl Grammar {
             if let Some(title) = heading.take() {
                 out += &format!("{}/* {title} */\n", if out.is_empty() { "" } else { "\n" });
             }
-            let tight = matches!(rule.ty, RuleType::Atomic | RuleType::CompoundAtomic);
-            out += &wrapped(&format!("{name} {} {}", if tight { ":==" } else { "::=" }, body.text));
+            let sign = if loose.contains(name) { "::=" } else { ":==" };
+            out += &wrapped(&format!("{name} {sign} {}", body.text));
         }
         out
     }
@@ -91,6 +93,33 @@ impl Grammar {
         let mut names = Vec::new();
         collect(&rule.expr, &mut names);
         names.iter().for_each(|n| self.reach(n, reached));
+    }
+
+    /// Rules between whose parts blanks may stand: those that say so, and what stands in others of that kind.
+    fn loosen(&self, name: &str, loose: &mut BTreeSet<String>) {
+        let Some(rule) = self.0.get(name).filter(|r| !left_out(&r.name)) else { return };
+        if matches!(rule.ty, RuleType::Atomic | RuleType::CompoundAtomic) {
+            let mut resets = Vec::new();
+            self.resets(name, &mut BTreeSet::new(), &mut resets);
+            resets.iter().for_each(|n| self.loosen(n, loose));
+        } else if loose.insert(name.to_string()) {
+            let mut names = Vec::new();
+            collect(&rule.expr, &mut names);
+            names.iter().for_each(|n| self.loosen(n, loose));
+        }
+    }
+
+    /// Rules that let blanks in again, below one that does not.
+    fn resets(&self, name: &str, seen: &mut BTreeSet<String>, out: &mut Vec<String>) {
+        let Some(rule) = self.0.get(name).filter(|_| seen.insert(name.to_string())) else { return };
+        let mut names = Vec::new();
+        collect(&rule.expr, &mut names);
+        for name in names {
+            match self.0.get(&name).map(|r| r.ty) {
+                Some(RuleType::NonAtomic) => out.push(name),
+                _ => self.resets(&name, seen, out),
+            }
+        }
     }
 
     /// What stands for a rule wherever it is named, where that is one text or one other rule.
