@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::ast::{Item, ItemKind, MemberKind};
 
-use super::markdown::{code, table};
+use super::markdown::{cell, code, table};
 use super::{Library, Module, calls};
 
 /// The index.
@@ -14,14 +14,10 @@ pub fn page(library: &Library) -> String {
         .modules
         .iter()
         .map(|m| {
-            let about =
-                m.tree.docs.iter().map(|l| l.trim()).take_while(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
+            let first: Vec<String> = m.tree.docs.iter().take_while(|l| !l.trim().is_empty()).cloned().collect();
+            let about = cell(&first);
             let prelude = if listed.iter().any(|l| l == m.short()) { "yes" } else { "" };
-            vec![
-                format!("[`{}`]({}.md)", m.name, m.short()),
-                prelude.to_string(),
-                first_sentence(&about).replace('|', "\\|"),
-            ]
+            vec![format!("[`{}`]({}.md)", m.name, m.short()), prelude.to_string(), first_sentence(&about).to_string()]
         })
         .collect();
     let mut out = "# The standard library, module by module\n\n".to_string();

@@ -10,9 +10,16 @@ pub fn codes<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
     texts.into_iter().map(code).collect::<Vec<_>>().join(", ")
 }
 
+/// Words with a `*` that is one, outside of what stands as code.
+pub fn prose(text: &str) -> String {
+    let piece =
+        |(index, piece): (usize, &str)| if index % 2 == 0 { piece.replace('*', "\\*") } else { piece.to_string() };
+    text.split('`').enumerate().map(piece).collect::<Vec<_>>().join("`")
+}
+
 /// Lines of documentation as one line; a blank line is passed over.
 pub fn line(docs: &[String]) -> String {
-    docs.iter().map(|l| l.trim()).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ")
+    prose(&docs.iter().map(|l| l.trim()).filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" "))
 }
 
 /// Lines of documentation in a cell of a table.
@@ -22,7 +29,11 @@ pub fn cell(docs: &[String]) -> String {
 
 /// Lines of documentation as they stand, a blank line after them.
 pub fn paragraphs(docs: &[String]) -> String {
-    if docs.iter().all(|l| l.trim().is_empty()) { String::new() } else { format!("{}\n\n", docs.join("\n").trim()) }
+    if docs.iter().all(|l| l.trim().is_empty()) {
+        String::new()
+    } else {
+        format!("{}\n\n", prose(docs.join("\n").trim()))
+    }
 }
 
 /// A table with these heads; nothing where it has no rows. Columns in which no row has anything are left out, but for the first.

@@ -30,9 +30,10 @@ pub struct Page {
 /// All pages: the index, then those of the modules in order of their names.
 pub fn pages() -> Vec<Page> {
     let library = Library::read();
-    let mut pages = vec![Page { name: "README".to_string(), text: index::page(&library) }];
-    pages.extend(library.modules.iter().map(|m| Page { name: m.short().to_string(), text: page::page(&library, m) }));
-    pages
+    let index = ("README", index::page(&library));
+    let modules = library.modules.iter().map(|m| (m.short(), page::page(&library, m)));
+    let page = |(name, text): (&str, String)| Page { name: name.to_string(), text: library.relinked(&text) };
+    std::iter::once(index).chain(modules).map(page).collect()
 }
 
 /// Every command and skill of the library with its form, by module, for a page that has everything in one place.
@@ -89,6 +90,13 @@ impl Library {
         }
         let measures = Measures::of(modules.iter().map(|m| &m.tree));
         Library { modules, homes, measures }
+    }
+
+    /// A page whose links lead to pages of modules where they lead to the modules.
+    fn relinked(&self, text: &str) -> String {
+        let to =
+            |text: String, m: &Module| text.replace(&format!("]({}.mtx)", m.short()), &format!("]({}.md)", m.short()));
+        self.modules.iter().fold(text.to_string(), to)
     }
 
     /// The names that the prelude lists.

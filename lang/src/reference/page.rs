@@ -2,15 +2,13 @@
 
 use crate::ast::ItemKind;
 
+use super::markdown::paragraphs;
 use super::{Library, Module, calls, tables, things};
 
 /// The page of a module.
 pub fn page(library: &Library, module: &Module) -> String {
     let mut out = format!("# `{}`\n\n", module.name);
-    let docs = module.tree.docs.join("\n");
-    if !docs.trim().is_empty() {
-        out += &format!("{}\n\n", docs.trim());
-    }
+    out += &paragraphs(&module.tree.docs);
     let listed = library.prelude();
     let short = module.short();
     out += &if short == "prelude" {

@@ -1,8 +1,8 @@
 //! What a module declares beside things and actions: functions, laws, substances, units.
 
-use crate::ast::{Expr, Field, FieldValue, Item, ItemKind, Name, Param};
+use crate::ast::{Expr, ExprKind, Field, FieldValue, Item, ItemKind, Name, Param};
 
-use super::markdown::{cell, code, line, table};
+use super::markdown::{cell, code, line, prose, table};
 use super::{Library, Module};
 
 /// A field as it is written; nothing where there is none.
@@ -26,10 +26,11 @@ fn written(module: &Module, value: &FieldValue) -> String {
     }
 }
 
-/// A value as it is written; a text without its quotes.
+/// A value as it is written; a text without its quotes, a list without its brackets.
 fn plain(module: &Module, e: &Expr) -> String {
     match &*e.kind {
-        crate::ast::ExprKind::Text(text) => text.clone(),
+        ExprKind::Text(text) => text.clone(),
+        ExprKind::List(items) => items.iter().map(|i| plain(module, i)).collect::<Vec<_>>().join(", "),
         _ => module.shown(e.span),
     }
 }
@@ -119,8 +120,7 @@ fn sources(module: &Module, item: &Item) -> String {
 }
 
 /// Fields of a species that have a column of their own, or are no property.
-const SHOWN: [&str; 8] =
-    ["formula", "density", "molar_volume", "heat_capacity", "specific_heat", "dissolves", "same_as", "smiles"];
+const SHOWN: [&str; 7] = ["formula", "density", "molar_volume", "heat_capacity", "specific_heat", "same_as", "smiles"];
 
 /// Species, each with its properties, other names after its own.
 pub fn species(module: &Module) -> String {
@@ -147,14 +147,13 @@ pub fn species(module: &Module) -> String {
         rows.push(vec![
             format!("{}{}", code(&name.text), other_names(name)),
             either("formula", "smiles").replace('|', "\\|"),
-            either("density", "molar_volume"),
-            either("heat_capacity", "specific_heat"),
-            get("dissolves"),
-            rest.join("; ").replace('|', "\\|"),
+            prose(&either("density", "molar_volume")),
+            prose(&either("heat_capacity", "specific_heat")),
+            prose(&rest.join("; ")).replace('|', "\\|"),
             sources(module, item),
         ]);
     }
-    table(&["species", "formula", "density or volume", "heat capacity", "in water", "also", "source"], &rows)
+    table(&["species", "formula", "density or volume", "heat capacity", "also", "source"], &rows)
 }
 
 /// The names of the species of a module on one line.
@@ -189,15 +188,14 @@ pub fn groups(module: &Module) -> String {
         let members = if members.is_empty() { field(module, fields, "smarts") } else { members };
         rows.push(vec![
             code(&name.text),
-            field(module, fields, "title"),
+            if item.docs.is_empty() { field(module, fields, "title") } else { cell(&item.docs) },
             code(&members),
             field(module, fields, "above"),
             field(module, fields, "friction"),
             field(module, fields, "source"),
-            cell(&item.docs),
         ]);
     }
-    table(&["name", "title", "members", "from", "friction", "source", ""], &rows)
+    table(&["name", "is", "members", "from", "friction", "source"], &rows)
 }
 
 /// Pairs that must not meet, and pairs that may.
@@ -208,7 +206,7 @@ pub fn pairs(module: &Module) -> String {
             ItemKind::Incompatible { a, b, fields } => rows.push(vec![
                 code(&a.text),
                 code(&b.text),
-                field(module, fields, "consequence").trim_matches(['[', ']']).to_string(),
+                field(module, fields, "consequence"),
                 field(module, fields, "above"),
                 field(module, fields, "source"),
                 cell(&item.docs),
