@@ -51,6 +51,7 @@ fn main() {
     bench.asked("hover, right after a keystroke", "textDocument/hover", true);
     bench.asked("completion, right after a keystroke", "textDocument/completion", true);
     bench.memory();
+    assert_eq!(bench.editor.close(), Some(0));
 }
 
 /// Writes a package without findings; the text that imports all the others.

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use matterix_ir::points::Points;
+use matterix_ir::points::{Point, Points};
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
 use matterix_lang::{Gathered, Loader, Session, program};
@@ -50,6 +50,21 @@ impl Analysis {
     /// The index of names.
     pub fn index(&self) -> Arc<Index> {
         self.index.get_or_init(|| Arc::new(Index::of(self))).clone()
+    }
+
+    /// Whether another one knows the same of the same statements, as far as that can be seen at a glance.
+    pub fn knows_the_same(&self, other: &Analysis) -> bool {
+        fn points(of: &Analysis) -> impl Iterator<Item = &Point> {
+            of.points.iter().flat_map(|points| &points.points)
+        }
+        points(self).count() == points(other).count()
+            && points(self).zip(points(other)).all(|(a, b)| {
+                let same = match (&a.after, &b.after) {
+                    (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+                    (a, b) => a.is_none() && b.is_none(),
+                };
+                same && a.span == b.span
+            })
     }
 
     /// The text of a file; empty where it is not known.

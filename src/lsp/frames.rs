@@ -43,7 +43,10 @@ fn header(stream: &mut impl BufRead) -> Option<Result<u64, String>> {
     let mut lines = 0;
     loop {
         let mut line = Vec::new();
-        stream.take(LONGEST_LINE).read_until(b'\n', &mut line).ok().filter(|read| *read > 0)?;
+        let read = stream.take(LONGEST_LINE).read_until(b'\n', &mut line).ok()?;
+        if !line.ends_with(b"\n") && (read as u64) < LONGEST_LINE {
+            return None;
+        }
         let line = String::from_utf8_lossy(&line);
         let line = line.trim();
         match (line.is_empty(), length) {

@@ -17,8 +17,14 @@ use crate::STACK;
 use crate::cache;
 use crate::pipeline::{self, Neighbours};
 
+/// Bytes of a text whose check takes longer than one waits for.
+const LARGE: usize = 64 << 10;
+
 /// How long nothing must have changed before the ways of robots are looked at.
 const QUIET: Duration = Duration::from_millis(400);
+
+/// The open texts by their paths.
+pub type Open = Arc<BTreeMap<PathBuf, Arc<str>>>;
 
 /// A text to be checked.
 #[derive(Clone, Debug)]
@@ -41,7 +47,7 @@ pub struct Round {
     /// What is to be checked.
     pub wishes: Vec<Wish>,
     /// The open texts by their paths.
-    pub open: Arc<BTreeMap<PathBuf, Arc<str>>>,
+    pub open: Open,
 }
 
 /// What was found.
@@ -58,6 +64,8 @@ pub struct Verdict {
 /// What was found, and how.
 #[derive(Debug)]
 pub enum Said {
+    /// By reading the text alone: the rest of a large one takes its time.
+    Read(Vec<Diagnostic>),
     /// By a check, which asked for these files.
     Checked(Box<Analysis>, Vec<PathBuf>),
     /// By a check that looked at the ways of robots as well.
@@ -110,6 +118,14 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
             if done.get(&wish.uri) == Some(&wish.stamp) {
                 continue;
             }
+            if wish.text.len() > LARGE {
+                let found = session.syntax(&wish.name, &wish.text);
+                let said = Said::Read(found);
+                let verdict = Verdict { uri: wish.uri.clone(), stamp: wish.stamp, said };
+                if verdicts.send(verdict).is_err() {
+                    return;
+                }
+            }
             let texts = Texts::new(wish.folder.as_deref(), &round.open);
             let analysis = Analysis::of(&wish.name, &wish.text, &texts, &mut session);
             let said = Said::Checked(Box::new(analysis), texts.asked());
@@ -123,7 +139,7 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
 
 fn look_at_motions(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
     let store = cache::of(false);
-    let mut wishes: BTreeMap<String, (Wish, Arc<BTreeMap<PathBuf, Arc<str>>>)> = BTreeMap::new();
+    let mut wishes: BTreeMap<String, (Wish, Open)> = BTreeMap::new();
     loop {
         let came = match wishes.is_empty() {
             true => wished.recv().ok(),

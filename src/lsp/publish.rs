@@ -41,6 +41,11 @@ impl Published {
         self.fresh.insert(uri.to_string());
     }
 
+    /// This was told of a text, whatever was checked.
+    pub fn told(&mut self, params: &PublishDiagnosticsParams) {
+        self.told.insert(params.uri.as_str().to_string(), (None, params.diagnostics.clone()));
+    }
+
     /// A text was closed: what its check found elsewhere goes too.
     pub fn forget(&mut self, uri: &str) {
         self.moved.remove(uri);
@@ -59,6 +64,10 @@ impl Published {
         let mut now: BTreeMap<&str, Vec<lsp_types::Diagnostic>> = BTreeMap::new();
         for (of, placed) in &self.places {
             let current = documents.iter().any(|d| d.uri.as_str() == of && d.current().is_some());
+            if current {
+                // That nothing is wrong is told too.
+                now.entry(of).or_default();
+            }
             for (at, found) in placed {
                 // Of itself a text says the last that is known; elsewhere only what holds for the texts as they are.
                 if current || at == of {
@@ -105,6 +114,16 @@ impl Published {
     }
 }
 
+/// What is to be told of a text of which no more than its own mistakes is known yet.
+pub fn read(document: &Document, found: &[Diagnostic], shelf: &Shelf) -> PublishDiagnosticsParams {
+    let place = |span: Span| {
+        let range = document.lines.range(&document.text, span.start as usize, span.end as usize);
+        (span.file == FileId(0)).then(|| (document.uri.clone(), range))
+    };
+    let diagnostics = found.iter().map(|d| findings::diagnostic(d, &place, &|code| shelf.page(code))).collect();
+    PublishDiagnosticsParams { uri: document.uri.clone(), diagnostics, version: None }
+}
+
 /// The findings of a text by the addresses they stand at.
 fn placed(
     document: &Document,
@@ -124,6 +143,9 @@ fn placed(
     Some(out)
 }
 
+/// The address and the lines of a file, as far as it has an address.
+type Known = Option<(Uri, Rc<Lines>)>;
+
 /// Where the spans of a check stand in the protocol's terms.
 pub struct Places<'s> {
     analysis: &'s Analysis,
@@ -132,7 +154,7 @@ pub struct Places<'s> {
     pub shelf: &'s Shelf,
     encoding: Encoding,
     /// Addresses and lines of the files that were asked for.
-    known: RefCell<BTreeMap<FileId, Option<(Uri, Rc<Lines>)>>>,
+    known: RefCell<BTreeMap<FileId, Known>>,
 }
 
 impl<'s> Places<'s> {

@@ -22,7 +22,7 @@ use super::frames::{self, Frame};
 use super::judge::{Judge, Round, Said, Verdict, Wish};
 use super::publish::Published;
 use super::shelf::Shelf;
-use super::{answers, uris};
+use super::{answers, publish, uris};
 use crate::{Exit, cache};
 
 /// Where a conversation stands.
@@ -255,8 +255,8 @@ impl Server {
             }
             told::DidSaveTextDocument::METHOD => {
                 if let Some(params) = self.params::<told::DidSaveTextDocument>(note) {
-                    let path = uris::path(&params.text_document.uri);
-                    self.documents.changed(None, path.as_deref());
+                    // Not every client tells of files that change on the disk: now is a time to look.
+                    self.documents.changed(Some(params.text_document.uri.as_str()), None);
                 }
             }
             told::DidChangeWatchedFiles::METHOD => {
@@ -295,26 +295,36 @@ impl Server {
         self.judge.check(Round { wishes, open: Arc::new(self.documents.texts()) });
     }
 
-    /// Takes what was found, unless the text has changed since.
+    /// Takes what was found. Of a text that has changed since nothing is told, but answers may still come from its check.
     fn hear(&mut self, verdict: Verdict) {
-        let Some(document) = self.documents.get_mut(&verdict.uri).filter(|d| d.stamp == verdict.stamp) else { return };
+        let Some(document) = self.documents.get_mut(&verdict.uri) else { return };
+        let current = document.stamp == verdict.stamp;
         match verdict.said {
+            Said::Read(found) if current && !found.is_empty() => {
+                let params = publish::read(document, &found, &self.shelf);
+                self.published.told(&params);
+                self.tell::<told::PublishDiagnostics>(params);
+            }
             Said::Checked(analysis, asked) => {
-                let changed = document.judged.as_ref().is_none_or(|(_, last)| last.points != analysis.points);
+                let hints = document.judged.as_ref().is_none_or(|(_, last)| !last.knows_the_same(&analysis));
                 document.judged = Some((verdict.stamp, Arc::new(*analysis)));
                 document.asked = asked;
+                if !current {
+                    return;
+                }
                 let round = Round { wishes: vec![wish(document)], open: Arc::new(self.documents.texts()) };
                 self.published.checked(&verdict.uri, verdict.stamp);
                 self.publish();
                 self.judge.look_at_motions(round);
-                if changed && self.client.refreshes_hints {
+                if hints && self.client.refreshes_hints {
                     self.ask::<asked::InlayHintRefreshRequest>(());
                 }
             }
-            Said::Moved(found) => {
+            Said::Moved(found) if current => {
                 self.published.moved(&verdict.uri, verdict.stamp, found);
                 self.publish();
             }
+            Said::Read(_) | Said::Moved(_) => {}
         }
     }
 

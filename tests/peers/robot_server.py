@@ -235,7 +235,7 @@ def deploy(command, folder, name, text, address, files={}):
         (place / name).write_text(content)
     (place / "lab.toml").write_text(f'[ot2]\nhttp = "{address}"\n')
     arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SPEED]
-    return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True, timeout=120)
+    return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True, timeout=600)
 
 
 def told(robot):

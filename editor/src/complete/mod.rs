@@ -112,7 +112,7 @@ impl Place<'_> {
                 }
                 return;
             }
-            Some("as") if !matches!(context.item(), "use") && !tokens.first().is_some_and(|t| t.text == "include") => {
+            Some("as") if !matches!(context.item(), "use") && tokens.first().is_none_or(|t| t.text != "include") => {
                 let of = self.value(primary(&tokens[..tokens.len() - 1]));
                 self.units(of.as_ref().map(|o| &o.1), context.word.1, out);
                 return;

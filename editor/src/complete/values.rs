@@ -135,25 +135,24 @@ impl<'i> Place<'i> {
     pub(crate) fn wanted(&self, context: &Context<'_>) -> Wanted {
         let none = Wanted::default();
         // An argument of a function, or a value in round or square brackets.
-        if let Some(open) = context.open.last().filter(|o| o.bracket == '(') {
-            if let Some(name) = open.head.last().filter(|t| t.is_word() && t.end() == open.at)
-                && let Some(def) = self.function(name.text)
-            {
-                let given = context.before.iter().filter(|t| t.text == ",").count();
-                let named = context
-                    .before
-                    .iter()
-                    .rev()
-                    .take_while(|t| t.text != ",")
-                    .last()
-                    .filter(|_| context.last() == Some(":"));
-                let params = &self.index.def(def).inside;
-                let param = match named {
-                    Some(name) => params.iter().find(|p| self.index.def(**p).name == name.text),
-                    None => params.get(given),
-                };
-                return param.map_or(none, |p| Wanted::of(self.index, *p));
-            }
+        if let Some(open) = context.open.last().filter(|o| o.bracket == '(')
+            && let Some(name) = open.head.last().filter(|t| t.is_word() && t.end() == open.at)
+            && let Some(def) = self.function(name.text)
+        {
+            let given = context.before.iter().filter(|t| t.text == ",").count();
+            let named = context
+                .before
+                .iter()
+                .rev()
+                .take_while(|t| t.text != ",")
+                .last()
+                .filter(|_| context.last() == Some(":"));
+            let params = &self.index.def(def).inside;
+            let param = match named {
+                Some(name) => params.iter().find(|p| self.index.def(**p).name == name.text),
+                None => params.get(given),
+            };
+            return param.map_or(none, |p| Wanted::of(self.index, *p));
         }
         let tokens = &context.before;
         // What it is compared with.

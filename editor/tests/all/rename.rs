@@ -51,6 +51,7 @@ fn what_cannot_be_renamed_is_said() {
     assert_eq!(why("std::|heating", "warming"), "`heating` is a module: it has the name of its file");
     assert_eq!(why("look.|elapsed", "time"), "`elapsed` is a word of the language: how long it has lasted so far");
     assert_eq!(why("lid == |open", "ajar"), "`open` is a word of a state: types are the same if their words are");
+    assert_eq!(why("|ambient: 22", "around"), "`ambient` is a setting that laws read by this name");
     assert_eq!(why("cook(|target", "wait"), "`wait` cannot be the name of a parameter");
     assert_eq!(why("cook(|target", "2x"), "`2x` cannot be the name of a parameter");
     assert_eq!(why("|crate = Crate", "plate"), "`plate` is the name of a thing in a lab already");

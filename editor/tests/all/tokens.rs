@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use matterix_editor::index::{Index, Meaning};
 use matterix_ir::FileId;
-use matterix_lang::LibraryOnly;
 
 use crate::support::{analysed, beside, examples};
 
@@ -225,7 +224,6 @@ fn line(text: &str, at: usize) -> &str {
 #[test]
 fn every_name_of_the_library_stands_for_something() {
     let (analysis, index) = analysed("a.mtx", "mtx 1\n", &crate::support::Files::default());
-    let _ = LibraryOnly;
     let mut found = BTreeMap::new();
     let (mut all, mut known) = (0, 0);
     for module in analysis.modules.iter().filter(|m| m.is_library()) {

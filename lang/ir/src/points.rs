@@ -3,6 +3,8 @@
 //! Every value holds for each run in which devices do what they are told, however often a statement is done and
 //! whichever way leads to it: turns of a loop and branches are joined.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::scene::InstanceId;
@@ -21,7 +23,7 @@ pub struct Points {
     /// Name of the lab.
     pub lab: String,
     /// Every thing of which something is known that can change, at the start; in the order of the lab.
-    pub start: Vec<Thing>,
+    pub start: Arc<Vec<Thing>>,
     /// One per statement, in the order of the text.
     pub points: Vec<Point>,
 }
@@ -40,7 +42,7 @@ pub struct Point {
     /// Whether other statements stand in it.
     pub block: bool,
     /// Absent where no way that was followed goes on behind it.
-    pub after: Option<After>,
+    pub after: Option<Arc<After>>,
 }
 
 /// What is known after a statement, whichever of the times it was done.

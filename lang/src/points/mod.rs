@@ -95,10 +95,12 @@ impl Questions {
         let start = seen.next()?.after?;
         let mut points: Vec<Point> = seen
             .map(|s| {
-                let after = s.after.map(|after| After {
-                    elapsed: quantity(&after.time, Unit::scaled("s", 1.0)),
-                    kept: words.kept(plan, sources, &s.label, &after.locals),
-                    things: self.things(&words, &after.values),
+                let after = s.after.map(|after| {
+                    Arc::new(After {
+                        elapsed: quantity(&after.time, Unit::scaled("s", 1.0)),
+                        kept: words.kept(plan, sources, &s.label, &after.locals),
+                        things: self.things(&words, &after.values),
+                    })
                 });
                 Point {
                     span: s.span,
@@ -116,7 +118,7 @@ impl Questions {
             version: POINTS_VERSION,
             workflow: plan.workflow.clone(),
             lab: sources.slice(lab.lab_name).to_string(),
-            start: self.things(&words, &start.values),
+            start: Arc::new(self.things(&words, &start.values)),
             points,
         })
     }

@@ -61,6 +61,13 @@ impl Session {
         &mut self.packages[last].1
     }
 
+    /// What is wrong with a text by itself, before anything else of it is looked at. A check of it under this name does not read it again.
+    pub fn syntax(&mut self, name: &str, text: &str) -> Vec<Diagnostic> {
+        let mut sources = Sources::default();
+        let file = sources.add(name, text);
+        self.module(&sources, name, "", file).1
+    }
+
     /// A file as a module, with what is wrong with its text.
     pub(crate) fn module(
         &mut self,

@@ -67,10 +67,11 @@ proptest! {
         let mut frame = codec("cavro_oem").answer(&Reply::of(text));
         let at = at.min(frame.len() - 2);
         frame[at] ^= 1 << bit;
-        let mut buffer = frame;
-        // What is damaged is refused or still waited for; nothing is taken from it.
+        let mut buffer = frame.clone();
+        // What is damaged is refused or still waited for; nothing is taken from it. A letter that becomes the end mark makes a
+        // shorter frame, whose sum may be right by chance: then the rest is left behind, which no good frame does.
         if let Some(Ok(reply)) = codec("cavro_oem").take_reply(&mut buffer) {
-            prop_assert!(false, "{:?}", reply);
+            prop_assert!(frame[at] == 0x03 && !buffer.is_empty(), "{:?}", reply);
         }
     }
 

@@ -117,13 +117,15 @@ pub fn around(server: &Server, of: &Place, word: &str) -> Vec<Arc<Index>> {
     let texts = server.documents.texts();
     let mut all = open(server);
     let mut session = Session::default();
+    let module = Path::new(&of.file).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     for path in files_around(Path::new(&of.file)) {
         if texts.contains_key(&path) {
             continue;
         }
         let Ok(bytes) = files::contents(&path, files::LARGEST_TEXT) else { continue };
         let Ok(text) = String::from_utf8(bytes) else { continue };
-        if text.contains(word) {
+        // What names it imports the module that declares it.
+        if text.contains(word) && text.contains(module) {
             let beside = Texts::new(path.parent(), &texts);
             let analysis = Analysis::of(&path.display().to_string(), &text, &beside, &mut session);
             all.push(analysis.index());

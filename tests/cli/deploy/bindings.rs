@@ -88,7 +88,7 @@ fn what_is_said_of_some_devices_only_is_known_before() {
         matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"])
     };
     let later = dry("open_while_later", "temperature > 30 degC");
-    assert!(later.err.contains("error[driver-line]") && later.err.contains("lab.mtx:11:16"), "{}", later.err);
+    assert!(later.err.contains("error[driver-line]") && later.err.contains("lab.mtx:10:16"), "{}", later.err);
     for (name, condition) in [("open_while_so", "mass > 1 kg"), ("open_while_not", "mass > 100 kg")] {
         let ended = dry(name, condition);
         assert!(!ended.err.contains("driver-line") && ended.err.contains("undriven"), "{}", ended.err);

@@ -1,7 +1,7 @@
 //! An editor for tests: speaks the protocol with the command and keeps what it is told.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -157,6 +157,7 @@ impl Client {
     }
 
     /// The number of the server's process.
+    #[allow(dead_code, reason = "benchmarks ask for it")]
     pub fn process(&self) -> u32 {
         self.child.id()
     }

@@ -1,5 +1,7 @@
 //! The language server, as an editor sees it.
 
+#![allow(clippy::unwrap_used)]
+
 mod client;
 mod names;
 mod replay;
@@ -13,8 +15,8 @@ use client::Client;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_matterixc");
 
-const TEXT: &str = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRet\n}\n\n\
-    workflow warm in bench {\n    step heating {\n        heat plate to 40 degC\n    }\n    stop plate\n}\n";
+const TEXT: &str = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRetControl\n}\n\n\
+    workflow warm in bench {\n    step heating {\n        heat plate to 40 degC\n    }\n    stop heating plate\n}\n";
 
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("lsp").join(name);
@@ -145,18 +147,18 @@ fn a_session_from_the_first_word_to_the_last() {
 
 #[test]
 fn columns_are_counted_as_agreed() {
-    let text = TEXT.replace("    stop plate", "    note \"µL °C 🧪\"; stop plote\r");
-    for (encoding, column) in [("utf-8", 27), ("utf-16", 23), ("utf-32", 22)] {
+    let text = TEXT.replace("    stop heating plate", "    note \"µL °C 🧪\"; stop heating plote\r");
+    for (encoding, column) in [("utf-8", 38), ("utf-16", 34), ("utf-32", 33)] {
         let mut editor = Client::new(BINARY, encoding);
         assert_eq!(editor.server["capabilities"]["positionEncoding"], encoding);
         let at = uri(&folder("columns").join("signs.mtx"));
         editor.open(&at, &text);
         let found = editor.findings(&at, 1);
         let fault = found.iter().find(|d| d["severity"] == json!(1)).expect("`plote` is not known");
-        assert_eq!(fault["range"]["start"]["character"], column + 5, "{encoding}: {found:?}");
+        assert_eq!(fault["range"]["start"]["character"], column, "{encoding}: {found:?}");
         // An edit behind the signs mends it.
-        let start = json!({ "line": fault["range"]["start"]["line"], "character": column + 7 });
-        let end = json!({ "line": start["line"], "character": column + 8 });
+        let start = json!({ "line": fault["range"]["start"]["line"], "character": column + 2 });
+        let end = json!({ "line": start["line"], "character": column + 3 });
         editor.change(&at, 2, Some(json!({ "start": start, "end": end })), "a");
         assert_eq!(codes(&editor.findings(&at, 2)), [""; 0], "{encoding}");
         assert_eq!(editor.close(), Some(0));
@@ -167,8 +169,8 @@ fn columns_are_counted_as_agreed() {
 fn what_is_open_counts_for_what_imports_it() {
     let folder = folder("package");
     let (lab, use_) = (folder.join("place.mtx"), folder.join("work.mtx"));
-    let lab_text = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRet\n}\n";
-    let work = "mtx 1\n\nuse std::heating\nuse place\n\nworkflow warm in bench {\n    heat plate to 40 degC\n    stop plate\n}\n";
+    let lab_text = "mtx 1\n\nuse std::heating\n\nlab bench {\n    ambient: 25 degC\n    plate = IkaRetControl\n}\n";
+    let work = "mtx 1\n\nuse std::heating\nuse place\n\nworkflow warm in bench {\n    heat plate to 40 degC\n    stop heating plate\n}\n";
     fs::write(&lab, lab_text).unwrap();
     fs::write(&use_, work).unwrap();
     let mut editor = Client::new(BINARY, "utf-8");
@@ -183,7 +185,7 @@ fn what_is_open_counts_for_what_imports_it() {
         editor.next();
     }
     // A mistake of a text is told of that text alone.
-    editor.change(&uri(&lab), 3, None, &lab_text.replace("IkaRet", "IkaRot"));
+    editor.change(&uri(&lab), 3, None, &lab_text.replace("IkaRetControl", "IkaRot"));
     assert!(!codes(&editor.findings(&uri(&lab), 3)).is_empty());
     // Closed, the text on the disk counts.
     editor.tell("textDocument/didClose", json!({ "textDocument": { "uri": uri(&lab) } }));

@@ -9,7 +9,7 @@ use super::client::Client;
 use super::{BINARY, edited, folder, range, uri};
 
 const PLACE: &str = "mtx 1\n\nuse std::heating\n\n/// Where it is done.\nlab bench {\n    ambient: 25 degC\n    \
-    plate = IkaRet\n}\n\n/// Warms a device.\nskill warm(h: Heater) to(t: Temperature) {\n    heat h to t\n    wait 5 s\n    stop h\n}\n";
+    plate = IkaRetControl at (0, 0, 0) m\n}\n\n/// Warms a device.\nskill warm(h: Heater) to(t: Temperature) {\n    heat h to t\n    wait 5 s\n    stop heating h\n}\n";
 
 const WORK: &str = "mtx 1\n\nuse place\n\nworkflow µ_free(goal: Temperature = 40 degC) in bench {\n    \
     note \"°C\"; warm plate to goal\n    expect plate.temperature > 20 degC\n}\n";
@@ -95,7 +95,7 @@ fn names_lead_across_files_and_into_the_library() {
     assert_eq!(names, ["free", "other"]);
     let calls = editor.ask("callHierarchy/outgoingCalls", json!({ "item": found[0] })).unwrap();
     let names: Vec<&str> = calls.as_array().unwrap().iter().map(|c| c["to"]["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["heat", "stop"]);
+    assert_eq!(names, ["heat", "stop heating"]);
     assert_eq!(editor.close(), Some(0));
 }
 
@@ -147,7 +147,7 @@ fn what_is_typed_is_completed() {
     let start = about(&work_at, &text, "warm pl", 5)["position"].clone();
     assert_eq!(best["textEdit"]["range"]["start"], start);
     let resolved = editor.ask("completionItem/resolve", best.clone()).unwrap();
-    assert!(resolved["documentation"]["value"].as_str().unwrap().contains("plate = IkaRet"), "{resolved}");
+    assert!(resolved["documentation"]["value"].as_str().unwrap().contains("plate = IkaRetControl"), "{resolved}");
     let text = work.replace("warm plate to goal", "warm plate to ");
     editor.change(&work_at, 3, None, &text);
     let form = editor.ask("textDocument/signatureHelp", about(&work_at, &text, "plate to ", 9)).unwrap();

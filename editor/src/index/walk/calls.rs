@@ -137,7 +137,7 @@ impl Walk<'_> {
         // `by` names the device of a command whose object is something else.
         let command = self.index.def(def).kind == Kind::Command && (takes || !object);
         let unknown =
-            call.labelled.iter().filter(|(l, _)| !labels.contains(&l.text.as_str()) && !(command && l.text == "by"));
+            call.labelled.iter().filter(|(l, _)| !(labels.contains(&l.text.as_str()) || command && l.text == "by"));
         let missing = labels.iter().filter(|l| !call.labelled.iter().any(|(c, _)| c.text == **l));
         unknown.count() + missing.count()
     }

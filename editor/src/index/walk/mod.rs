@@ -1,10 +1,15 @@
 //! A walk through a module that finds what each name stands for.
 
 mod calls;
+mod chemistry;
+mod drivers;
 mod exprs;
 mod items;
+mod labs;
 mod laws;
+mod many;
 mod steps;
+mod things;
 mod types;
 
 use matterix_ir::{FileId, Span};
@@ -13,7 +18,7 @@ use matterix_lang::meanings::Sort;
 use matterix_lang::names::Module;
 
 use super::collect::bare;
-use super::{Def, DefId, Index, Kind, Local, Meaning, Region, Use};
+use super::{DefId, Index, Kind, Local, Meaning, Region, Use};
 
 /// What an expression was found to be.
 #[derive(Clone, Debug)]
@@ -93,13 +98,13 @@ impl Walk<'_> {
     fn bind(&mut self, kind: Kind, name: &Name, whole: Span, found: &Found) -> DefId {
         let words = found.def.map(|d| self.index.def(d).words.clone()).unwrap_or_default();
         let owner = self.item;
-        let id = self.index.add(Def {
-            sort: found.sort.clone(),
-            words: if matches!(found.sort, Sort::Word(_)) { words } else { Vec::new() },
-            ..bare(&name.text, kind, name.span, whole)
-        });
+        // Where a text is looked at twice, it declares once.
+        let known = self.index.declared_at(name.span).filter(|d| self.index.def(*d).kind == kind);
+        let id = known.unwrap_or_else(|| self.index.add(bare(&name.text, kind, name.span, whole)));
         if let Some(def) = self.index.own_mut(id) {
             def.owner = owner;
+            def.sort = found.sort.clone();
+            def.words = if matches!(found.sort, Sort::Word(_)) { words } else { Vec::new() };
         }
         self.known(name.span, id);
         self.enter(&name.text, id, name.span.start);

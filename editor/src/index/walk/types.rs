@@ -115,7 +115,7 @@ fn words_of(text: &str) -> Vec<(usize, String)> {
     let mut out: Vec<(usize, String)> = Vec::new();
     let mut open: Option<usize> = None;
     for (i, c) in text.char_indices().chain(std::iter::once((text.len(), '*'))) {
-        let part = !matches!(c, '*' | '/' | '(' | ')' | '^' | '-' | ' ') && !(open.is_none() && c.is_ascii_digit());
+        let part = !(matches!(c, '*' | '/' | '(' | ')' | '^' | '-' | ' ') || open.is_none() && c.is_ascii_digit());
         match (open, part) {
             (None, true) => open = Some(i),
             (Some(start), false) => {
