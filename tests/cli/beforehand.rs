@@ -117,15 +117,15 @@ fn a_file_without_findings_is_looked_through_again_when_what_it_read_has_changed
     let clean = |dir: &Path| kept(dir).iter().filter(|f| f.to_string_lossy().contains(CLEAN)).count();
     let text = "mtx 1\nuse rooms\n\nworkflow pause in room {\n    wait stay\n}\n";
     let room = |stay: &str| format!("mtx 1\nlab room {{ ambient: 22 degC }}\nconst stay: Duration = {stay}\n");
-    write(&dir, "rooms.mtx", &room("1 min"));
+    write(&dir, "rooms.mtx", room("1 min"));
     assert_eq!(check(&dir, text, &[]), "");
     assert_eq!(clean(&dir), 1);
     assert_eq!(check(&dir, text, &[]), "");
-    write(&dir, "rooms.mtx", &room("1 mL"));
+    write(&dir, "rooms.mtx", room("1 mL"));
     assert!(check(&dir, text, &[]).contains("rooms.mtx:3:24: error[unit-mismatch]"), "{}", check(&dir, text, &[]));
     fs::remove_file(dir.join("rooms.mtx")).expect("it was written");
     assert!(check(&dir, text, &[]).contains("error[unknown-module]"), "{}", check(&dir, text, &[]));
-    write(&dir, "rooms.mtx", &room("1 min"));
+    write(&dir, "rooms.mtx", room("1 min"));
     assert_eq!(check(&dir, text, &[]), "");
     assert_eq!(check(&dir, text, &["--fidelity", "process"]), "");
     assert_eq!(clean(&dir), 2, "each fidelity is a matter of its own");

@@ -16,7 +16,7 @@ fn lab(lines: &str) -> String {
 /// What a check says of these lines, without the summary.
 fn check(name: &str, lines: &str) -> String {
     let dir = folder(&format!("overlap_{name}"));
-    write(&dir, "bench.mtx", &lab(lines));
+    write(&dir, "bench.mtx", lab(lines));
     let said = matterixc_in(&dir, &["check", "bench.mtx", "--format", "concise", "--no-cache"]).out;
     said.lines().filter(|l| l.contains("[overlap]")).collect::<Vec<_>>().join("\n")
 }
@@ -72,17 +72,17 @@ fn what_goes_with_another_thing_is_no_mistake_of_its_own() {
 fn the_nearest_free_place_is_offered_and_good() {
     let dir = folder("overlap_offer");
     let lines = "    a = Crate on table at (0, 0) mm\n    b = Crate on table at (80, 5) mm";
-    write(&dir, "bench.mtx", &lab(lines));
+    write(&dir, "bench.mtx", lab(lines));
     let said = matterixc_in(&dir, &["check", "bench.mtx", "--no-cache"]).out;
     assert!(said.contains("help: `b` has room at (110, 0) mm on `table`"), "{said}");
-    write(&dir, "bench.mtx", &lab(&lines.replace("(80, 5)", "(110, 0)")));
+    write(&dir, "bench.mtx", lab(&lines.replace("(80, 5)", "(110, 0)")));
     assert!(matterixc_in(&dir, &["check", "bench.mtx", "--no-cache"]).out.contains("no findings"));
 }
 
 #[test]
 fn neither_a_check_of_the_process_nor_a_run_passes_over_it() {
     let dir = folder("overlap_run");
-    write(&dir, "bench.mtx", &lab("    a = Crate on table at (0, 0) mm\n    b = Crate on table at (50, 0) mm"));
+    write(&dir, "bench.mtx", lab("    a = Crate on table at (0, 0) mm\n    b = Crate on table at (50, 0) mm"));
     let checked = matterixc_in(&dir, &["check", "bench.mtx", "--fidelity", "process", "--no-cache"]);
     assert!(checked.out.contains("error[overlap]"), "{}", checked.out);
     for more in [&["--fidelity", "process"][..], &["--dry"], &["--fidelity", "motion"]] {
