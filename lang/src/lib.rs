@@ -18,6 +18,7 @@ pub mod names;
 pub mod points;
 pub mod program;
 pub mod prose;
+pub mod reference;
 pub mod screen;
 mod session;
 mod share;

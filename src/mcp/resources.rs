@@ -21,6 +21,13 @@ const PLAIN: &str = "text/plain";
 /// The pages, the most useful first.
 const PAGES: &[Page] = &[
     Page {
+        uri: "mtx://guide",
+        title: "All on one page",
+        about: "Grammar, units, verbs, assets, idioms and frequent mistakes on one page, for programs that write .mtx",
+        mime: MARKDOWN,
+        text: include_str!("../../docs/for-programs.md"),
+    },
+    Page {
         uri: "mtx://language",
         title: "The language",
         about: "The reference of .mtx with examples: read this before writing a protocol",

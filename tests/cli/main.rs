@@ -3,6 +3,7 @@
 mod along;
 mod beforehand;
 mod bill;
+mod book;
 mod contents;
 mod deploy;
 mod determinism;

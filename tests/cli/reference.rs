@@ -6,21 +6,27 @@ use matterix_ir::FileId;
 use matterix_lang::ast::{ItemKind, MemberKind, Name};
 use matterix_lang::{library, syntax};
 
-use crate::harness::{Ended, folder, matterixc_in, root, write};
+use crate::harness::{Ended, folder, matterixc_in, names, root, write};
 
 /// Pages whose `mtx` blocks run as tests.
 const PAGES: [&str; 5] = ["docs/language.md", "docs/library.md", "docs/devices.md", "docs/sila.md", "README.md"];
 
+/// The folder of pages whose `mtx` blocks also are in the style.
+const TUTORIAL: &str = "docs/tutorial";
+
 /// A fenced block of a page.
 #[derive(Debug, PartialEq, Eq)]
-struct Block {
+pub struct Block {
     /// Line of its opening fence.
-    line: usize,
-    fence: String,
-    text: String,
+    pub line: usize,
+    /// What stands behind its opening fence.
+    pub fence: String,
+    /// What is in it.
+    pub text: String,
 }
 
-fn blocks(page: &str) -> Vec<Block> {
+/// The fenced blocks of a page.
+pub fn blocks(page: &str) -> Vec<Block> {
     let mut out: Vec<Block> = Vec::new();
     let mut open = false;
     for (index, line) in page.lines().enumerate() {
@@ -50,19 +56,22 @@ fn codes(lines: &[serde_json::Value]) -> Vec<&str> {
 }
 
 /// Whether a block yields what its fence promises; in words if not.
-fn verify(name: &str, block: &Block) -> Result<(), String> {
+fn verify(name: &str, block: &Block, styled: bool) -> Result<(), String> {
+    let fence = block.fence.as_str();
+    if matches!(fence, "text" | "sh" | "toml" | "json" | "ebnf") {
+        return Ok(());
+    }
     let dir = folder(name);
     write(&dir, "example.mtx", &block.text);
+    if styled && matterixc_in(&dir, &["fmt", "--check", "example.mtx"]).code != 0 {
+        return Err("is not in the style of `matterixc fmt`".to_string());
+    }
     let check = || matterixc_in(&dir, &["check", "example.mtx", "--format", "json"]);
     let run = || matterixc_in(&dir, &["run", "example.mtx", "--format", "json"]);
     let clean = |ended: &Ended, lines: &[serde_json::Value]| match codes(lines).as_slice() {
         [] if ended.code == 0 => Ok(()),
         found => Err(format!("exit status {}, findings {found:?}\n{}", ended.code, ended.err)),
     };
-    let fence = block.fence.as_str();
-    if matches!(fence, "text" | "sh") {
-        return Ok(());
-    }
     if let Some(code) = fence.strip_prefix("mtx error[").and_then(|rest| rest.strip_suffix(']')) {
         let code = matterix_ir::codes::find(code).ok_or("there is no such code")?;
         let lines = if code.family.starts_with('X') { run().err_lines() } else { check().out_lines() };
@@ -81,17 +90,42 @@ fn verify(name: &str, block: &Block) -> Result<(), String> {
     Ok(())
 }
 
-#[test]
-fn every_example_yields_what_its_fence_promises() {
+/// Goes through the blocks of pages; where `styled`, they are in the style of `fmt`, too.
+fn verify_pages(pages: &[String], styled: bool) {
     let mut wrong = Vec::new();
-    for page in PAGES {
+    for page in pages {
         let text = fs::read_to_string(root().join(page)).expect("the page can be read");
         for block in blocks(&text) {
             let name = format!("reference_{}_{}", page.replace(['/', '.'], "_"), block.line);
-            wrong.extend(verify(&name, &block).err().map(|e| format!("{page}:{}: `{}`: {e}", block.line, block.fence)));
+            let found = verify(&name, &block, styled).err();
+            wrong.extend(found.map(|e| format!("{page}:{}: `{}`: {e}", block.line, block.fence)));
         }
     }
     assert!(wrong.is_empty(), "{} blocks:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// The pages of the tutorial, by their paths from the top.
+pub fn tutorial() -> Vec<String> {
+    names(&root().join(TUTORIAL))
+        .into_iter()
+        .filter(|n| n.ends_with(".md"))
+        .map(|n| format!("{TUTORIAL}/{n}"))
+        .collect()
+}
+
+#[test]
+fn every_example_yields_what_its_fence_promises() {
+    verify_pages(&PAGES.map(str::to_string), false);
+}
+
+#[test]
+fn every_example_of_the_tutorial_yields_what_its_fence_promises() {
+    verify_pages(&tutorial(), true);
+}
+
+#[test]
+fn every_example_for_programs_yields_what_its_fence_promises() {
+    verify_pages(&["docs/for-programs.md".to_string()], true);
 }
 
 fn verb(words: &[Name]) -> String {
