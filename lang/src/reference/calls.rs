@@ -52,7 +52,11 @@ fn stands_behind(library: &Library, sig: &Sig) -> bool {
     let verb = verb(&sig.verb);
     let first = sig.labelled.first().map(|(label, _)| label.text.as_str());
     let called: Vec<String> = first.into_iter().chain(["by"]).map(|label| format!("{verb} {label} ")).collect();
-    let calls = |text: &str| called.iter().any(|c| text.contains(c));
+    // What comments say in passing is no call.
+    let calls = |text: &str| {
+        let mut lines = text.lines().filter(|line| !line.trim_start().starts_with("//"));
+        lines.any(|line| called.iter().any(|c| line.contains(c)))
+    };
     sig.verb.first().is_some_and(|w| w.text == "return") || library.modules.iter().any(|m| calls(m.text))
 }
 
