@@ -419,7 +419,9 @@ module.exports = grammar({
     ),
     wires: ($) => block_of($, $._wire),
     _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_command),
-    wire_fixed: ($) => prec(1, seq(choice('open', 'close', 'halt', 'safe', 'play'), $._exchange)),
+    wire_fixed: ($) => prec(1, seq(
+      choice('open', 'close', 'halt', 'safe', 'play'), optional(seq('while', field('condition', $.expression))), $._exchange,
+    )),
     wire_alive: ($) => seq(
       'alive', 'while', field('condition', $.expression), 'every', $._operand,
       'by', $.verb, optional(seq('else', $.verb)),
