@@ -121,14 +121,18 @@ impl Network {
     pub fn least_from(&self, source: Point, scopes: &[Scope]) -> Result<Vec<f64>, Vec<Edge>> {
         let mut holds = vec![false; self.scopes.len()];
         scopes.iter().flat_map(|s| self.around(*s)).for_each(|s| holds[s.0 as usize] = true);
-        let edges: Vec<&Edge> = self.edges.iter().filter(|e| holds[e.scope.0 as usize]).collect();
+        let mut edges: Vec<&Edge> = self.edges.iter().filter(|e| holds[e.scope.0 as usize]).collect();
+        // Points are made in the order of the plan: along it, then against it, one pass carries a time far.
+        edges.sort_by_key(|e| e.from);
         let mut least = vec![f64::NEG_INFINITY; self.points as usize];
         let mut reached_by: Vec<Option<usize>> = vec![None; self.points as usize];
         least[source.0 as usize] = 0.0;
         let mut look = 1;
         for pass in 1.. {
             let mut moved = false;
-            for (index, edge) in edges.iter().enumerate() {
+            for turn in 0..edges.len() {
+                let index = if pass % 2 == 1 { turn } else { edges.len() - 1 - turn };
+                let edge = edges[index];
                 let time = least[edge.from.0 as usize] + edge.weight;
                 if time > least[edge.to.0 as usize] + ROUNDING {
                     least[edge.to.0 as usize] = time;

@@ -261,6 +261,7 @@ impl Graph {
     }
 
     /// One operation.
+    #[inline]
     pub fn op(&self, node: NodeId) -> Op {
         self.ops[node.0 as usize]
     }
@@ -420,6 +421,14 @@ impl Graph {
         });
         found.sort_unstable();
         found
+    }
+
+    /// Visits the operations that a value rests on, each once, in no particular order.
+    pub fn visit(&self, node: NodeId, mut visit: impl FnMut(Op)) {
+        self.below([node], |n| {
+            visit(self.op(n));
+            false
+        });
     }
 
     /// Whether `node` depends on an operation for which `test` holds.

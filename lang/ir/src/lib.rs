@@ -37,6 +37,7 @@ pub mod span;
 pub mod stock;
 pub mod study;
 pub mod text;
+pub mod values;
 pub mod wire;
 
 pub use codes::Code;

@@ -12,12 +12,11 @@ use super::Elaborator;
 impl Elaborator<'_> {
     /// Whether a mixture has touched a reagent; absent where that reagent cannot get there.
     pub fn touched(&mut self, mixture: InstanceId, origin: &str) -> Option<NodeId> {
+        if let Some(state) = self.lineage.get(&mixture).and_then(|of| of.get(origin)) {
+            return Some(self.graph.add(Op::State(*state)));
+        }
         if !self.reach.origins(&self.instances[mixture.0 as usize].name).any(|o| o == origin) {
             return None;
-        }
-        let key = (mixture, origin.to_string());
-        if let Some(state) = self.lineage.get(&key) {
-            return Some(self.graph.add(Op::State(*state)));
         }
         let inst = &self.instances[mixture.0 as usize];
         let (name, span) = (format!("{}.origins[{origin}]", inst.name), inst.span);
@@ -26,7 +25,7 @@ impl Elaborator<'_> {
         let index = self.states.len() as u32;
         self.state_owner.push(mixture);
         self.states.push(State { name, domain: Domain::Bool, initial, scale: 1.0, span });
-        self.lineage.insert(key, index);
+        self.lineage.entry(mixture).or_default().insert(origin.to_string(), index);
         Some(self.graph.add(Op::State(index)))
     }
 

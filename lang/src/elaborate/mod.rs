@@ -163,8 +163,8 @@ pub struct Elaborator<'a> {
     pub lab_name: Span,
     /// Settings of the lab, such as `ambient`.
     pub settings: BTreeMap<String, Value>,
-    /// Which states say what has touched a mixture, by mixture and reagent.
-    pub lineage: BTreeMap<(InstanceId, String), u32>,
+    /// Which states say what has touched a mixture, by mixture, then by reagent.
+    pub lineage: BTreeMap<InstanceId, BTreeMap<String, u32>>,
     /// Terms of what vessels hold at the start, in the order of the text.
     pub held: Vec<crate::stock::Held>,
     /// What the verbs of calls were found to mean, by the place of the call.

@@ -66,7 +66,10 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// The meanings of the longest declared verb that the words begin with, and its number of words.
-    fn find_verb(&mut self, call: &'a Call, scope: &Scope) -> Option<(Vec<Verb<'a>>, usize)> {
+    fn find_verb(&mut self, call: &'a Call, scope: &Scope) -> Option<(Arc<[Verb<'a>]>, usize)> {
+        if let Some(known) = self.meanings.get(&call.span) {
+            return Some(known.clone());
+        }
         let longest = call.words.len();
         for n in (1..=longest).rev() {
             let rest = longest - n;
@@ -75,7 +78,9 @@ impl<'a> Planner<'a, '_> {
             }
             let verbs = self.verbs(&verb_text(&call.words[..n]), scope.module);
             if !verbs.is_empty() {
-                return Some((verbs, n));
+                let found = (verbs.into(), n);
+                self.meanings.insert(call.span, Clone::clone(&found));
+                return Some(found);
             }
         }
         self.unknown_verb(call, scope);

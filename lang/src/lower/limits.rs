@@ -1,7 +1,5 @@
 //! What things keep at all times, and which steps may break it.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use matterix_ir::Op;
 use matterix_ir::plan::{Limit, Step};
 use matterix_ir::scene::InstanceId;
@@ -35,20 +33,20 @@ impl Planner<'_, '_> {
 
     /// Notes at every operation the limits that its effects may pass.
     pub fn note_limits(&mut self, limits: &[Limit]) {
-        let mut of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        let mut of: Vec<Vec<u32>> = vec![Vec::new(); self.lab.states.len()];
         for (i, limit) in limits.iter().enumerate() {
-            for node in self.lab.graph.schedule([limit.condition.node]) {
-                if let Op::State(s) = self.lab.graph.op(node) {
-                    of.entry(s).or_default().push(i as u32);
+            self.lab.graph.visit(limit.condition.node, |op| {
+                if let Op::State(s) = op {
+                    of[s as usize].push(i as u32);
                 }
-            }
+            });
         }
         let extensive = self.lab.extensive_by_mixture();
         for step in &mut self.steps {
             let Step::Operation(o) = &mut step.step else { continue };
-            let due: BTreeSet<u32> =
-                written(o, &extensive).iter().filter_map(|s| of.get(s)).flatten().copied().collect();
-            o.limits = due.into_iter().collect();
+            o.limits = written(o, &extensive).iter().flat_map(|s| &of[*s as usize]).copied().collect();
+            o.limits.sort_unstable();
+            o.limits.dedup();
         }
     }
 }

@@ -14,12 +14,14 @@ pub mod wires;
 
 pub use call::Verb;
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::script::Wiring;
 use matterix_ir::{Sources, Span, Unit};
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::clauses::Clauses;
 use crate::ast::{Block, Handlers, ItemKind};
@@ -65,6 +67,9 @@ pub struct Planner<'a, 'e> {
     /// What is said over a wire, where that is asked for.
     pub wiring: Option<Wiring>,
     clauses: Clauses,
+    /// What the verb of a call can mean, and how many words it has.
+    meanings: FxHashMap<Span, (Arc<[Verb<'a>]>, usize)>,
+    texts: RefCell<FxHashMap<Span, String>>,
     /// Clauses and limits that a draft has looked at.
     drafted: FxHashSet<Span>,
 }
@@ -109,6 +114,8 @@ impl<'a, 'e> Planner<'a, 'e> {
             offers: matterix_ir::offer::Offers::default(),
             wiring: None,
             clauses: Clauses::default(),
+            meanings: FxHashMap::default(),
+            texts: RefCell::default(),
             drafted: FxHashSet::default(),
         }
     }

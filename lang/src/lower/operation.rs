@@ -262,6 +262,9 @@ impl<'a> Planner<'a, '_> {
     ) -> (Vec<Arc<Condition>>, Vec<Condition>, Vec<Condition>, Option<Takes>) {
         let (mut needs, mut invariants, mut promises, mut takes) = (Vec::new(), Vec::new(), Vec::new(), None);
         for clause in clauses {
+            if self.is_drafted(clause.span) {
+                continue;
+            }
             match &clause.kind {
                 ClauseKind::Needs { .. } => needs.extend(self.need(clause, inner).map(Arc::new)),
                 ClauseKind::Presumes { .. } => self.lab.report(Diagnostic::error(

@@ -54,11 +54,15 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
 }
 
 impl<'a> Planner<'a, '_> {
-    /// The source under a span on one line, shortened.
+    /// The source under a span on one line, shortened; what is written once is asked for at every turn of a loop.
     pub fn text(&self, span: Span) -> String {
         if self.draft {
             return String::new();
         }
+        self.texts.borrow_mut().entry(span).or_insert_with(|| self.on_one_line(span)).clone()
+    }
+
+    fn on_one_line(&self, span: Span) -> String {
         let text = self.sources.slice(span);
         let blanks = text.starts_with(' ') || text.ends_with(' ') || text.contains("  ");
         if text.len() <= 100 && !blanks && !text.contains(|c: char| c != ' ' && c.is_whitespace()) {

@@ -79,9 +79,9 @@ impl Questions {
             }
             things[key.instance.0 as usize].species.push(asked);
         }
-        for ((mixture, reagent), state) in lab.lineage.clone() {
-            let node = lab.graph.add(Op::State(state));
-            things[mixture.0 as usize].reagents.push((reagent, node));
+        for (mixture, reagents) in lab.lineage.clone() {
+            let asked = reagents.into_iter().map(|(reagent, state)| (reagent, lab.graph.add(Op::State(state))));
+            things[mixture.0 as usize].reagents.extend(asked);
         }
         things.retain(|t| !(t.facts.is_empty() && t.species.is_empty() && t.reagents.is_empty()));
         let nodes = things.iter().flat_map(About::nodes).collect();

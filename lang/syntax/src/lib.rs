@@ -15,6 +15,7 @@ mod lower;
 mod mistake;
 pub mod moved;
 mod parts;
+mod pieces;
 mod repair;
 mod scan;
 mod spot;

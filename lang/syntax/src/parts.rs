@@ -8,6 +8,7 @@ use pest::Parser;
 use crate::ast::{File, Item};
 use crate::grammar::{Grammar, Rule};
 use crate::moved::{Moved, shifted};
+use crate::pieces::{self, Piece};
 use crate::repair::{self, Change, Offsets};
 use crate::scan::{self, Scan};
 use crate::{MISSING_VALUE, lower, missing_value, unreadable, with_stack};
@@ -20,13 +21,18 @@ pub struct Memo {
 
 /// What a part of a text says.
 #[derive(Clone, Debug, Default)]
-struct Part {
+pub(super) struct Part {
     version: Option<u32>,
-    items: Vec<Item>,
-    found: Vec<Diagnostic>,
+    pub(super) items: Vec<Item>,
+    pub(super) found: Vec<Diagnostic>,
     /// Mistakes that were not looked into.
-    hidden: usize,
+    pub(super) hidden: usize,
+    /// Which of its statements were read together.
+    pub(super) pieces: Vec<Piece>,
 }
+
+/// The version of a file, for its parts behind the first.
+pub(super) type Known = Option<Option<u32>>;
 
 /// Reads a text whose brackets match; the last number counts mistakes that were not looked into. What was read is in the memo afterwards,
 /// and nothing else.
@@ -49,7 +55,9 @@ pub(crate) fn read(
                 let key = (known.is_some_and(|version| version.is_none()), own.to_owned());
                 // The first part, with the header, is read anew: it is short.
                 let kept = if i > 0 { before.remove(&key).or_else(|| memo.parts.get(&key).cloned()) } else { None };
-                let part = kept.unwrap_or_else(|| part(FileId(0), own, &Offsets::default(), known));
+                let in_pieces = || pieces::read(own, known, &before);
+                let in_one = || part(FileId(0), own, &Offsets::default(), known);
+                let part = kept.or_else(in_pieces).unwrap_or_else(in_one);
                 let mut moved = part.clone();
                 memo.parts.insert(key, part);
                 let to = shifted(file, offsets.user(start) as i64);
@@ -71,7 +79,7 @@ pub(crate) fn read(
 }
 
 /// Where parts begin: where an item does, with the comment above it, outside of all brackets.
-fn cuts(text: &str, scan: &Scan) -> Vec<usize> {
+pub(super) fn cuts(text: &str, scan: &Scan) -> Vec<usize> {
     let mut cuts = vec![0];
     let mut brackets = scan.brackets.iter().peekable();
     let mut open = 0usize;
@@ -98,7 +106,7 @@ fn cuts(text: &str, scan: &Scan) -> Vec<usize> {
 
 /// One part, and once more with marks for values that its lines lack where it has mistakes. `known` is the version of the file, behind its
 /// first part.
-fn part(file: FileId, text: &str, offsets: &Offsets, known: Option<Option<u32>>) -> Part {
+fn part(file: FileId, text: &str, offsets: &Offsets, known: Known) -> Part {
     let scan = scan::scan(text);
     let (depth, _) = scan::depth(&scan);
     let part = with_stack(depth, || once(file, text, offsets, known));
@@ -121,11 +129,12 @@ fn part(file: FileId, text: &str, offsets: &Offsets, known: Option<Option<u32>>)
     part
 }
 
-fn once(file: FileId, text: &str, offsets: &Offsets, known: Option<Option<u32>>) -> Part {
+/// What the grammar makes of a text.
+pub(super) fn once(file: FileId, text: &str, offsets: &Offsets, known: Known) -> Part {
     match Grammar::parse(Rule::file, text).ok().and_then(|mut pairs| pairs.next()) {
         Some(root) => {
             let (tree, found, hidden) = lower::Lower::new(file, text, offsets).run(root, known);
-            Part { version: tree.version, items: tree.items, found, hidden }
+            Part { version: tree.version, items: tree.items, found, hidden, pieces: Vec::new() }
         }
         None => Part { found: vec![unreadable(offsets.span(file, 0, 0))], ..Part::default() },
     }

@@ -51,6 +51,11 @@ pub(super) fn apply(text: &str, changes: &[Change]) -> (String, Offsets) {
 }
 
 impl Offsets {
+    /// Those of a text that stands behind so many bytes which are not the user's.
+    pub(super) fn behind(inserted: usize) -> Offsets {
+        Offsets { steps: vec![Step { parsed: inserted, user: 0, inserted }], below: None }
+    }
+
     /// The user's offset of a parsed one; inside of something inserted, where that was put.
     pub(super) fn user(&self, parsed: usize) -> usize {
         let after = self.steps.partition_point(|step| step.parsed <= parsed);

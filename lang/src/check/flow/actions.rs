@@ -1,6 +1,7 @@
 //! What operations need and do.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use matterix_ir::NodeId;
@@ -10,6 +11,7 @@ use matterix_ir::plan::{Condition, Operation, Presumption};
 use super::Flow;
 use super::facts::Facts;
 use super::value::{Known, Why};
+use crate::elaborate::ExtensiveKey;
 
 /// Events that set each other off at one instant before the rest is left to the run.
 const MOST_EVENTS: usize = 200;
@@ -172,12 +174,7 @@ impl Flow<'_, '_> {
             },
         };
         let mut changes = Vec::new();
-        for (key, source) in &self.mixtures[from] {
-            let there = self.mixtures[to].iter().find(|(k, _)| k.member == key.member && k.species == key.species);
-            let Some((_, target)) = there else { continue };
-            if source == target {
-                continue;
-            }
+        for (source, target) in self.passage(from, to).iter() {
             let held = &facts.states[*source as usize];
             let moved = Known::binary(matterix_ir::BinaryOp::Mul, &fraction, held);
             // A share of what is there leaves the rest: exact where the share is.
@@ -194,6 +191,20 @@ impl Flow<'_, '_> {
             changes.push((*target, more));
         }
         self.write(changes, facts)
+    }
+
+    /// The states of a mixture that a transfer takes from, each with that of another mixture which it adds to.
+    fn passage(&mut self, from: usize, to: usize) -> Rc<[(u32, u32)]> {
+        let (sources, targets) = (&self.mixtures[from], &self.mixtures[to]);
+        let known = self.passages.entry((from, to)).or_insert_with(|| {
+            let pair = |(key, source): &(ExtensiveKey, u32)| {
+                let same = |(k, _): &&(ExtensiveKey, u32)| k.member == key.member && k.species == key.species;
+                let target = targets.iter().find(same)?.1;
+                (*source != target).then_some((*source, target))
+            };
+            sources.iter().filter_map(pair).collect()
+        });
+        known.clone()
     }
 
     /// Fires those of the events that became true, and what they set off, until none does.

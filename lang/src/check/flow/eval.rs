@@ -2,6 +2,8 @@
 
 use std::rc::Rc;
 
+use matterix_ir::graph::unary;
+use matterix_ir::values::{Formula, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::facts::Facts;
@@ -11,12 +13,44 @@ use super::{Flow, Raised};
 /// What a node depends on.
 #[derive(Debug, Default)]
 pub struct Parts {
-    /// Operations, operands first.
-    pub order: Rc<[NodeId]>,
     /// States, those behind readings included.
     pub states: Vec<u32>,
     /// Whether time or a kept value is among them.
     pub timed: bool,
+}
+
+/// Numbers, as long as all are known exactly and no comparison hangs on rounding; what comes of them is what
+/// [`Known`] makes of points.
+struct Exact<'f> {
+    params: &'f [Known],
+    facts: &'f Facts,
+}
+
+impl Rules for Exact<'_> {
+    type Value = f64;
+
+    fn leaf(&self, op: Op) -> Option<f64> {
+        match op {
+            Op::Const(v) => Some(v).filter(|v| !v.is_nan()),
+            Op::Time => self.facts.time.exact(),
+            Op::State(i) => self.facts.states[i as usize].exact(),
+            Op::Param(i) => self.params[i as usize].exact(),
+            Op::Local(i) => self.facts.locals[i as usize].exact(),
+            _ => None,
+        }
+    }
+
+    fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
+        Some(unary(op, a)).filter(|v| !v.is_nan())
+    }
+
+    fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
+        Known::points(op, a, b).exact()
+    }
+
+    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
+        if condition != 0.0 { a } else { b }
+    }
 }
 
 impl Flow<'_, '_> {
@@ -26,16 +60,14 @@ impl Flow<'_, '_> {
             return parts.clone();
         }
         let graph = &self.lab.graph;
-        let mut parts = Parts { order: graph.schedule([node]).into(), ..Parts::default() };
+        let mut parts = Parts::default();
         let mut readings = Vec::new();
-        for n in parts.order.iter() {
-            match graph.op(*n) {
-                Op::State(s) => parts.states.push(s),
-                Op::Reading(r) => readings.push(r),
-                Op::Time | Op::Local(_) => parts.timed = true,
-                _ => {}
-            }
-        }
+        graph.visit(node, |op| match op {
+            Op::State(s) => parts.states.push(s),
+            Op::Reading(r) => readings.push(r),
+            Op::Time | Op::Local(_) => parts.timed = true,
+            _ => {}
+        });
         for r in readings {
             let inner = self.parts(self.lab.readings[r as usize].value);
             parts.states.extend(&inner.states);
@@ -48,10 +80,27 @@ impl Flow<'_, '_> {
         parts
     }
 
-    /// The value of a node.
+    /// The operations below a node, operands first; found once.
+    pub fn order(&mut self, node: NodeId) -> Rc<[NodeId]> {
+        let find = || self.lab.graph.schedule([node]).into();
+        self.orders[node.0 as usize].get_or_insert_with(find).clone()
+    }
+
+    /// The value of a node: where all that it rests on is known exactly, by numbers alone.
     pub fn eval(&mut self, node: NodeId, facts: &Facts) -> Known {
-        let parts = self.parts(node);
-        for n in parts.order.iter() {
+        let find = || Formula::of(&self.lab.graph, node);
+        let formula = self.formulas[node.0 as usize].get_or_insert_with(find);
+        let exact = Exact { params: &self.params, facts };
+        match formula.value(&exact, &mut self.numbers) {
+            Some(value) => Known::Point(value),
+            None => self.enclose(node, facts),
+        }
+    }
+
+    /// The value of a node with those of all that it rests on, which stay in `values`.
+    pub(super) fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
+        let order = self.order(node);
+        for n in order.iter() {
             let value = match self.lab.graph.op(*n) {
                 Op::Const(v) => Known::point(v),
                 Op::Time => facts.time.clone(),

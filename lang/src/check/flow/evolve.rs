@@ -262,7 +262,8 @@ impl Flow<'_, '_> {
             if reached {
                 continue;
             }
-            for n in self.parts(guard).order.iter().copied() {
+            self.enclose(guard, facts);
+            for n in self.order(guard).iter().copied() {
                 let Op::Binary(BinaryOp::Le, a, b) = self.lab.graph.op(n) else { continue };
                 let live = if self.lab.graph.constant(a).is_some() { b } else { a };
                 if !self.parts(live).states.is_empty() {

@@ -82,7 +82,7 @@ impl Flow<'_, '_> {
 
     /// The changes of states behind a condition that names no member itself, as one that calls a function.
     fn changes_behind(&mut self, node: NodeId, facts: &Facts) -> Vec<(Span, String)> {
-        let mut order = self.parts(node).order.to_vec();
+        let mut order = self.order(node).to_vec();
         let mut said = Vec::new();
         let mut at = 0;
         while let Some(node) = order.get(at).copied() {
@@ -90,7 +90,10 @@ impl Flow<'_, '_> {
             let Op::State(s) = self.lab.graph.op(node) else { continue };
             let state = &self.lab.states[s as usize];
             let term = Term { name: state.name.clone(), node, domain: state.domain.clone() };
-            let touched = self.lab.lineage.iter().find(|(_, state)| **state == s).map(|(key, _)| key.clone());
+            let lineage = self.lab.lineage.iter();
+            let mut touched =
+                lineage.flat_map(|(mixture, of)| of.iter().map(move |(reagent, s)| (*mixture, reagent, *s)));
+            let touched = touched.find(|t| t.2 == s).map(|(mixture, reagent, _)| (mixture, reagent.clone()));
             let latest: Vec<_> = self.history(&term, facts).into_iter().take(1).collect();
             // What came from another thing has a story there.
             if touched.is_some()

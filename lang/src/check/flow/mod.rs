@@ -26,7 +26,9 @@ use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::values::Formula;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
+use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
 use self::facts::Facts;
@@ -58,11 +60,19 @@ struct Flow<'l, 'a> {
     derivatives: &'l [Derivative],
     /// Extensive states by mixture index.
     mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
+    /// The pairs of states that transfers between two of them change.
+    passages: FxHashMap<(usize, usize), Rc<[(u32, u32)]>>,
     params: Vec<Known>,
-    /// What a node depends on: operations in order, and states.
+    /// The states that a node depends on.
     parts: Vec<Option<Rc<eval::Parts>>>,
-    /// Values of the operations of the node evaluated last.
+    /// The operations below a node, operands first.
+    orders: Vec<Option<Rc<[NodeId]>>>,
+    /// Values of the operations of the node enclosed last.
     values: Vec<Known>,
+    /// What nodes are made of, as far as they were asked for.
+    formulas: Vec<Option<Formula>>,
+    /// Room for exact values.
+    numbers: Vec<f64>,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
@@ -158,9 +168,13 @@ impl<'l, 'a> Flow<'l, 'a> {
             events,
             derivatives,
             mixtures: lab.extensive_by_mixture(),
+            passages: FxHashMap::default(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: vec![None; lab.graph.ops().len()],
+            orders: vec![None; lab.graph.ops().len()],
             values: vec![Known::Point(0.0); lab.graph.ops().len()],
+            formulas: vec![None; lab.graph.ops().len()],
+            numbers: Vec::new(),
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
             limits_of: BTreeMap::new(),

@@ -23,7 +23,8 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
         }
         let facts = flow.start();
         let usual = flow.eval(node, &facts).truth();
-        for (param, limit) in compared(flow, &parts.order) {
+        let order = flow.order(node);
+        for (param, limit) in compared(flow, &order) {
             let default = flow.lab.params[param as usize].value;
             let flips = |value: &f64| {
                 let kept = std::mem::replace(&mut flow.params[param as usize], Known::point(*value));

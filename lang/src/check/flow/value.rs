@@ -184,7 +184,7 @@ impl Known {
     }
 
     /// Two exact numbers. Where a comparison hangs on rounding, it is left open.
-    fn points(op: BinaryOp, a: f64, b: f64) -> Known {
+    pub fn points(op: BinaryOp, a: f64, b: f64) -> Known {
         let result = binary(op, a, b);
         let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
         if compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) {

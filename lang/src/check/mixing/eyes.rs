@@ -4,22 +4,25 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use matterix_ir::graph::apply;
+use matterix_ir::graph::{binary, unary};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{NodeId, Op};
+use matterix_ir::values::{Formula, Rules};
+use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
+use rustc_hash::FxHashMap;
 
 use super::world::World;
 use crate::elaborate::{Elaborator, SpeciesId};
+
+/// The states of a mixture that a transfer takes from, each with that of the other mixture which it adds to, if any.
+pub type Passage = Rc<[(u32, Option<u32>)]>;
 
 /// Evaluates nodes of the lab at states of the world.
 pub struct Eyes<'l, 'a> {
     /// The lab.
     pub lab: &'l Elaborator<'a>,
     params: Vec<f64>,
-    /// Operations below nodes, operands first, as far as they were asked for.
-    cones: RefCell<Vec<Option<Rc<[NodeId]>>>>,
-    /// Values of the operations of the node evaluated last, and whether they are known.
-    values: RefCell<(Vec<f64>, Vec<bool>)>,
+    /// What nodes are made of, as far as they were asked for, and room for values and whether they are known.
+    formulas: RefCell<(Vec<Option<Formula>>, Vec<(f64, bool)>)>,
     /// By state: whether time changes it.
     moving: Vec<bool>,
     /// The mixtures in the order in which actions number them.
@@ -27,7 +30,8 @@ pub struct Eyes<'l, 'a> {
     /// The amount states of each mixture.
     pub amounts: BTreeMap<InstanceId, Vec<(SpeciesId, u32)>>,
     /// Every extensive state of each mixture by what it is.
-    pub extensive: BTreeMap<InstanceId, BTreeMap<(String, Option<SpeciesId>), u32>>,
+    extensive: BTreeMap<InstanceId, BTreeMap<(String, Option<SpeciesId>), u32>>,
+    passages: RefCell<FxHashMap<(InstanceId, InstanceId), Passage>>,
     /// Whose lineage a state is.
     pub lineage: BTreeMap<u32, InstanceId>,
     /// The states that are amounts.
@@ -50,15 +54,26 @@ impl<'l, 'a> Eyes<'l, 'a> {
         Eyes {
             lab,
             params: lab.params.iter().map(|p| p.value).collect(),
-            cones: RefCell::new(vec![None; lab.graph.ops().len()]),
-            values: RefCell::new((vec![0.0; lab.graph.ops().len()], vec![false; lab.graph.ops().len()])),
+            formulas: RefCell::new((vec![None; lab.graph.ops().len()], Vec::new())),
             moving: (0..lab.states.len() as u32).map(|state| lab.rates.contains_key(&state)).collect(),
             order,
             counted: amounts.values().flatten().map(|a| a.1).collect(),
-            lineage: lab.lineage.iter().map(|((m, _), state)| (*state, *m)).collect(),
+            lineage: lab.lineage.iter().flat_map(|(m, of)| of.values().map(|state| (*state, *m))).collect(),
             amounts,
             extensive,
+            passages: RefCell::default(),
         }
+    }
+
+    /// The states that a transfer between two mixtures changes.
+    pub fn passage(&self, from: InstanceId, to: InstanceId) -> Passage {
+        let find = || {
+            let (Some(have), Some(get)) = (self.extensive.get(&from), self.extensive.get(&to)) else {
+                return Passage::default();
+            };
+            have.iter().map(|(key, state)| (*state, get.get(key).copied())).collect()
+        };
+        self.passages.borrow_mut().entry((from, to)).or_insert_with(find).clone()
     }
 
     /// A value at a point of the plan; not a number where it depends on what only a run knows.
@@ -80,33 +95,11 @@ impl<'l, 'a> Eyes<'l, 'a> {
 
     /// A value, and whether it is known: a comparison with what is not known is false, which says nothing.
     fn look(&self, node: NodeId, world: &World, moving: impl Fn(u32) -> bool) -> (f64, bool) {
-        let leaf = |op: Op| match op {
-            Op::Const(v) => v,
-            Op::State(i) => world.states[i as usize],
-            Op::Param(i) => self.params[i as usize],
-            Op::Local(i) => world.locals.get(i as usize).copied().unwrap_or(f64::NAN),
-            _ => f64::NAN,
-        };
-        let graph = &self.lab.graph;
-        let (values, known) = &mut *self.values.borrow_mut();
-        for n in self.cone(node).iter() {
-            let op = graph.op(*n);
-            let value = apply(op, leaf, |o| values[o.0 as usize]);
-            let is_known = match op {
-                Op::Const(_) => true,
-                Op::State(i) => !value.is_nan() && !moving(i),
-                Op::Time | Op::Reading(_) | Op::Local(_) | Op::Param(_) => !value.is_nan(),
-                _ => op.operands().all(|o| known[o.0 as usize]),
-            };
-            (values[n.0 as usize], known[n.0 as usize]) = (value, is_known);
-        }
-        (values[node.0 as usize], known[node.0 as usize])
-    }
-
-    /// What a node depends on; found once.
-    fn cone(&self, node: NodeId) -> Rc<[NodeId]> {
-        let find = || self.lab.graph.schedule([node]).into();
-        self.cones.borrow_mut()[node.0 as usize].get_or_insert_with(find).clone()
+        let look = Look { params: &self.params, world, moving };
+        let (formulas, room) = &mut *self.formulas.borrow_mut();
+        let find = || Formula::of(&self.lab.graph, node);
+        let formula = formulas[node.0 as usize].get_or_insert_with(find);
+        formula.value(&look, room).unwrap_or((f64::NAN, false))
     }
 
     /// Whether time changes a state.
@@ -119,5 +112,41 @@ impl<'l, 'a> Eyes<'l, 'a> {
         let species = &self.lab.tables.species;
         let list = self.amounts.get(&mixture).map_or(&[][..], Vec::as_slice);
         list.iter().map(|(s, state)| world.states[*state as usize] * species.get(*s).molar_mass).sum()
+    }
+}
+
+/// A look at one point of the plan: values, and whether they are known.
+struct Look<'w, M> {
+    params: &'w [f64],
+    world: &'w World,
+    /// Whether a state has no value that can be known.
+    moving: M,
+}
+
+impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
+    type Value = (f64, bool);
+
+    fn leaf(&self, op: Op) -> Option<(f64, bool)> {
+        let value = match op {
+            Op::Const(v) => return Some((v, true)),
+            Op::State(i) => self.world.states[i as usize],
+            Op::Param(i) => self.params[i as usize],
+            Op::Local(i) => self.world.locals.get(i as usize).copied().unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        };
+        let moves = matches!(op, Op::State(i) if (self.moving)(i));
+        Some((value, !value.is_nan() && !moves))
+    }
+
+    fn unary(&self, op: UnaryOp, a: (f64, bool)) -> Option<(f64, bool)> {
+        Some((unary(op, a.0), a.1))
+    }
+
+    fn binary(&self, op: BinaryOp, a: (f64, bool), b: (f64, bool)) -> Option<(f64, bool)> {
+        Some((binary(op, a.0, b.0), a.1 && b.1))
+    }
+
+    fn select(&self, condition: (f64, bool), a: (f64, bool), b: (f64, bool)) -> (f64, bool) {
+        (if condition.0 != 0.0 { a.0 } else { b.0 }, condition.1 && a.1 && b.1)
     }
 }

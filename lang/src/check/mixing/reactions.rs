@@ -13,7 +13,7 @@ impl World {
     pub fn react(&mut self, lab: &Elaborator<'_>, m: InstanceId, step: Span) -> Vec<SpeciesId> {
         let mut made = Vec::new();
         loop {
-            let Some(shared) = self.mixtures.get_mut(&m) else { return made };
+            let shared = &mut self.mixtures[m.0 as usize];
             let entries = &**shared;
             let mut new: Vec<(SpeciesId, Option<f64>)> = Vec::new();
             let mut used: Vec<SpeciesId> = Vec::new();

@@ -36,12 +36,11 @@ impl Walk<'_, '_> {
         before: Option<&Before>,
     ) {
         let tables = self.eyes.lab.tables;
-        let Some(entries) = world.mixtures.get(&m) else { return };
-        let Some(entry) = entries.get(&s) else { return };
+        let Some(entry) = world.held(m).get(&s) else { return };
         // As concentrated as it arrives, and as what it meets is before it is diluted.
         let arriving = before.and_then(|b| b.source.get(&s)).unwrap_or(entry);
         for o in others.iter().filter(|o| **o != s) {
-            let met = before.and_then(|b| b.target.get(o)).or_else(|| entries.get(o));
+            let met = before.and_then(|b| b.target.get(o)).or_else(|| world.held(m).get(o));
             let Some(met) = met else { continue };
             let (a, b): (Presence, Presence) = ((s, arriving.content), (*o, met.content));
             let Some(found) = tables.screen.pair(&tables.species, a, b) else { continue };
@@ -123,7 +122,7 @@ impl Walk<'_, '_> {
     pub(super) fn touch(&mut self, world: &World, m: InstanceId, s: SpeciesId, before: Option<&Before>) {
         let Some(&material) = self.materials.get(&m) else { return };
         let tables = self.eyes.lab.tables;
-        let Some(entry) = world.mixtures.get(&m).and_then(|e| e.get(&s)) else { return };
+        let Some(entry) = world.held(m).get(&s) else { return };
         let Some(found) = tables.screen.material(&tables.species, material, (s, entry.content)) else { return };
         let place = match before {
             Some(_) => self.place(),

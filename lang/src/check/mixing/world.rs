@@ -54,8 +54,8 @@ const HISTORY: usize = 4;
 /// The state of the lab at one point of the plan, without the work of time: nothing warms up or reacts.
 #[derive(Clone, Debug)]
 pub struct World {
-    /// By mixture.
-    pub mixtures: BTreeMap<InstanceId, Contents>,
+    /// By instance; nothing where it is no mixture.
+    pub mixtures: Pages<Contents>,
     /// By state index; not a number where it is not known.
     pub states: Pages<f64>,
     /// By the index of kept values; not a number where it is not known.
@@ -71,7 +71,7 @@ impl World {
     pub fn initial(eyes: &Eyes<'_, '_>, locals: usize) -> World {
         let lab = eyes.lab;
         let mut world = World {
-            mixtures: BTreeMap::new(),
+            mixtures: vec![Contents::default(); lab.instances.len()].into_iter().collect(),
             states: lab.states.iter().map(|_| f64::NAN).collect(),
             locals: vec![f64::NAN; locals],
             set: lab.states.iter().map(|_| None).collect(),
@@ -95,7 +95,7 @@ impl World {
                 let came = vec![Came { span, into: m }];
                 entries.insert(*s, Entry { content: None, certain: true, residue: false, came });
             }
-            world.mixtures.insert(m, Rc::new(entries));
+            world.mixtures[m.0 as usize] = Rc::new(entries);
         }
         for &m in &eyes.order {
             world.weigh(eyes, m);
@@ -105,13 +105,17 @@ impl World {
 
     /// What two mixtures hold now.
     pub fn before(&self, from: InstanceId, to: InstanceId) -> Before {
-        let of = |m: InstanceId| self.mixtures.get(&m).cloned().unwrap_or_default();
-        Before { source: of(from), target: of(to) }
+        Before { source: self.held(from).clone(), target: self.held(to).clone() }
     }
 
     /// What is in a mixture, as the screen asks for it.
     pub fn present(&self, m: InstanceId) -> impl Iterator<Item = (Presence, &Entry)> {
-        self.mixtures.get(&m).into_iter().flat_map(|entries| entries.iter()).map(|(s, e)| ((*s, e.content), e))
+        self.held(m).iter().map(|(s, e)| ((*s, e.content), e))
+    }
+
+    /// What is in a mixture.
+    pub fn held(&self, m: InstanceId) -> &Contents {
+        &self.mixtures[m.0 as usize]
     }
 
     /// Brings the contents of a mixture up to date with the amounts, where these are known.
@@ -120,7 +124,7 @@ impl World {
         if mass.is_nan() || mass <= 0.0 {
             return;
         }
-        let Some(entries) = self.mixtures.get_mut(&m).map(Rc::make_mut) else { return };
+        let entries = Rc::make_mut(&mut self.mixtures[m.0 as usize]);
         for (s, state) in eyes.amounts.get(&m).map_or(&[][..], Vec::as_slice) {
             if let Some(entry) = entries.get_mut(s) {
                 let content = self.states[*state as usize] / mass;
@@ -158,10 +162,9 @@ impl World {
                 if value == 0.0
                     && self.states[*state as usize] == 1.0
                     && let Some(m) = eyes.lineage.get(state)
-                    && let Some(entries) = self.mixtures.get_mut(m)
-                    && entries.values().any(|e| e.residue)
+                    && self.held(*m).values().any(|e| e.residue)
                 {
-                    Rc::make_mut(entries).retain(|_, e| !e.residue);
+                    Rc::make_mut(&mut self.mixtures[m.0 as usize]).retain(|_, e| !e.residue);
                 }
                 self.states[*state as usize] = value;
                 self.set[*state as usize] = Some(step);
@@ -193,29 +196,28 @@ impl World {
         let moved = share * eyes.mass(from, self);
         let known = share > 0.0 && share <= 1.0 + 1e-9;
         let share = if known { share.min(1.0) } else { f64::NAN };
-        if let (Some(have), Some(get)) = (eyes.extensive.get(&from), eyes.extensive.get(&to)) {
-            for (key, a) in have {
-                let there = self.states[*a as usize];
-                if there == 0.0 {
-                    continue;
-                }
-                if let Some(b) = get.get(key) {
-                    self.states[*b as usize] += share * there;
-                }
-                self.states[*a as usize] = there - share * there;
-                self.changed.insert(*a);
-                self.changed.extend(get.get(key));
+        for (a, b) in eyes.passage(from, to).iter() {
+            let there = self.states[*a as usize];
+            if there == 0.0 {
+                continue;
             }
+            if let Some(b) = b {
+                self.states[*b as usize] += share * there;
+            }
+            self.states[*a as usize] = there - share * there;
+            self.changed.insert(*a);
+            self.changed.extend(b);
         }
         if moved < SPECK {
             return;
         }
-        let source = self.mixtures.get(&from).cloned().unwrap_or_default();
+        let source = self.held(from).clone();
         let emptied = share >= 1.0 - 1e-9;
-        if emptied && let Some(entries) = self.mixtures.get_mut(&from) {
-            Rc::make_mut(entries).values_mut().for_each(|e| e.residue = true);
+        if emptied {
+            let left = Rc::make_mut(&mut self.mixtures[from.0 as usize]);
+            left.values_mut().for_each(|e| e.residue = true);
         }
-        let target = Rc::make_mut(self.mixtures.entry(to).or_default());
+        let target = Rc::make_mut(&mut self.mixtures[to.0 as usize]);
         for (s, entry) in source.iter() {
             // What stuck to the walls of the source is not worth a history of its own.
             if entry.residue {
@@ -257,10 +259,9 @@ impl World {
         }
         self.changed.extend(other.changed);
         self.set.merge(&other.set, |set, o| *set = o.or(*set));
-        for (m, entries) in other.mixtures {
-            let mine = self.mixtures.entry(m).or_default();
-            if Rc::ptr_eq(mine, &entries) {
-                continue;
+        self.mixtures.merge(&other.mixtures, |mine, entries| {
+            if Rc::ptr_eq(mine, entries) {
+                return;
             }
             let mine = Rc::make_mut(mine);
             for (s, entry) in mine.iter_mut() {
@@ -277,7 +278,7 @@ impl World {
                     }
                 }
             }
-        }
+        });
         self
     }
 }

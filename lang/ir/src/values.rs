@@ -1,0 +1,100 @@
+//! One value of a graph at one point, for those who ask for the same ones again and again.
+
+use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp};
+
+/// How operations come out; none where it cannot be said, which leaves what was asked for open.
+pub trait Rules {
+    /// What values are.
+    type Value: Copy;
+    /// The value of an operation without operands.
+    fn leaf(&self, op: Op) -> Option<Self::Value>;
+    /// An operation on one value.
+    fn unary(&self, op: UnaryOp, a: Self::Value) -> Option<Self::Value>;
+    /// An operation on two values.
+    fn binary(&self, op: BinaryOp, a: Self::Value, b: Self::Value) -> Option<Self::Value>;
+    /// One of two by a condition.
+    fn select(&self, condition: Self::Value, a: Self::Value, b: Self::Value) -> Self::Value;
+}
+
+/// What a node of a graph is made of, by itself: operations, operands first, which name these by their position in it.
+#[derive(Clone, Debug)]
+pub struct Formula(Box<[Op]>);
+
+impl Formula {
+    /// That of a node.
+    pub fn of(graph: &Graph, node: NodeId) -> Formula {
+        let order = graph.schedule([node]);
+        // Operands stand before their user, so that they are found.
+        let at = |n: NodeId| NodeId(order.partition_point(|o| *o < n) as u32);
+        let by_position = |n: &NodeId| match graph.op(*n) {
+            Op::Unary(op, a) => Op::Unary(op, at(a)),
+            Op::Binary(op, a, b) => Op::Binary(op, at(a), at(b)),
+            Op::Select(c, a, b) => Op::Select(at(c), at(a), at(b)),
+            leaf => leaf,
+        };
+        Formula(order.iter().map(by_position).collect())
+    }
+
+    /// Its value by some rules; `room` is for values in between, and may be kept from one question to the next.
+    pub fn value<R: Rules>(&self, rules: &R, room: &mut Vec<R::Value>) -> Option<R::Value> {
+        room.clear();
+        room.reserve(self.0.len());
+        for op in &self.0 {
+            let at = |n: NodeId| room.get(n.0 as usize).copied();
+            let value = match *op {
+                Op::Unary(op, a) => rules.unary(op, at(a)?)?,
+                Op::Binary(op, a, b) => rules.binary(op, at(a)?, at(b)?)?,
+                Op::Select(c, a, b) => rules.select(at(c)?, at(a)?, at(b)?),
+                leaf => rules.leaf(leaf)?,
+            };
+            room.push(value);
+        }
+        room.last().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::{Env, binary, unary};
+
+    /// Exact numbers; the state 9 is not known.
+    struct Numbers;
+
+    impl Rules for Numbers {
+        type Value = f64;
+        fn leaf(&self, op: Op) -> Option<f64> {
+            match op {
+                Op::Const(v) => Some(v),
+                Op::State(9) => None,
+                Op::State(s) => Some(f64::from(s)),
+                _ => None,
+            }
+        }
+        fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
+            Some(unary(op, a))
+        }
+        fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
+            Some(binary(op, a, b))
+        }
+        fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
+            if condition != 0.0 { a } else { b }
+        }
+    }
+
+    #[test]
+    fn a_formula_gives_what_its_graph_gives() {
+        let mut graph = Graph::default();
+        let (two, five, unknown) = (graph.add(Op::State(2)), graph.add(Op::State(5)), graph.add(Op::State(9)));
+        let less = graph.binary(BinaryOp::Lt, two, five);
+        let chosen = graph.select(less, five, two);
+        let root = graph.unary(UnaryOp::Sqrt, chosen);
+        let sum = graph.binary(BinaryOp::Sub, root, two);
+        let other = graph.binary(BinaryOp::Mul, sum, unknown);
+        let mut room = Vec::new();
+        let states = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
+        let env = Env { time: 0.0, states: &states, params: &[], locals: &[], readings: &[] };
+        assert_eq!(Formula::of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
+        assert_eq!(Formula::of(&graph, other).value(&Numbers, &mut room), None);
+    }
+}
