@@ -9,8 +9,10 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::Elaborator;
 use super::coverings::is_place;
 use super::extents::LONGEST;
+use super::instances::Setting;
 use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
 use crate::eval::{Scope, Value};
+use crate::names::DeclId;
 use crate::names::near::{nearest, question};
 
 /// The shapes and what they are given.
@@ -48,9 +50,39 @@ pub struct Geometry {
     pub visual: Option<Shape>,
 }
 
+/// What parts of things are alike by: how many instances there were, their kinds, the lab they stand in, and the places of the
+/// fields given for them, each with its module, whether it stands in a lab, and the instance whose names it sees, if that is
+/// another one.
+pub type Alike = (usize, Vec<DeclId>, String, Vec<(usize, usize, bool, Option<Option<InstanceId>>)>);
+
 impl<'a> Elaborator<'a> {
-    /// Frames and shapes of an instance.
+    /// Frames and shapes of an instance; found once for all wells of a plate, as they have them from the same text.
     pub fn geometry(&mut self, id: InstanceId) -> Geometry {
+        let alike = self.shaped_like(id);
+        if let Some(known) = alike.as_ref().and_then(|alike| self.known_geometries.get(alike)) {
+            return known.clone();
+        }
+        let reported = self.reported;
+        let found = self.find_geometry(id);
+        if let Some(alike) = alike.filter(|_| self.reported == reported) {
+            self.known_geometries.insert(alike, found.clone());
+        }
+        found
+    }
+
+    /// What of a part of something its geometry depends on.
+    fn shaped_like(&self, id: InstanceId) -> Option<Alike> {
+        let instance = &self.instances[id.0 as usize];
+        let told = |s: &Setting<'a>| {
+            let of = s.of.map(|of| if of == id { None } else { Some(of) });
+            (std::ptr::from_ref(s.field) as usize, s.module, s.lab, of)
+        };
+        instance.owner?;
+        let settings = instance.settings.iter().map(told).collect();
+        Some((self.instances.len(), instance.kinds.clone(), instance.within.clone(), settings))
+    }
+
+    fn find_geometry(&mut self, id: InstanceId) -> Geometry {
         let mut out = Geometry::default();
         out.room = self.given_shape(id, "room");
         // What is nothing but room has its points where that is.

@@ -262,6 +262,8 @@ pub struct Elaborator<'a> {
     pub picks: BTreeMap<NodeId, Vec<InstanceId>>,
     /// Values of functions of instances, as far as they were asked for.
     pub known_calls: BTreeMap<KnownCall, Value>,
+    /// What parts of things that are alike are shaped like.
+    pub known_geometries: FxHashMap<geometry::Alike, geometry::Geometry>,
     /// Instances by kind, and how many there were when they were looked for.
     pub by_kind: RwLock<BTreeMap<DeclId, (usize, Vec<InstanceId>)>>,
     /// Members being evaluated.
@@ -339,6 +341,7 @@ impl<'a> Elaborator<'a> {
             gone_through: BTreeSet::new(),
             picks: BTreeMap::new(),
             known_calls: BTreeMap::new(),
+            known_geometries: FxHashMap::default(),
             by_kind: RwLock::default(),
             open_members: Vec::new(),
             open_calls: Vec::new(),
