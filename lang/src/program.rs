@@ -22,7 +22,7 @@ use crate::lower::wires::Wires;
 use crate::meanings::{Around, Gathered, Noted};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
-use crate::session::{self, Earlier, Package, Session, Verdict};
+use crate::session::{self, About, Earlier, Package, Session, Verdict, Words};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -128,8 +128,9 @@ fn examine(
     }
     let mut points = Vec::new();
     let package = sources.get(file).map_or_else(String::new, |source| source.name.clone());
+    let beside = session.beside;
     let package = session.package(&package);
-    let mut judged = judge_anew(&tables, sources, (root, file), &tasks, wanted, package);
+    let mut judged = judge_anew(&tables, sources, (root, file), &tasks, wanted, (package, beside));
     for (task, built) in tasks.iter().zip(&mut judged) {
         let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
         // What robots do is looked at for the workflow itself.
@@ -170,7 +171,7 @@ fn examine(
     }
     let findings = finish(diagnostics, sources);
     if wanted == Wanted::Contents {
-        meanings.pieces.splice(..0, Noted::of(seeing, &modules));
+        meanings.pieces.splice(..0, Noted::of(seeing, &names));
         meanings.around = Around::of(&tables);
         drop(tables);
         meanings.around.scopes = names.into_scopes();
@@ -529,38 +530,55 @@ fn judge_anew<'a>(
     (root, file): (usize, FileId),
     tasks: &[Task<'a>],
     wanted: Wanted,
-    package: &mut Package,
+    (package, beside): (&mut Package, u64),
 ) -> Vec<Built> {
     // A program is not kept.
     if wanted != Wanted::Contents {
         return judge(tables, sources, tasks, wanted);
     }
     let names = tables.names;
-    let mut now = Earlier::of(names.modules, sources, root);
+    let mut now = Earlier::of(names, sources, root, beside);
+    let about: Vec<Option<About>> = tasks.iter().map(|task| about(tables, root, task)).collect();
     let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
-    let lab = |task: &Task<'_>| {
-        names::item_name(names.decl(task.lab).item).map(|(name, _)| (names.decl(task.lab).module, name))
-    };
-    let known: Vec<Option<Verdict>> = tasks
+    let mut known: Vec<Option<(Verdict, Words)>> = about
         .iter()
-        .map(|task| {
-            let verdict = matched.as_ref()?.verdict(session::number(names, task.item)?, &lab(task)?)?;
-            Some(verdict).filter(|v| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
+        .map(|about| {
+            let known = matched.as_ref()?.verdict(about.as_ref()?)?;
+            Some(known).filter(|(v, _)| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
         })
         .collect();
     let open: Vec<Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t.clone()).collect();
     let mut judged = judge(tables, sources, &open, wanted).into_iter();
-    let all: Vec<Built> = known.into_iter().filter_map(|v| v.map(Built::from).or_else(|| judged.next())).collect();
-    for (task, built) in tasks.iter().zip(&all) {
-        let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
-        // What it runs may stand in another file, where it is common to all.
-        let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
-        if let (Some(item), Some(lab)) = (session::number(names, task.item), lab(task)) {
-            now.keep((item, runs), lab, built.verdict());
+    let anew: Vec<&About> =
+        about.iter().zip(&known).filter(|(_, v)| v.is_none()).filter_map(|(a, _)| a.as_ref()).collect();
+    let mut words = now.words(file, &anew).into_iter();
+    let mut all = Vec::with_capacity(tasks.len());
+    for (about, known) in about.into_iter().zip(&mut known) {
+        let (built, rests_on) = match known.take() {
+            Some((verdict, words)) => (Built::from(verdict), Some(words)),
+            None => {
+                let Some(built) = judged.next() else { continue };
+                (built, about.as_ref().and_then(|_| words.next()))
+            }
+        };
+        if let (Some(about), Some(words)) = (about, rests_on) {
+            now.keep(about, words, built.verdict());
         }
+        all.push(built);
     }
     package.earlier = Some(now);
     all
+}
+
+/// What the verdict of a task is about; none where it has no place in the root file.
+fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<About> {
+    let names = tables.names;
+    let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
+    // What it runs may stand in another file, where its name leads to it.
+    let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
+    let lab = names.decl(task.lab);
+    let (lab_name, _) = names::item_name(lab.item)?;
+    Some(About { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
 }
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
@@ -637,7 +655,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
         elaborator.note_things(lab);
-        let noted = Noted::of(elaborator.meanings.take(), tables.names.modules);
+        let noted = Noted::of(elaborator.meanings.take(), tables.names);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;

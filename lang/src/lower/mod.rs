@@ -13,6 +13,7 @@ mod text;
 pub mod wires;
 
 pub use call::Verb;
+pub use text::declared_failures;
 
 use std::collections::BTreeSet;
 

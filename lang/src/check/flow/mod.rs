@@ -27,6 +27,7 @@ use std::rc::Rc;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
+use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
 use self::facts::Facts;
@@ -61,8 +62,10 @@ struct Flow<'l, 'a> {
     params: Vec<Known>,
     /// What a node depends on: operations in order, and states.
     parts: Vec<Option<Rc<eval::Parts>>>,
-    /// Values of the operations of the node evaluated last.
-    values: Vec<Known>,
+    /// Operations of a node that depend on a state.
+    parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
+    /// Values of the operations that were evaluated.
+    values: eval::Values,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
@@ -160,7 +163,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             mixtures: lab.extensive_by_mixture(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: vec![None; lab.graph.ops().len()],
-            values: vec![Known::Point(0.0); lab.graph.ops().len()],
+            parts_on: FxHashMap::default(),
+            values: eval::Values::new(lab.graph.ops().len()),
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
             limits_of: BTreeMap::new(),
