@@ -116,7 +116,7 @@ wait("the server has begun", function() return client.initialized end)
 replace("5 min", "5 mg")
 wait("a wrong unit is found", function() return #serious() == 1 end, found)
 local finding = serious()[1]
-expect(finding.source == "matterixc" or finding.source ~= nil, "the finding says whose it is", finding)
+expect(finding.source == "matterixc" and finding.code ~= nil, "the finding says whose it is", finding)
 expect(finding.lnum == row("5 mg") - 1, "it stands in its line", finding)
 replace("5 mg", "5 min")
 wait("it is gone once it is mended", function() return #serious() == 0 end, found)
@@ -148,11 +148,7 @@ wait("nothing is wrong after it", function() return #serious() == 0 end, found)
 
 -- Completion, also in a line that is not whole.
 replace("    wait 5 min", "    wait 5 min\n    hea")
-go("hea\n" == "" and "hea" or "    hea")
-local line = vim.api.nvim_win_get_cursor(0)[1]
-for i, l in ipairs(vim.api.nvim_buf_get_lines(0, 0, -1, true)) do
-  if l == "    hea" then line = i end
-end
+local line = row("    wait 5 min") + 1
 vim.api.nvim_win_set_cursor(0, { line, 7 })
 local offered = asked("textDocument/completion", { position = { line = line - 1, character = 7 } })
 local labels = vim.tbl_map(function(item) return item.label end, offered.items or offered)
@@ -174,7 +170,7 @@ wait("its correction is made", function() return text():find("heat plate", 1, tr
 wait("nothing is wrong at last", function() return #serious() == 0 end, found)
 
 -- What is shown beside and on the text.
-wait("hints stand beside the text, where there are any", function() return vim.lsp.inlay_hint.is_enabled() end)
+expect(vim.lsp.inlay_hint.is_enabled(), "hints beside the text are on")
 go("IkaRetControl")
 wait("words have their colours", function()
   local line, column = row("IkaRetControl")
@@ -182,6 +178,15 @@ wait("words have their colours", function()
 end)
 expect(#asked("textDocument/documentSymbol") >= 2, "the outline has its items")
 expect(#asked("textDocument/foldingRange") >= 2, "items can be folded")
+
+-- The tree-sitter grammar, where it was built beside.
+if #vim.api.nvim_get_runtime_file("parser/mtx.so", false) > 0 then
+  vim.treesitter.start(0, "mtx")
+  vim.treesitter.get_parser(0, "mtx"):parse(true)
+  local line, column = row("workflow")
+  local classes = vim.treesitter.get_captures_at_pos(0, line - 1, column)
+  expect(vim.iter(classes):any(function(c) return c.capture:find("^keyword") ~= nil end), "`workflow` is a keyword", classes)
+end
 
 -- The end.
 client:stop()
