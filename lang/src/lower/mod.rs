@@ -16,6 +16,7 @@ pub use call::Verb;
 pub use text::declared_failures;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use matterix_ir::plan::{Condition, Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::script::Wiring;
@@ -48,7 +49,7 @@ pub struct Planner<'a, 'e> {
     /// Depth of failure handlers around.
     pub handlers: usize,
     /// Failures that something declares or raises.
-    pub failures: BTreeSet<String>,
+    pub failures: Arc<BTreeSet<String>>,
     /// Jobs started so far.
     pub jobs: BTreeSet<String>,
     /// What the call that is being written out says of its sources.
@@ -90,7 +91,7 @@ pub fn leave(scope: &mut Scope, depth: usize) {
 impl<'a, 'e> Planner<'a, 'e> {
     /// An empty plan over a lab.
     pub fn new(lab: &'e mut Elaborator<'a>, sources: &'e Sources) -> Self {
-        let failures = text::declared_failures(lab.tables.names);
+        let failures = lab.tables.failures();
         Planner {
             lab,
             sources,

@@ -66,7 +66,8 @@ impl Written {
         largest(&choice.written, magnitude)
             .filter(|u| reads_well(u))
             .or_else(|| largest(&choice.prefixed, magnitude))
-            .unwrap_or_else(|| unit.clone())
+            .unwrap_or(unit)
+            .clone()
     }
 
     fn choice(&self, lab: &Elaborator<'_>, unit: &Unit) -> Rc<Choice> {
@@ -92,11 +93,10 @@ impl Written {
 /// Numbers that read well in a unit somebody chose.
 const WELL: std::ops::Range<f64> = 0.01..1e5;
 
-/// The largest unit in which a magnitude is not less than one, or the smallest.
-fn largest(units: &[Unit], magnitude: f64) -> Option<Unit> {
-    let mut all: Vec<&Unit> = units.iter().collect();
-    all.sort_by(|a, b| a.factor.total_cmp(&b.factor));
+/// The largest unit in which a magnitude is not less than one, or the smallest; of equal ones the last, or the first.
+fn largest(units: &[Unit], magnitude: f64) -> Option<&Unit> {
     // What is a whole number but for rounding is one.
-    let fits = |u: &&&Unit| magnitude >= u.factor * (1.0 - 1e-9);
-    all.iter().rev().find(fits).or(all.first()).map(|u| (*u).clone())
+    let fits = units.iter().filter(|u| magnitude >= u.factor * (1.0 - 1e-9));
+    let smallest = || units.iter().min_by(|a, b| a.factor.total_cmp(&b.factor));
+    fits.max_by(|a, b| a.factor.total_cmp(&b.factor)).or_else(smallest)
 }

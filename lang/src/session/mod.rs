@@ -17,7 +17,7 @@ use crate::syntax::{self, Memo};
 
 pub(crate) use files::{features, imported};
 pub(crate) use reach::Words;
-pub(crate) use verdicts::{About, Earlier, Verdict, number};
+pub(crate) use verdicts::{About, Around, Earlier, Verdict, number};
 
 /// How many packages are remembered: those that are worked on at the same time.
 const MOST: usize = 8;

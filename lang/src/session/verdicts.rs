@@ -10,7 +10,6 @@ use matterix_ir::{Diagnostic, FileId, Severity, Sources, Span};
 use super::items::{self, File};
 use super::reach::{Reach, Words};
 use crate::check::{Starts, Uses};
-use crate::lower::declared_failures;
 use crate::meanings::Noted;
 use crate::names::{DeclId, Module, Names};
 use crate::study::Many;
@@ -31,6 +30,8 @@ pub(crate) struct Verdict {
     pub(crate) uses: Option<Uses>,
     /// What it is asked for many runs.
     pub(crate) many: Option<Many>,
+    /// What looking at motions has found, where that was asked for.
+    pub(crate) moved: Option<Vec<Diagnostic>>,
 }
 
 impl Moved for Verdict {
@@ -43,6 +44,7 @@ impl Moved for Verdict {
         self.starts.moved(to);
         self.uses.moved(to);
         self.many.moved(to);
+        self.moved.moved(to);
     }
 }
 
@@ -51,11 +53,19 @@ impl Moved for Verdict {
 pub(crate) struct Earlier {
     library: Vec<Arc<Module>>,
     files: Vec<File>,
-    /// A figure of the files beside the modules that were read.
-    beside: u64,
-    /// Failures that something declares.
-    failures: BTreeSet<String>,
+    around: Around,
     verdicts: Vec<Judged>,
+}
+
+/// What verdicts stand on beside the texts.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Around {
+    /// A figure of the other files that modules name.
+    pub(crate) beside: u64,
+    /// Failures that something declares.
+    pub(crate) failures: Arc<BTreeSet<String>>,
+    /// Whether motions were looked at.
+    pub(crate) moved: bool,
 }
 
 /// The verdict of an item.
@@ -101,16 +111,16 @@ struct Stretch {
 }
 
 impl Earlier {
-    /// What there is to judge of a package now, without verdicts yet; `beside` is a figure of the other files that its modules name.
-    pub(crate) fn of(names: &Names<'_>, sources: &Sources, root: usize, beside: u64) -> Earlier {
+    /// What there is to judge of a package now, without verdicts yet.
+    pub(crate) fn of(names: &Names<'_>, sources: &Sources, root: usize, around: Around) -> Earlier {
         let library = names.modules.iter().filter(|m| m.is_library()).cloned().collect();
         let own = names.modules.iter().enumerate().filter(|(_, m)| !m.is_library());
         let files = own.map(|(index, _)| File::of(names, index, sources, index == root)).collect();
-        Earlier { library, files, beside, failures: declared_failures(names), verdicts: Vec::new() }
+        Earlier { library, files, around, verdicts: Vec::new() }
     }
 
     /// On which words the verdicts of items of the root file rest, in their order.
-    pub(crate) fn words(&self, root: FileId, about: &[&About]) -> Vec<Words> {
+    pub(crate) fn words(&self, root: FileId, about: &[About]) -> Vec<Words> {
         if about.is_empty() {
             return Vec::new();
         }
@@ -134,7 +144,7 @@ impl Earlier {
     pub(crate) fn matched(&self, now: &Earlier, root: FileId) -> Option<Match<'_>> {
         let same_library = self.library.len() == now.library.len()
             && self.library.iter().zip(&now.library).all(|(a, b)| Arc::ptr_eq(a, b));
-        let same_around = same_library && self.beside == now.beside && self.failures == now.failures;
+        let same_around = same_library && self.around == now.around;
         if !same_around || self.files.len() != now.files.len() {
             return None;
         }

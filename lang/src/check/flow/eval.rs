@@ -105,6 +105,9 @@ impl Flow<'_, '_> {
 
     /// The value of a node. Of its operations those are done again whose operands are no longer what they were.
     pub fn eval(&mut self, node: NodeId, facts: &Facts) -> Known {
+        if let Op::State(state) = self.lab.graph.op(node) {
+            return facts.states[state as usize].clone();
+        }
         let order = self.parts(node).order.clone();
         self.work_out(&order, facts);
         self.values.of(node).clone()
