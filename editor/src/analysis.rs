@@ -5,7 +5,8 @@ use std::sync::{Arc, OnceLock};
 use matterix_ir::points::{Point, Points};
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
-use matterix_lang::{Gathered, Loader, Session, program};
+use matterix_lang::program::{self, Examined};
+use matterix_lang::{Gathered, Loader, Session};
 use matterix_syntax::ast;
 
 use crate::Index;
@@ -34,17 +35,27 @@ impl Analysis {
     pub fn of(name: &str, text: &str, loader: &dyn Loader, session: &mut Session) -> Analysis {
         let mut sources = Sources::default();
         let root = sources.add(name, text);
-        let seen = program::examined(&mut sources, root, loader, session);
-        let meanings = Arc::new(seen.meanings);
-        Analysis {
-            root,
-            sources,
-            modules: seen.modules,
-            findings: seen.findings,
-            points: seen.points,
-            meanings,
-            index: OnceLock::new(),
-        }
+        let seen = program::examined(&mut sources, root, loader, session, &|| false).unwrap_or_default();
+        Analysis::seen(root, sources, seen)
+    }
+
+    /// The same; nothing where `stop` says, on the way, that it is of no use any more.
+    pub fn unless(
+        name: &str,
+        text: &str,
+        loader: &dyn Loader,
+        session: &mut Session,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Analysis> {
+        let mut sources = Sources::default();
+        let root = sources.add(name, text);
+        let seen = program::examined(&mut sources, root, loader, session, stop)?;
+        Some(Analysis::seen(root, sources, seen))
+    }
+
+    fn seen(root: FileId, sources: Sources, seen: Examined) -> Analysis {
+        let Examined { modules, findings, points, meanings } = seen;
+        Analysis { root, sources, modules, findings, points, meanings: Arc::new(meanings), index: OnceLock::new() }
     }
 
     /// The index of names.

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -27,13 +29,19 @@ impl Loader for Beside {
     }
 }
 
-fn same(name: &str, text: &str, beside: &Beside, session: &mut Session) {
+fn same(name: &str, text: &str, beside: &dyn Loader, session: &mut Session) {
     let again = Analysis::of(name, text, beside, session);
     let anew = Analysis::of(name, text, beside, &mut Session::default());
     assert_eq!(again.findings, anew.findings, "{name}:\n{text}");
     assert_eq!(again.points, anew.points, "{name}:\n{text}");
     let trees = |a: &Analysis| a.modules.iter().map(|m| m.tree.clone()).collect::<Vec<_>>();
     assert_eq!(trees(&again), trees(&anew), "{name}:\n{text}");
+    let (again, anew) = (again.meanings, anew.meanings);
+    assert_eq!(again.around.scopes, anew.around.scopes, "{name}:\n{text}");
+    let (again, anew) = (again.joined(), anew.joined());
+    assert_eq!(again.names, anew.names, "{name}:\n{text}");
+    assert_eq!(again.values, anew.values, "{name}:\n{text}");
+    assert_eq!(again.things, anew.things, "{name}:\n{text}");
 }
 
 /// Places to type at, `count` of them spread over a text.
@@ -88,5 +96,119 @@ fn verdicts_move_with_their_text_and_fall_with_what_they_stand_on() {
         let changed = TWO.replacen(from, to, 1);
         assert_ne!(changed, TWO, "{from}");
         same("two", &changed, &beside, &mut session);
+    }
+}
+
+/// A package of two labs with all that workflows can name, and its other file.
+const MANY: [&str; 2] = [include_str!("packages/many/main.mtx"), include_str!("packages/many/part.mtx")];
+
+/// Texts beside a file, and files that they name.
+struct Texts(RefCell<BTreeMap<String, String>>);
+
+impl Loader for Texts {
+    fn load(&self, _: FileId, module: &str) -> Option<(String, String)> {
+        Some((format!("{module}.mtx"), self.0.borrow().get(module)?.clone()))
+    }
+
+    fn bytes(&self, from: FileId, path: &str) -> Result<Vec<u8>, String> {
+        self.file(from, path).map(String::into_bytes)
+    }
+
+    fn file(&self, _: FileId, path: &str) -> Result<String, String> {
+        self.0.borrow().get(path).cloned().ok_or_else(|| "no such file".to_string())
+    }
+}
+
+/// What is typed over what, in the first file and in the second: of everything that is declared something else, nothing, or another name.
+const EDITS: [(usize, &str, &str); 57] = [
+    (0, "warm = 40", "warm = 41"),
+    (0, "warm = 40 degC", "warm = "),
+    (0, "const warm = 40 degC\n", ""),
+    (0, "const warm", "const heat"),
+    (0, "hot = 60", "hot = 500"),
+    (0, "pause = 10 s", "pause = 10 g"),
+    (0, "const pause = 10 s\n", "const pause = 10 s\nconst paus = 4 s\n"),
+    (0, "const hot = 60 degC\nconst pause = 10 s\n", "const pause = 10 s\nconst hot = 60 degC\n"),
+    (0, "const idle_time = 2 min", "// const idle_time = 2 min"),
+    (0, "t + pause", "t + pause + pause"),
+    (0, "= t + pause", "= t + nothing_like_it"),
+    (0, "> 50 g", "> 60 g"),
+    (0, "gain: 20 W/K", "gain: 25 W/K"),
+    (0, "120 degC", "50 degC"),
+    (0, "Heater, Surface {", "Heater, Stirrer, Surface {\n    speeds: 50 rpm .. 1500 rpm"),
+    (0, "species dye { formula: \"C16H18N3S+\" }", "species dye { formula: \"C16H18N3S\" }"),
+    (0, "0.9 %w/w", "1.9 %w/w"),
+    (0, "wait longer(5 s)", "wait longer(6 s)"),
+    (0, "wait longer(5 s)", "fail overheated"),
+    (0, "heat h to t", "heat h to t\n    heat h to"),
+    (0, "skill warm up(h", "skill warm it(h"),
+    (0, "ambient: 25", "ambient: 26"),
+    (0, "ambient: 25 degC", "ambient:"),
+    (0, "plate = IkaRetControl", "plate = IkaRetControl  // warms"),
+    (0, "plate = IkaRetControl", "plate = IkaRctBasic"),
+    (0, "spare = Beaker250mL", "other = Beaker250mL"),
+    (0, "100 g of water", "400 g of water"),
+    (0, "of brine", "of brin"),
+    (0, "ambient: 22 degC\n    weak", "ambient: 22 degC\n    strong = IkaRetControl\n    weak"),
+    (0, "weak = WeakPlate", "weak = IkaRetControl"),
+    (0, "lab corner", "lab korner"),
+    (0, "lab bench {", "lab third {\n    ambient: 20 degC\n    plate = IkaRetControl\n}\n\nlab bench {"),
+    (0, "heat plate to warm\n", "heat plate to warm\n    pause\n"),
+    (0, "wait 1 min", "wait 1 min // °C 🧪"),
+    (0, "workflow slow", "workflow fast"),
+    (0, "workflow slow in corner {", "workflow slow in corner"),
+    (0, "workflow gentle in bench", "workflow gentle in corner"),
+    (0, "900 degC", "90 degC"),
+    (0, "wait paus\n", "wait pause\n"),
+    (0, "wait paus\n", "wait pausing\n"),
+    (0, "run gentle", "run slow"),
+    (0, "45 degC .. 55 degC", "45 degC .. 56 degC"),
+    (0, "study range of strong", "study range of stron"),
+    (0, "workflow wrong in corner {\n    heat weak to 900 degC\n    wait paus\n    stop heating weak\n}\n", ""),
+    (0, "workflow wrong", "workflow more in bench {\n    wait 1 s\n}\n\nworkflow wrong"),
+    (0, "use part\n", ""),
+    (0, "use part\n", "use part\nuse std::glassware::Vial20mL\n"),
+    (0, "mtx 1\n", "mtx 1\n\n\n"),
+    (0, "//! A package.\n", "//! A package.\nallow unused\n"),
+    (0, "workflow gentle", "/// Gently.\nworkflow gentle"),
+    (1, "rest = 5 s", "rest = 6 s"),
+    (1, "t + t", "t + t + t"),
+    (1, "t + t", "t + u"),
+    (1, "wait 1 s", "wait 2 s"),
+    (1, "wait twice(rest)", "wait twice(rest)\n    wait 1 s"),
+    (1, "skill calm(", "skill calms("),
+    (1, "const rest = 5 s\n", "const rest = 5 s\nconst warm = 50 degC\n"),
+];
+
+#[test]
+fn whatever_is_edited_is_judged_as_if_it_had_always_stood_there() {
+    // Which edits are there: each step makes or takes back one of them.
+    let mut there = [false; EDITS.len()];
+    let steps = std::env::var("MATTERIX_EDITS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+    let mut session = Session::default();
+    let mut random: u64 = 0x5eed;
+    for _ in 0..steps {
+        // Knuth's linear congruential generator.
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let pick = (random >> 33) as usize;
+        there[pick % EDITS.len()] ^= true;
+        // Few at a time, so that most of the package is whole.
+        if there.iter().filter(|there| **there).count() > 3 {
+            there = [false; EDITS.len()];
+        }
+        let mut texts = MANY.map(str::to_string);
+        for ((file, from, to), _) in EDITS.iter().zip(there).filter(|(_, there)| *there) {
+            texts[*file] = texts[*file].replacen(from, to, 1);
+        }
+        let [main, part] = texts;
+        let beside = Texts(RefCell::new(BTreeMap::from([("part".to_string(), part)])));
+        same("main", &main, &beside, &mut session);
+    }
+}
+
+#[test]
+fn every_edit_changes_something() {
+    for (file, from, to) in EDITS {
+        assert_ne!(MANY[file].replacen(from, to, 1), MANY[file], "{from}");
     }
 }

@@ -19,10 +19,10 @@ use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
-use crate::meanings::{Around, Gathered, Noted};
+use crate::meanings::{Around as Declared, Gathered, Noted};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
-use crate::session::{self, Earlier, Package, Session, Verdict};
+use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -53,7 +53,7 @@ pub struct Test {
 }
 
 /// What a check saw.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Examined {
     /// The library's modules, then those of the package.
     pub modules: Vec<Arc<Module>>,
@@ -67,40 +67,59 @@ pub struct Examined {
 
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Findings, &|_| Vec::new(), &mut Session::default()).findings
+    let asked = Asked { wanted: Wanted::Findings, motions: &|_| Vec::new(), stop: &|| false };
+    examine(sources, file, loader, &asked, &mut Session::default()).unwrap_or_default().findings
 }
 
 /// Checks a file; of a workflow without an error, what stands where in its lab and what robots with joints do is looked at by
-/// `motions` as well.
+/// `motions` as well. What a session knows from earlier checks of this kind is not worked out again.
 pub fn check_and(
     sources: &mut Sources,
     file: FileId,
     loader: &dyn Loader,
     motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
+    session: &mut Session,
 ) -> Vec<Diagnostic> {
-    examine(sources, file, loader, Wanted::Motions, motions, &mut Session::default()).findings
+    let asked = Asked { wanted: Wanted::Motions, motions, stop: &|| false };
+    examine(sources, file, loader, &asked, session).unwrap_or_default().findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    let seen = examined(sources, file, loader, &mut Session::default());
+    let seen = examined(sources, file, loader, &mut Session::default(), &|| false).unwrap_or_default();
     (seen.findings, seen.points)
 }
 
-/// Checks a file as [`contents`] does, and gives the trees as well. What a session knows from earlier checks is not worked out again.
-pub fn examined(sources: &mut Sources, file: FileId, loader: &dyn Loader, session: &mut Session) -> Examined {
-    examine(sources, file, loader, Wanted::Contents, &|_| Vec::new(), session)
+/// Checks a file as [`contents`] does, and gives the trees as well. What a session knows from earlier checks is not worked out
+/// again. Nothing where `stop` says, on the way, that the check is of no use any more; what was found until then the session keeps.
+pub fn examined(
+    sources: &mut Sources,
+    file: FileId,
+    loader: &dyn Loader,
+    session: &mut Session,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Examined> {
+    examine(sources, file, loader, &Asked { wanted: Wanted::Contents, motions: &|_| Vec::new(), stop }, session)
+}
+
+/// What is asked of a check.
+struct Asked<'c> {
+    wanted: Wanted,
+    /// Looks at what robots do.
+    motions: &'c (dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
+    /// Whether it is of no use any more.
+    stop: &'c (dyn Fn() -> bool + Sync),
 }
 
 fn examine(
     sources: &mut Sources,
     file: FileId,
     loader: &dyn Loader,
-    wanted: Wanted,
-    motions: &(dyn Fn(&Program) -> Vec<Diagnostic> + Sync),
+    asked: &Asked<'_>,
     session: &mut Session,
-) -> Examined {
+) -> Option<Examined> {
+    let wanted = asked.wanted;
     let (modules, mut diagnostics) = names::load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -128,17 +147,10 @@ fn examine(
     }
     let mut points = Vec::new();
     let package = sources.get(file).map_or_else(String::new, |source| source.name.clone());
+    let beside = session.beside;
     let package = session.package(&package);
-    let mut judged = judge_anew(&tables, sources, (root, file), &tasks, wanted, package);
-    for (task, built) in tasks.iter().zip(&mut judged) {
-        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
-        // What robots do is looked at for the workflow itself.
-        if !fine || many(&names.decl(task.item).item.kind) {
-            built.program = None;
-        }
-    }
-    let moved = crate::share::over(&judged, |built| built.program.iter().flat_map(motions).collect::<Vec<_>>());
-    for ((task, mut built), moved) in tasks.iter().zip(judged).zip(moved) {
+    let judged = judge_anew(&tables, sources, (root, file), &tasks, asked, (package, beside))?;
+    for (task, mut built) in tasks.iter().zip(judged) {
         if let Some(Many::Fit(fit)) = &mut built.many
             && let Err(d) = study::data::read(fit, &tables, sources, loader)
         {
@@ -146,7 +158,7 @@ fn examine(
         }
         diagnostics.extend(built.findings);
         meanings.pieces.extend(built.noted.take());
-        diagnostics.extend(moved);
+        diagnostics.extend(built.moved.into_iter().flatten());
         starts.extend(built.starts);
         // The statements of a test, a study or a fit of a workflow are the workflow's.
         let kind = &names.decl(task.item).item.kind;
@@ -170,12 +182,12 @@ fn examine(
     }
     let findings = finish(diagnostics, sources);
     if wanted == Wanted::Contents {
-        meanings.pieces.splice(..0, Noted::of(seeing, &modules));
-        meanings.around = Around::of(&tables);
+        meanings.pieces.splice(..0, Noted::of(seeing, &names));
+        meanings.around = Declared::of(&tables);
         drop(tables);
         meanings.around.scopes = names.into_scopes();
     }
-    Examined { modules, findings, points, meanings }
+    Some(Examined { modules, findings, points, meanings })
 }
 
 /// Compiles one workflow of a file; no program where there is an error.
@@ -246,7 +258,7 @@ fn compile_and<T>(
     let Some(task) = task_of(&tables, sources, (root, item), &set, options, &mut diagnostics) else {
         return (None, finish(diagnostics, sources));
     };
-    let built = build(&tables, sources, &task, wanted);
+    let built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -318,7 +330,8 @@ pub fn many_runs(
     let Some(task) = task_of(&tables, sources, (root, item), &set, options, &mut diagnostics) else {
         return (None, finish(diagnostics, sources));
     };
-    let mut built = build(&tables, sources, &task, Wanted::Program(Wires::default()));
+    let wanted = Wanted::Program(Wires::default());
+    let mut built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
     diagnostics.extend(built.findings);
     if let Some(Many::Fit(fit)) = &mut built.many
         && let Err(d) = study::data::read(fit, &tables, sources, loader)
@@ -351,7 +364,8 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let mut program = None;
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
-                let built = build(&tables, sources, &Task { item, lab, given }, Wanted::Program(Wires::Off));
+                let (task, wanted) = (Task { item, lab, given }, Wanted::Program(Wires::Off));
+                let built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
                 found.extend(built.findings);
                 program = built.program;
             }
@@ -498,19 +512,21 @@ struct Built {
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+    /// What looking at motions has found, where that was asked for.
+    moved: Option<Vec<Diagnostic>>,
 }
 
 impl From<Verdict> for Built {
     fn from(known: Verdict) -> Built {
-        let Verdict { findings, points, noted, starts, uses, many } = known;
-        Built { findings, points, noted, starts, uses, many, ..Built::default() }
+        let Verdict { findings, points, noted, starts, uses, many, moved } = known;
+        Built { findings, points, noted, starts, uses, many, moved, ..Built::default() }
     }
 }
 
 impl Built {
     /// What is kept of it.
     fn verdict(&self) -> Verdict {
-        let Built { findings, points, noted, starts, uses, many, .. } = self;
+        let Built { findings, points, noted, starts, uses, many, moved, .. } = self;
         Verdict {
             findings: findings.clone(),
             points: points.clone(),
@@ -518,77 +534,91 @@ impl Built {
             starts: starts.clone(),
             uses: uses.clone(),
             many: many.clone(),
+            moved: moved.clone(),
         }
     }
 }
 
-/// Verdicts of the tasks of a package, in their order; those that hold on are taken from its earlier check.
+/// Verdicts of the tasks of a package, in their order; those that hold on are taken from its earlier check. Nothing where the check
+/// is of no use any more.
 fn judge_anew<'a>(
     tables: &'a Tables<'a>,
     sources: &Sources,
     (root, file): (usize, FileId),
     tasks: &[Task<'a>],
-    wanted: Wanted,
-    package: &mut Package,
-) -> Vec<Built> {
-    // A program is not kept.
-    if wanted != Wanted::Contents {
-        return judge(tables, sources, tasks, wanted);
-    }
+    asked: &Asked<'_>,
+    (package, beside): (&mut Package, u64),
+) -> Option<Vec<Built>> {
     let names = tables.names;
-    let mut now = Earlier::of(names.modules, sources, root);
+    let of = Around { beside, failures: tables.failures(), moved: asked.wanted == Wanted::Motions };
+    let mut now = Earlier::of(names, sources, root, of);
+    let about: Vec<Option<About>> = tasks.iter().map(|task| about(tables, root, task)).collect();
     let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
-    let lab = |task: &Task<'_>| {
-        names::item_name(names.decl(task.lab).item).map(|(name, _)| (names.decl(task.lab).module, name))
-    };
-    let known: Vec<Option<Verdict>> = tasks
+    let known: Vec<Option<(Verdict, Words)>> = about
         .iter()
-        .map(|task| {
-            let verdict = matched.as_ref()?.verdict(session::number(names, task.item)?, &lab(task)?)?;
-            Some(verdict).filter(|v| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
+        .map(|about| {
+            let known = matched.as_ref()?.verdict(about.as_ref()?)?;
+            Some(known).filter(|(v, _)| v.uses.as_ref().is_none_or(|uses| uses.hold(tables, sources)))
         })
         .collect();
-    let open: Vec<Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t.clone()).collect();
-    let mut judged = judge(tables, sources, &open, wanted).into_iter();
-    let all: Vec<Built> = known.into_iter().filter_map(|v| v.map(Built::from).or_else(|| judged.next())).collect();
-    for (task, built) in tasks.iter().zip(&all) {
-        let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
-        // What it runs may stand in another file, where it is common to all.
-        let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
-        if let (Some(item), Some(lab)) = (session::number(names, task.item), lab(task)) {
-            now.keep((item, runs), lab, built.verdict());
+    let open: Vec<&Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t).collect();
+    let anew = |(about, known): (&Option<About>, &Option<_>)| about.clone().filter(|_| known.is_none());
+    let anew: Vec<About> = about.iter().zip(&known).filter_map(anew).collect();
+    let mut words = now.words(file, &anew).into_iter();
+    // Tasks do not depend on each other, so all processors share them.
+    let mut judged = crate::share::over(&open, |task| judge(tables, sources, task, asked)).into_iter();
+    let mut all = Vec::with_capacity(tasks.len());
+    let mut broken_off = false;
+    for (about, known) in about.into_iter().zip(known) {
+        let (built, words) = match known {
+            Some((verdict, words)) => (Some(Built::from(verdict)), Some(words)),
+            None => (judged.next().flatten(), about.as_ref().and_then(|_| words.next())),
+        };
+        let Some(built) = built else {
+            broken_off = true;
+            continue;
+        };
+        if let (Some(about), Some(words)) = (about, words) {
+            now.keep(about, words, built.verdict());
         }
+        all.push(built);
     }
     package.earlier = Some(now);
-    all
+    (!broken_off).then_some(all)
 }
 
-/// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
-fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], wanted: Wanted) -> Vec<Built> {
-    let judge =
-        |tasks: &[Task<'a>]| -> Vec<Built> { tasks.iter().map(|task| build(tables, sources, task, wanted)).collect() };
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = workflows.len().div_ceil(processors).max(1);
-    let (own, others) = workflows.split_at(share.min(workflows.len()));
-    std::thread::scope(|scope| {
-        let start = |ids| {
-            let thread = std::thread::Builder::new().stack_size(names::STACK);
-            (ids, thread.spawn_scoped(scope, move || judge(ids)))
-        };
-        let running: Vec<_> = others.chunks(share).map(start).collect();
-        let mut built = judge(own);
-        for (ids, thread) in running {
-            // Where there is no thread to be had, this one does the work.
-            let done = thread.ok().and_then(|thread| thread.join().ok());
-            built.extend(done.unwrap_or_else(|| judge(ids)));
-        }
-        built
-    })
+/// Judges a task, what robots do in it too where that is asked for.
+fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, asked: &Asked<'_>) -> Option<Built> {
+    let mut built = build(tables, sources, task, asked.wanted, asked.stop)?;
+    if asked.wanted == Wanted::Motions {
+        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+        // What robots do is looked at for the workflow itself.
+        let looked_at = built.program.take().filter(|_| fine && !many(&tables.names.decl(task.item).item.kind));
+        built.moved = Some(looked_at.iter().flat_map(asked.motions).collect());
+    }
+    Some(built)
+}
+
+/// What the verdict of a task is about; none where it has no place in the root file.
+fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<About> {
+    let names = tables.names;
+    let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
+    // What it runs may stand in another file, where its name leads to it.
+    let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
+    let lab = names.decl(task.lab);
+    let (lab_name, _) = names::item_name(lab.item)?;
+    Some(About { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
 }
 
 /// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
-/// of it only where it is wanted.
-fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted: Wanted) -> Built {
+/// of it only where it is wanted, nothing where `stop` says that it is of no use any more.
+fn build<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    task: &Task<'a>,
+    wanted: Wanted,
+    stop: &dyn Fn() -> bool,
+) -> Option<Built> {
     let (to_run, wires) = match wanted {
         Wanted::Program(wires) => (true, wires),
         Wanted::Scripted(_) => (true, Wires::Off),
@@ -598,6 +628,9 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
     let mut reach = Reach::default();
     let mut draft = true;
     loop {
+        if stop() {
+            return None;
+        }
         let mut elaborator = Elaborator::new(tables, reach.clone());
         elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
         elaborator.lab(lab);
@@ -637,7 +670,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let starts = Some(starts);
         let many = study::resolve(&mut elaborator, task);
         elaborator.note_things(lab);
-        let noted = Noted::of(elaborator.meanings.take(), tables.names.modules);
+        let noted = Noted::of(elaborator.meanings.take(), tables.names);
         let mut uses = None;
         if !to_run {
             let item = tables.names.decl(task.item).item;
@@ -647,7 +680,7 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
                 let findings = elaborator.diagnostics;
-                return Built { program: None, wiring, points, noted, findings, starts, uses, many };
+                return Some(Built { wiring, points, noted, findings, starts, uses, many, ..Built::default() });
             }
         }
         let mixtures = mixtures(&elaborator, &observables);
@@ -676,7 +709,8 @@ fn build<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, wanted:
         let (drivers, offers) = (elaborator.drivers, elaborator.offers);
         let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
         let findings = elaborator.diagnostics;
-        return Built { program: Some(program), wiring, points, noted, findings, starts, uses, many };
+        let program = Some(program);
+        return Some(Built { program, wiring, points, noted, findings, starts, uses, many, moved: None });
     }
 }
 

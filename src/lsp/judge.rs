@@ -23,6 +23,10 @@ const LARGE: usize = 64 << 10;
 /// How long nothing must have changed before the ways of robots are looked at.
 const QUIET: Duration = Duration::from_millis(400);
 
+/// So many checks in a row are broken off for newer texts; then one is done to its end, so that somebody who never rests is told too what
+/// things hold.
+const MOST_BROKEN_OFF: usize = 20;
+
 /// The open texts by their paths.
 pub type Open = Arc<BTreeMap<PathBuf, Arc<str>>>;
 
@@ -109,6 +113,7 @@ impl Judge {
 fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
     let mut done: BTreeMap<String, u64> = BTreeMap::new();
     let mut session = Session::default();
+    let mut broken_off = 0;
     while let Ok(round) = wished.recv() {
         let round = wished.try_iter().last().unwrap_or(round);
         for wish in round.wishes {
@@ -127,7 +132,12 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
                 }
             }
             let texts = Texts::new(wish.folder.as_deref(), &round.open);
-            let analysis = Analysis::of(&wish.name, &wish.text, &texts, &mut session);
+            let newer = || broken_off < MOST_BROKEN_OFF && !wished.is_empty();
+            let Some(analysis) = Analysis::unless(&wish.name, &wish.text, &texts, &mut session, &newer) else {
+                broken_off += 1;
+                break;
+            };
+            broken_off = 0;
             let said = Said::Checked(Box::new(analysis), texts.asked());
             done.insert(wish.uri.clone(), wish.stamp);
             if verdicts.send(Verdict { uri: wish.uri, stamp: wish.stamp, said }).is_err() {
@@ -140,6 +150,7 @@ fn check_all(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
 fn look_at_motions(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
     let store = cache::of(false);
     let mut wishes: BTreeMap<String, (Wish, Open)> = BTreeMap::new();
+    let mut session = Session::default();
     loop {
         let came = match wishes.is_empty() {
             true => wished.recv().ok(),
@@ -148,7 +159,7 @@ fn look_at_motions(wished: &Receiver<Round>, verdicts: &Sender<Verdict>) {
                 Err(crossbeam_channel::RecvTimeoutError::Timeout) => {
                     let Some((uri, (wish, open))) = wishes.pop_first() else { continue };
                     let texts = Texts::new(wish.folder.as_deref(), &open);
-                    let found = pipeline::check_text(&wish.name, &wish.text, &texts, &*store);
+                    let found = pipeline::check_text(&wish.name, &wish.text, &texts, &*store, &mut session);
                     if verdicts.send(Verdict { uri, stamp: wish.stamp, said: Said::Moved(found) }).is_err() {
                         return;
                     }

@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use matterix_ir::points::Points;
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
+use matterix_lang::{Loader, Session};
 
 use crate::args::Fidelity;
 use matterix_runtime::motion::{Store, overlaps, preflight};
@@ -113,9 +114,12 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
         return (sources, Vec::new());
     }
     let read = clean::Noted::new(&neighbours);
+    let session = &mut Session::default();
     let found = match fidelity {
-        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps),
-        Fidelity::Motion => matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store)),
+        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps, session),
+        Fidelity::Motion => {
+            matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store), session)
+        }
     };
     if let Some(entry) = entry.filter(|_| found.is_empty()) {
         entry.keep(read);
@@ -123,11 +127,18 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
     (sources, found)
 }
 
-/// Findings of a text with those in the way of robots; its neighbours come from a loader.
-pub fn check_text(name: &str, text: &str, loader: &dyn matterix_lang::Loader, store: &dyn Store) -> Vec<Diagnostic> {
+/// Findings of a text with those in the way of robots; its neighbours come from a loader. What the session knows from earlier checks of
+/// this kind is not looked at again.
+pub fn check_text(
+    name: &str,
+    text: &str,
+    loader: &dyn Loader,
+    store: &dyn Store,
+    session: &mut Session,
+) -> Vec<Diagnostic> {
     let mut sources = Sources::default();
     let file = sources.add(name, text);
-    matterix_lang::check_and(&mut sources, file, loader, &|program| preflight(program, store))
+    matterix_lang::check_and(&mut sources, file, loader, &|program| preflight(program, store), session)
 }
 
 /// What would go wrong with the motions of a program.

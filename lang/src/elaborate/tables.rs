@@ -1,7 +1,7 @@
 //! What all elaboration looks up: units, kinds with their inherited members, species, reactions.
 
-use std::collections::{BTreeMap, HashSet};
-use std::sync::{Arc, RwLock};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::sync::{Arc, OnceLock, RwLock};
 
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 use rustc_hash::FxHashMap;
@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use super::species::SpeciesTable;
 use super::units;
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
+use crate::lower::declared_failures;
 use crate::names::{DeclId, Names, verb_text};
 use crate::screen::Screen;
 use crate::units::text::UnitError;
@@ -91,6 +92,8 @@ pub struct Tables<'a> {
     si: RwLock<BTreeMap<Dimension, Unit>>,
     /// Words of modules outside their labs, for the modules that were asked for.
     pub spoken: RwLock<BTreeMap<usize, Arc<HashSet<String>>>>,
+    /// Failures that something declares, once they were asked for.
+    failures: OnceLock<Arc<BTreeSet<String>>>,
     /// Capabilities and assets.
     pub kinds: BTreeMap<DeclId, Kind<'a>>,
     /// Commands by the words of their verbs, in order of capability.
@@ -116,6 +119,7 @@ impl<'a> Tables<'a> {
             read: RwLock::default(),
             si: RwLock::default(),
             spoken: RwLock::default(),
+            failures: OnceLock::new(),
             kinds: BTreeMap::new(),
             commands: BTreeMap::new(),
             species: SpeciesTable::default(),
@@ -243,6 +247,11 @@ impl<'a> Tables<'a> {
             }
         }
         kind.lines.extend(base.lines.iter().copied());
+    }
+
+    /// Failures that something declares.
+    pub fn failures(&self) -> Arc<BTreeSet<String>> {
+        self.failures.get_or_init(|| Arc::new(declared_failures(self.names))).clone()
     }
 
     /// Resolves a unit as written.

@@ -13,6 +13,7 @@ mod text;
 pub mod wires;
 
 pub use call::Verb;
+pub use text::declared_failures;
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -49,7 +50,7 @@ pub struct Planner<'a, 'e> {
     /// Depth of failure handlers around.
     pub handlers: usize,
     /// Failures that something declares or raises.
-    pub failures: BTreeSet<String>,
+    pub failures: Arc<BTreeSet<String>>,
     /// Jobs started so far.
     pub jobs: BTreeSet<String>,
     /// What the call that is being written out says of its sources.
@@ -94,7 +95,7 @@ pub fn leave(scope: &mut Scope, depth: usize) {
 impl<'a, 'e> Planner<'a, 'e> {
     /// An empty plan over a lab.
     pub fn new(lab: &'e mut Elaborator<'a>, sources: &'e Sources) -> Self {
-        let failures = text::declared_failures(lab.tables.names);
+        let failures = lab.tables.failures();
         Planner {
             lab,
             sources,

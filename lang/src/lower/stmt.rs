@@ -1,5 +1,7 @@
 //! Statements, one construct at a time.
 
+use std::sync::Arc;
+
 use matterix_ir::plan::{Caught, Step, StepId};
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
@@ -198,7 +200,9 @@ impl<'a> Planner<'a, '_> {
                     None => Text::default(),
                 };
                 let name = name.as_ref().map_or("failure", |n| n.text.as_str()).to_string();
-                self.failures.insert(name.clone());
+                if !self.failures.contains(&name) {
+                    Arc::make_mut(&mut self.failures).insert(name.clone());
+                }
                 Step::Fail { name, text }
             }
             StmtKind::Expect { cond } => {

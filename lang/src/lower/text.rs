@@ -295,7 +295,7 @@ impl<'a> Planner<'a, '_> {
         if self.failures.contains(&name.text) {
             return;
         }
-        let near = near::nearest(&name.text, &self.failures);
+        let near = near::nearest(&name.text, self.failures.iter());
         let mut d = Diagnostic::error(
             codes::UNKNOWN_NAME,
             name.span,

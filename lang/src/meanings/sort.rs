@@ -105,6 +105,19 @@ impl Sort {
     }
 }
 
+impl Sort {
+    /// The declarations it names.
+    pub(super) fn declared(&mut self) -> Vec<&mut DeclId> {
+        match self {
+            Sort::Thing(kinds, _) => kinds.iter_mut().collect(),
+            Sort::Kind(id) | Sort::Function(id) => vec![id],
+            Sort::Range(inner) | Sort::List(inner) => inner.declared(),
+            Sort::Tuple(all) => all.iter_mut().flat_map(Sort::declared).collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
 impl Elaborator<'_> {
     /// What kind of value this is; none for a mistake.
     pub fn sort_of(&self, value: &Value) -> Option<Sort> {

@@ -65,6 +65,7 @@ pub fn load(
 ) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
     let package = sources.get(root).map_or_else(String::new, |source| source.name.clone());
     let (mut modules, mut diagnostics, first) = library(sources, root, &package, session);
+    session.beside = 0;
     let mut queue = vec![(String::new(), root)];
     let mut parsed = Some(first);
     while let Some((name, file)) = queue.pop() {
@@ -114,7 +115,7 @@ pub fn load(
         let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
         for module in modules.iter_mut().filter(|module| import::has_features(&module.tree)) {
             let module = Arc::make_mut(module);
-            diagnostics.extend(import::features(&mut module.tree, module.file, &units, sources, loader));
+            diagnostics.extend(session::features(session, module, &units, sources, loader));
         }
     }
     (modules, diagnostics)

@@ -1,6 +1,8 @@
 //! The units in which the user wrote quantities: what is known is shown in them.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 use matterix_ir::plan::{Argument, Condition, Plan, Step};
 use matterix_ir::{Sources, Span, Unit};
@@ -8,7 +10,20 @@ use matterix_ir::{Sources, Span, Unit};
 use crate::elaborate::Elaborator;
 
 /// Units by symbol, as written by the user.
-pub struct Written(BTreeMap<String, Unit>);
+pub struct Written {
+    units: BTreeMap<String, Unit>,
+    /// What a quantity declared in a unit may be shown in, by its symbol: the same few are asked for at every statement.
+    choices: RefCell<BTreeMap<String, Rc<Choice>>>,
+}
+
+/// What a quantity may be shown in.
+#[derive(Default)]
+struct Choice {
+    /// Units that were written for such quantities, by symbol.
+    written: Vec<Unit>,
+    /// Those that differ from the declared one by a prefix.
+    prefixed: Vec<Unit>,
+}
 
 impl Written {
     /// The units of the workflow's arguments and conditions and of the lab's contents and parameters.
@@ -32,42 +47,56 @@ impl Written {
                 _ => {}
             }
         }
-        Written(units.into_iter().map(|u| (u.symbol.clone(), u)).collect())
+        let units = units.into_iter().map(|u| (u.symbol.clone(), u)).collect();
+        Written { units, choices: RefCell::default() }
     }
 
     /// The largest of the written units of the same dimension in which a magnitude, SI, is not less than one. Where none
     /// was written or none fits well, a prefix is chosen.
     pub fn best(&self, lab: &Elaborator<'_>, unit: &Unit, magnitude: f64) -> Unit {
-        let Ok(wanted) = lab.tables.unit(&unit.symbol) else { return unit.clone() };
+        let choice = self.choice(lab, unit);
         if unit.offset != 0.0 {
-            let same = |u: &&Unit| {
-                u.offset != 0.0 && lab.tables.unit(&u.symbol).is_ok_and(|r| r.dimension == wanted.dimension)
-            };
-            return self.0.values().find(same).unwrap_or(unit).clone();
+            return choice.written.first().unwrap_or(unit).clone();
         }
-        let same =
-            |u: &&Unit| u.offset == 0.0 && lab.tables.unit(&u.symbol).is_ok_and(|r| r.dimension == wanted.dimension);
-        let written: Vec<Unit> = self.0.values().filter(same).cloned().collect();
         if magnitude == 0.0 {
-            let used = written.iter().any(|w| w.symbol == unit.symbol);
-            return written.first().filter(|_| !used).unwrap_or(unit).clone();
+            let used = choice.written.iter().any(|w| w.symbol == unit.symbol);
+            return choice.written.first().filter(|_| !used).unwrap_or(unit).clone();
         }
         let reads_well = |u: &Unit| WELL.contains(&(magnitude / u.factor));
-        largest(&written, magnitude)
+        largest(&choice.written, magnitude)
             .filter(|u| reads_well(u))
-            .or_else(|| largest(&lab.tables.units.prefixed(&wanted), magnitude))
-            .unwrap_or_else(|| unit.clone())
+            .or_else(|| largest(&choice.prefixed, magnitude))
+            .unwrap_or(unit)
+            .clone()
+    }
+
+    fn choice(&self, lab: &Elaborator<'_>, unit: &Unit) -> Rc<Choice> {
+        if let Some(known) = self.choices.borrow().get(&unit.symbol) {
+            return known.clone();
+        }
+        let choice = Rc::new(match lab.tables.unit(&unit.symbol) {
+            Ok(wanted) => {
+                let same = |u: &&Unit| {
+                    (u.offset == 0.0) == (unit.offset == 0.0)
+                        && lab.tables.unit(&u.symbol).is_ok_and(|r| r.dimension == wanted.dimension)
+                };
+                let written = self.units.values().filter(same).cloned().collect();
+                Choice { written, prefixed: lab.tables.units.prefixed(&wanted) }
+            }
+            Err(_) => Choice::default(),
+        });
+        self.choices.borrow_mut().insert(unit.symbol.clone(), choice.clone());
+        choice
     }
 }
 
 /// Numbers that read well in a unit somebody chose.
 const WELL: std::ops::Range<f64> = 0.01..1e5;
 
-/// The largest unit in which a magnitude is not less than one, or the smallest.
-fn largest(units: &[Unit], magnitude: f64) -> Option<Unit> {
-    let mut all: Vec<&Unit> = units.iter().collect();
-    all.sort_by(|a, b| a.factor.total_cmp(&b.factor));
+/// The largest unit in which a magnitude is not less than one, or the smallest; of equal ones the last, or the first.
+fn largest(units: &[Unit], magnitude: f64) -> Option<&Unit> {
     // What is a whole number but for rounding is one.
-    let fits = |u: &&&Unit| magnitude >= u.factor * (1.0 - 1e-9);
-    all.iter().rev().find(fits).or(all.first()).map(|u| (*u).clone())
+    let fits = units.iter().filter(|u| magnitude >= u.factor * (1.0 - 1e-9));
+    let smallest = || units.iter().min_by(|a, b| a.factor.total_cmp(&b.factor));
+    fits.max_by(|a, b| a.factor.total_cmp(&b.factor)).or_else(smallest)
 }

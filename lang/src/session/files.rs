@@ -4,13 +4,14 @@ use std::cell::RefCell;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use matterix_ir::{Diagnostic, FileId};
+use matterix_ir::{Diagnostic, FileId, Sources};
 use rustc_hash::FxHasher;
 
 use super::Session;
 use crate::import;
 use crate::loader::Loader;
 use crate::names::Module;
+use crate::units::Units;
 
 /// So many modules are kept.
 const MOST: usize = 32;
@@ -25,7 +26,7 @@ pub(super) struct Imported {
 }
 
 /// A file that was asked for, with a figure of what came.
-#[derive(Debug)]
+#[derive(Debug, Hash)]
 struct Asked {
     path: String,
     as_text: bool,
@@ -43,6 +44,7 @@ pub(crate) fn imported(
         Arc::ptr_eq(&known.before, module) && known.asked.iter().all(|asked| asked.came == again(asked, file, loader))
     };
     if let Some(known) = session.imported.iter().find(|known| holds(known)) {
+        session.beside = figure(&(session.beside, &known.asked));
         return (known.after.clone(), known.found.clone());
     }
     let noting = Noting { loader, asked: RefCell::default() };
@@ -55,12 +57,27 @@ pub(crate) fn imported(
         found: found.clone(),
         asked: noting.asked.into_inner(),
     };
+    session.beside = figure(&(session.beside, &known.asked));
     session.imported.retain(|old| !Arc::ptr_eq(&old.before, module));
     if session.imported.len() >= MOST {
         session.imported.remove(0);
     }
     session.imported.push(known);
     (after, found)
+}
+
+/// Writes out what a module takes from files of features; what is wrong with those.
+pub(crate) fn features(
+    session: &mut Session,
+    module: &mut Module,
+    units: &Units,
+    sources: &mut Sources,
+    loader: &dyn Loader,
+) -> Vec<Diagnostic> {
+    let noting = Noting { loader, asked: RefCell::default() };
+    let found = import::features(&mut module.tree, module.file, units, sources, &noting);
+    session.beside = figure(&(session.beside, noting.asked.into_inner()));
+    found
 }
 
 fn again(asked: &Asked, from: FileId, loader: &dyn Loader) -> u64 {

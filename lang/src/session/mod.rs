@@ -2,6 +2,8 @@
 //! session is a check like any other, so that what an editor shows is what the command says.
 
 mod files;
+mod items;
+mod reach;
 mod verdicts;
 
 use std::collections::BTreeMap;
@@ -13,8 +15,9 @@ use crate::ast;
 use crate::names::Module;
 use crate::syntax::{self, Memo};
 
-pub(crate) use files::imported;
-pub(crate) use verdicts::{Earlier, Verdict, number};
+pub(crate) use files::{features, imported};
+pub(crate) use reach::Words;
+pub(crate) use verdicts::{About, Around, Earlier, Verdict, number};
 
 /// How many packages are remembered: those that are worked on at the same time.
 const MOST: usize = 8;
@@ -28,6 +31,8 @@ pub struct Session {
     packages: Vec<(String, Package)>,
     /// Modules whose assets come from files.
     imported: Vec<files::Imported>,
+    /// A figure of the files that modules of the check under way name.
+    pub(crate) beside: u64,
 }
 
 /// A file with what it imports.

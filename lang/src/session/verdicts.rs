@@ -1,16 +1,17 @@
-//! Verdicts of workflows that hold on: those whose own text and everything around it stayed as they were, wherever it stands now.
+//! Verdicts of workflows that hold on: those whose own text stayed as it was, and that of all that it can mean, wherever it stands now.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use matterix_ir::points::Points;
-use matterix_ir::{Diagnostic, FileId, Sources, Span};
+use matterix_ir::{Diagnostic, FileId, Severity, Sources, Span};
 
-use crate::ast::{Item, ItemKind};
+use super::items::{self, File};
+use super::reach::{Reach, Words};
 use crate::check::{Starts, Uses};
 use crate::meanings::Noted;
-use crate::names::{DeclId, Module, Names, item_name};
+use crate::names::{DeclId, Module, Names};
 use crate::study::Many;
 use crate::syntax::moved::Moved;
 
@@ -29,6 +30,8 @@ pub(crate) struct Verdict {
     pub(crate) uses: Option<Uses>,
     /// What it is asked for many runs.
     pub(crate) many: Option<Many>,
+    /// What looking at motions has found, where that was asked for.
+    pub(crate) moved: Option<Vec<Diagnostic>>,
 }
 
 impl Moved for Verdict {
@@ -41,35 +44,8 @@ impl Moved for Verdict {
         self.starts.moved(to);
         self.uses.moved(to);
         self.many.moved(to);
+        self.moved.moved(to);
     }
-}
-
-/// A file of a package: where its items stand.
-#[derive(Debug)]
-struct File {
-    file: FileId,
-    text: String,
-    items: Vec<Placed>,
-}
-
-/// An item and where it stands.
-#[derive(Clone, Debug)]
-struct Placed {
-    start: usize,
-    end: usize,
-    sort: Sort,
-    name: Option<String>,
-}
-
-/// What an item is to the others.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sort {
-    /// Declares nothing.
-    Nothing,
-    /// Is judged, and says nothing to others but those that name it.
-    Judged,
-    /// May mean something for all others.
-    Common,
 }
 
 /// What was judged of a package, and of which texts.
@@ -77,20 +53,39 @@ enum Sort {
 pub(crate) struct Earlier {
     library: Vec<Arc<Module>>,
     files: Vec<File>,
-    /// By item of the root file.
+    around: Around,
     verdicts: Vec<Judged>,
+}
+
+/// What verdicts stand on beside the texts.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Around {
+    /// A figure of the other files that modules name.
+    pub(crate) beside: u64,
+    /// Failures that something declares.
+    pub(crate) failures: Arc<BTreeSet<String>>,
+    /// Whether motions were looked at.
+    pub(crate) moved: bool,
 }
 
 /// The verdict of an item.
 #[derive(Debug)]
 struct Judged {
-    /// The item, by its number in the root file.
-    item: usize,
-    /// The item that it runs, if that is another one of the root file.
-    runs: Option<usize>,
-    /// Its lab: the module and the name.
-    lab: (usize, String),
+    about: About,
+    /// On which words it rests.
+    words: Words,
     verdict: Verdict,
+}
+
+/// What a verdict is about.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct About {
+    /// The item, by its number in the root file.
+    pub(crate) item: usize,
+    /// The item that it runs, if that is another one of the root file.
+    pub(crate) runs: Option<usize>,
+    /// Its lab: the module and the name.
+    pub(crate) lab: (usize, String),
 }
 
 /// How an earlier text of a package and this one belong together.
@@ -100,10 +95,12 @@ pub(crate) struct Match<'e> {
     stayed: BTreeMap<usize, usize>,
     /// By file: from where on places are further on, and by how much.
     shifts: BTreeMap<FileId, Vec<Stretch>>,
-    /// Whether the same names are declared.
-    same_names: bool,
-    /// Whether as many are, so that declarations have the numbers they had.
-    same_numbers: bool,
+    /// Numbers of declarations that stayed, by those then.
+    numbers: BTreeMap<DeclId, DeclId>,
+    /// Names of items that only those mean that name them, and that say something else, are gone or new.
+    changed: BTreeSet<String>,
+    /// Whether there are other names than before.
+    renamed: bool,
 }
 
 /// An item that stayed as it was.
@@ -115,35 +112,49 @@ struct Stretch {
 
 impl Earlier {
     /// What there is to judge of a package now, without verdicts yet.
-    pub(crate) fn of(modules: &[Arc<Module>], sources: &Sources, root: usize) -> Earlier {
-        let library = modules.iter().filter(|m| m.is_library()).cloned().collect();
-        let own = modules.iter().enumerate().filter(|(_, m)| !m.is_library());
-        let files = own.map(|(index, module)| File {
-            file: module.file,
-            text: sources.get(module.file).map_or_else(String::new, |s| s.text.clone()),
-            items: module.tree.items.iter().map(|item| placed(item, index == root)).collect(),
-        });
-        Earlier { library, files: files.collect(), verdicts: Vec::new() }
+    pub(crate) fn of(names: &Names<'_>, sources: &Sources, root: usize, around: Around) -> Earlier {
+        let library = names.modules.iter().filter(|m| m.is_library()).cloned().collect();
+        let own = names.modules.iter().enumerate().filter(|(_, m)| !m.is_library());
+        let files = own.map(|(index, _)| File::of(names, index, sources, index == root)).collect();
+        Earlier { library, files, around, verdicts: Vec::new() }
+    }
+
+    /// On which words the verdicts of items of the root file rest, in their order.
+    pub(crate) fn words(&self, root: FileId, about: &[About]) -> Vec<Words> {
+        if about.is_empty() {
+            return Vec::new();
+        }
+        let reach = Reach::of(&self.files);
+        let Some(file) = self.files.iter().find(|file| file.file == root) else { return Vec::new() };
+        about
+            .iter()
+            .map(|about| {
+                let runs = about.runs.map_or("", |runs| file.text(runs));
+                reach.from(&[file.text(about.item), runs, &about.lab.1])
+            })
+            .collect()
     }
 
     /// Keeps the verdict of an item of the root file.
-    pub(crate) fn keep(&mut self, (item, runs): (usize, Option<usize>), lab: (usize, String), verdict: Verdict) {
-        self.verdicts.push(Judged { item, runs, lab, verdict });
+    pub(crate) fn keep(&mut self, about: About, words: Words, verdict: Verdict) {
+        self.verdicts.push(Judged { about, words, verdict });
     }
 
     /// How this package belongs to a later state of it; nothing where anything has changed that may mean something for all.
     pub(crate) fn matched(&self, now: &Earlier, root: FileId) -> Option<Match<'_>> {
         let same_library = self.library.len() == now.library.len()
             && self.library.iter().zip(&now.library).all(|(a, b)| Arc::ptr_eq(a, b));
-        if !same_library || self.files.len() != now.files.len() {
+        let same_around = same_library && self.around == now.around;
+        if !same_around || self.files.len() != now.files.len() {
             return None;
         }
         let mut found = Match {
             earlier: self,
             stayed: BTreeMap::new(),
             shifts: BTreeMap::new(),
-            same_names: true,
-            same_numbers: true,
+            numbers: BTreeMap::new(),
+            changed: BTreeSet::new(),
+            renamed: false,
         };
         for (old, new) in self.files.iter().zip(&now.files) {
             if old.file != new.file {
@@ -155,93 +166,59 @@ impl Earlier {
     }
 }
 
-fn placed(item: &Item, in_root: bool) -> Placed {
-    let judged = matches!(
-        item.kind,
-        ItemKind::Workflow { .. } | ItemKind::Test { .. } | ItemKind::Study { .. } | ItemKind::Fit { .. }
-    );
-    let sort = match &item.kind {
-        ItemKind::Error => Sort::Nothing,
-        _ if judged && in_root => Sort::Judged,
-        _ => Sort::Common,
-    };
-    let name = item_name(item).map(|(name, _)| name);
-    Placed { start: item.span.start as usize, end: item.span.end as usize, sort, name }
-}
-
 impl<'e> Match<'e> {
-    /// Finds the items of a file that stayed; nothing where one of the common ones has changed.
+    /// Finds the items of a file that stayed; nothing where one has changed that may mean something for all.
     fn file(&mut self, old: &'e File, new: &File, is_root: bool) -> Option<()> {
-        let of = |file: &File, sort: Sort| -> Vec<usize> {
-            let all = file.items.iter().enumerate();
-            all.filter(|(_, item)| item.sort == sort).map(|(index, _)| index).collect()
-        };
-        fn text<'f>(file: &'f File, item: &Placed) -> Option<&'f str> {
-            file.text.get(item.start..item.end)
-        }
-        let mut pairs = Vec::new();
-        let (before, now) = (of(old, Sort::Common), of(new, Sort::Common));
-        if before.len() != now.len() {
-            return None;
-        }
-        for (a, b) in before.into_iter().zip(now) {
-            let (a, b) = (old.items.get(a).zip(Some(a))?, new.items.get(b).zip(Some(b))?);
-            if text(old, a.0) != text(new, b.0) {
-                return None;
-            }
-            pairs.push((a.1, b.1));
-        }
-        let mut free: BTreeSet<usize> = of(new, Sort::Judged).into_iter().collect();
-        for a in of(old, Sort::Judged) {
-            let Some(was) = old.items.get(a) else { continue };
-            let same = |b: &&usize| {
-                new.items.get(**b).is_some_and(|is| is.name == was.name && text(new, is) == text(old, was))
-            };
-            if let Some(b) = free.iter().find(same).copied() {
-                free.remove(&b);
-                pairs.push((a, b));
-                if is_root {
-                    self.stayed.insert(a, b);
-                }
-            }
-        }
-        let names = |file: &'_ File| -> BTreeSet<Option<String>> {
-            file.items.iter().filter(|i| i.sort == Sort::Judged).map(|i| i.name.clone()).collect()
-        };
-        self.same_names &= names(old) == names(new);
-        self.same_numbers &= of(old, Sort::Judged).len() == of(new, Sort::Judged).len();
-        pairs.sort_unstable();
-        let stretch = |(a, b): (usize, usize)| {
-            let (was, is) = (old.items.get(a)?, new.items.get(b)?);
+        let pairs = items::pairs(old, new)?;
+        self.renamed |= pairs.renamed;
+        self.changed.extend(pairs.changed);
+        let stretch = |(a, b): &(usize, usize)| {
+            let (was, is) = (old.items.get(*a)?, new.items.get(*b)?);
             Some(Stretch { start: was.start, end: was.end, by: is.start as i64 - was.start as i64 })
         };
-        self.shifts.insert(old.file, pairs.into_iter().filter_map(stretch).collect());
+        self.shifts.insert(old.file, pairs.same.iter().filter_map(stretch).collect());
+        self.numbers.extend(pairs.same.iter().filter_map(|(a, b)| old.number(*a).zip(new.number(*b))));
+        if is_root {
+            self.stayed.extend(pairs.same);
+        }
         Some(())
     }
 
-    /// The verdict of an item of the root file in a lab, with its places as they are now; nothing where the item is not as it was.
-    pub(crate) fn verdict(&self, item: usize, lab: &(usize, String)) -> Option<Verdict> {
+    /// The verdict of an item of the root file, with its places as they are now, and on which words it rests; nothing where
+    /// something that it can mean is not as it was.
+    pub(crate) fn verdict(&self, about: &About) -> Option<(Verdict, Words)> {
         let stayed = |judged: &&Judged| {
-            let runs = judged.runs.is_none_or(|runs| self.stayed.contains_key(&runs));
-            runs && judged.lab == *lab && self.stayed.get(&judged.item) == Some(&item)
+            let runs = judged.about.runs.map(|runs| self.stayed.get(&runs).copied());
+            judged.about.lab == about.lab
+                && self.stayed.get(&judged.about.item) == Some(&about.item)
+                && runs == about.runs.map(Some)
         };
-        // What was noted of names counts declarations.
-        let known = self.earlier.verdicts.iter().find(stayed).filter(|_| self.same_numbers)?;
+        let known = self.earlier.verdicts.iter().find(stayed)?;
+        if self.changed.iter().any(|name| known.words.name(name)) {
+            return None;
+        }
         // What is not found may be taken for another name.
-        if !self.same_names && !known.verdict.findings.is_empty() {
+        let is_wrong = |d: &Diagnostic| d.severity == Severity::Error;
+        if self.renamed && known.verdict.findings.iter().any(is_wrong) {
             return None;
         }
         let whole = Cell::new(true);
-        let to = |span: Span| match self.place(span) {
-            Some(span) => span,
-            None => {
+        let to = |span: Span| {
+            self.place(span).unwrap_or_else(|| {
                 whole.set(false);
                 span
-            }
+            })
+        };
+        let number = |id: DeclId| {
+            self.numbers.get(&id).copied().unwrap_or_else(|| {
+                whole.set(false);
+                id
+            })
         };
         let mut verdict = known.verdict.clone();
         verdict.moved(&to);
-        whole.get().then_some(verdict)
+        verdict.noted.iter_mut().for_each(|noted| noted.renumber(&number));
+        whole.get().then(|| (verdict, known.words.clone()))
     }
 
     /// Where a place is now; nothing where what stood there has changed.

@@ -1,5 +1,6 @@
 //! Values of nodes from what is known.
 
+use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use matterix_ir::graph::unary;
@@ -53,6 +54,60 @@ impl Rules for Exact<'_> {
     }
 }
 
+/// Values of operations as they were when they were done last, and when that was.
+#[derive(Debug)]
+pub struct Values {
+    known: Vec<Known>,
+    /// When each was done last; 0 for never.
+    done: Vec<u64>,
+    /// When each has become another one.
+    changed: Vec<u64>,
+    now: u64,
+}
+
+impl Values {
+    /// None yet, of so many operations.
+    pub fn new(count: usize) -> Self {
+        Values { known: vec![Known::Point(0.0); count], done: vec![0; count], changed: vec![0; count], now: 0 }
+    }
+
+    /// The last value of an operation.
+    pub fn of(&self, node: NodeId) -> &Known {
+        &self.known[node.0 as usize]
+    }
+
+    /// Takes in what an operation without operands is.
+    fn leaf(&mut self, node: NodeId, value: &Known) {
+        let at = node.0 as usize;
+        if self.done[at] == 0 || !self.known[at].is(value) {
+            self.set(at, value.clone());
+        }
+    }
+
+    /// Does an operation if one of its operands has changed since.
+    fn result<const N: usize>(&mut self, node: NodeId, on: [NodeId; N], how: impl FnOnce([&Known; N]) -> Known) {
+        let at = node.0 as usize;
+        let done = self.done[at];
+        if done != 0 && on.iter().all(|a| self.changed[a.0 as usize] <= done) {
+            return;
+        }
+        let value = how(on.map(|a| &self.known[a.0 as usize]));
+        if done != 0 && self.known[at].is(&value) {
+            self.now += 1;
+            self.done[at] = self.now;
+        } else {
+            self.set(at, value);
+        }
+    }
+
+    fn set(&mut self, at: usize, value: Known) {
+        self.now += 1;
+        self.known[at] = value;
+        self.done[at] = self.now;
+        self.changed[at] = self.now;
+    }
+}
+
 impl Flow<'_, '_> {
     /// What a node depends on; found once.
     pub fn parts(&mut self, node: NodeId) -> Rc<Parts> {
@@ -88,6 +143,9 @@ impl Flow<'_, '_> {
 
     /// The value of a node: where all that it rests on is known exactly, by numbers alone.
     pub fn eval(&mut self, node: NodeId, facts: &Facts) -> Known {
+        if let Op::State(state) = self.lab.graph.op(node) {
+            return facts.states[state as usize].clone();
+        }
         let find = || Formula::of(&self.lab.graph, node);
         let formula = self.formulas[node.0 as usize].get_or_insert_with(find);
         let exact = Exact { params: &self.params, facts };
@@ -97,28 +155,62 @@ impl Flow<'_, '_> {
         }
     }
 
-    /// The value of a node with those of all that it rests on, which stay in `values`.
-    pub(super) fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
+    /// The value of a node with those of all that it rests on, which stay in `values`. Of its operations those are done again
+    /// whose operands are no longer what they were.
+    pub fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
         let order = self.order(node);
-        for n in order.iter() {
-            let value = match self.lab.graph.op(*n) {
-                Op::Const(v) => Known::point(v),
-                Op::Time => facts.time.clone(),
-                Op::State(i) => facts.states[i as usize].clone(),
-                Op::Param(i) => self.params[i as usize].clone(),
-                Op::Local(i) => facts.locals[i as usize].clone(),
-                Op::Reading(i) => self.reading(i, facts),
-                Op::Unary(op, a) => Known::unary(op, &self.values[a.0 as usize]),
-                Op::Binary(BinaryOp::Eq, a, b) if a == b => Known::Point(1.0),
-                Op::Binary(op, a, b) => Known::binary(op, &self.values[a.0 as usize], &self.values[b.0 as usize]),
-                Op::Select(c, a, b) => {
-                    let [c, a, b] = [c, a, b].map(|n| &self.values[n.0 as usize]);
-                    Known::select(c, a, b)
-                }
-            };
-            self.values[n.0 as usize] = value;
+        self.work_out(&order, facts);
+        self.values.of(node).clone()
+    }
+
+    /// The value of a node that was enclosed just before, now that of what is known one state alone has changed.
+    pub fn enclose_again(&mut self, node: NodeId, state: u32, facts: &Facts) -> Known {
+        let order = self.parts_on(node, state);
+        self.work_out(&order, facts);
+        self.values.of(node).clone()
+    }
+
+    /// The operations of a node that depend on a state; found once.
+    fn parts_on(&mut self, node: NodeId, state: u32) -> Rc<[NodeId]> {
+        if let Some(known) = self.parts_on.get(&(node, state)) {
+            return known.clone();
         }
-        self.values[node.0 as usize].clone()
+        let order = self.order(node);
+        let mut on: BTreeSet<NodeId> = BTreeSet::new();
+        for n in order.iter() {
+            let op = self.lab.graph.op(*n);
+            let depends = match op {
+                Op::State(s) => s == state,
+                Op::Reading(r) => self.parts(self.lab.readings[r as usize].value).states.contains(&state),
+                _ => op.operands().any(|a| on.contains(&a)),
+            };
+            if depends {
+                on.insert(*n);
+            }
+        }
+        let found: Rc<[NodeId]> = order.iter().copied().filter(|n| on.contains(n)).collect();
+        self.parts_on.insert((node, state), found.clone());
+        found
+    }
+
+    fn work_out(&mut self, order: &[NodeId], facts: &Facts) {
+        for n in order {
+            match self.lab.graph.op(*n) {
+                Op::Const(v) => self.values.leaf(*n, &Known::point(v)),
+                Op::Time => self.values.leaf(*n, &facts.time),
+                Op::State(i) => self.values.leaf(*n, &facts.states[i as usize]),
+                Op::Param(i) => self.values.leaf(*n, &self.params[i as usize]),
+                Op::Local(i) => self.values.leaf(*n, &facts.locals[i as usize]),
+                Op::Reading(i) => {
+                    let value = self.reading(i, facts);
+                    self.values.leaf(*n, &value);
+                }
+                Op::Unary(op, a) => self.values.result(*n, [a], |[a]| Known::unary(op, a)),
+                Op::Binary(BinaryOp::Eq, a, b) if a == b => self.values.leaf(*n, &Known::Point(1.0)),
+                Op::Binary(op, a, b) => self.values.result(*n, [a, b], |[a, b]| Known::binary(op, a, b)),
+                Op::Select(c, a, b) => self.values.result(*n, [c, a, b], |[c, a, b]| Known::select(c, a, b)),
+            }
+        }
     }
 
     /// What a device shows: the true value, give or take its imperfection.

@@ -31,6 +31,9 @@ const HALVINGS: usize = 24;
 /// Times that faces are brought back in.
 const NARROWINGS: usize = 6;
 
+/// A face that came in by no more than this share of its distance has come to rest.
+const AT_REST: f64 = 1e-6;
+
 /// So many moving states are bounded; more are only known to move.
 const MOST_MOVING: usize = 48;
 
@@ -120,9 +123,9 @@ impl Flow<'_, '_> {
             let mut crossed = BTreeSet::new();
             for i in std::mem::take(&mut due) {
                 let state = self.derivatives[i as usize].state;
+                let (a, b) = self.rate(i, &within);
                 if !moving.contains(&i) {
                     let still = self.still(state);
-                    let (a, b) = self.rate(i, None, &mut within);
                     if a.abs() <= still && b.abs() <= still {
                         continue;
                     }
@@ -166,7 +169,7 @@ impl Flow<'_, '_> {
     }
 
     /// Where a face that is crossed has to be moved so that it no longer is, and a little further, so that faces that
-    /// push each other come to rest. `side` is 1 for an upper face, -1 for a lower one.
+    /// push each other come to rest. `side` is 1 for an upper face, -1 for a lower one. The rate was evaluated just before.
     fn face(&mut self, derivative: u32, from: f64, start: f64, side: f64, within: &mut Facts) -> f64 {
         let state = self.derivatives[derivative as usize].state;
         let mut step = self.lab.states[state as usize].scale.max((from - start).abs());
@@ -189,16 +192,18 @@ impl Flow<'_, '_> {
     }
 
     fn outwards(&mut self, derivative: u32, at: f64, side: f64, within: &mut Facts) -> bool {
-        let (slow, fast) = self.rate(derivative, Some(at), within);
+        let (slow, fast) = self.rate_at(derivative, at, within);
         if side > 0.0 { fast > 0.0 } else { slow < 0.0 }
     }
 
     /// Brings faces back in as far as nothing crosses them.
     fn narrow(&mut self, moving: &BTreeSet<u32>, facts: &Facts, within: &mut Facts) {
         for _ in 0..NARROWINGS {
+            let mut rests = true;
             for i in moving {
                 let state = self.derivatives[*i as usize].state;
                 let (inner_low, inner_high) = facts.states[state as usize].bounds();
+                self.rate(*i, within);
                 for upper in [true, false] {
                     let (low, high) = within.states[state as usize].bounds();
                     let (mut near, mut far) = if upper { (inner_high, high) } else { (inner_low, low) };
@@ -210,32 +215,40 @@ impl Flow<'_, '_> {
                         let side = if upper { 1.0 } else { -1.0 };
                         if self.outwards(*i, middle, side, within) { near = middle } else { far = middle }
                     }
+                    let (inner, before) = if upper { (inner_high, high) } else { (inner_low, low) };
+                    rests &= (before - far).abs() <= AT_REST * (before - inner).abs();
                     let face = if upper { (low, far) } else { (far, high) };
                     within.states[state as usize] = Known::Range(face.0, face.1, Why::Unknown);
                 }
             }
+            if rests {
+                return;
+            }
         }
     }
 
-    /// Whether the lower and the upper face of a state's bounds are crossed outwards.
+    /// Whether the lower and the upper face of a state's bounds are crossed outwards; its rate was evaluated just before.
     fn crossings(&mut self, derivative: u32, within: &mut Facts) -> (bool, bool) {
         let state = self.derivatives[derivative as usize].state;
         let (low, high) = within.states[state as usize].bounds();
         let still = self.still(state);
-        let down = low.is_finite() && self.rate(derivative, Some(low), within).0 < -still;
-        let up = high.is_finite() && self.rate(derivative, Some(high), within).1 > still;
+        let down = low.is_finite() && self.rate_at(derivative, low, within).0 < -still;
+        let up = high.is_finite() && self.rate_at(derivative, high, within).1 > still;
         (down, up)
     }
 
-    /// Bounds of a derivative, with its own state at a value if one is given.
-    fn rate(&mut self, derivative: u32, at: Option<f64>, within: &mut Facts) -> (f64, f64) {
+    /// Bounds of a derivative.
+    fn rate(&mut self, derivative: u32, within: &Facts) -> (f64, f64) {
+        self.enclose(self.derivatives[derivative as usize].rate, within).bounds()
+    }
+
+    /// Bounds of a derivative with its own state at a value, where it was evaluated before with nothing else otherwise.
+    fn rate_at(&mut self, derivative: u32, at: f64, within: &mut Facts) -> (f64, f64) {
         let derivative = &self.derivatives[derivative as usize];
         let place = derivative.state as usize;
-        let before = at.map(|v| std::mem::replace(&mut within.states[place], Known::Point(v)));
-        let bounds = self.eval(derivative.rate, within).bounds();
-        if let Some(before) = before {
-            within.states[place] = before;
-        }
+        let before = std::mem::replace(&mut within.states[place], Known::Point(at));
+        let bounds = self.enclose_again(derivative.rate, derivative.state, within).bounds();
+        within.states[place] = before;
         bounds
     }
 
@@ -267,7 +280,7 @@ impl Flow<'_, '_> {
                 let Op::Binary(BinaryOp::Le, a, b) = self.lab.graph.op(n) else { continue };
                 let live = if self.lab.graph.constant(a).is_some() { b } else { a };
                 if !self.parts(live).states.is_empty() {
-                    let (low, high) = self.values[live.0 as usize].bounds();
+                    let (low, high) = self.values.of(live).bounds();
                     let window = self.windows.entry(reaction).or_default();
                     window.low = window.low.min(low);
                     window.high = window.high.max(high);

@@ -67,12 +67,14 @@ struct Flow<'l, 'a> {
     parts: Vec<Option<Rc<eval::Parts>>>,
     /// The operations below a node, operands first.
     orders: Vec<Option<Rc<[NodeId]>>>,
-    /// Values of the operations of the node enclosed last.
-    values: Vec<Known>,
     /// What nodes are made of, as far as they were asked for.
     formulas: Vec<Option<Formula>>,
     /// Room for exact values.
     numbers: Vec<f64>,
+    /// Operations of a node that depend on a state.
+    parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
+    /// Values of the operations that were evaluated.
+    values: eval::Values,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
@@ -172,9 +174,10 @@ impl<'l, 'a> Flow<'l, 'a> {
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: vec![None; lab.graph.ops().len()],
             orders: vec![None; lab.graph.ops().len()],
-            values: vec![Known::Point(0.0); lab.graph.ops().len()],
             formulas: vec![None; lab.graph.ops().len()],
             numbers: Vec::new(),
+            parts_on: FxHashMap::default(),
+            values: eval::Values::new(lab.graph.ops().len()),
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
             limits_of: BTreeMap::new(),

@@ -31,6 +31,11 @@ const MOST: usize = 8;
 /// Numbers closer than this, relative to the larger, are not told apart.
 const CLOSE: f64 = 1e-10;
 
+thread_local! {
+    /// No and yes, of which many comparisons are made.
+    static EITHER: Rc<[f64]> = Rc::from([0.0, 1.0]);
+}
+
 impl Known {
     /// Nothing is known.
     pub fn nothing() -> Self {
@@ -39,12 +44,26 @@ impl Known {
 
     /// A truth value that is not known.
     pub fn either(why: Why) -> Self {
-        Known::Few(Rc::from([0.0, 1.0]), why)
+        Known::Few(EITHER.with(Rc::clone), why)
     }
 
     /// A number; what is no number is not known.
     pub fn point(value: f64) -> Self {
         if value.is_nan() { Known::nothing() } else { Known::Point(value) }
+    }
+
+    /// Whether both are the same to the last bit.
+    pub fn is(&self, other: &Known) -> bool {
+        match (self, other) {
+            (Known::Point(a), Known::Point(b)) => a.to_bits() == b.to_bits(),
+            (Known::Range(a, b, one), Known::Range(c, d, other)) => {
+                [a, b].map(|v| v.to_bits()) == [c, d].map(|v| v.to_bits()) && one == other
+            }
+            (Known::Few(a, one), Known::Few(b, other)) => {
+                one == other && (Rc::ptr_eq(a, b) || a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits())))
+            }
+            _ => false,
+        }
     }
 
     /// The bounds, ends included.
