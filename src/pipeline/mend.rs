@@ -80,11 +80,11 @@ fn choose(found: &[Diagnostic], which: Fixes, file: FileId) -> Vec<&Fix> {
     let mut taken: Vec<Span> = Vec::new();
     let mut chosen = Vec::new();
     for diagnostic in by_place {
-        let fix = match (which, diagnostic.fixes.as_slice()) {
-            (Fixes::Sure, [fix]) if fix.sure => fix,
-            (Fixes::All, [fix, ..]) => fix,
-            _ => continue,
+        let fix = match which {
+            Fixes::Sure => diagnostic.sure_fix(),
+            Fixes::All => diagnostic.fixes.first(),
         };
+        let Some(fix) = fix else { continue };
         let here = fix.edits.iter().all(|e| e.span.file == file);
         let free = fix.edits.iter().all(|e| taken.iter().all(|t| apart(*t, e.span)));
         if here && free {
