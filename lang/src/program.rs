@@ -565,25 +565,7 @@ fn judge_anew<'a>(
 
 /// Findings of each task, in their order; tasks do not depend on each other, so all processors share them.
 fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, workflows: &[Task<'a>], wanted: Wanted) -> Vec<Built> {
-    let judge =
-        |tasks: &[Task<'a>]| -> Vec<Built> { tasks.iter().map(|task| build(tables, sources, task, wanted)).collect() };
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
-    let share = workflows.len().div_ceil(processors).max(1);
-    let (own, others) = workflows.split_at(share.min(workflows.len()));
-    std::thread::scope(|scope| {
-        let start = |ids| {
-            let thread = std::thread::Builder::new().stack_size(names::STACK);
-            (ids, thread.spawn_scoped(scope, move || judge(ids)))
-        };
-        let running: Vec<_> = others.chunks(share).map(start).collect();
-        let mut built = judge(own);
-        for (ids, thread) in running {
-            // Where there is no thread to be had, this one does the work.
-            let done = thread.ok().and_then(|thread| thread.join().ok());
-            built.extend(done.unwrap_or_else(|| judge(ids)));
-        }
-        built
-    })
+    crate::share::over(workflows, |task| build(tables, sources, task, wanted))
 }
 
 /// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
