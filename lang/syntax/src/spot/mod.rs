@@ -86,8 +86,8 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
 ];
 
 impl<'a> Spot<'a> {
-    /// The place `at` in the form from `start` to `end`.
-    pub(super) fn new(text: &'a str, only: Rule, start: usize, end: usize, at: usize, expected: &'a [Rule]) -> Self {
+    /// The place `at` in the form that begins at `start`.
+    pub(super) fn new(text: &'a str, only: Rule, start: usize, at: usize, expected: &'a [Rule]) -> Self {
         let rest = text.get(at..).unwrap_or_default();
         let line = rest.split('\n').next().unwrap_or_default();
         // Reading fails before the blanks of a place; the token comes after them.
@@ -96,7 +96,6 @@ impl<'a> Spot<'a> {
         let before = text.get(start..at).unwrap_or_default().trim_end();
         let token = if line.starts_with("//") { "" } else { first_token(line) };
         let at = if token.is_empty() { start + before.len() } else { at };
-        let _ = end;
         Spot { only, start, at, end: at + token.len(), before, after: line, token, expected }
     }
 
