@@ -44,13 +44,16 @@ struct Reader<'p> {
 
 type Range = std::ops::Range<usize>;
 
-/// The texts of a binding and where they stand.
+/// A text, and where it stands.
+type Text = (String, Range);
+
+/// The texts of a binding.
 struct Said {
     /// In the order of their keys.
     places: Vec<(Place, Range)>,
-    driver: Option<(String, Range)>,
-    unit: Option<(String, Range)>,
-    by: Option<(String, Range)>,
+    driver: Option<Text>,
+    unit: Option<Text>,
+    by: Option<Text>,
 }
 
 impl Said {
@@ -127,7 +130,7 @@ impl Reader<'_> {
 
     /// The texts of a binding; what is none is reported.
     fn said(&mut self, table: &DeTable<'_>) -> Said {
-        let mut text = |wanted: &str| -> Option<(String, Range)> {
+        let mut text = |wanted: &str| -> Option<Text> {
             let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
             if let DeValue::String(text) = value.get_ref() {
                 return Some((text.to_string(), value.span()));
@@ -136,13 +139,14 @@ impl Reader<'_> {
             self.wrong(value.span(), &headline, "no text", Some("write it in quotes".into()));
             None
         };
-        let places: [(fn(String) -> Place, _); 4] = [
-            (Place::Serial, text("port")),
-            (Place::Tcp, text("address")),
-            (Place::Http, text("http")),
-            (Place::Sila, text("sila")),
+        let mut place = |key: &str, of: fn(String) -> Place| text(key).map(|(said, at)| (of(said), at));
+        let places = [
+            place("port", Place::Serial),
+            place("address", Place::Tcp),
+            place("http", Place::Http),
+            place("sila", Place::Sila),
         ];
-        let places = places.into_iter().filter_map(|(place, said)| said.map(|(text, at)| (place(text), at))).collect();
+        let places = places.into_iter().flatten().collect();
         Said { places, driver: text("driver"), unit: text("unit"), by: text("by") }
     }
 
