@@ -30,23 +30,30 @@ impl Units {
         if !whole.is_empty() {
             return whole.into_iter().filter(|(rough, _)| !(exact && *rough)).map(|(_, symbol)| symbol).collect();
         }
-        let part = |called: &str| called.split(' ').any(|own| meant(&word, own) == Some(true));
+        let part = |called: &str| called.split(' ').any(|own| is(&word, own) || is_nearly(&word, own));
         all().filter(|(_, _, called)| part(called)).map(|(symbol, ..)| symbol.clone()).collect()
     }
 }
 
-/// Whether a word, or what it is the plural of, is a name: exactly, or cut short or misspelt; none where it is another.
+/// Whether a word is a whole name: exactly, or cut short as `sec`, or misspelt; none where it is another.
 fn meant(word: &str, name: &str) -> Option<bool> {
+    let cut = word.len() >= 3 && !name.contains(' ') && name.starts_with(word);
+    if is(word, name) { Some(true) } else { (cut || is_nearly(word, name)).then_some(false) }
+}
+
+/// Whether a word is a name or its plural.
+fn is(word: &str, name: &str) -> bool {
+    forms(word).any(|form| form == name)
+}
+
+/// Whether a word is one slip away from a name: `liter`, `celcius`; short words are near to too many.
+fn is_nearly(word: &str, name: &str) -> bool {
+    let enough = |form: &str| form.len() >= 6 || form.len() >= 5 && same_letters(form, name);
+    forms(word).any(|form| enough(form) && strsim::damerau_levenshtein(form, name) == 1)
+}
+
+/// A word, and what it is the plural of.
+fn forms(word: &str) -> impl Iterator<Item = &str> {
     let single = word.strip_suffix('s').filter(|single| single.len() >= 3);
-    let forms = || [Some(word), single].into_iter().flatten();
-    if forms().any(|form| form == name) {
-        return Some(true);
-    }
-    // `sec`, `liter`, `celcius`; short words are near to too many.
-    let cut = |form: &str| form.len() >= 3 && !name.contains(' ') && name.starts_with(form);
-    let spelt = |form: &str| {
-        let near = strsim::damerau_levenshtein(form, name) == 1;
-        near && (form.len() >= 6 || form.len() >= 5 && same_letters(form, name))
-    };
-    forms().any(|form| cut(form) || spelt(form)).then_some(false)
+    std::iter::once(word).chain(single)
 }
