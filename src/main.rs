@@ -16,6 +16,7 @@ mod pipeline;
 mod progress;
 mod report;
 mod terminal;
+mod uri;
 
 use std::process::ExitCode;
 

@@ -21,17 +21,13 @@ pub fn fixes_at(analysis: &Analysis, file: FileId, start: usize, end: usize) -> 
 pub fn all_fixes(analysis: &Analysis, file: FileId) -> Vec<&Edit> {
     let mut edits: Vec<&Edit> = Vec::new();
     for finding in analysis.findings.iter().filter(|finding| finding.span().file == file) {
-        let [fix] = finding.fixes.as_slice() else { continue };
-        if !fix.sure {
-            continue;
-        }
-        let apart = |edit: &&Edit| {
+        let Some(fix) = finding.sure_fix() else { continue };
+        let apart = |edit: &Edit| {
             edits
                 .iter()
                 .all(|o| o.span.file != edit.span.file || o.span.end < edit.span.start || edit.span.end < o.span.start)
         };
-        let known = |edit: &Edit| edits.iter().any(|o| **o == *edit);
-        if ours(analysis, fix) && !fix.edits.iter().any(known) && fix.edits.iter().all(|edit| apart(&edit)) {
+        if ours(analysis, fix) && fix.edits.iter().all(apart) {
             edits.extend(&fix.edits);
         }
     }

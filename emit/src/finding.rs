@@ -1,6 +1,6 @@
 //! What a target cannot say, as findings.
 
-use matterix_ir::{Diagnostic, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Span, codes};
 
 /// Something that has no counterpart in the target.
 pub fn not_expressible(span: Span, headline: impl Into<String>, label: impl Into<String>) -> Diagnostic {
@@ -15,7 +15,7 @@ pub fn wrong_message(span: Span, headline: impl Into<String>, label: impl Into<S
 /// The warnings where there are no errors, in the order of the text.
 pub fn settle(found: Vec<Diagnostic>) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
     let found = in_order(found);
-    if found.iter().any(|d| d.severity == Severity::Error) { Err(found) } else { Ok(found) }
+    if found.iter().any(Diagnostic::is_error) { Err(found) } else { Ok(found) }
 }
 
 /// Each once, in the order of the text.

@@ -8,7 +8,7 @@ use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
-use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
 
 use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
@@ -265,7 +265,7 @@ fn compile_and<T>(
         diagnostics.extend(checks::never_starts(&tables, root, built.starts.as_slice()));
     }
     let diagnostics = finish(diagnostics, sources);
-    let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let failed = diagnostics.iter().any(Diagnostic::is_error);
     let program = built.program.filter(|_| !failed);
     let more = program.map(|program| {
         let more = then(&program, &task, (&tables, sources));
@@ -339,7 +339,7 @@ pub fn many_runs(
         diagnostics.push(*d);
     }
     let diagnostics = finish(diagnostics, sources);
-    let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let failed = diagnostics.iter().any(Diagnostic::is_error);
     let compiled = built.program.zip(built.many).filter(|_| !failed);
     (compiled.map(|(program, many)| Compiled { program, many }), diagnostics)
 }
@@ -372,7 +372,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
             Err(d) => found.push(*d),
         }
         let diagnostics = finish(found, sources);
-        let failed = diagnostics.iter().any(|d| d.severity == Severity::Error);
+        let failed = diagnostics.iter().any(Diagnostic::is_error);
         let program = program.filter(|_| !failed);
         tests.push(Test { name: name.text.clone(), span: name.span, program, diagnostics });
     }
@@ -591,7 +591,7 @@ fn judge_anew<'a>(
 fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, asked: &Asked<'_>) -> Option<Built> {
     let mut built = build(tables, sources, task, asked.wanted, asked.stop)?;
     if asked.wanted == Wanted::Motions {
-        let fine = built.findings.iter().all(|d| d.severity != Severity::Error);
+        let fine = built.findings.iter().all(|d| !d.is_error());
         // What robots do is looked at for the workflow itself.
         let looked_at = built.program.take().filter(|_| fine && !many(&tables.names.decl(task.item).item.kind));
         built.moved = Some(looked_at.iter().flat_map(asked.motions).collect());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use matterix_ir::{Diagnostic, Severity, Sources};
+use matterix_ir::{Diagnostic, Sources};
 
 use crate::args::{BillArgs, BillFormat, Color};
 use crate::pipeline::{self, Input, Prices};
@@ -20,7 +20,7 @@ fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let prices = args.prices.as_deref().map(prices).transpose()?;
     let (sources, program, found) = pipeline::compile(&input, &args.subject.options());
-    let wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let wrong = found.iter().any(Diagnostic::is_error);
     let Some(program) = program.filter(|_| !wrong) else {
         show(&sources, found, color);
         return Ok(Exit::Findings);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use matterix_ir::points::Points;
-use matterix_ir::{Severity, Sources};
+use matterix_ir::{Diagnostic, Severity, Sources};
 use matterix_runtime::motion::Store;
 
 use super::watch;
@@ -11,10 +11,13 @@ use crate::Exit;
 use crate::args::{CheckArgs, Color};
 use crate::cache;
 use crate::files;
-use crate::pipeline::{self, Input, Mended};
-use crate::report::points::{self, Found};
+use crate::pipeline::{self, Input, Mended, Mending};
+use crate::report::points::{self, Found as At};
 use crate::report::{Format, Reporter, stricter};
 use crate::terminal::{self, Stream, complain, print};
+
+/// Findings, and the texts they are in.
+type Found = (Sources, Vec<Diagnostic>);
 
 /// Reports on every file that can be read; findings go to standard output.
 pub fn check(args: &CheckArgs, color: Color) -> Exit {
@@ -37,8 +40,8 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
     let mut out = String::new();
     let cache = cache::of(args.no_cache);
     for path in files {
-        let input = match read(path, args, &*cache) {
-            Ok(input) => input,
+        let (input, left) = match read(path, args, &*cache) {
+            Ok(read) => read,
             Err(message) => {
                 complain(&message);
                 exit = Exit::Usage;
@@ -48,7 +51,7 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
         let (sources, mut diagnostics, known) = match args.contents {
             true => pipeline::contents(&input),
             false => {
-                let (sources, diagnostics) = pipeline::check(&input, args.fidelity, &*cache);
+                let (sources, diagnostics) = left.unwrap_or_else(|| pipeline::check(&input, args.fidelity, &*cache));
                 (sources, diagnostics, Vec::new())
             }
         };
@@ -74,18 +77,18 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
     (out, exit)
 }
 
-/// A file, mended where that is wanted; what was done is said on standard error.
-fn read(path: &Path, args: &CheckArgs, cache: &dyn Store) -> Result<Input, String> {
+/// A file, mended where that is wanted, with what is left to find then; what was done is said on standard error.
+fn read(path: &Path, args: &CheckArgs, cache: &dyn Store) -> Result<(Input, Option<Found>), String> {
     let input = Input::file(path, files::read(path)?);
-    let Some(which) = args.fix else { return Ok(input) };
-    let (mended, done) = pipeline::mend(input, which, args.fidelity, cache);
+    let Some(which) = args.fix else { return Ok((input, None)) };
+    let Mending { input, done, sources, found } = pipeline::mend(input, which, args.fidelity, cache);
     if !done.is_empty() {
-        files::replace(path, &mended.bytes)?;
+        files::replace(path, &input.bytes)?;
     }
     for Mended { at: (line, column), title } in &done {
-        print(Stream::Err, &format!("{}:{line}:{column}: fixed: {title}\n", mended.name));
+        print(Stream::Err, &format!("{}:{line}:{column}: fixed: {title}\n", input.name));
     }
-    Ok(mended)
+    Ok((input, Some((sources, found))))
 }
 
 /// What is known at the statements of a file; `Err` says in words why there is no such place.
@@ -102,27 +105,27 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
     let mut shown = false;
     for points in known {
         match points::find(points, place, sources) {
-            Found::Statement(index) => {
+            At::Statement(index) => {
                 out += &match json {
                     true => points::json(points, Some(index), sources),
                     false => points::all(points, index, sources) + "\n",
                 };
                 shown = true;
             }
-            found => missed = missed.or(Some(found)),
+            other => missed = missed.or(Some(other)),
         }
     }
     let path = path.display();
     match missed {
         _ if shown => Ok(out),
         None => Err(format!("nothing is known of `{path}`: none of its workflows could be followed")),
-        Some(Found::NoLine(lines)) => Err(format!("`{path}` has {lines} lines")),
-        Some(Found::Nothing(before, after)) => {
+        Some(At::NoLine(lines)) => Err(format!("`{path}` has {lines} lines")),
+        Some(At::Nothing(before, after)) => {
             let near: Vec<String> = before.into_iter().chain(after).map(|l| l.to_string()).collect();
             let near =
                 if near.is_empty() { String::new() } else { format!("; the nearest are at {}", near.join(" and ")) };
             Err(format!("there is no statement of a workflow at this place of `{path}`{near}"))
         }
-        Some(Found::Statement(_)) => Ok(out),
+        Some(At::Statement(_)) => Ok(out),
     }
 }

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use matterix_hardware::deploy::{Exposed, Journal, Mode};
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 use matterix_ir::quantity::show_number;
 
 use super::run::Findings;
@@ -36,7 +36,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let mut findings = Findings::new(RunFormat::Human, color);
     let options = Options { wires: Wires::Called, ..args.subject.options() };
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
-    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {
         findings.end();

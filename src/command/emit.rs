@@ -1,6 +1,6 @@
 //! `matterixc emit`.
 
-use matterix_ir::{Diagnostic, Severity};
+use matterix_ir::Diagnostic;
 
 use crate::args::{Color, EmitArgs};
 use crate::pipeline::{self, Input};
@@ -18,7 +18,7 @@ pub fn emit(args: &EmitArgs, color: Color) -> Exit {
 fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let (sources, wired, mut found) = pipeline::wire(&input, &args.subject.options(), args.target.wire());
-    let is_wrong = |found: &[Diagnostic]| found.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = |found: &[Diagnostic]| found.iter().any(Diagnostic::is_error);
     let cancel = cancel::on_interrupt()?;
     let mut written = None;
     if let Some((program, wiring)) = wired.filter(|_| !is_wrong(&found)) {

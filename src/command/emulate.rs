@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 
 use super::run::Findings;
 use crate::args::{Color, EmulateArgs, RunFormat};
@@ -25,7 +25,7 @@ fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
     };
     let options = Options { workflow: args.workflow.clone(), wires: Wires::Served, ..Options::default() };
     let (sources, program, diagnostics) = pipeline::compile(&input, &options);
-    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     let Some(program) = program.filter(|_| !is_wrong) else {
         let mut findings = Findings::new(RunFormat::Human, color);
         findings.show(&sources, diagnostics);

@@ -1,6 +1,6 @@
 //! `matterixc fit`.
 
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 
 use crate::args::{Color, FitArgs, RunFormat};
 use crate::pipeline::{self, Asked, Input};
@@ -21,7 +21,7 @@ fn attempt(args: &FitArgs, color: Color) -> Result<Exit, String> {
         super::run::create(dir)?;
     }
     let (sources, compiled, found) = pipeline::many(&input, &many.options(), true);
-    let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = found.iter().any(Diagnostic::is_error);
     super::bill::show(&sources, found, color);
     let Some(compiled) = compiled.filter(|_| !is_wrong) else { return Ok(Exit::Findings) };
     let Some(fit) = pipeline::as_fit(&compiled) else { return Ok(Exit::Findings) };

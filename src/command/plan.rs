@@ -1,6 +1,6 @@
 //! `matterixc plan`.
 
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 
 use crate::args::{Color, PlanArgs, RunFormat};
 use crate::pipeline::{self, Input, Search};
@@ -19,7 +19,7 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     let mut findings = Findings::new(args.format, color);
     let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
-    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {
         findings.end();

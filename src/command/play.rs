@@ -7,7 +7,7 @@ use matterix_hardware::binding;
 use matterix_hardware::deploy::Carrier;
 use matterix_hardware::link::{Overhear, Trouble};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
-use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_ir::{Diagnostic, codes};
 
 use super::bill::show;
 use crate::args::Color;
@@ -26,7 +26,7 @@ pub fn play(
 ) -> Result<Exit, String> {
     let text = String::from_utf8(files::read(path)?).map_err(|_| format!("`{}` is not UTF-8", path.display()))?;
     let (mut sources, program, found) = pipeline::compile(input, &Options { wires: Wires::Called, ..options.clone() });
-    let Some(program) = program.filter(|_| found.iter().all(|d| d.severity != Severity::Error)) else {
+    let Some(program) = program.filter(|_| found.iter().all(|d| !d.is_error())) else {
         show(&sources, found, color);
         return Ok(Exit::Findings);
     };

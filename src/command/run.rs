@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use matterix_ir::{Diagnostic, Program, Severity};
+use matterix_ir::{Diagnostic, Program};
 use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::perturb;
 
@@ -29,7 +29,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     }
     let mut findings = Findings::new(args.format, color);
     let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
-    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(mut program) = program.filter(|_| !is_wrong) else {
         findings.end();
@@ -44,7 +44,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         true => pipeline::motions(&program, &*cache::of(args.no_cache)),
         false => pipeline::standing(&program),
     };
-    let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = found.iter().any(Diagnostic::is_error);
     findings.show(&sources, found);
     if is_wrong {
         findings.end();

@@ -3,7 +3,7 @@
 use std::net::{SocketAddr, ToSocketAddrs};
 
 use matterix_hardware::deploy::Journal;
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 
 use super::run::Findings;
 use crate::args::{Color, RunFormat, ServeArgs};
@@ -31,7 +31,7 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     let mut findings = Findings::new(RunFormat::Human, color);
     let options = Options { workflow: args.workflow.clone(), wires: Wires::Offered, ..Options::default() };
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
-    let is_wrong = diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(mut program) = program.filter(|_| !is_wrong) else {
         findings.end();
@@ -65,7 +65,7 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     let found = pipeline::serve(&program, &sources, service);
     args.journal.iter().for_each(|path| super::deploy::forget_empty(path));
     let found = found?;
-    let failed = found.iter().any(|d| d.severity == Severity::Error);
+    let failed = found.iter().any(Diagnostic::is_error);
     findings.show(&sources, found);
     findings.end();
     Ok(if failed { Exit::Findings } else { Exit::Fine })

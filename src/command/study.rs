@@ -1,6 +1,6 @@
 //! `matterixc study`.
 
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 
 use crate::args::{Color, RunFormat, StudyArgs};
 use crate::pipeline::{self, Asked, Input};
@@ -21,7 +21,7 @@ fn attempt(args: &StudyArgs, color: Color) -> Result<Exit, String> {
         super::run::create(dir)?;
     }
     let (sources, compiled, found) = pipeline::many(&input, &many.options(), false);
-    let is_wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let is_wrong = found.iter().any(Diagnostic::is_error);
     super::bill::show(&sources, found, color);
     let Some(compiled) = compiled.filter(|_| !is_wrong) else { return Ok(Exit::Findings) };
     let Some(study) = pipeline::as_study(&compiled) else { return Ok(Exit::Findings) };

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use matterix_ir::{Diagnostic, Severity, Sources};
+use matterix_ir::{Diagnostic, Sources};
 use serde_json::{Value, json};
 
 use crate::args::{Color, Fidelity, TestArgs, TestFormat};
@@ -64,7 +64,7 @@ impl Trial {
     fn file(&mut self, path: &Path, wanted: &str) -> Result<(), String> {
         let input = Input::file(path, files::read(path)?);
         let (sources, tests, found) = pipeline::tests(&input, wanted);
-        let broken = found.iter().any(|d| d.severity == Severity::Error);
+        let broken = found.iter().any(Diagnostic::is_error);
         // What cannot be read may have been a test.
         let unread = broken && tests.is_empty() && input.mentions_tests();
         if tests.is_empty() && !unread {

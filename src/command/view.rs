@@ -1,6 +1,6 @@
 //! `matterixc view`.
 
-use matterix_ir::Severity;
+use matterix_ir::Diagnostic;
 use matterix_view::{Document, from_recording, page, serve};
 
 use crate::args::{Color, ViewArgs};
@@ -50,7 +50,7 @@ fn document(args: &ViewArgs, color: Color) -> Result<Option<Document>, String> {
     }
     let input = Input::file(file, bytes);
     let (sources, program, found) = pipeline::compile(&input, &args.subject.options());
-    let wrong = found.iter().any(|d| d.severity == Severity::Error);
+    let wrong = found.iter().any(Diagnostic::is_error);
     show(&sources, found, color);
     Ok(program.filter(|_| !wrong).map(|program| pipeline::still(&program, &sources)))
 }

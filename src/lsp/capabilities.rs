@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::answers::tokens;
 use super::lines::Encoding;
-use super::shelf::SCHEME;
+use crate::uri::SCHEME;
 
 /// What a client can do, as far as answers depend on it.
 #[derive(Clone, Copy, Debug, Default)]

@@ -9,9 +9,7 @@ use matterix_ir::{Code, codes};
 use matterix_lang::library;
 
 use super::uris;
-
-/// The scheme of texts that lie nowhere.
-pub const SCHEME: &str = "mtx-std";
+use crate::uri::SCHEME;
 
 /// Where the texts are offered.
 #[derive(Clone, Debug)]

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use lsp_types::Uri;
 
+use crate::uri::escape;
+
 /// The path of a file's address.
 pub fn path(uri: &Uri) -> Option<PathBuf> {
     let scheme = uri.scheme()?;
@@ -21,14 +23,7 @@ pub fn path(uri: &Uri) -> Option<PathBuf> {
 pub fn of(path: &Path) -> Option<Uri> {
     let text = path.to_str()?;
     let text = if cfg!(windows) { format!("/{}", text.replace('\\', "/")) } else { text.to_string() };
-    let mut uri = String::from("file://");
-    for byte in text.bytes() {
-        match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => uri.push(char::from(byte)),
-            _ => uri.push_str(&format!("%{byte:02X}")),
-        }
-    }
-    uri.parse().ok()
+    format!("file://{}", escape(&text)).parse().ok()
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ impl Deployed {
 /// Carries a program out.
 pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Deployed, String> {
     let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
-    if found.iter().any(|d| d.severity == Severity::Error) {
+    if found.iter().any(Diagnostic::is_error) {
         return Ok(Deployed::not_begun(found));
     }
     let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
@@ -133,7 +133,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     found.extend(hardware.end_journal(status).err().map(of_fault));
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
-    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| d.severity != Severity::Error);
+    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
     Ok(Deployed { diagnostics: found, passed, stopped, end: Some(execution.end_time), counts })
 }
 

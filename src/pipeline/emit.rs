@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use matterix_emit::robots::{ros, urscript};
 use matterix_emit::{Performance, Subject, opentrons, steps};
 use matterix_ir::script::Wiring;
-use matterix_ir::{Diagnostic, Program, Severity, Sources};
+use matterix_ir::{Diagnostic, Program, Sources};
 use matterix_runtime::exec::Limits;
 use matterix_runtime::run::{Fidelity, RunOptions};
 
@@ -62,7 +62,7 @@ pub fn emit(
     let mut performance = Performance::new(subject);
     let outcome = matterix_runtime::run::run(program, &options, &mut performance);
     let mut found = super::run::findings(&outcome, sources);
-    if found.iter().any(|d| d.severity == Severity::Error) {
+    if found.iter().any(Diagnostic::is_error) {
         return (None, found);
     }
     let written = match target {

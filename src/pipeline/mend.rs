@@ -26,12 +26,23 @@ pub struct Mended {
     pub title: String,
 }
 
-/// The text of a file after its corrections, and those in the order in which they were made.
-pub fn mend(input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Store) -> (Input, Vec<Mended>) {
-    let mut input = input;
+/// A file after its corrections.
+pub struct Mending {
+    /// With the text as it is now.
+    pub input: Input,
+    /// What was done, in this order.
+    pub done: Vec<Mended>,
+    /// The texts that findings are in.
+    pub sources: Sources,
+    /// What is still found.
+    pub found: Vec<Diagnostic>,
+}
+
+/// Makes corrections until none is left.
+pub fn mend(mut input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Store) -> Mending {
     let mut done = Vec::new();
+    let (mut sources, mut found) = check(&input, fidelity, store);
     for _ in 0..ROUNDS {
-        let (sources, found) = check(&input, fidelity, store);
         let chosen = choose(&found, which, FileId(0));
         if chosen.is_empty() {
             break;
@@ -40,8 +51,9 @@ pub fn mend(input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Store) -
         let mended = apply(text, chosen.iter().flat_map(|fix| &fix.edits));
         done.extend(chosen.iter().map(|fix| of(fix, &sources)));
         input.bytes = mended.into_bytes();
+        (sources, found) = check(&input, fidelity, store);
     }
-    (input, done)
+    Mending { input, done, sources, found }
 }
 
 /// The text of a file after these corrections of one check, and each with its place; `Err` says in words why they cannot
@@ -80,11 +92,11 @@ fn choose(found: &[Diagnostic], which: Fixes, file: FileId) -> Vec<&Fix> {
     let mut taken: Vec<Span> = Vec::new();
     let mut chosen = Vec::new();
     for diagnostic in by_place {
-        let fix = match (which, diagnostic.fixes.as_slice()) {
-            (Fixes::Sure, [fix]) if fix.sure => fix,
-            (Fixes::All, [fix, ..]) => fix,
-            _ => continue,
+        let fix = match which {
+            Fixes::Sure => diagnostic.sure_fix(),
+            Fixes::All => diagnostic.fixes.first(),
         };
+        let Some(fix) = fix else { continue };
         let here = fix.edits.iter().all(|e| e.span.file == file);
         let free = fix.edits.iter().all(|e| taken.iter().all(|t| apart(*t, e.span)));
         if here && free {

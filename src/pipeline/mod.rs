@@ -30,7 +30,7 @@ pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
 pub use matterix_lang::{Options, Test, Wires};
-pub use mend::{Fixes, Mended, correct, mend};
+pub use mend::{Fixes, Mended, Mending, correct, mend};
 pub use neighbours::Neighbours;
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
 pub use run::{Choices, run};

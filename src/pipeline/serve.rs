@@ -11,7 +11,7 @@ use matterix_hardware::deploy::{Device, Exposed, Hardware, Journal, Mode, Settin
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
 use matterix_ir::offer::{Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
-use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources};
+use matterix_ir::{Diagnostic, FileId, Program, Sources};
 use matterix_runtime::backend::{Backend, Prepared, Sim};
 use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
@@ -56,7 +56,7 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         return attend(program, sources, &mut twin, offers, shown, service).map(|(found, _)| found);
     };
     let (bindings, found) = binding::read(program, file, text);
-    if found.iter().any(|d| d.severity == Severity::Error) {
+    if found.iter().any(Diagnostic::is_error) {
         return Ok(found);
     }
     let devices: Vec<Device<'_>> = bindings.into_iter().map(|b| Device::new(program, b)).collect::<Result<_, _>>()?;
@@ -106,7 +106,7 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
-    let status = if found.iter().any(|d| d.severity == Severity::Error) { "failed" } else { "ended" };
+    let status = if found.iter().any(Diagnostic::is_error) { "failed" } else { "ended" };
     found.extend(hardware.end_journal(status).err().map(of_fault));
     Ok(found)
 }

@@ -6,6 +6,7 @@ use matterix_ir::{Code, Diagnostic, Fix, Severity, Span};
 use serde_json::{Value, json};
 
 use super::text::{Text, Texts};
+use crate::uri::{SCHEME, escape};
 
 /// Where the schema of the form is published.
 const SCHEMA: &str = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json";
@@ -107,14 +108,11 @@ fn artifact(text: &Text) -> Value {
 
 /// A file as named on the command line, or a module of the library: `mtx-std:/heating.mtx`.
 fn uri(name: &str) -> String {
-    let (scheme, path) = match name.strip_prefix(LIBRARY) {
-        Some(module) => ("mtx-std:/", format!("{}.mtx", module.replace("::", "/"))),
-        None if name.starts_with('/') => ("file://", name.to_owned()),
-        None => ("", name.replace('\\', "/")),
-    };
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-._~/".contains(&b);
-    let encoded = path.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") });
-    scheme.chars().map(String::from).chain(encoded).collect()
+    match name.strip_prefix(LIBRARY) {
+        Some(module) => format!("{SCHEME}:/{}.mtx", escape(&module.replace("::", "/"))),
+        None if name.starts_with('/') => format!("file://{}", escape(name)),
+        None => escape(&name.replace('\\', "/")),
+    }
 }
 
 fn region(span: Span, text: &Text) -> Value {

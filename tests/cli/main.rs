@@ -23,6 +23,7 @@ mod hollow;
 mod joints;
 mod lsp;
 mod mcp;
+mod meant;
 mod mend;
 mod meshes;
 mod motion;

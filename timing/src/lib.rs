@@ -11,9 +11,7 @@ pub mod value;
 pub mod walk;
 
 pub use interval::Interval;
+pub use matterix_ir::quantity::ROUNDING;
 pub use network::{Edge, Network, Point, Reason, Scope, Why};
 pub use value::{Known, Linear};
 pub use walk::{Timing, Visit};
-
-/// Differences of times below this do not matter, s.
-pub const ROUNDING: f64 = 1e-6;

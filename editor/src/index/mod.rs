@@ -12,10 +12,9 @@ mod settle;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::{Arc, OnceLock, RwLock};
+use std::sync::{Arc, LazyLock, OnceLock, RwLock};
 
 use matterix_ir::{FileId, Sources, Span};
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::{DeclId, Module};
 use matterix_lang::units::Dimension;
 use matterix_lang::{Gathered, Meanings};
@@ -206,16 +205,4 @@ impl Index {
 }
 
 /// What stands where there is no declaration.
-static NOTHING: Def = Def {
-    name: String::new(),
-    kind: Kind::Variable,
-    span: Span { file: FileId(0), start: 0, end: 0 },
-    whole: Span { file: FileId(0), start: 0, end: 0 },
-    head: Span { file: FileId(0), start: 0, end: 0 },
-    docs: Vec::new(),
-    sort: Sort::Any,
-    words: Vec::new(),
-    owner: None,
-    inside: Vec::new(),
-    label: None,
-};
+static NOTHING: LazyLock<Def> = LazyLock::new(|| collect::bare("", Kind::Variable, Span::default(), Span::default()));

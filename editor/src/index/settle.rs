@@ -69,68 +69,80 @@ impl Index {
             ItemKind::Skill { sig, clauses, .. } => self.settle_signature(at, sig, clauses),
             ItemKind::Capability { members, name, .. } => {
                 self.set_kind(name.span);
-                for m in members {
-                    match &m.kind {
-                        MemberKind::Value { name, ty, per, .. } => {
-                            let sort = self.sort_of_type(at, ty);
-                            self.set(name.span, sort);
-                            if let Some(id) = self.declared_at(name.span) {
-                                self.words_of(id, Some(ty));
-                                if per.is_some() {
-                                    self.own.per_species.push(id);
-                                }
-                            }
-                        }
-                        MemberKind::Frame { name, .. } => self.set(name.span, Sort::Frame),
-                        MemberKind::Process(p) => self.settle_params(at, &p.params),
-                        MemberKind::Event(e) => self.settle_params(at, &e.params),
-                        MemberKind::Command { sig, clauses } => self.settle_signature(at, sig, clauses),
-                        MemberKind::View { .. } | MemberKind::Limit { .. } | MemberKind::Error => {}
-                    }
+                for member in members {
+                    self.settle_member(at, &member.kind);
                 }
             }
             ItemKind::Asset { name, lines, .. } => {
                 self.set_kind(name.span);
                 for line in lines {
-                    match line {
-                        AssetLine::Frame { name, .. } => self.set(name.span, Sort::Frame),
-                        AssetLine::Part { name, literal } => {
-                            let sort = self.thing(at, literal, None);
-                            self.set(name.span, sort);
-                        }
-                        AssetLine::Grid(grid) => {
-                            let sort = Sort::List(Box::new(self.thing(at, &grid.literal, None)));
-                            self.set(grid.name.span, sort);
-                        }
-                        _ => {}
-                    }
+                    self.settle_asset_line(at, line);
                 }
             }
             ItemKind::Lab { params, lines, .. } => {
                 self.settle_params(at, params);
                 for line in lines {
-                    match &line.kind {
-                        LabLineKind::Setting { name, value } => {
-                            let sort = self.typed(at, None, Some(value));
-                            self.set(name.span, sort);
-                        }
-                        LabLineKind::Instance { name, literal, .. } => {
-                            let sort = self.thing(at, literal, Some(&name.text));
-                            self.set(name.span, sort);
-                        }
-                        LabLineKind::Include { name, lab, .. } => {
-                            self.set(name.span, Sort::Lab(name.text.clone()));
-                            let target = lab.segments.last().and_then(|n| self.lookup(at, &n.text));
-                            let id = self.declared_at(name.span);
-                            if let Some(def) = id.and_then(|id| self.own_mut(id)) {
-                                def.words = target.into_iter().collect();
-                            }
-                        }
-                        LabLineKind::Between { .. } | LabLineKind::Error => {}
-                    }
+                    self.settle_lab_line(at, &line.kind);
                 }
             }
             _ => {}
+        }
+    }
+
+    fn settle_member(&mut self, at: usize, member: &MemberKind) {
+        match member {
+            MemberKind::Value { name, ty, per, .. } => {
+                let sort = self.sort_of_type(at, ty);
+                self.set(name.span, sort);
+                if let Some(id) = self.declared_at(name.span) {
+                    self.words_of(id, Some(ty));
+                    if per.is_some() {
+                        self.own.per_species.push(id);
+                    }
+                }
+            }
+            MemberKind::Frame { name, .. } => self.set(name.span, Sort::Frame),
+            MemberKind::Process(p) => self.settle_params(at, &p.params),
+            MemberKind::Event(e) => self.settle_params(at, &e.params),
+            MemberKind::Command { sig, clauses } => self.settle_signature(at, sig, clauses),
+            MemberKind::View { .. } | MemberKind::Limit { .. } | MemberKind::Error => {}
+        }
+    }
+
+    fn settle_asset_line(&mut self, at: usize, line: &AssetLine) {
+        match line {
+            AssetLine::Frame { name, .. } => self.set(name.span, Sort::Frame),
+            AssetLine::Part { name, literal } => {
+                let sort = self.thing(at, literal, None);
+                self.set(name.span, sort);
+            }
+            AssetLine::Grid(grid) => {
+                let sort = Sort::List(Box::new(self.thing(at, &grid.literal, None)));
+                self.set(grid.name.span, sort);
+            }
+            _ => {}
+        }
+    }
+
+    fn settle_lab_line(&mut self, at: usize, line: &LabLineKind) {
+        match line {
+            LabLineKind::Setting { name, value } => {
+                let sort = self.typed(at, None, Some(value));
+                self.set(name.span, sort);
+            }
+            LabLineKind::Instance { name, literal, .. } => {
+                let sort = self.thing(at, literal, Some(&name.text));
+                self.set(name.span, sort);
+            }
+            LabLineKind::Include { name, lab, .. } => {
+                self.set(name.span, Sort::Lab(name.text.clone()));
+                let target = lab.segments.last().and_then(|n| self.lookup(at, &n.text));
+                let id = self.declared_at(name.span);
+                if let Some(def) = id.and_then(|id| self.own_mut(id)) {
+                    def.words = target.into_iter().collect();
+                }
+            }
+            LabLineKind::Between { .. } | LabLineKind::Error => {}
         }
     }
 

@@ -112,6 +112,19 @@ impl Diagnostic {
         self
     }
 
+    /// Whether it keeps the program from being run.
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+
+    /// The correction that may be done without asking: the only one, and sure.
+    pub fn sure_fix(&self) -> Option<&Fix> {
+        match self.fixes.as_slice() {
+            [fix] if fix.sure => Some(fix),
+            _ => None,
+        }
+    }
+
     /// Where the cause stands.
     pub fn span(&self) -> Span {
         self.labels.iter().find(|l| l.primary).map(|l| l.span).unwrap_or_default()

@@ -41,8 +41,8 @@ impl Unit {
     }
 }
 
-/// Shorter than this counts as nothing, s: what adding times up leaves.
-const ROUNDING: f64 = 1e-6;
+/// Differences of times below this do not matter, s: what adding times up leaves.
+pub const ROUNDING: f64 = 1e-6;
 
 /// A duration given in s, in days, hours, minutes and seconds: `1 h 30 min`; days alone from a thousand on.
 pub fn show_duration(seconds: f64) -> String {

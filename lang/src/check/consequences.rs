@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::{Diagnostic, FileId, Severity, Sources, codes};
+use matterix_ir::{Diagnostic, FileId, Sources, codes};
 
 /// Where a finding stands and what it is about.
 struct Place {
@@ -40,14 +40,10 @@ fn place(d: &Diagnostic, sources: &Sources) -> Place {
     Place { file: span.file, line, block: (first, last), subject }
 }
 
-fn is_error(d: &Diagnostic) -> bool {
-    d.severity == Severity::Error
-}
-
 fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) -> bool {
     let (d, p) = (&all[i], &places[i]);
     let syntax = |e: &Diagnostic| e.code == codes::SYNTAX;
-    let others = || all.iter().zip(places).filter(|(e, _)| is_error(e) && !std::ptr::eq(*e, d));
+    let others = || all.iter().zip(places).filter(|(e, _)| e.is_error() && !std::ptr::eq(*e, d));
     // A line that could not be read means nothing.
     if !syntax(d) && others().any(|(e, q)| syntax(e) && q.file == p.file && q.line == p.line) {
         return true;

@@ -16,7 +16,7 @@ mod unused;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::Plan;
-use matterix_ir::{Diagnostic, NodeId, Severity, Sources};
+use matterix_ir::{Diagnostic, NodeId, Sources};
 
 use self::flow::Window;
 pub use self::flow::{After, Known, Seen};
@@ -74,7 +74,7 @@ pub fn plan(
     asked: Option<&[NodeId]>,
 ) -> (Option<BTreeMap<ReactionId, Window>>, Vec<Seen>) {
     // What is not whole cannot be followed.
-    let whole = |d: &Diagnostic| d.severity != Severity::Error || matches!(d.code.family, "S1" | "H1" | "M1");
+    let whole = |d: &Diagnostic| !d.is_error() || matches!(d.code.family, "S1" | "H1" | "M1");
     let is_whole = lab.diagnostics.iter().all(whole);
     let ready = mixing::ready(lab);
     let about = &*lab;

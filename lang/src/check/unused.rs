@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use matterix_ir::plan::{Argument, Plan, Step};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Severity, Sources, Span, codes};
+use matterix_ir::{Diagnostic, Sources, Span, codes};
 
 use crate::ast::{Item, ItemKind, LabLineKind};
 use crate::elaborate::{Elaborator, Tables};
@@ -40,7 +40,7 @@ impl Moved for Uses {
 
 /// What one workflow has to do with the things of its lab; nothing where it is not whole.
 pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan) -> Option<Uses> {
-    if lab.diagnostics.iter().any(|d| d.severity == Severity::Error) {
+    if lab.diagnostics.iter().any(Diagnostic::is_error) {
         return None;
     }
     let decl = lab.tables.names.decl(lab_id);

@@ -14,6 +14,7 @@ mod inertia;
 pub mod instances;
 mod joints;
 pub mod lab;
+mod labels;
 pub mod laws;
 mod lineage;
 pub mod mixtures;

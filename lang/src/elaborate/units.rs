@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, UnitText};
 use crate::names::{Names, near};
 use crate::units::text::UnitError;
-use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units};
+use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units, called};
 
 /// Reads every `dimension` item in the order of the modules, then every `unit`.
 pub fn declare(names: &Names<'_>, diagnostics: &mut Vec<Diagnostic>) -> Units {
@@ -86,7 +86,8 @@ fn rings(
         // What a unit of a ring measures is known all the same.
         let dimension = dimension.as_ref().and_then(|n| units.dimension(&n.text)).map(|d| d.dimension.clone());
         let dimension = dimension.unwrap_or_else(Dimension::any);
-        let def = UnitDef { dimension, factor: 1.0, offset: None, prefixes: *prefixes, span: name.span };
+        let (prefixes, span) = (*prefixes, name.span);
+        let def = UnitDef { dimension, factor: 1.0, offset: None, prefixes, called: None, span };
         units.add_unit(&name.text, def);
         if walked[at] == start + 1
             && let ItemKind::Unit { name, .. } = &items[at].kind
@@ -218,13 +219,16 @@ fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
     }
     let offset = origin.as_ref().and_then(|e| constant(units, e, diagnostics)).map(|(_, v)| v);
     let offset = offset.or_else(|| declared.as_ref().is_some_and(|d| d.point).then_some(0.0));
-    let def = UnitDef { dimension: value, factor, offset, prefixes: *prefixes, span: name.span };
+    let (prefixes, span) = (*prefixes, name.span);
+    let mut def = UnitDef { dimension: value, factor, offset, prefixes, called: called(&item.docs), span };
     for spelling in std::iter::once(name).chain(aliases) {
         if let Some(first) = units.declared(&spelling.text).map(|u| u.span) {
             diagnostics.push(declared_twice(&format!("unit `{}`", spelling.text), spelling.span, first));
             continue;
         }
         units.add_unit(&spelling.text, def.clone());
+        // Other spellings are not proposed for the name.
+        def.called = None;
     }
 }
 

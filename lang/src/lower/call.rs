@@ -10,6 +10,7 @@ use crate::ast::{Block, Call, Clause, Expr, ExprKind, Handlers, ItemKind, Member
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near, verb_text};
+use crate::syntax::{STEP_WORDS, is_step};
 
 /// What a verb can mean.
 #[derive(Clone, Debug)]
@@ -119,6 +120,7 @@ impl<'a> Planner<'a, '_> {
             &call.words[..]
         };
         let text = verb_text(words);
+        all.extend(self.step_words(&text, call));
         let span = words.first().map_or(call.span, |w| w.span.to(words[words.len() - 1].span));
         let mut d = Diagnostic::error(
             codes::UNKNOWN_VERB,
@@ -135,6 +137,16 @@ impl<'a> Planner<'a, '_> {
             d.help.push(format!("it is declared in `{module}`: add `use {module}::{text}`"));
         }
         self.lab.report(d);
+    }
+
+    /// Words of the language near to an unknown verb with which the step can be read.
+    fn step_words(&self, verb: &str, call: &Call) -> Vec<String> {
+        let written = self.sources.get(call.span.file).map_or("", |source| source.text.as_str());
+        let step = written.get(call.span.start as usize..call.span.end as usize).unwrap_or_default();
+        let Some(rest) = step.strip_prefix(verb) else { return Vec::new() };
+        let mut near = near::nearest(verb, STEP_WORDS);
+        near.retain(|word| is_step(&format!("{word}{rest}")));
+        near
     }
 
     /// The meaning that fits the object and the labels.

@@ -3,7 +3,7 @@
 /// The candidates closest to `word`, best first, at most three; none where nothing is close.
 pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S>) -> Vec<String> {
     let lower = word.to_lowercase();
-    let mut scored: Vec<(usize, String)> = candidates
+    let mut scored: Vec<(usize, bool, String)> = candidates
         .into_iter()
         .filter_map(|c| {
             let c = c.as_ref();
@@ -13,10 +13,9 @@ pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S
             let candidate = c.to_lowercase();
             // A word cut short, such as `temp`, is far by its letters and yet plain.
             if lower.len() >= 3 && candidate.starts_with(&lower) {
-                return Some((1, c.to_string()));
+                return Some((1, true, c.to_string()));
             }
             let distance = strsim::damerau_levenshtein(&lower, &candidate);
-            let candidate = c.to_lowercase();
             let limit = match word.chars().count() {
                 // Any two letters are one change apart: only another case, a longer or a shorter form is near.
                 0..=2 if candidate.starts_with(&lower) || lower.starts_with(&candidate) => 9,
@@ -24,13 +23,28 @@ pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S
                 3..=5 => 2,
                 n => n / 3 + 1,
             };
-            (distance <= limit).then(|| (distance, c.to_string()))
+            // Of equally near ones that with the same letters in another order is the likelier.
+            (distance <= limit).then(|| (distance, !same_letters(&lower, &candidate), c.to_string()))
         })
         .collect();
     scored.sort();
     scored.dedup();
+    // The same letters are hardly ever there by chance.
+    if scored.first().is_some_and(|best| !best.1) {
+        scored.retain(|other| !other.1);
+    }
     scored.truncate(3);
-    scored.into_iter().map(|(_, c)| c).collect()
+    scored.into_iter().map(|(_, _, c)| c).collect()
+}
+
+/// Whether two words differ at most in the order of their letters.
+pub fn same_letters(a: &str, b: &str) -> bool {
+    let sorted = |word: &str| {
+        let mut letters: Vec<char> = word.chars().collect();
+        letters.sort_unstable();
+        letters
+    };
+    a.len() == b.len() && sorted(a) == sorted(b)
 }
 
 /// `did you mean `a` or `b`?`, or nothing.
@@ -40,5 +54,16 @@ pub fn question(near: &[String]) -> Option<String> {
         [a] => Some(format!("did you mean `{a}`?")),
         [a, b] => Some(format!("did you mean `{a}` or `{b}`?")),
         [a, b, c, ..] => Some(format!("did you mean `{a}`, `{b}` or `{c}`?")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_that_changed_places_say_enough() {
+        assert_eq!(nearest("wiat", ["heat", "what", "wait"]), ["wait"]);
+        assert_eq!(nearest("temp", ["time", "temperature"]), ["temperature", "time"]);
     }
 }

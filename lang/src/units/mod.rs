@@ -1,5 +1,6 @@
 //! Dimensions and units. The compiler knows the SI prefixes; every unit is declared in the library.
 
+mod called;
 pub mod dimension;
 pub mod text;
 
@@ -8,6 +9,7 @@ use std::sync::Arc;
 
 use matterix_ir::{Span, Unit};
 
+pub(crate) use called::called;
 pub use dimension::{Dimension, Rational};
 
 /// What a declared dimension name stands for.
@@ -32,6 +34,8 @@ pub struct UnitDef {
     pub offset: Option<f64>,
     /// Whether it takes SI prefixes.
     pub prefixes: bool,
+    /// What it is called, where its documentation begins like `The litre, ...`: `litre`.
+    pub called: Option<Arc<str>>,
     /// Its declaration.
     pub span: Span,
 }
@@ -56,34 +60,34 @@ pub struct Units {
     base_units: BTreeMap<u16, String>,
 }
 
-/// SI prefixes with both micro signs and `u`; SI brochure, 9th edition, table 7.
-const PREFIXES: &[(&str, f64)] = &[
-    ("da", 1e1),
-    ("Q", 1e30),
-    ("R", 1e27),
-    ("Y", 1e24),
-    ("Z", 1e21),
-    ("E", 1e18),
-    ("P", 1e15),
-    ("T", 1e12),
-    ("G", 1e9),
-    ("M", 1e6),
-    ("k", 1e3),
-    ("h", 1e2),
-    ("d", 1e-1),
-    ("c", 1e-2),
-    ("m", 1e-3),
-    ("u", 1e-6),
-    ("µ", 1e-6),
-    ("μ", 1e-6),
-    ("n", 1e-9),
-    ("p", 1e-12),
-    ("f", 1e-15),
-    ("a", 1e-18),
-    ("z", 1e-21),
-    ("y", 1e-24),
-    ("r", 1e-27),
-    ("q", 1e-30),
+/// SI prefixes with their names, both micro signs and `u`; SI brochure, 9th edition, table 7.
+const PREFIXES: &[(&str, &str, f64)] = &[
+    ("da", "deca", 1e1),
+    ("Q", "quetta", 1e30),
+    ("R", "ronna", 1e27),
+    ("Y", "yotta", 1e24),
+    ("Z", "zetta", 1e21),
+    ("E", "exa", 1e18),
+    ("P", "peta", 1e15),
+    ("T", "tera", 1e12),
+    ("G", "giga", 1e9),
+    ("M", "mega", 1e6),
+    ("k", "kilo", 1e3),
+    ("h", "hecto", 1e2),
+    ("d", "deci", 1e-1),
+    ("c", "centi", 1e-2),
+    ("m", "milli", 1e-3),
+    ("u", "micro", 1e-6),
+    ("µ", "micro", 1e-6),
+    ("μ", "micro", 1e-6),
+    ("n", "nano", 1e-9),
+    ("p", "pico", 1e-12),
+    ("f", "femto", 1e-15),
+    ("a", "atto", 1e-18),
+    ("z", "zepto", 1e-21),
+    ("y", "yocto", 1e-24),
+    ("r", "ronto", 1e-27),
+    ("q", "quecto", 1e-30),
 ];
 
 impl Units {
@@ -137,7 +141,7 @@ impl Units {
         if let Some(def) = self.units.get(name) {
             return Some((def, 1.0));
         }
-        PREFIXES.iter().find_map(|&(prefix, factor)| {
+        PREFIXES.iter().find_map(|&(prefix, _, factor)| {
             let rest = name.strip_prefix(prefix)?;
             let def = self.units.get(rest)?;
             def.prefixes.then_some((def, factor))
@@ -226,7 +230,7 @@ impl Units {
     pub fn prefixed(&self, unit: &Resolved) -> Vec<Unit> {
         let alike = |(name, def): &(&String, &UnitDef)| {
             let prefix = unit.unit.symbol.strip_suffix(name.as_str());
-            let known = |p: &str| p.is_empty() || PREFIXES.iter().any(|(q, _)| *q == p);
+            let known = |p: &str| p.is_empty() || PREFIXES.iter().any(|(q, _, _)| *q == p);
             def.prefixes && def.dimension == unit.dimension && prefix.is_some_and(known)
         };
         let Some((name, _)) = self.units.iter().find(alike) else { return Vec::new() };

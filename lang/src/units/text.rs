@@ -3,6 +3,7 @@
 use matterix_ir::Unit;
 
 use super::{Dimension, Rational, Resolved, Units};
+use crate::names::near::nearest;
 
 /// Why a unit could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,15 +43,21 @@ impl Units {
     }
 
     fn unknown(&self, name: &str) -> UnitError {
-        let near = crate::names::near::nearest(name, self.unit_names().flat_map(|n| self.spellings(n)));
+        let mut near = self.known_as(name);
+        if near.is_empty() {
+            near = nearest(name, self.unit_names().flat_map(|unit| self.spellings(unit, name)));
+        }
         UnitError::Unknown { name: name.to_string(), near }
     }
 
-    /// The unit alone and, where it takes them, with the prefixes people use.
-    fn spellings(&self, name: &str) -> Vec<String> {
-        let mut out = vec![name.to_string()];
-        if self.units.get(name).is_some_and(|u| u.prefixes) {
-            out.extend(["k", "m", "u", "n", "c"].iter().map(|p| format!("{p}{name}")));
+    /// The unit alone and, where it takes them, with the prefixes people use that are a slip away from what was written.
+    fn spellings(&self, unit: &str, written: &str) -> Vec<String> {
+        let mut out = vec![unit.to_string()];
+        if self.units.get(unit).is_some_and(|u| u.prefixes) {
+            let prefixed = ["k", "m", "u", "n"].iter().map(|p| format!("{p}{unit}"));
+            out.extend(
+                prefixed.filter(|p| strsim::damerau_levenshtein(&p.to_lowercase(), &written.to_lowercase()) <= 1),
+            );
         }
         out
     }

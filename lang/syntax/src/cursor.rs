@@ -54,6 +54,16 @@ impl<'i> Kids<'i> {
         self.eat(rule).is_some()
     }
 
+    /// The first part that is a `rule`, if there is one.
+    pub(super) fn find(&mut self, rule: Rule) -> Option<Node<'i>> {
+        std::iter::from_fn(|| self.take()).find(|part| part.as_rule() == rule)
+    }
+
+    /// The parts that are left.
+    pub(super) fn rest(&mut self) -> Vec<Node<'i>> {
+        std::iter::from_fn(|| self.take()).collect()
+    }
+
     /// The parts while they are of this `rule`.
     pub(super) fn all(&mut self, rule: Rule) -> Vec<Node<'i>> {
         std::iter::from_fn(|| self.eat(rule)).collect()

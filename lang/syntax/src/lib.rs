@@ -28,6 +28,7 @@ use pest::Parser;
 pub use decode::{NotText, decode};
 pub use dump::dump;
 pub use parts::Memo;
+pub use scan::STEP_WORDS;
 
 use crate::ast::{Expr, ExprKind, File};
 use grammar::{Grammar, Rule};
@@ -101,6 +102,14 @@ pub fn groups(text: &str) -> Vec<std::ops::Range<usize>> {
 pub fn is_name(word: &str) -> bool {
     Grammar::parse(Rule::ident, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
 }
+
+/// Whether a short text is one step.
+pub fn is_step(text: &str) -> bool {
+    text.len() <= MAX_STEP && Grammar::parse(Rule::only_stmt, text).is_ok()
+}
+
+/// The longest text that is tried as a step, bytes.
+const MAX_STEP: usize = 400;
 
 /// Runs `inside` where the stack holds for that many nested brackets, also without optimisation.
 fn with_stack<T: Send>(depth: usize, inside: impl Fn() -> T + Sync) -> T {

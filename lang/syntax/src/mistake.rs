@@ -84,7 +84,7 @@ impl<'a> Mistakes<'a> {
         if block || failure.at < span.start() {
             failure = Failure { at: span.start(), expected: vec![Rule::end] };
         }
-        self.explain(only, start, span.end(), &failure);
+        self.explain(only, start, &failure);
     }
 
     /// A line that is no form; `before` is where the one before starts, which it may be meant to go on with.
@@ -95,16 +95,16 @@ impl<'a> Mistakes<'a> {
         if let Some(before) = before.filter(|_| goes_on(node.as_str())) {
             let joined = self.reread(only, before, head);
             if joined.at > own.at.max(start) {
-                return self.explain(only, before, end, &joined);
+                return self.explain(only, before, &joined);
             }
         }
-        self.explain(only, start, end, &own);
+        self.explain(only, start, &own);
     }
 
     /// A range of the text that should be one form and is not.
     pub(super) fn piece(&mut self, only: Rule, start: usize, end: usize) {
         let failure = self.reread(only, start, end);
-        self.explain(only, start, end, &failure);
+        self.explain(only, start, &failure);
     }
 
     fn reread(&self, only: Rule, start: usize, end: usize) -> Failure {
@@ -124,7 +124,7 @@ impl<'a> Mistakes<'a> {
         Failure { at, expected }
     }
 
-    fn explain(&mut self, only: Rule, start: usize, end: usize, failure: &Failure) {
+    fn explain(&mut self, only: Rule, start: usize, failure: &Failure) {
         if self.found.len() >= MAX_MISTAKES {
             self.hidden += 1;
             return;
@@ -137,7 +137,7 @@ impl<'a> Mistakes<'a> {
         {
             return;
         }
-        let spot = Spot::new(self.text, only, start, end, failure.at, &failure.expected);
+        let spot = Spot::new(self.text, only, start, failure.at, &failure.expected);
         let diagnostic = spot.diagnose(|start, end| self.offsets.span(self.file, start, end));
         self.push(diagnostic);
     }

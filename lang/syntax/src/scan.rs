@@ -31,6 +31,12 @@ pub(super) const ITEM_WORDS: &[&str] = &[
     "test",
 ];
 
+/// The words that start a step; other steps start with a verb.
+pub const STEP_WORDS: &[&str] = &[
+    "let", "wait", "step", "if", "repeat", "for", "within", "hold", "keep", "try", "retry", "claim", "sequence",
+    "parallel", "start", "await", "fail", "expect", "record", "note", "ask", "return",
+];
+
 /// A bracket outside of texts and comments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bracket {

@@ -59,3 +59,12 @@ fn grammars_of_editors_reserve_the_same_words() -> Result {
     assert_eq!(in_scanner, reserved);
     Ok(())
 }
+
+#[test]
+fn the_words_that_start_a_step_are_those_of_the_grammar() -> Result {
+    let grammar = read("grammar/mtx.pest")?;
+    let rules = words(between(&grammar, "step_word = _{", "}")?);
+    let of_grammar: BTreeSet<&str> = rules.into_iter().map(|rule| rule.trim_end_matches('_')).collect();
+    assert_eq!(matterix_syntax::STEP_WORDS.iter().copied().collect::<BTreeSet<_>>(), of_grammar);
+    Ok(())
+}

@@ -44,6 +44,25 @@ struct Reader<'p> {
 
 type Range = std::ops::Range<usize>;
 
+/// A text, and where it stands.
+type Text = (String, Range);
+
+/// The texts of a binding.
+struct Said {
+    /// In the order of their keys.
+    places: Vec<(Place, Range)>,
+    driver: Option<Text>,
+    unit: Option<Text>,
+    by: Option<Text>,
+}
+
+impl Said {
+    /// Whether it says where a line is, or who speaks on it.
+    fn names_a_line(&self) -> bool {
+        !self.places.is_empty() || self.driver.is_some()
+    }
+}
+
 impl Reader<'_> {
     fn wrong(&mut self, at: Range, headline: &str, label: impl Into<String>, help: Option<String>) {
         let span = Span::new(self.file, at.start, at.end);
@@ -76,95 +95,25 @@ impl Reader<'_> {
             self.wrong(k.span(), &format!("a binding has no `{}`", k.get_ref()), "not a known key", Some(help));
         }
         let before = self.found.len();
-        let text = |this: &mut Self, wanted: &str| -> Option<(String, Range)> {
-            let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
-            match value.get_ref() {
-                DeValue::String(text) => Some((text.to_string(), value.span())),
-                _ => {
-                    this.wrong(
-                        value.span(),
-                        &format!("`{wanted}` is a text"),
-                        "no text",
-                        Some("write it in quotes".into()),
-                    );
-                    None
-                }
-            }
-        };
-        let (port, address) = (text(self, "port"), text(self, "address"));
-        let (http, sila) = (text(self, "http"), text(self, "sila"));
-        let (driver, unit, by) = (text(self, "driver"), text(self, "unit"), text(self, "by"));
-        if let Some((by, at)) = &by {
-            if by != HAND {
-                self.wrong(
-                    at.clone(),
-                    "only a person's hands need no line",
-                    "not understood",
-                    Some("write `by = \"hand\"`".into()),
-                );
-            }
-            if [&port, &address, &http, &sila, &driver].into_iter().any(Option::is_some) {
-                self.wrong(
-                    at.clone(),
-                    &format!("`{key}` is done by hand and bound to a line"),
-                    "one or the other",
-                    None,
-                );
-            }
-            let at = Span::new(self.file, at.start, at.end);
-            let binding = Binding { instance, at, carrier: Carrier::Hand, tolerances: Vec::new() };
+        let mut said = self.said(table);
+        if let Some((by, at)) = said.by.take() {
+            let binding = Binding {
+                instance,
+                at: Span::new(self.file, at.start, at.end),
+                carrier: Carrier::Hand,
+                tolerances: Vec::new(),
+            };
+            self.by_hand(key, &by, at, said.names_a_line());
             return (self.found.len() == before).then_some(binding);
         }
-        let places = [
-            port.map(|(path, at)| (Place::Serial(path), at)),
-            address.map(|(address, at)| (Place::Tcp(address), at)),
-            http.map(|(server, at)| (Place::Http(server), at)),
-            sila.map(|(server, at)| (Place::Sila(server), at)),
-        ];
-        let mut places = places.into_iter().flatten();
-        let (place, said) = match (places.next(), places.next()) {
-            (Some(place), None) => place,
-            (_, Some((_, at))) => {
-                let label = "only one of `port`, `address`, `http` and `sila`";
-                self.wrong(at, &format!("`{key}` has two lines"), label, None);
-                return None;
-            }
-            (None, None) => {
-                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `http = \"HOST:PORT\"`, \
-                            `sila = \"HOST:PORT\"` or \
-                            `by = \"hand\"`";
-                self.wrong(name.span(), &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
-                return None;
-            }
-        };
+        let Said { driver, unit, places, .. } = said;
+        let (place, at) = self.place(key, places, name.span())?;
         let driver = self.driver(key, instance, driver, name.span())?;
-        let transport = &self.program.drivers[driver].transport;
-        let fits = match (transport, &place) {
-            (Transport::Sila { .. }, _) => matches!(place, Place::Sila(_)),
-            (Transport::Http { .. }, _) => matches!(place, Place::Http(_)),
-            (_, Place::Sila(_) | Place::Http(_)) => false,
-            _ => true,
-        };
-        if !fits {
-            let name = &self.program.drivers[driver].name;
-            let (headline, help) = match transport {
-                Transport::Sila { .. } => {
-                    (format!("`{name}` speaks to a server of SiLA 2"), format!("write `sila = \"{place}\"`"))
-                }
-                Transport::Http { .. } => (format!("`{name}` speaks over HTTP"), format!("write `http = \"{place}\"`")),
-                _ => (
-                    format!("`{name}` speaks over a line"),
-                    "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`".to_owned(),
-                ),
-            };
-            self.wrong(said.clone(), &headline, "another kind of place", Some(help));
-            return None;
-        }
-        let at = Span::new(self.file, said.start, said.end);
+        self.fits(driver, &place, &at)?;
         let place = match place.checked() {
             Ok(place) => place,
             Err(no) => {
-                self.wrong(said, &format!("`{key}` cannot be there: {}", no.why), "no place", Some(no.help));
+                self.wrong(at, &format!("`{key}` cannot be there: {}", no.why), "no place", Some(no.help));
                 return None;
             }
         };
@@ -175,7 +124,87 @@ impl Reader<'_> {
         }
         let tolerances = self.tolerances(key, driver, table);
         let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
+        let at = Span::new(self.file, at.start, at.end);
         (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances })
+    }
+
+    /// The texts of a binding; what is none is reported.
+    fn said(&mut self, table: &DeTable<'_>) -> Said {
+        let mut text = |wanted: &str| -> Option<Text> {
+            let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
+            if let DeValue::String(text) = value.get_ref() {
+                return Some((text.to_string(), value.span()));
+            }
+            let headline = format!("`{wanted}` is a text");
+            self.wrong(value.span(), &headline, "no text", Some("write it in quotes".into()));
+            None
+        };
+        let mut place = |key: &str, of: fn(String) -> Place| text(key).map(|(said, at)| (of(said), at));
+        let places = [
+            place("port", Place::Serial),
+            place("address", Place::Tcp),
+            place("http", Place::Http),
+            place("sila", Place::Sila),
+        ];
+        let places = places.into_iter().flatten().collect();
+        Said { places, driver: text("driver"), unit: text("unit"), by: text("by") }
+    }
+
+    /// Reports what does not go with a device that a person does by hand.
+    fn by_hand(&mut self, key: &str, by: &str, at: Range, names_a_line: bool) {
+        if by != HAND {
+            let help = "write `by = \"hand\"`";
+            self.wrong(at.clone(), "only a person's hands need no line", "not understood", Some(help.into()));
+        }
+        if names_a_line {
+            let headline = format!("`{key}` is done by hand and bound to a line");
+            self.wrong(at, &headline, "one or the other", None);
+        }
+    }
+
+    /// The only place of a device named at `name`; none, or more than one, is reported.
+    fn place(&mut self, key: &str, places: Vec<(Place, Range)>, name: Range) -> Option<(Place, Range)> {
+        let mut places = places.into_iter();
+        match (places.next(), places.next()) {
+            (Some(place), None) => Some(place),
+            (_, Some((_, at))) => {
+                let label = "only one of `port`, `address`, `http` and `sila`";
+                self.wrong(at, &format!("`{key}` has two lines"), label, None);
+                None
+            }
+            (None, None) => {
+                let help = "write `port = \"/dev/ttyUSB0\"`, `address = \"HOST:PORT\"`, `http = \"HOST:PORT\"`, \
+                            `sila = \"HOST:PORT\"` or `by = \"hand\"`";
+                self.wrong(name, &format!("where `{key}` is, is not said"), "no line", Some(help.into()));
+                None
+            }
+        }
+    }
+
+    /// Whether a driver can speak to a place said at `at`; none, and reported, where it cannot.
+    fn fits(&mut self, driver: usize, place: &Place, at: &Range) -> Option<()> {
+        let matterix_ir::wire::Driver { transport, name, .. } = &self.program.drivers[driver];
+        let fits = match (transport, place) {
+            (Transport::Sila { .. }, _) => matches!(place, Place::Sila(_)),
+            (Transport::Http { .. }, _) => matches!(place, Place::Http(_)),
+            (_, Place::Sila(_) | Place::Http(_)) => false,
+            _ => true,
+        };
+        if fits {
+            return Some(());
+        }
+        let (headline, help) = match transport {
+            Transport::Sila { .. } => {
+                (format!("`{name}` speaks to a server of SiLA 2"), format!("write `sila = \"{place}\"`"))
+            }
+            Transport::Http { .. } => (format!("`{name}` speaks over HTTP"), format!("write `http = \"{place}\"`")),
+            _ => (
+                format!("`{name}` speaks over a line"),
+                "write `port = \"/dev/ttyUSB0\"` or `address = \"HOST:PORT\"`".to_owned(),
+            ),
+        };
+        self.wrong(at.clone(), &headline, "another kind of place", Some(help));
+        None
     }
 
     fn driver(

@@ -12,7 +12,7 @@ use super::arguments::Fidelity;
 use crate::mcp::answer::Answer;
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline::{self, Fixes, Input, Mended};
+use crate::pipeline::{self, Fixes, Input, Mended, Mending};
 use crate::{args, files};
 
 /// Which corrections are made.
@@ -94,13 +94,12 @@ impl Task for FixTask {
             return Err("a `text` is in no file that could be written; give its `path`".to_string());
         }
         let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
-        let (mended, done) = match (&self.ids, self.which) {
+        let Mending { input: mended, done, sources, found } = match (&self.ids, self.which) {
             (Some(ids), None) => chosen(input, ids, fidelity, desk)?,
             (None, Some(Which::Sure)) => pipeline::mend(input, Fixes::Sure, fidelity, desk),
             (None, Some(Which::All)) => pipeline::mend(input, Fixes::All, fidelity, desk),
             _ => return Err("give either `ids` or `which`".to_string()),
         };
-        let (sources, found) = pipeline::check(&mended, fidelity, desk);
         let (left, found) = told(&sources, &judged(named(&sources, found), false));
         let text = String::from_utf8(mended.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
         let written = self.write && !done.is_empty();
@@ -123,7 +122,7 @@ impl Task for FixTask {
 }
 
 /// A text after the corrections that have these names.
-fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -> Result<(Input, Vec<Mended>), String> {
+fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -> Result<Mending, String> {
     let (sources, found) = pipeline::check(&input, fidelity, desk);
     let found = named(&sources, found);
     let offered: Vec<(&String, &Fix)> = found.iter().flat_map(|n| n.ids.iter().zip(&n.diagnostic.fixes)).collect();
@@ -137,5 +136,7 @@ fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -
         };
         fixes.push(*fix);
     }
-    pipeline::correct(input, &sources, &fixes)
+    let (input, done) = pipeline::correct(input, &sources, &fixes)?;
+    let (sources, found) = pipeline::check(&input, fidelity, desk);
+    Ok(Mending { input, done, sources, found })
 }

@@ -3,8 +3,9 @@
 use std::sync::OnceLock;
 
 use matterix_ir::{FileId, Span};
-use matterix_lang::ast::{ItemKind, MemberKind, Name, Sig};
+use matterix_lang::ast::{self, ItemKind, MemberKind, Sig};
 use matterix_lang::library::MODULES;
+use matterix_lang::names::item_name;
 use matterix_lang::syntax::parse;
 use rmcp::schemars::JsonSchema;
 use serde::Serialize;
@@ -88,7 +89,7 @@ fn of(module: &'static str, text: &str) -> Vec<Item> {
     let (tree, _) = parse(FileId(0), text);
     let mut items = Vec::new();
     for item in &tree.items {
-        let Some(name) = name(&item.kind, text) else { continue };
+        let Some(name) = name(item, text) else { continue };
         items.push(Item {
             module,
             signature: signature(text, item.span),
@@ -115,37 +116,16 @@ fn of(module: &'static str, text: &str) -> Vec<Item> {
     items
 }
 
-/// What an item is called; nothing for what is not named.
-fn name(kind: &ItemKind, text: &str) -> Option<String> {
-    let slice = |name: &Name| {
-        text.get(name.span.start as usize..name.span.end as usize).map_or(name.text.clone(), str::to_string)
-    };
-    Some(match kind {
-        ItemKind::Error | ItemKind::Use { .. } | ItemKind::Allow { .. } => return None,
-        ItemKind::Unit { name, .. } => name.text.clone(),
-        ItemKind::Incompatible { a, b, .. } => format!("{} with {}", slice(a), slice(b)),
-        ItemKind::Process(process) => slice(&process.name),
-        ItemKind::Event(event) => slice(&event.name),
-        ItemKind::Skill { sig, .. } => verb(sig),
-        ItemKind::Dimension { name, .. }
-        | ItemKind::Species { name, .. }
-        | ItemKind::Solution { name, .. }
-        | ItemKind::Reaction { name, .. }
-        | ItemKind::ReactiveGroup { name, .. }
-        | ItemKind::Material { name, .. }
-        | ItemKind::Hazard { name, .. }
-        | ItemKind::Capability { name, .. }
-        | ItemKind::Asset { name, .. }
-        | ItemKind::Relation { name, .. }
-        | ItemKind::Fn { name, .. }
-        | ItemKind::Const { name, .. }
-        | ItemKind::Driver { name, .. }
-        | ItemKind::Lab { name, .. }
-        | ItemKind::Workflow { name, .. }
-        | ItemKind::Study { name, .. }
-        | ItemKind::Fit { name, .. }
-        | ItemKind::Test { name, .. } => slice(name),
-    })
+/// What an item is called, as written; nothing for what is not named.
+fn name(item: &ast::Item, text: &str) -> Option<String> {
+    let written = |span: Span| text.get(span.start as usize..span.end as usize).map(str::to_string);
+    match &item.kind {
+        ItemKind::Unit { name, .. } => Some(name.text.clone()),
+        ItemKind::Dimension { name, .. } => Some(name.text.clone()),
+        ItemKind::Incompatible { a, b, .. } => Some(format!("{} with {}", written(a.span)?, written(b.span)?)),
+        ItemKind::Skill { sig, .. } => Some(verb(sig)),
+        _ => item_name(item).and_then(|(_, span)| written(span)),
+    }
 }
 
 /// The line that imports a type; what else there is comes with its module or is known everywhere.

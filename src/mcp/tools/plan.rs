@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use matterix_ir::{Diagnostic, Severity, Sources};
+use matterix_ir::{Diagnostic, Sources};
 use rmcp::schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -80,7 +80,7 @@ impl Task for Plan {
         }
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
-        let wrong = found.iter().any(|d| d.severity == Severity::Error);
+        let wrong = found.iter().any(Diagnostic::is_error);
         let Some(program) = program.filter(|_| !wrong) else { return unplanned(&sources, found) };
         let search = Search::Clock { time: Duration::from_secs(seconds), seed: self.seed };
         let schedule = match pipeline::schedule(&program, search, stop) {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use matterix_ir::{Diagnostic, Severity, Sources};
+use matterix_ir::{Diagnostic, Sources};
 use rmcp::schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -103,7 +103,7 @@ impl Task for Run {
 }
 
 fn is_wrong(found: &[Diagnostic]) -> bool {
-    found.iter().any(|d| d.severity == Severity::Error)
+    found.iter().any(Diagnostic::is_error)
 }
 
 fn unrun(sources: &Sources, found: Vec<Diagnostic>) -> Result<Answer, String> {

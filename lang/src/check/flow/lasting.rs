@@ -1,9 +1,8 @@
 //! How long steps take and how often they are done, where that cannot be.
 
-use matterix_ir::NodeId;
-use matterix_ir::codes;
 use matterix_ir::plan::LONGEST_RUN;
 use matterix_ir::quantity::{show_duration, show_number};
+use matterix_ir::{Code, NodeId, codes};
 
 use super::Flow;
 use super::facts::Facts;
@@ -15,12 +14,9 @@ impl Flow<'_, '_> {
         let time = self.eval(node, facts);
         let (_, longest) = time.bounds();
         if longest < 0.0 {
-            let label = self.label();
-            let headline = format!("`{label}` cannot be done: a duration cannot be negative");
+            let wrong = format!("`{}` cannot be done: a duration cannot be negative", self.label());
             let said = format!("would take {}", show_duration(longest));
-            let d = self.at_site(codes::TYPE_MISMATCH, headline, said, self.doubt > 0);
-            let about = d.span();
-            self.found(d.help("give a duration of 0 s or more"), about);
+            self.found_here(codes::TYPE_MISMATCH, wrong, said, "give a duration of 0 s or more");
             // Said already: when it would end is not known.
             return Known::Range(0.0, f64::INFINITY, Why::Unknown);
         }
@@ -31,11 +27,9 @@ impl Flow<'_, '_> {
     pub(super) fn turns(&mut self, node: NodeId, facts: &Facts) -> Known {
         let times = self.eval(node, facts);
         if let Some(exact) = times.exact().filter(|n| *n < 0.0 || n.fract() != 0.0) {
-            let headline = format!("`{}` cannot be done: how often is a whole number", self.label());
+            let wrong = format!("`{}` cannot be done: how often is a whole number", self.label());
             let said = format!("{} times", show_number(exact));
-            let d = self.at_site(codes::TYPE_MISMATCH, headline, said, self.doubt > 0);
-            let about = d.span();
-            self.found(d.help("give a whole number, 0 or more"), about);
+            self.found_here(codes::TYPE_MISMATCH, wrong, said, "give a whole number, 0 or more");
         }
         times
     }
@@ -46,12 +40,18 @@ impl Flow<'_, '_> {
         if before > LONGEST_RUN || least <= LONGEST_RUN {
             return;
         }
-        let headline = format!("`{}` ends when no run goes on any more", self.label());
+        let wrong = format!("`{}` ends when no run goes on any more", self.label());
         let (end, most) = (show_duration(least), show_duration(LONGEST_RUN));
         let said = format!("not before {end}; a run ends after {most}");
-        let d = self.at_site(codes::WAITS_FOR_EVER, headline, said, self.doubt > 0);
+        let mend = "make it shorter, or divide the workflow into several runs";
+        self.found_here(codes::WAITS_FOR_EVER, wrong, said, mend);
+    }
+
+    /// Reports what is wrong with the statement that is followed now; a warning where it may not be reached.
+    fn found_here(&mut self, code: Code, headline: String, said: String, mend: &str) {
+        let d = self.at_site(code, headline, said, self.doubt > 0).help(mend);
         let about = d.span();
-        self.found(d.help("make it shorter, or divide the workflow into several runs"), about);
+        self.found(d, about);
     }
 
     /// The statement that is followed now, as written.

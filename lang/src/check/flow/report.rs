@@ -34,7 +34,7 @@ impl Finding {
 
     /// Whether it is an error.
     pub fn is_error(&self) -> bool {
-        self.diagnostic.severity == Severity::Error
+        self.diagnostic.is_error()
     }
 }
 

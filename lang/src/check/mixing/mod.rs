@@ -54,7 +54,7 @@ pub struct Ready {
 
 /// Makes a lab ready; none where contents and transfers are not right, as one cannot tell then what meets.
 pub fn ready(lab: &mut Elaborator<'_>) -> Option<Ready> {
-    let right = !lab.diagnostics.iter().any(|d| d.severity == Severity::Error);
+    let right = !lab.diagnostics.iter().any(Diagnostic::is_error);
     right.then(|| Ready { materials: materials(lab), hazards: Hazards::new(lab.hazards()) })
 }
 

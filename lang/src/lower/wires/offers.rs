@@ -3,7 +3,7 @@
 use matterix_ir::offer::{Arranged, Kind, Offer, Parameter, Shown};
 use matterix_ir::plan::Step;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Severity, Unit};
+use matterix_ir::{Diagnostic, Unit};
 
 use super::{Arrangement, Mapped};
 use crate::ast::{Clause, ClauseKind, ItemKind, Member, MemberKind, Param, Role, Sig};
@@ -127,7 +127,7 @@ impl<'a> Planner<'a, '_> {
                 let lowered = self.skill_body(sig, clauses, body, handlers, &verb, sig.span, &mut scope);
                 self.open.pop();
                 // What makes no sense with these things is not offered with them.
-                let wrong = self.lab.diagnostics[found..].iter().any(|d| d.severity == Severity::Error);
+                let wrong = self.lab.diagnostics[found..].iter().any(Diagnostic::is_error);
                 self.lab.diagnostics.truncate(found);
                 match lowered.filter(|_| !wrong && !self.never(steps)) {
                     Some((step, _)) => {

@@ -1,11 +1,13 @@
 //! Blocks and the steps in them.
 
-use matterix_ir::Span;
+use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{
     super::{
         cursor::{Kids, Node},
         grammar::Rule,
+        scan::first_word,
+        spot::meant_step,
     },
     Lower,
 };
@@ -79,9 +81,31 @@ impl Lower<'_> {
         handlers
     }
 
+    /// `paralel { heat plate to 60 degC }`: what reads as options and is none. The slip is reported, not what it leads to.
+    fn is_slip_before_block(&mut self, call: &Node) -> bool {
+        let is_option = |part: &Node| matches!(part.as_rule(), Rule::named | Rule::field_end);
+        let options = Kids::of(call.clone()).find(Rule::options);
+        if options.is_none_or(|options| Kids::of(options).rest().iter().all(is_option)) {
+            return false;
+        }
+        let text = call.as_str();
+        let word = first_word(text);
+        let rest = text.find('{').and_then(|brace| text.get(word.len()..=brace));
+        let Some(meant) = rest.and_then(|rest| meant_step(word, rest)) else { return false };
+        let start = call.as_span().start();
+        let place = self.place(start, start + word.len());
+        let headline = format!("`{word}` does not start a step");
+        let slip = Diagnostic::error(codes::SYNTAX, place, headline, format!("did you mean `{meant}`?"));
+        self.mistakes.push(slip.guess(format!("write `{meant}`"), place, meant));
+        true
+    }
+
     fn stmt(&mut self, node: Node) -> StmtKind {
         let rule = node.as_rule();
         if rule == Rule::call {
+            if self.is_slip_before_block(&node) {
+                return StmtKind::Error;
+            }
             let call = self.call(node);
             return if self.in_test { run_of(call) } else { StmtKind::Call(call) };
         }

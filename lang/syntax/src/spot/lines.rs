@@ -1,6 +1,6 @@
 //! Lines that start wrongly, stand in the wrong place or go on too long.
 
-use super::{ITEM_WORDS, Mistake, RESERVED, Rule, Spot, either, first_word, is_word, last_word};
+use super::{ITEM_WORDS, Mistake, RESERVED, Rule, STEP_WORDS, Spot, either, first_word, is_word, last_word};
 
 /// `heat(plate, 80 degC)` as a step.
 pub(super) fn function_call(spot: &Spot) -> Option<Mistake> {
@@ -43,6 +43,38 @@ pub(super) fn reserved(spot: &Spot) -> Option<Mistake> {
 fn nearest<'w>(word: &str, words: &[&'w str]) -> Option<&'w str> {
     let near = words.iter().map(|w| (strsim::damerau_levenshtein(word, w), *w)).min()?;
     (near.0 <= 1 + word.len() / 5).then_some(near.1)
+}
+
+/// The word that starts a step and is near to another one, where the line can be read with it.
+pub(crate) fn meant_step(word: &str, rest: &str) -> Option<&'static str> {
+    // What follows the brace is on other lines.
+    let block = if rest.trim_end().ends_with('{') { " note \"\" }" } else { "" };
+    let reads = |meant: &str| crate::is_step(&format!("{meant}{rest}{block}"));
+    STEP_WORDS.iter().copied().find(|meant| is_slip(word, meant) && reads(meant))
+}
+
+/// Whether a word is another one with a slip: letters that changed places, one too few or too many, capitals; in a short word another
+/// letter makes another word, as `stop` and `step` are two.
+fn is_slip(word: &str, meant: &str) -> bool {
+    let turned = || strsim::levenshtein(word, meant) == 2;
+    match strsim::damerau_levenshtein(word, meant) {
+        _ if word.eq_ignore_ascii_case(meant) => true,
+        1 => word.len() != meant.len() || word.len() >= 6 || turned(),
+        2 => word.len() >= 8,
+        _ => false,
+    }
+}
+
+/// `repaet 3 times {`: a word of the language with a slip in it, where the line can be read without the slip.
+pub(super) fn misspelt_step(spot: &Spot) -> Option<Mistake> {
+    let word = spot.form();
+    if spot.only != Rule::only_stmt || spot.is_at_start() || RESERVED.contains(&word) {
+        return None;
+    }
+    let meant = meant_step(word, &format!("{} {}", spot.before.get(word.len()..)?, spot.after))?;
+    let (from, to) = (spot.start, spot.start + word.len());
+    let mistake = Mistake::new(format!("`{word}` does not start a step"), format!("did you mean `{meant}`?"));
+    Some(mistake.guess(format!("write `{meant}`"), from, to, meant).at(from, to))
 }
 
 /// Words that other languages use.

@@ -8,9 +8,11 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{
     grammar::Rule,
-    scan::{ITEM_WORDS, first_word},
+    scan::{ITEM_WORDS, STEP_WORDS, first_word},
     words::{either, expected},
 };
+
+pub(super) use lines::meant_step;
 
 /// The place with what stands around it.
 pub(super) struct Spot<'a> {
@@ -32,6 +34,8 @@ pub(super) struct Spot<'a> {
 pub(super) struct Mistake {
     headline: String,
     label: String,
+    /// From where to where it stands, where that is not the failing token.
+    place: Option<(usize, usize)>,
     help: Option<String>,
     /// Title, range and text of a correction, and whether it leaves no doubt.
     fix: Option<(String, usize, usize, String, bool)>,
@@ -39,7 +43,12 @@ pub(super) struct Mistake {
 
 impl Mistake {
     fn new(headline: impl Into<String>, label: impl Into<String>) -> Self {
-        Mistake { headline: headline.into(), label: label.into(), help: None, fix: None }
+        Mistake { headline: headline.into(), label: label.into(), place: None, help: None, fix: None }
+    }
+
+    fn at(mut self, start: usize, end: usize) -> Self {
+        self.place = Some((start, end));
+        self
     }
 
     fn help(mut self, help: impl Into<String>) -> Self {
@@ -64,6 +73,7 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::control,
     signs::comment,
     signs::quotes,
+    lines::misspelt_step,
     signs::operator,
     signs::reaction_arrow,
     signs::equals,
@@ -86,8 +96,8 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
 ];
 
 impl<'a> Spot<'a> {
-    /// The place `at` in the form from `start` to `end`.
-    pub(super) fn new(text: &'a str, only: Rule, start: usize, end: usize, at: usize, expected: &'a [Rule]) -> Self {
+    /// The place `at` in the form that begins at `start`.
+    pub(super) fn new(text: &'a str, only: Rule, start: usize, at: usize, expected: &'a [Rule]) -> Self {
         let rest = text.get(at..).unwrap_or_default();
         let line = rest.split('\n').next().unwrap_or_default();
         // Reading fails before the blanks of a place; the token comes after them.
@@ -96,14 +106,14 @@ impl<'a> Spot<'a> {
         let before = text.get(start..at).unwrap_or_default().trim_end();
         let token = if line.starts_with("//") { "" } else { first_token(line) };
         let at = if token.is_empty() { start + before.len() } else { at };
-        let _ = end;
         Spot { only, start, at, end: at + token.len(), before, after: line, token, expected }
     }
 
     /// The finding, in the user's words.
     pub(super) fn diagnose(&self, span: impl Fn(usize, usize) -> Span) -> Diagnostic {
         let mistake = RULES.iter().find_map(|rule| rule(self)).unwrap_or_else(|| self.unexpected());
-        let place = span(self.at, self.end);
+        let (from, to) = mistake.place.unwrap_or((self.at, self.end));
+        let place = span(from, to);
         let mut diagnostic = Diagnostic::error(codes::SYNTAX, place, mistake.headline, mistake.label);
         if let Some(help) = mistake.help {
             diagnostic = diagnostic.help(help);

@@ -1,0 +1,89 @@
+//! What is proposed for words with a slip in them.
+
+use crate::harness::{folder, matterixc_in, write};
+
+const BENCH: &str = "mtx 1\n\nuse std::glassware::Beaker250mL\nuse std::heating::IkaRetControl\n\nlab bench {\n    ambient: 25 degC\n    \
+    table = OpticalTable at (0, 0, 0) m\n    plate = IkaRetControl on table at (300, 0) mm\n    \
+    beaker = Beaker250mL on plate holding 100 g of water\n}\n\nworkflow warm in bench {\n    wait 5 s\n}\n";
+
+/// The only finding of a text, with its help and the texts of its corrections.
+#[track_caller]
+fn finding(name: &str, text: &str) -> (String, Vec<String>, Vec<String>) {
+    let dir = folder(&format!("meant_{name}"));
+    write(&dir, "bench.mtx", text);
+    let lines = matterixc_in(&dir, &["check", "bench.mtx", "--format", "json"]).out_lines();
+    assert_eq!(lines.len(), 1, "{name}: {lines:#?}");
+    let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
+    let all = |v: &serde_json::Value| v.as_array().cloned().unwrap_or_default();
+    let edits = |fix: &serde_json::Value| all(&fix["edits"]);
+    (
+        text(&lines[0]["headline"]),
+        all(&lines[0]["help"]).iter().map(text).collect(),
+        all(&lines[0]["fixes"]).iter().flat_map(edits).map(|edit| text(&edit["text"])).collect(),
+    )
+}
+
+#[test]
+fn words_that_start_steps_are_meant_too() {
+    for (slip, headline, meant) in [
+        ("wiat 5 s", "no skill or command is called `wiat`", "wait"),
+        ("repaet 3 times { wait 5 s }", "`repaet` does not start a step", "repeat"),
+        (
+            "paralel {\n        heat plate to 60 degC\n        wait 5 s\n    }",
+            "`paralel` does not start a step",
+            "parallel",
+        ),
+        ("expcet beaker.contents.mass > 1 g", "`expcet` does not start a step", "expect"),
+        ("fial \"empty\"", "no skill or command is called `fial`", "fail"),
+        ("haet plate to 60 degC", "no skill or command is called `haet`", "heat"),
+    ] {
+        let (found, _, fixes) = finding("steps", &BENCH.replace("wait 5 s", slip));
+        assert_eq!((found.as_str(), fixes.as_slice()), (headline, [meant.to_string()].as_slice()), "{slip}");
+    }
+}
+
+#[test]
+fn units_are_known_by_their_names() {
+    for (said, meant) in [
+        ("gram", "`g`"),
+        ("grams", "`g`"),
+        ("kilograms", "`kg`"),
+        ("milligrams", "`mg`"),
+        ("liter", "`L`"),
+        ("litres", "`L`"),
+        ("milliliters", "`mL`"),
+        ("microlitre", "`uL`"),
+        ("tons", "`t`"),
+        ("sec", "`s`"),
+        ("minutes", "`min`"),
+        ("hours", "`h`"),
+        ("celsius", "`degC`"),
+        ("celcius", "`degC`"),
+        ("degrees", "`deg`, `degC` or `degF`"),
+        ("molar", "`M`"),
+        ("moles", "`mol`"),
+        ("gg", "`g`"),
+    ] {
+        let (_, help, _) = finding("units", &BENCH.replace("100 g of", &format!("100 {said} of")));
+        assert_eq!(help.first(), Some(&format!("did you mean {meant}?")), "{said}");
+    }
+}
+
+#[test]
+fn a_label_of_an_ion_is_meant_of_its_salt() {
+    let text = "mtx 1\n\nsolution iodide { KI: 0.66 g, water: 100 g } labelled 0.04 mol/kg of K+\n";
+    let (headline, help, fixes) = finding("ion", text);
+    assert_eq!(headline, "the label of `iodide` is of `K+`, of which its recipe holds none");
+    assert_eq!(help, ["a label counts what is weighed in: `K+` comes of `KI` when it dissolves"]);
+    assert_eq!(fixes, ["0.0395 mol/kg of KI"]);
+    let mended = text.replace("0.04 mol/kg of K+", &fixes[0]);
+    let dir = folder("meant_salt");
+    write(&dir, "bench.mtx", &mended);
+    assert_eq!(matterixc_in(&dir, &["check", "bench.mtx"]).out, "no findings\n");
+
+    let (headline, help, _) = finding("none", &text.replace("K+", "ethanol"));
+    assert_eq!(headline, "the label of `iodide` is of `ethanol`, of which its recipe holds none");
+    assert_eq!(help, ["label a species of the recipe, or add `ethanol` to it"]);
+    let (headline, ..) = finding("zero", &text.replace("0.04 mol/kg of K+", "0 mol/kg of KI"));
+    assert_eq!(headline, "the label of `iodide` is zero: its recipe gives 0.0394977 mol/kg of KI");
+}
