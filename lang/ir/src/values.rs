@@ -20,21 +20,65 @@ pub trait Rules {
 #[derive(Clone, Debug)]
 pub struct Formula(Box<[Op]>);
 
-impl Formula {
-    /// That of a node.
-    pub fn of(graph: &Graph, node: NodeId) -> Formula {
-        let order = graph.schedule([node]);
-        // Operands stand before their user, so that they are found.
-        let at = |n: NodeId| NodeId(order.partition_point(|o| *o < n) as u32);
-        let by_position = |n: &NodeId| match graph.op(*n) {
-            Op::Unary(op, a) => Op::Unary(op, at(a)),
-            Op::Binary(op, a, b) => Op::Binary(op, at(a), at(b)),
-            Op::Select(c, a, b) => Op::Select(at(c), at(a), at(b)),
-            leaf => leaf,
-        };
-        Formula(order.iter().map(by_position).collect())
+/// Formulas of a graph that does not change any more, each made once.
+#[derive(Clone, Debug, Default)]
+pub struct Formulas {
+    made: Vec<Option<Formula>>,
+    /// Where each node stands in the formula that is being made, with the number of that.
+    places: Vec<(u32, u32)>,
+    number: u32,
+}
+
+impl Formulas {
+    /// The formula of a node.
+    pub fn of(&mut self, graph: &Graph, node: NodeId) -> &Formula {
+        let count = graph.ops().len();
+        if self.made.len() != count {
+            *self = Formulas { made: vec![None; count], places: vec![(0, 0); count], number: 0 };
+        }
+        if self.made[node.0 as usize].is_none() {
+            self.number += 1;
+            let formula = self.make(graph, node);
+            self.made[node.0 as usize] = Some(formula);
+        }
+        self.made[node.0 as usize].get_or_insert_with(|| Formula(Box::default()))
     }
 
+    fn make(&mut self, graph: &Graph, node: NodeId) -> Formula {
+        let mut ops: Vec<Op> = Vec::new();
+        let mut todo = vec![node];
+        while let Some(&next) = todo.last() {
+            if self.place(next).is_some() {
+                todo.pop();
+                continue;
+            }
+            let before = todo.len();
+            let op = graph.op(next);
+            todo.extend(op.operands().filter(|n| self.place(*n).is_none()));
+            if todo.len() > before {
+                continue;
+            }
+            let at = |n: NodeId| NodeId(self.places[n.0 as usize].1);
+            let op = match op {
+                Op::Unary(op, a) => Op::Unary(op, at(a)),
+                Op::Binary(op, a, b) => Op::Binary(op, at(a), at(b)),
+                Op::Select(c, a, b) => Op::Select(at(c), at(a), at(b)),
+                leaf => leaf,
+            };
+            self.places[next.0 as usize] = (self.number, ops.len() as u32);
+            ops.push(op);
+            todo.pop();
+        }
+        Formula(ops.into())
+    }
+
+    fn place(&self, node: NodeId) -> Option<u32> {
+        let (number, place) = self.places[node.0 as usize];
+        (number == self.number).then_some(place)
+    }
+}
+
+impl Formula {
     /// Its value by some rules; `room` is for values in between, and may be kept from one question to the next.
     pub fn value<R: Rules>(&self, rules: &R, room: &mut Vec<R::Value>) -> Option<R::Value> {
         room.clear();
@@ -94,7 +138,9 @@ mod tests {
         let mut room = Vec::new();
         let states = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         let env = Env { time: 0.0, states: &states, params: &[], locals: &[], readings: &[] };
-        assert_eq!(Formula::of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
-        assert_eq!(Formula::of(&graph, other).value(&Numbers, &mut room), None);
+        let mut formulas = Formulas::default();
+        assert_eq!(formulas.of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
+        assert_eq!(formulas.of(&graph, other).value(&Numbers, &mut room), None);
+        assert_eq!(formulas.of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use matterix_ir::graph::unary;
-use matterix_ir::values::{Formula, Rules};
+use matterix_ir::values::Rules;
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::facts::Facts;
@@ -146,8 +146,7 @@ impl Flow<'_, '_> {
         if let Op::State(state) = self.lab.graph.op(node) {
             return facts.states[state as usize].clone();
         }
-        let find = || Formula::of(&self.lab.graph, node);
-        let formula = self.formulas[node.0 as usize].get_or_insert_with(find);
+        let formula = self.formulas.of(&self.lab.graph, node);
         let exact = Exact { params: &self.params, facts };
         match formula.value(&exact, &mut self.numbers) {
             Some(value) => Known::Point(value),

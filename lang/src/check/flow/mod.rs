@@ -26,7 +26,7 @@ use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
-use matterix_ir::values::Formula;
+use matterix_ir::values::Formulas;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 use rustc_hash::FxHashMap;
 
@@ -68,7 +68,7 @@ struct Flow<'l, 'a> {
     /// The operations below a node, operands first.
     orders: Vec<Option<Rc<[NodeId]>>>,
     /// What nodes are made of, as far as they were asked for.
-    formulas: Vec<Option<Formula>>,
+    formulas: Formulas,
     /// Room for exact values.
     numbers: Vec<f64>,
     /// Operations of a node that depend on a state.
@@ -174,7 +174,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: vec![None; lab.graph.ops().len()],
             orders: vec![None; lab.graph.ops().len()],
-            formulas: vec![None; lab.graph.ops().len()],
+            formulas: Formulas::default(),
             numbers: Vec::new(),
             parts_on: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::values::{Formula, Rules};
+use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 use rustc_hash::FxHashMap;
 
@@ -22,7 +22,7 @@ pub struct Eyes<'l, 'a> {
     pub lab: &'l Elaborator<'a>,
     params: Vec<f64>,
     /// What nodes are made of, as far as they were asked for, and room for values and whether they are known.
-    formulas: RefCell<(Vec<Option<Formula>>, Vec<(f64, bool)>)>,
+    formulas: RefCell<(Formulas, Vec<(f64, bool)>)>,
     /// By state: whether time changes it.
     moving: Vec<bool>,
     /// The mixtures in the order in which actions number them.
@@ -54,7 +54,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
         Eyes {
             lab,
             params: lab.params.iter().map(|p| p.value).collect(),
-            formulas: RefCell::new((vec![None; lab.graph.ops().len()], Vec::new())),
+            formulas: RefCell::default(),
             moving: (0..lab.states.len() as u32).map(|state| lab.rates.contains_key(&state)).collect(),
             order,
             counted: amounts.values().flatten().map(|a| a.1).collect(),
@@ -97,9 +97,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
     fn look(&self, node: NodeId, world: &World, moving: impl Fn(u32) -> bool) -> (f64, bool) {
         let look = Look { params: &self.params, world, moving };
         let (formulas, room) = &mut *self.formulas.borrow_mut();
-        let find = || Formula::of(&self.lab.graph, node);
-        let formula = formulas[node.0 as usize].get_or_insert_with(find);
-        formula.value(&look, room).unwrap_or((f64::NAN, false))
+        formulas.of(&self.lab.graph, node).value(&look, room).unwrap_or((f64::NAN, false))
     }
 
     /// Whether time changes a state.
