@@ -11,7 +11,7 @@ use crate::Exit;
 use crate::args::{CheckArgs, Color};
 use crate::cache;
 use crate::files;
-use crate::pipeline::{self, Input, Mended, Mending};
+use crate::pipeline::{self, Advice, Input, Mended, Mending};
 use crate::report::points::{self, Found as At};
 use crate::report::{Format, Reporter, stricter};
 use crate::terminal::{self, Stream, complain, print};
@@ -51,7 +51,9 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
         let (sources, mut diagnostics, known) = match args.contents {
             true => pipeline::contents(&input),
             false => {
-                let (sources, diagnostics) = left.unwrap_or_else(|| pipeline::check(&input, args.fidelity, &*cache));
+                let advice = if args.strict { Advice::Given } else { Advice::LeftOut };
+                let check = || pipeline::check(&input, args.fidelity, advice, &*cache);
+                let (sources, diagnostics) = left.unwrap_or_else(check);
                 (sources, diagnostics, Vec::new())
             }
         };

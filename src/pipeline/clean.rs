@@ -1,4 +1,5 @@
-//! Files in which an earlier check found nothing: they are not looked through again while nothing it read has changed.
+//! Files in which an earlier check found nothing that is to be shown: they are not looked through again while nothing it read has
+//! changed.
 //!
 //! Findings are not kept, only that there were none: what has to be shown is found anew.
 
@@ -12,6 +13,7 @@ use matterix_lang::Loader;
 use matterix_runtime::motion::{Store, seal};
 use serde::{Deserialize, Serialize};
 
+use super::Advice;
 use super::neighbours::Neighbours;
 use crate::args::Fidelity;
 
@@ -69,7 +71,7 @@ impl Loader for Noted<'_> {
     }
 }
 
-/// What is kept of a text and a fidelity.
+/// What is kept of a text, a fidelity and what is looked for.
 pub(super) struct Entry<'s> {
     store: &'s dyn Store,
     key: String,
@@ -77,9 +79,9 @@ pub(super) struct Entry<'s> {
 
 impl<'s> Entry<'s> {
     /// That of a text; none where nothing is kept.
-    pub(super) fn of(text: &[u8], fidelity: Fidelity, store: &'s dyn Store) -> Option<Self> {
+    pub(super) fn of(text: &[u8], fidelity: Fidelity, advice: Advice, store: &'s dyn Store) -> Option<Self> {
         let made_by = store.keeps().then(command).flatten()?;
-        let key = seal::sum(format!("{made_by} {fidelity:?} {}", seal::sum(text)).as_bytes());
+        let key = seal::sum(format!("{made_by} {fidelity:?} {advice:?} {}", seal::sum(text)).as_bytes());
         Some(Entry { store, key })
     }
 

@@ -3,7 +3,7 @@
 use matterix_ir::{Diagnostic, Edit, FileId, Fix, Sources, Span};
 use matterix_runtime::motion::Store;
 
-use super::{Input, check};
+use super::{Advice, Input, check};
 use crate::args::Fidelity;
 
 /// Looks at a text at most: a correction may bring the next mistake to light, and none should go round in a ring.
@@ -41,7 +41,7 @@ pub struct Mending {
 /// Makes corrections until none is left.
 pub fn mend(mut input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Store) -> Mending {
     let mut done = Vec::new();
-    let (mut sources, mut found) = check(&input, fidelity, store);
+    let (mut sources, mut found) = check(&input, fidelity, Advice::Given, store);
     for _ in 0..ROUNDS {
         let chosen = choose(&found, which, FileId(0));
         if chosen.is_empty() {
@@ -51,7 +51,7 @@ pub fn mend(mut input: Input, which: Fixes, fidelity: Fidelity, store: &dyn Stor
         let mended = apply(text, chosen.iter().flat_map(|fix| &fix.edits));
         done.extend(chosen.iter().map(|fix| of(fix, &sources)));
         input.bytes = mended.into_bytes();
-        (sources, found) = check(&input, fidelity, store);
+        (sources, found) = check(&input, fidelity, Advice::Given, store);
     }
     Mending { input, done, sources, found }
 }

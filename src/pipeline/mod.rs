@@ -100,16 +100,25 @@ impl Input {
     }
 }
 
+/// Whether findings that are no more than advice are among those of a check.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Advice {
+    /// They are.
+    Given,
+    /// They are not.
+    LeftOut,
+}
+
 /// Findings of a file and of where its labs put things; at the fidelity `motion` also those in the way of robots, whose ways
-/// are kept in a store, as is which files had none.
-pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
+/// are kept in a store, as is which files had none, or nothing but advice.
+pub fn check(input: &Input, fidelity: Fidelity, advice: Advice, store: &dyn Store) -> (Sources, Vec<Diagnostic>) {
     let (mut sources, file) = input.source();
     let file = match file {
         Ok(file) => file,
         Err(found) => return (sources, vec![found]),
     };
     let neighbours = input.neighbours();
-    let entry = clean::Entry::of(&input.bytes, fidelity, store);
+    let entry = clean::Entry::of(&input.bytes, fidelity, advice, store);
     if entry.as_ref().is_some_and(|entry| entry.is_clean(&neighbours)) {
         return (sources, Vec::new());
     }
@@ -120,6 +129,10 @@ pub fn check(input: &Input, fidelity: Fidelity, store: &dyn Store) -> (Sources, 
         Fidelity::Motion => {
             matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store), session)
         }
+    };
+    let found = match advice {
+        Advice::Given => found,
+        Advice::LeftOut => without_advice(found),
     };
     if let Some(entry) = entry.filter(|_| found.is_empty()) {
         entry.keep(read);

@@ -11,7 +11,7 @@ use crate::args;
 use crate::mcp::answer::Answer;
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline;
+use crate::pipeline::{self, Advice};
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -46,7 +46,7 @@ impl Task for Check {
     fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
         let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
-        let (sources, found) = pipeline::check(&input, fidelity, desk);
+        let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
         let found = judged(named(&sources, found), self.strict);
         let (data, text) = told(&sources, &found);
         Answer::new(text, data)

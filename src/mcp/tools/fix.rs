@@ -12,7 +12,7 @@ use super::arguments::Fidelity;
 use crate::mcp::answer::Answer;
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline::{self, Fixes, Input, Mended, Mending};
+use crate::pipeline::{self, Advice, Fixes, Input, Mended, Mending};
 use crate::{args, files};
 
 /// Which corrections are made.
@@ -123,7 +123,7 @@ impl Task for FixTask {
 
 /// A text after the corrections that have these names.
 fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -> Result<Mending, String> {
-    let (sources, found) = pipeline::check(&input, fidelity, desk);
+    let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
     let found = named(&sources, found);
     let offered: Vec<(&String, &Fix)> = found.iter().flat_map(|n| n.ids.iter().zip(&n.diagnostic.fixes)).collect();
     let mut fixes = Vec::new();
@@ -137,6 +137,6 @@ fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -
         fixes.push(*fix);
     }
     let (input, done) = pipeline::correct(input, &sources, &fixes)?;
-    let (sources, found) = pipeline::check(&input, fidelity, desk);
+    let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
     Ok(Mending { input, done, sources, found })
 }
