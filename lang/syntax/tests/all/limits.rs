@@ -35,6 +35,22 @@ fn deeper_nesting_is_one_finding() {
 }
 
 #[test]
+fn groups_that_a_text_leaves_open_are_skipped_in_linear_time() {
+    for open in ["(", "[", "{", "([{", "f([x"] {
+        for core in ["1\"", "\"", "a \" b", "]\"", "// \""] {
+            let text = format!("{}{core}", open.repeat(60));
+            for text in
+                [text.clone(), format!("mtx 1\nuse x{text}\n}}\n"), format!("mtx 1\nlab l {{\n  a = {text}\n}}\n")]
+            {
+                let start = Instant::now();
+                parse(FileId(0), &text);
+                assert!(start.elapsed() < Duration::from_secs(5), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
 fn long_chains_do_not_make_deep_trees() {
     for link in [" + 1", ".a", "[1]", "(1)", " ^ 2", " and a", " .. 2"] {
         let found = headlines(&format!("mtx 1\nconst c = a{}\n", link.repeat(5_000)));
