@@ -31,8 +31,8 @@ fn main() {
     let text = package(&folder);
     println!("{} lines, {} files beside them\n", text.lines().count(), BESIDE);
     let mut bench = Bench::new(&folder, text);
-    // A digit in a workflow, a word in it, a statement that is not whole yet, a number of the lab, a constant that all may mean.
-    let places: [(&str, &str, &[&str]); 5] = [
+    // A digit in a workflow, a word in it, a statement that is not whole yet, a number of a lab, constants.
+    let places: [(&str, &str, &[&str]); 7] = [
         ("a number in a workflow", "wait ", &["1", "2", "3", ""]),
         ("a word in a workflow", "pour ", &["x", "xy", "x", ""]),
         (
@@ -40,8 +40,10 @@ fn main() {
             "    note \"warm enough\"\n",
             &["        w", "        wait", "        wait 5 s\n", ""],
         ),
-        ("a number in the lab", "ambient: ", &["1", ""]),
-        ("a constant", "const warm1 = ", &["1", ""]),
+        ("a number in a lab", "ambient: ", &["1", ""]),
+        ("a constant that no workflow names", "const warm1 = ", &["1", ""]),
+        ("a constant that one workflow names", "const settle = ", &["1", ""]),
+        ("a constant that all workflows name", "const pause = ", &["1", ""]),
     ];
     for (what, before, typed) in places {
         bench.keystrokes(what, before, typed, 200);
@@ -67,6 +69,8 @@ fn package(folder: &Path) -> String {
         uses.push_str(&format!("use {name}\n"));
     }
     let text = generate::program(LINES - BESIDE).replacen("\nuse ", &format!("\n{uses}use "), 1);
+    let text = text.replacen("/// Family", "const settle = 1 s\nconst pause = 10 s\n\n/// Family", 1);
+    let text = text.replacen("wait 1 s\n", "wait settle\n", 1).replace("wait 10 s\n", "wait pause\n");
     fs::write(folder.join("main.mtx"), &text).unwrap();
     text
 }
@@ -142,12 +146,12 @@ impl Bench {
     /// What the server takes of memory, before and after many edits.
     fn memory(&mut self) {
         let at = self.text.find("wait ").unwrap() + "wait ".len();
-        for count in [EDITS / 10, EDITS] {
-            for n in 0..count {
-                self.edit(at, usize::from(n % 2 == 1), if n % 2 == 0 { "1" } else { "" });
-                self.editor.findings(&self.uri, self.version);
+        for n in 1..=EDITS {
+            self.edit(at, usize::from(n % 2 == 0), if n % 2 == 1 { "1" } else { "" });
+            self.editor.findings(&self.uri, self.version);
+            if n == EDITS / 10 || n % (EDITS / 4) == 0 {
+                println!("{:<48} {:>8.1} MB", format!("memory after {n} edits more"), resident(self.editor.process()));
             }
-            println!("{:<48} {:>8.1} MB", format!("memory after {count} edits more"), resident(self.editor.process()));
         }
     }
 }

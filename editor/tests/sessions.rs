@@ -6,9 +6,11 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::Ordering::Relaxed;
 
 use matterix_editor::Analysis;
-use matterix_ir::FileId;
+use matterix_ir::{Diagnostic, FileId, Sources};
 use matterix_lang::{Loader, Session};
 
 /// Modules and files beside an example.
@@ -204,6 +206,71 @@ fn whatever_is_edited_is_judged_as_if_it_had_always_stood_there() {
         let beside = Texts(RefCell::new(BTreeMap::from([("part".to_string(), part)])));
         same("main", &main, &beside, &mut session);
     }
+}
+
+#[test]
+fn what_was_broken_off_is_judged_later() {
+    let beside = Texts(RefCell::new(BTreeMap::from([("part".to_string(), MANY[1].to_string())])));
+    let mut session = Session::default();
+    for (asked, (_, from, to)) in EDITS.iter().filter(|(file, _, _)| *file == 0).take(12).enumerate() {
+        let text = MANY[0].replacen(from, to, 1);
+        // Whether to go on is asked again and again: at a later time each round.
+        let left = AtomicUsize::new(asked * 2);
+        let stop = || left.fetch_update(Relaxed, Relaxed, |left| left.checked_sub(1)).is_err();
+        let seen = Analysis::unless("main", &text, &beside, &mut session, &stop);
+        assert!(asked > 0 || seen.is_none(), "it is asked before the first is judged");
+        same("main", MANY[0], &beside, &mut session);
+    }
+}
+
+const PLATED: &str = "mtx 1\nuse std::opentrons\nasset Plate from labware \"plate.json\"\n\
+    lab deck {\n    ambient: 22 degC\n    plate = Plate at (0, 0, 0) m holding { A1: 10 g of water }\n}\n\
+    workflow w in deck {\n    expect plate[A1].max_volume > 12 mL\n}\n";
+
+#[test]
+fn verdicts_fall_with_the_files_that_a_text_names() {
+    let json = include_str!("../../assets/labware/nest_12_reservoir_15ml.json");
+    let texts = BTreeMap::from([("plate.json".to_string(), json.to_string())]);
+    let beside = Texts(RefCell::new(texts));
+    let mut session = Session::default();
+    let before = Analysis::of("plated", PLATED, &beside, &mut session).findings;
+    let smaller = json.replace("\"totalLiquidVolume\": 15000", "\"totalLiquidVolume\": 11000");
+    assert_ne!(smaller, json);
+    beside.0.borrow_mut().insert("plate.json".to_string(), smaller);
+    same("plated", PLATED, &beside, &mut session);
+    let after = Analysis::of("plated", PLATED, &beside, &mut session).findings;
+    assert_ne!(before, after);
+}
+
+#[test]
+fn motions_are_looked_at_again_where_something_changed() {
+    let beside = Texts(RefCell::new(BTreeMap::from([("part".to_string(), MANY[1].to_string())])));
+    let mut session = Session::default();
+    let mut looked = |text: &str| {
+        let seen = AtomicUsize::new(0);
+        let motions = |program: &matterix_ir::Program| {
+            seen.fetch_add(1, Relaxed);
+            let span = program.plan.get(program.plan.root).span;
+            vec![Diagnostic::advice(matterix_ir::codes::UNUSED, span, program.plan.workflow.clone(), "seen")]
+        };
+        let check = |session: &mut Session| {
+            let mut sources = Sources::default();
+            let file = sources.add("main", text);
+            matterix_lang::check_and(&mut sources, file, &beside, &motions, session)
+        };
+        let again = check(&mut session);
+        let count = seen.swap(0, Relaxed);
+        assert_eq!(again, check(&mut Session::default()), "{text}");
+        count
+    };
+    let whole = MANY[0].replacen("wait paus\n", "wait pause\n", 1);
+    // Three and a test are done where things stand.
+    assert_eq!(looked(&whole), 4);
+    assert_eq!(looked(&whole), 0);
+    assert_eq!(looked(&whole.replacen("wait 1 min", "wait 2 min", 1)), 1);
+    assert_eq!(looked(&whole), 1);
+    assert_eq!(looked(&whole.replacen("idle_time = 2", "idle_time = 3", 1)), 0);
+    assert_eq!(looked(&whole.replacen("pause = 10", "pause = 11", 1)), 4);
 }
 
 #[test]

@@ -633,6 +633,7 @@ fn build<'a>(
         }
         let mut elaborator = Elaborator::new(tables, reach.clone());
         elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
+        elaborator.draft = draft;
         elaborator.lab(lab);
         let mut planner = Planner::new(&mut elaborator, sources);
         planner.to_run = to_run;

@@ -29,6 +29,16 @@ enum Target {
     Derivative(u32),
 }
 
+/// Whether lines call anything, as those do that move or soil.
+fn has_calls(laws: &[Law]) -> bool {
+    laws.iter().any(|law| match &law.kind {
+        LawKind::Call(_) => true,
+        LawKind::For { body, .. } => has_calls(body),
+        LawKind::If { then, otherwise, .. } => has_calls(then) || has_calls(otherwise),
+        LawKind::Error | LawKind::Let { .. } | LawKind::Assign { .. } => false,
+    })
+}
+
 impl<'a> Elaborator<'a> {
     /// Writes out every process that the plan can make run. Processes that read flows come after all others.
     pub fn processes(&mut self) {
@@ -50,11 +60,17 @@ impl<'a> Elaborator<'a> {
             let id = InstanceId(i);
             for m in self.all_members(id) {
                 let MemberKind::Process(process) = &m.member.kind else { continue };
+                if self.draft && !has_calls(&process.laws) {
+                    continue;
+                }
                 let name = format!("{}({})", process.name.text, self.instances[i as usize].name);
                 jobs.push(Job { process, scope: Scope::of_member(id, m), name });
             }
         }
         for (decl, process) in self.tables.processes.clone() {
+            if self.draft && !has_calls(&process.laws) {
+                continue;
+            }
             let module = self.tables.names.decl(decl).module;
             for (scope, name) in self.tuples(&process.params, module, process.guard.as_ref(), &process.name) {
                 jobs.push(Job { process, scope, name });
@@ -585,7 +601,9 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.all_members(id) {
-                if let MemberKind::Event(e) = &m.member.kind {
+                if let MemberKind::Event(e) = &m.member.kind
+                    && (!self.draft || has_calls(&e.laws))
+                {
                     let name = format!("{}({})", e.name.text, self.instances[i as usize].name);
                     found.push((e, Scope::of_member(id, m), name));
                 }
@@ -593,7 +611,9 @@ impl<'a> Elaborator<'a> {
         }
         for index in 0..self.tables.names.decls.len() {
             let decl = self.tables.names.decls[index];
-            if let ItemKind::Event(e) = &decl.item.kind {
+            if let ItemKind::Event(e) = &decl.item.kind
+                && (!self.draft || has_calls(&e.laws))
+            {
                 for (scope, name) in self.tuples(&e.params, decl.module, Some(&e.when), &e.name) {
                     found.push((e, scope, name));
                 }

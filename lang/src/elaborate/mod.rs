@@ -253,6 +253,8 @@ pub struct Elaborator<'a> {
     pub readings_live: bool,
     /// A declaration is checked by itself, on stand-ins.
     pub prototype: bool,
+    /// Only what goes where is asked for: laws that move nothing are left out.
+    pub draft: bool,
     /// While a rate is evaluated: the name its arguments get as parameters.
     pub rate_prefix: Option<String>,
     /// Calls of skills being written out, outermost first.
@@ -337,6 +339,7 @@ impl<'a> Elaborator<'a> {
             initial_mode: false,
             readings_live: false,
             prototype: false,
+            draft: false,
             rate_prefix: None,
             calls: Vec::new(),
             gone_through: BTreeSet::new(),

@@ -125,6 +125,10 @@ fn every_example_is_typed_and_cut_where_that_is_asked_for() {
     examples(&Path::new(env!("CARGO_MANIFEST_DIR")).join("examples"), &mut all);
     all.sort();
     let folder = folder("replay_all");
+    // What an example imports is whole.
+    for path in &all {
+        fs::copy(path, folder.join(path.file_name().unwrap())).unwrap();
+    }
     let mut cuts = 0;
     for path in all {
         let text = fs::read_to_string(&path).unwrap();
@@ -148,6 +152,7 @@ fn every_example_is_typed_and_cut_where_that_is_asked_for() {
                 }
             }
         }
+        fs::write(&copy, &text).unwrap();
         assert_eq!(editor.close(), Some(0), "{name}");
     }
     assert!(cuts > 10_000, "{cuts}");
