@@ -127,7 +127,8 @@ fn a_decision_on_a_device_that_is_not_bound_says_how_to_bind_it() {
         .replace("    plate =", "    scale = PrecisionBalance at (2, 0, 0) m\n    plate =")
         .replace("    wait until", "    let load = scale.weight\n    if load > 1 kg { wait 1 s }\n    wait until");
     let err = found("unasked", &text, "[plate]\nport = \"x\"");
-    assert!(err.contains("error[unobserved]") && err.contains("do not say where `scale` is"), "{err}");
+    let flat = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(err.contains("error[unobserved]") && flat.contains("do not say where `scale` is"), "{err}");
     assert!(err.contains("[scale]\n") && !err.contains("undriven"), "{err}");
 }
 

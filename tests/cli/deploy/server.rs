@@ -215,13 +215,14 @@ fn what_was_measured_of_labware_is_told_once_a_person_confirms_it() {
     assert!(nobody.err.contains("not confirmed: nothing was sent") && !dir.join("one").exists(), "{}", nobody.err);
     let ended = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
-    let journal = std::fs::read_to_string(dir.join("two")).expect("a journal");
+    let journal = std::fs::read_to_string(dir.join("two")).expect("a journal").replace('\\', "");
     let sent: Vec<&str> = journal.lines().filter(|l| l.contains("\"event\":\"out\"")).collect();
-    let told = sent.iter().position(|l| l.contains("/labware_offsets {")).expect("it is told");
-    let load = sent.iter().position(|l| l.contains("loadLabware") && l.contains("\\\"plate\\\"")).expect("it is loaded");
-    assert!(told < load && sent.iter().filter(|l| l.contains("/labware_offsets {")).count() == 1, "{journal}");
-    for said in ["opentrons/corning_96_wellplate_360ul_flat/", "\\\"x\\\":0.3,", "\\\"y\\\":0.0,", "\\\"z\\\":-0.2"] {
-        assert!(sent[told].contains(said), "{said}: {}", sent[told]);
+    let offsets: Vec<usize> = (0..sent.len()).filter(|i| sent[*i].contains("/labware_offsets {")).collect();
+    let load = sent.iter().position(|l| l.contains("loadLabware") && l.contains("\"labwareId\":\"plate\""));
+    let ([offset], Some(load)) = (offsets.as_slice(), load) else { panic!("{journal}") };
+    assert!(*offset < load, "{journal}");
+    for said in ["\"opentrons/corning_96_wellplate_360ul_flat/", "\"vector\":{\"x\":0.3,\"y\":0,\"z\":-0.2}"] {
+        assert!(sent[*offset].contains(said), "{said}: {}", sent[*offset]);
     }
     // A file that it runs by itself is not what was confirmed.
     let played = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
