@@ -20,6 +20,7 @@ use crate::loader::Loader;
 use crate::lower::Planner;
 use crate::lower::wires::Wires;
 use crate::meanings::{Around as Declared, Gathered, Noted};
+use crate::measured::{self, Measured};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
 use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
@@ -37,6 +38,8 @@ pub struct Options {
     pub lab: Option<String>,
     /// What is asked of drivers.
     pub wires: Wires,
+    /// What was measured of things of the lab.
+    pub measured: Measured,
 }
 
 /// A test, ready to run.
@@ -244,8 +247,11 @@ fn compile_and<T>(
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
 ) -> (Option<Made<T>>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
+    let (mut modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
+    if let Some(module) = modules.get_mut(root) {
+        diagnostics.extend(measured::put(&options.measured, module, sources));
+    }
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);

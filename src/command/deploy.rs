@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::path::Path;
 
+use matterix_hardware::calibration::{self, Calibrated};
 use matterix_hardware::deploy::{Exposed, Journal, Mode};
 use matterix_ir::Diagnostic;
 use matterix_ir::quantity::show_number;
@@ -10,7 +11,7 @@ use matterix_ir::quantity::show_number;
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
 use crate::keys::Keys;
-use crate::pipeline::{self, Choices, DeployPlan, Input, Options, Wires};
+use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::terminal::{Stream, print};
 use crate::{Exit, cancel, files};
@@ -34,7 +35,8 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         return Err("a dry run has nothing to go on with".to_string());
     }
     let mut findings = Findings::new(RunFormat::Human, color);
-    let options = Options { wires: Wires::Called, ..args.subject.options() };
+    let measured = measured(args, &bindings);
+    let options = Options { wires: Wires::Called, measured: measured.clone(), ..args.subject.options() };
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
@@ -58,11 +60,6 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         print(Stream::Err, &format!("the simulation passed in {} s of lab time\n", show_number(end)));
     }
     let file = sources.add(args.bind.display().to_string(), bindings.clone());
-    let journal = match (&args.journal, args.resume) {
-        (Some(path), true) => Some(Journal::reopen(path)?),
-        (Some(path), false) if args.mode != DeployMode::Dry => Some((Journal::create(path)?, Vec::new())),
-        _ => None,
-    };
     let mode = match args.mode {
         DeployMode::Dry => Mode::Dry,
         DeployMode::Shadow => Mode::Shadow,
@@ -71,6 +68,16 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let yes = args.yes || mode == Mode::Dry;
     let keys = RefCell::new((mode != Mode::Dry).then(Keys::listen).flatten());
     let person = |text: &str| confirmed(text, yes, keys.borrow_mut().as_mut());
+    if mode != Mode::Dry && !args.resume && !stands(&measured, &person) {
+        findings.end();
+        print(Stream::Err, "what was measured is not confirmed: nothing was sent\n");
+        return Ok(Exit::Findings);
+    }
+    let journal = match (&args.journal, args.resume) {
+        (Some(path), true) => Some(Journal::reopen(path)?),
+        (Some(path), false) if args.mode != DeployMode::Dry => Some((Journal::create(path)?, Vec::new())),
+        _ => None,
+    };
     let plan = DeployPlan {
         bindings: (file, &bindings),
         mode,
@@ -107,6 +114,21 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         print(Stream::Err, "the deployment was stopped by a person before it began\n");
     }
     Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
+}
+
+/// What the bindings say was measured of the lab.
+fn measured(args: &DeployArgs, bindings: &str) -> Measured {
+    let gauged = |c: Calibrated| Gauged { thing: c.thing, field: c.field, value: c.value };
+    let given = calibration::read(bindings).into_iter().map(gauged).collect();
+    Measured { name: args.bind.display().to_string(), text: bindings.to_owned(), given }
+}
+
+/// Whether a person says that it is still so.
+fn stands(measured: &Measured, person: &dyn Fn(&str) -> bool) -> bool {
+    let value = |g: &Gauged| measured.text.get(g.value.clone()).unwrap_or_default().to_owned();
+    let all: Vec<String> =
+        measured.given.iter().map(|g| format!("  {}.{}: {}\n", g.thing.0, g.field.0, value(g))).collect();
+    all.is_empty() || person(&format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()))
 }
 
 /// What is said where nothing more is done.

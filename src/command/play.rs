@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::binding;
 use matterix_hardware::deploy::Carrier;
 use matterix_hardware::link::{Overhear, Trouble};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
+use matterix_hardware::{binding, calibration};
 use matterix_ir::{Diagnostic, codes};
 
 use super::bill::show;
@@ -31,7 +31,8 @@ pub fn play(
         return Ok(Exit::Findings);
     };
     let file = sources.add(path.display().to_string(), text.clone());
-    let (bindings, found) = binding::read(&program, file, &text);
+    let (bindings, mut found) = binding::read(&program, file, &text);
+    found.extend(calibration::unconfirmed(file, &text));
     if !found.is_empty() {
         show(&sources, found, color);
         return Ok(Exit::Findings);

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
 use matterix_hardware::deploy::{
-    Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, digest, preflight,
+    Binding, Carrier, Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, digest, preflight,
 };
 use matterix_hardware::link::Trouble;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
@@ -66,6 +66,11 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
     if found.iter().any(Diagnostic::is_error) {
         return Ok(Deployed::not_begun(found));
+    }
+    if plan.mode == Mode::Shadow
+        && let Some(d) = unmeasured(program, &bindings)
+    {
+        return Ok(Deployed::not_begun(vec![d]));
     }
     let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
     let digest = digest(program, plan.bindings.1)?;
@@ -135,6 +140,27 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
     Ok(Deployed { diagnostics: found, passed, stopped, end: Some(execution.end_time), counts })
+}
+
+/// That a shadow has nothing to go by: no device that tells something has a tolerance.
+fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
+    let is_measured = bindings.iter().any(|b| !b.tolerances.is_empty());
+    let telling = bindings.iter().find_map(|b| match &b.carrier {
+        Carrier::Line { driver, .. } => program.drivers[*driver].told.first().map(|told| (b, told)),
+        _ => None,
+    });
+    let at = telling.map(|(b, _)| b).or(bindings.first()).filter(|_| !is_measured)?.at;
+    let d = Diagnostic::error(codes::BINDING, at, "nothing is compared with the twin", "no device has a `tolerance`");
+    Some(match telling {
+        Some((_, told)) => {
+            let member = told.name.rsplit('.').next().unwrap_or(&told.name);
+            d.help(format!(
+                "say how far from the twin it may be: `tolerance = {{ {member} = \"2 {}\" }}`",
+                told.difference.symbol
+            ))
+        }
+        None => d.help("no device of these tells anything: take another mode"),
+    })
 }
 
 /// Why a journal is of another deployment, or of one that has ended.

@@ -6,9 +6,9 @@
 use std::net::SocketAddr;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::binding;
 use matterix_hardware::deploy::{Device, Exposed, Hardware, Journal, Mode, Settings, digest};
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
+use matterix_hardware::{binding, calibration};
 use matterix_ir::offer::{Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
 use matterix_ir::{Diagnostic, FileId, Program, Sources};
@@ -55,7 +55,8 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         let shown = program.offers.shown.iter().collect();
         return attend(program, sources, &mut twin, offers, shown, service).map(|(found, _)| found);
     };
-    let (bindings, found) = binding::read(program, file, text);
+    let (bindings, mut found) = binding::read(program, file, text);
+    found.extend(calibration::unconfirmed(file, text));
     if found.iter().any(Diagnostic::is_error) {
         return Ok(found);
     }

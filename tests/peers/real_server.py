@@ -7,8 +7,8 @@ The server is not on PyPI. SOURCE is a checkout of https://github.com/Opentrons/
 python-multipart==0.0.6, pydantic==1.10.12, python-dotenv==1.0.1, sqlalchemy==1.4.51, wsproto==1.2.0, paho-mqtt==1.6.1 and aiohttp.
 
 Each workflow is deployed on a robot with its pipettes, and the server is asked what it did: every command has succeeded, and moves
-the volumes that the emitted form says. Then emitted protocols are uploaded and played, labware of one's own is given to it, a person
-stops a run, and another pipette hangs there.
+the volumes that the emitted form says. Then emitted protocols are uploaded and played, labware of one's own and what was measured
+of a plate are given to it, a person stops a run, and another pipette hangs there.
 """
 
 import collections
@@ -175,6 +175,27 @@ def own_labware(text):
     verdict("labware of one's own", ended.returncode == 0 and "flat_96" in loaded, ended.stderr[-1500:] if ended.returncode else "")
 
 
+def measured(text):
+    def stands(name, offsets):
+        folder = place(name, text)
+        with open(folder / "lab.toml", "a") as bindings:
+            bindings.write(offsets)
+        ended = ran(folder, *DEPLOY, "--yes")
+        done, _ = told(folder)
+        where = [c["result"]["position"] for c in done if c["commandType"] == "dispense"]
+        loaded = [c["result"].get("offsetId") for c in done if c["commandType"] == "loadLabware"]
+        return ended, where, sum(offset is not None for offset in loaded)
+
+    given = {"x": 0.3, "y": -0.4, "z": 0.2}
+    fields = ", ".join(f'offset_{axis} = "{mm} mm"' for axis, mm in given.items())
+    _, nominal, _ = stands("nominal", "")
+    ended, moved, offsets = stands("measured", f"[plate]\ncalibration = {{ {fields} }}\n")
+    apart = [abs(b[axis] - a[axis] - mm) for a, b in zip(nominal, moved) for axis, mm in given.items()]
+    good = ended.returncode == 0 and offsets == 1 and len(moved) == len(nominal) > 0 and max(apart) <= 1e-9
+    said = f"{len(moved)} of its wells are met {list(given.values())} mm from where they were"
+    verdict("a plate that was measured to stand elsewhere", good, said if good else f"{apart} {ended.stderr[-1500:]}")
+
+
 def stopped(text):
     folder = place("stopped", text.replace("    blow out", "    wait 5 min\n    blow out"))
     process = subprocess.Popen([COMMAND, *DEPLOY[:-1], "1"], cwd=folder, stderr=subprocess.PIPE, text=True)
@@ -207,6 +228,7 @@ FIRST = pathlib.Path(FILES[0]).read_text()
 with robot(pipettes(FIRST)):
     played(FIRST)
     own_labware(FIRST)
+    measured(FIRST)
     stopped(FIRST)
 with robot({"left": {"model": "p1000_single_v2.1", "id": "left"}}):
     another(FIRST)

@@ -201,6 +201,7 @@ impl Elaborator<'_> {
             (Bound::Footing, [Value::Instance(thing), Value::Instance(on)]) => self.footings(*thing, *on),
             (Bound::Measures, [Value::Instance(i), Value::Text(what)]) => self.measures(*i, what, at),
             (Bound::Placed, [Value::Instance(i), Value::Text(words)]) => self.placed(*i, words),
+            (Bound::Placed, [Value::Nothing, Value::Text(_)]) => Value::Nothing,
             (Bound::Soils, [Value::Instance(a), Value::Instance(b)]) => Value::Bool(self.soils(*a, *b)),
             (Bound::Stated, [Value::Material(id), Value::Text(what)]) => self.stated(*id, what),
             (Bound::Stated, [Value::Nothing, Value::Text(_)]) => Value::Unlimited,

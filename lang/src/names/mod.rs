@@ -293,8 +293,10 @@ impl<'a> Names<'a> {
                 candidates.iter().enumerate().find_map(|(i, c)| self.module_index(c).map(|m| (i, m)))
             else {
                 if path.segments[0].text == "std" {
-                    let near = near::nearest(&candidates[0], self.modules.iter().map(|m| &m.name));
-                    let headline = format!("there is no module `{}`", candidates[0]);
+                    // `std` alone is no module: of `use std::NAME` the module is all of it.
+                    let wanted = candidates.iter().find(|c| c.contains("::")).unwrap_or(&candidates[0]);
+                    let near = near::nearest(wanted, self.modules.iter().map(|m| &m.name));
+                    let headline = format!("there is no module `{wanted}`");
                     let mut d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
                     d.help.extend(near::question(&near));
                     diagnostics.push(d);

@@ -11,10 +11,11 @@ use matterix_ir::{Diagnostic, FileId, Program, Span, codes};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::calibration::CALIBRATION;
 use crate::deploy::{Binding, Carrier};
 use crate::place::Place;
 
-const KEYS: [&str; 8] = ["port", "address", "http", "sila", "driver", "unit", "by", "tolerance"];
+const KEYS: [&str; 9] = ["port", "address", "http", "sila", "driver", "unit", "by", "tolerance", CALIBRATION];
 const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
@@ -95,6 +96,13 @@ impl Reader<'_> {
             self.wrong(k.span(), &format!("a binding has no `{}`", k.get_ref()), "not a known key", Some(help));
         }
         let before = self.found.len();
+        if let Some((_, value)) = table.iter().find(|(k, _)| k.get_ref() == CALIBRATION) {
+            self.calibration(value);
+            // What stands on a device's deck is told over its line.
+            if table.len() == 1 {
+                return None;
+            }
+        }
         let mut said = self.said(table);
         if let Some((by, at)) = said.by.take() {
             let binding = Binding {
@@ -271,6 +279,18 @@ impl Reader<'_> {
             }
         }
         all
+    }
+
+    /// `calibration = { offset_x = "0.1 mm" }`; what the values mean is seen when the program is compiled with them.
+    fn calibration(&mut self, value: &Spanned<DeValue<'_>>) {
+        let help = || Some("write `calibration = { offset_x = \"0.1 mm\" }`".to_owned());
+        let DeValue::Table(all) = value.get_ref() else {
+            self.wrong(value.span(), "a calibration is a table", "no table", help());
+            return;
+        };
+        for (_, value) in all.iter().filter(|(_, v)| !matches!(v.get_ref(), DeValue::String(_))) {
+            self.wrong(value.span(), "what was measured is a text with its unit", "no text", help());
+        }
     }
 
     /// `tolerance = { temperature = "5 K" }`.

@@ -4,6 +4,7 @@
 #![allow(clippy::result_large_err)]
 
 pub mod binding;
+pub mod calibration;
 pub mod codec;
 pub mod deploy;
 pub mod emulate;

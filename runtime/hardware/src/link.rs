@@ -155,7 +155,8 @@ impl Link {
         let mut hurried = false;
         loop {
             if let Some(reply) = self.codec.take_reply(&mut self.buffer) {
-                return reply.map_err(|g| Trouble::Garbled(format!("to `{}` it answered what {}", shown(to), g.why)));
+                return reply
+                    .map_err(|g| Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why)));
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;

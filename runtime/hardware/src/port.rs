@@ -114,7 +114,7 @@ impl Port for Tcp {
 fn some(mut read: impl FnMut(&mut [u8]) -> io::Result<usize>) -> io::Result<Vec<u8>> {
     let mut buffer = [0; 1024];
     match read(&mut buffer) {
-        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the line was closed")),
+        Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "it was closed from there")),
         Ok(n) => Ok(buffer[..n].to_vec()),
         Err(e) if matches!(e.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
             Ok(Vec::new())

@@ -49,6 +49,9 @@ fn what_is_wrong_with_bindings_is_said_where_it_stands() {
         ("[plate]\naddress = \"tcp://127.0.0.1:1\"", "`tcp://` is not spoken here"),
         ("[plate]\nport = \"\"", "a serial port has a path"),
         ("[plate]\nport = \"tcp://127.0.0.1:1\"", "begins none"),
+        ("[plate]\nport = \"x\"\ncalibration = 3", "a calibration is a table"),
+        ("[plate]\nport = \"x\"\ncalibration = { gain = 3 }", "a text with its unit"),
+        ("[ghost]\ncalibration = { gain = \"3 W/K\" }", "declares `ghost`"),
     ];
     for (index, (bindings, wanted)) in cases.iter().enumerate() {
         let err = found(&format!("binding_{index}"), HEAT, bindings);
@@ -93,6 +96,40 @@ fn what_is_said_of_some_devices_only_is_known_before() {
         let ended = dry(name, condition);
         assert!(!ended.err.contains("driver-line") && ended.err.contains("undriven"), "{}", ended.err);
     }
+}
+
+#[test]
+fn what_was_measured_is_judged_where_it_stands() {
+    for (name, given, code) in [
+        ("measured_unit", "{ gain = \"3 s\" }", "error[unit-mismatch]"),
+        ("measured_field", "{ gian = \"3 W/K\" }", "error[unknown-field]"),
+        ("measured_range", "{ gain = \"-3 W/K\" }", "error[out-of-range]"),
+    ] {
+        let err = found(name, HEAT, &format!("[plate]\nport = \"x\"\ncalibration = {given}"));
+        assert!(err.contains(code) && err.contains("lab.toml:3:"), "{name}: {err}");
+    }
+}
+
+#[test]
+fn a_shadow_needs_something_to_go_by() {
+    let dir = bench("shadow_of_nothing", HEAT, "plate", "");
+    write(&dir, "lab.toml", "[plate]\nport = \"x\"");
+    let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "shadow", "--journal", "j.jsonl"];
+    let ended = matterixc_in(&dir, &args);
+    assert!(ended.code == 1 && ended.err.contains("nothing is compared with the twin"), "{}", ended.err);
+    assert!(ended.err.contains("lab.toml:2:8") && !dir.join("j.jsonl").exists(), "{}", ended.err);
+}
+
+#[test]
+fn a_decision_on_a_device_that_is_not_bound_says_how_to_bind_it() {
+    let text = HEAT
+        .replace("use std::heating", "use std::balances::PrecisionBalance\nuse std::heating")
+        .replace("    plate =", "    scale = PrecisionBalance at (2, 0, 0) m\n    plate =")
+        .replace("    wait until", "    let load = scale.weight\n    if load > 1 kg { wait 1 s }\n    wait until");
+    let err = found("unasked", &text, "[plate]\nport = \"x\"");
+    let flat = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(err.contains("error[unobserved]") && flat.contains("do not say where `scale` is"), "{err}");
+    assert!(err.contains("[scale]\n") && !err.contains("undriven"), "{err}");
 }
 
 #[test]

@@ -204,6 +204,32 @@ fn labware_of_ones_own_is_given_to_the_robot_first() {
 }
 
 #[test]
+fn what_was_measured_of_labware_is_told_once_a_person_confirms_it() {
+    let dir = bench("measured", "");
+    let emulated = Emulated::start(&dir, &["ot2", "--file", "lab.mtx"]);
+    let measured = "[plate]\ncalibration = { offset_x = \"0.3 mm\", offset_z = \"-0.2 mm\" }\n";
+    write(&dir, "lab.toml", format!("[ot2]\nhttp = \"{}\"\n{measured}", emulated.address));
+    let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--speed", super::SPEED, "--journal"];
+    let nobody = matterixc_in(&dir, &[&given[..], &["one"]].concat());
+    assert!(nobody.code == 1 && nobody.err.contains("plate.offset_x: 0.3 mm"), "{}", nobody.err);
+    assert!(nobody.err.contains("not confirmed: nothing was sent") && !dir.join("one").exists(), "{}", nobody.err);
+    let ended = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let journal = std::fs::read_to_string(dir.join("two")).expect("a journal").replace('\\', "");
+    let sent: Vec<&str> = journal.lines().filter(|l| l.contains("\"event\":\"out\"")).collect();
+    let offsets: Vec<usize> = (0..sent.len()).filter(|i| sent[*i].contains("/labware_offsets {")).collect();
+    let load = sent.iter().position(|l| l.contains("loadLabware") && l.contains("\"labwareId\":\"plate\""));
+    let ([offset], Some(load)) = (offsets.as_slice(), load) else { panic!("{journal}") };
+    assert!(*offset < load, "{journal}");
+    for said in ["\"opentrons/corning_96_wellplate_360ul_flat/", "\"vector\":{\"x\":0.3,\"y\":0,\"z\":-0.2}"] {
+        assert!(sent[*offset].contains(said), "{said}: {}", sent[*offset]);
+    }
+    // A file that it runs by itself is not what was confirmed.
+    let played = matterixc_in(&dir, &["emit", "lab.mtx", "--target", "opentrons-json", "--play", "lab.toml"]);
+    assert!(played.code == 1 && played.err.contains("nobody is asked here"), "{}", played.err);
+}
+
+#[test]
 fn what_a_robot_cannot_do_its_emulator_refuses() {
     // The file of the emulated lab has no liquid.
     let dir = bench("empty", "");

@@ -247,7 +247,7 @@ fn line(buffer: &mut Vec<u8>) -> Option<Result<String, Garbled>> {
     };
     let bytes: Vec<u8> = buffer.drain(..=at).collect();
     let text = String::from_utf8(bytes).map(|t| t.trim_end().to_owned());
-    Some(text.map_err(|_| Garbled::new("an answer that is no text in UTF-8")))
+    Some(text.map_err(|_| Garbled::new("it is no text in UTF-8")))
 }
 
 /// Status and body of an answer.

@@ -2,45 +2,60 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::plan::{Operation, Plan, Step, StepId};
+use matterix_ir::codes::Code;
+use matterix_ir::plan::{Operation, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
 
 use super::device::{Carrier, Device};
 use super::observe::Observed;
-use super::unbound::{key, lines};
+use super::unbound::{key, lines, teller};
 
 /// Findings about a plan on these devices.
 pub fn preflight(program: &Program, devices: &[Device<'_>], observed: &Observed) -> Vec<Diagnostic> {
     let mut found = Vec::new();
-    let mut unbound: BTreeMap<InstanceId, Vec<StepId>> = BTreeMap::new();
+    let mut untold: BTreeMap<InstanceId, Vec<(Span, &str)>> = BTreeMap::new();
+    let mut unasked: BTreeMap<InstanceId, Vec<(Span, &str)>> = BTreeMap::new();
     for (id, step) in reachable(&program.plan) {
         let node = program.plan.get(id);
-        match step {
-            Step::Operation(operation) if carrier(id, operation, devices).is_none() => {
-                if let Some(key) = key(program, devices, id, operation) {
-                    unbound.entry(key).or_default().push(id);
-                    continue;
-                }
-                found.push(undriven(program, node.span, &node.label, operation, devices));
+        if let Step::Operation(operation) = step
+            && carrier(id, operation, devices).is_none()
+        {
+            match key(program, devices, id, operation) {
+                Some(key) => untold.entry(key).or_default().push((node.span, &node.label)),
+                None => found.push(undriven(program, node.span, &node.label, operation, devices)),
             }
-            Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } | Step::Keep { condition, .. } => {
-                found.extend(unobserved(program, observed, condition.node, condition.span, &condition.text));
+        }
+        for (value, span, text) in judged(node) {
+            let (told, supposed) = observed.asks(&program.model, value);
+            match teller(program, devices, value) {
+                _ if !supposed => {}
+                Some(key) => unasked.entry(key).or_default().push((span, text)),
+                None => found.push(unobserved(!told.is_empty(), span, text)),
             }
-            Step::If { condition, .. } | Step::RepeatWhile { condition, .. } => {
-                found.extend(unobserved(program, observed, condition.node, condition.span, &condition.text));
-            }
-            Step::During { invariants, .. } => {
-                found.extend(invariants.iter().filter_map(|c| unobserved(program, observed, c.node, c.span, &c.text)))
-            }
-            Step::Let { value, .. } => found.extend(unobserved(program, observed, *value, node.span, &node.label)),
-            _ => {}
         }
     }
-    found.extend(unbound.into_iter().map(|(key, steps)| not_bound(program, key, &steps)));
+    // A device that is told nothing is not asked either.
+    unasked.retain(|key, _| !untold.contains_key(key));
+    found.extend(untold.into_iter().map(|(key, places)| not_bound(program, key, places, codes::UNDRIVEN)));
+    found.extend(unasked.into_iter().map(|(key, places)| not_bound(program, key, places, codes::UNOBSERVED)));
     let mut seen = BTreeSet::new();
     found.retain(|d| seen.insert((d.code.name, d.span(), d.headline.clone())));
     found
+}
+
+/// What a step is decided by: nodes, with their places and texts.
+fn judged(node: &PlanStep) -> Vec<(NodeId, Span, &str)> {
+    match &node.step {
+        Step::WaitUntil { condition, .. }
+        | Step::Hold { condition, .. }
+        | Step::Keep { condition, .. }
+        | Step::If { condition, .. }
+        | Step::RepeatWhile { condition, .. } => vec![(condition.node, condition.span, &condition.text)],
+        Step::During { invariants, .. } => invariants.iter().map(|c| (c.node, c.span, &*c.text)).collect(),
+        Step::Let { value, .. } => vec![(*value, node.span, &node.label)],
+        _ => Vec::new(),
+    }
 }
 
 /// The device that carries out an operation.
@@ -69,20 +84,23 @@ fn reachable(plan: &Plan) -> Vec<(StepId, &Step)> {
     out
 }
 
-/// A device that the workflow uses and the bindings do not have, at the first step that needs it.
-fn not_bound(program: &Program, key: InstanceId, steps: &[StepId]) -> Diagnostic {
+/// A device that the workflow uses and the bindings do not have, at the first place that needs it.
+fn not_bound(program: &Program, key: InstanceId, mut at: Vec<(Span, &str)>, code: Code) -> Diagnostic {
     let name = &program.scene.get(key).name;
-    let mut at: Vec<(Span, &str)> = steps.iter().map(|id| program.plan.get(*id)).map(|n| (n.span, &*n.label)).collect();
     at.sort();
     at.dedup_by_key(|(span, _)| *span);
-    let (span, label) = at.first().copied().unwrap_or_default();
-    let headline = format!("nothing carries out `{label}`: the bindings do not say where `{name}` is");
-    let told = match at.len() {
-        0 | 1 => "nobody is told".to_owned(),
-        2 => "nobody is told this, nor at another place".to_owned(),
-        n => format!("nobody is told this, nor at {} other places", n - 1),
+    let (span, text) = at.first().copied().unwrap_or_default();
+    let (what, who) = match code == codes::UNDRIVEN {
+        true => (format!("nothing carries out `{text}`"), "nobody is told"),
+        false => (format!("no device tells what `{text}` depends on"), "nobody is asked"),
     };
-    Diagnostic::error(codes::UNDRIVEN, span, headline, told).help(lines(program, key))
+    let label = match at.len() {
+        0 | 1 => who.to_owned(),
+        2 => format!("{who} this, nor at another place"),
+        n => format!("{who} this, nor at {} other places", n - 1),
+    };
+    let headline = format!("{what}: the bindings do not say where `{name}` is");
+    Diagnostic::error(code, span, headline, label).help(lines(program, key))
 }
 
 fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, devices: &[Device<'_>]) -> Diagnostic {
@@ -102,15 +120,11 @@ fn undriven(program: &Program, span: Span, label: &str, operation: &Operation, d
     d.help("add a line to its driver, or let a person do it: `by = \"hand\"` in the bindings")
 }
 
-fn unobserved(program: &Program, observed: &Observed, node: NodeId, span: Span, text: &str) -> Option<Diagnostic> {
-    let (told, supposed) = observed.asks(&program.model, node);
-    if !supposed {
-        return None;
-    }
+fn unobserved(is_partly_told: bool, span: Span, text: &str) -> Diagnostic {
     let headline = format!("no device tells what `{text}` depends on");
     let mut d = Diagnostic::error(codes::UNOBSERVED, span, headline, "only the model knows it");
-    if !told.is_empty() {
+    if is_partly_told {
         d = d.help("a part of it is told, but not all");
     }
-    Some(d.help("wait for something that a device tells (a `reading` line of its driver), or for a time"))
+    d.help("wait for something that a device tells (a `reading` line of its driver), or for a time")
 }

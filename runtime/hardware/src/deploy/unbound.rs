@@ -1,9 +1,11 @@
 //! Devices that bindings leave out, and what to write for them.
 
-use matterix_ir::Program;
+use std::collections::BTreeSet;
+
 use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{Driver, Transport};
+use matterix_ir::{NodeId, Program};
 
 use super::device::Device;
 
@@ -15,12 +17,32 @@ pub(super) fn key(
     step: StepId,
     operation: &Operation,
 ) -> Option<InstanceId> {
-    let line_of = |d: &Driver| d.host.as_ref().map_or(d.instance, |h| h.instance);
     let callers = program.drivers.iter().filter(|d| d.call(step).is_some()).map(line_of).min();
     let own = || program.drivers.iter().filter(|d| Some(d.instance) == operation.device).map(line_of).min();
     let key = callers.or_else(own).or(operation.device)?;
-    let is_bound = |id| devices.iter().any(|d| d.binding.instance == id);
+    let is_bound = |id| is_bound(devices, id);
     (!is_bound(key) && !operation.device.is_some_and(is_bound)).then_some(key)
+}
+
+/// The instance that bindings would have to name for a part of a node to be told; none where they have all that tell something.
+pub(super) fn teller(program: &Program, devices: &[Device<'_>], node: NodeId) -> Option<InstanceId> {
+    let (mut below, mut open) = (BTreeSet::new(), vec![node]);
+    while let Some(node) = open.pop() {
+        if below.insert(node) {
+            open.extend(program.model.graph.op(node).operands());
+        }
+    }
+    let tells = |d: &&Driver| d.told.iter().any(|told| below.contains(&told.value));
+    program.drivers.iter().filter(tells).map(line_of).filter(|id| !is_bound(devices, *id)).min()
+}
+
+/// The instance whose line a driver speaks over.
+fn line_of(driver: &Driver) -> InstanceId {
+    driver.host.as_ref().map_or(driver.instance, |host| host.instance)
+}
+
+fn is_bound(devices: &[Device<'_>], id: InstanceId) -> bool {
+    devices.iter().any(|d| d.binding.instance == id)
 }
 
 /// What to write for it.
