@@ -52,6 +52,20 @@ impl Names<'_> {
     }
 }
 
+impl Names<'_> {
+    /// The correction of an import whose name only another module declares, where it imports nothing else.
+    pub(super) fn from_elsewhere(&self, d: Diagnostic, path: &Path, list: Option<&[Name]>, name: &str) -> Diagnostic {
+        let mut all = self.declaring(name).map(|(module, _)| &module.name).filter(|module| !module.is_empty());
+        let (Some(from), None) = (all.next(), all.next()) else { return d };
+        let text = match list {
+            None => format!("{from}::{name}"),
+            Some([_]) => from.clone(),
+            Some(_) => return d,
+        };
+        d.fix(format!("import it from `{from}`"), path.span, text)
+    }
+}
+
 /// The last name that a file imports in braces from a module.
 fn listed<'m>(reader: &'m Module, from: &str) -> Option<&'m Name> {
     let is = |path: &Path| path.segments.iter().map(|s| s.text.as_str()).eq(from.split("::"));

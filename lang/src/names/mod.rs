@@ -318,7 +318,10 @@ impl<'a> Names<'a> {
                     Some(&id) => {
                         scope.insert(name.text.as_str().into(), id);
                     }
-                    None => diagnostics.push(self.not_in_module(name, from)),
+                    None => {
+                        let d = self.not_in_module(name, from);
+                        diagnostics.push(self.from_elsewhere(d, path, names.as_deref(), &name.text));
+                    }
                 }
             }
         }
