@@ -108,8 +108,8 @@ fn what_follows_from_one_mistake_is_not_said() {
         (
             "result",
             "wait 5 min",
-            "let got <- pour 10 g from cup into beaker by arm\n    expect got > 1 g",
-            "there is no `cup` here",
+            "let got <- wriggle beaker\n    expect got > 1 g",
+            "no skill or command is called `wriggle`",
         ),
     ] {
         let (found, _, _) = finding(&format!("one_{slip}"), &heated.replacen(from, to, 1));
