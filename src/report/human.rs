@@ -22,7 +22,7 @@ pub(super) fn render(diagnostic: &Diagnostic, texts: &mut Texts<'_>, look: Look,
     // A correction that the help has named is for editors only.
     let named = |fix: &&matterix_ir::Fix| {
         let quoted: Vec<String> = fix.edits.iter().map(|e| format!("`{}`", e.text)).collect();
-        diagnostic.help.iter().any(|h| quoted.iter().all(|q| h.contains(q.as_str())))
+        diagnostic.help.iter().any(|h| h.ends_with(&fix.title) || quoted.iter().all(|q| h.contains(q.as_str())))
     };
     let fixes: Vec<String> = diagnostic.fixes.iter().filter(|f| !named(f)).map(|f| instruction(f, texts)).collect();
     for (i, line) in diagnostic.help.iter().chain(&fixes).enumerate() {

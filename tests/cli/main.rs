@@ -27,6 +27,7 @@ mod meant;
 mod mend;
 mod meshes;
 mod motion;
+mod mutants;
 mod new;
 mod offers;
 mod overlap;

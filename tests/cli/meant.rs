@@ -42,6 +42,81 @@ fn words_that_start_steps_are_meant_too() {
     }
 }
 
+/// The text with one slip in it, and with the first correction of its only finding; whether that leaves no doubt.
+#[track_caller]
+fn mended(name: &str, text: &str) -> (String, bool) {
+    let dir = folder(&format!("meant_{name}"));
+    write(&dir, "bench.mtx", text);
+    let lines = matterixc_in(&dir, &["check", "bench.mtx", "--format", "json"]).out_lines();
+    assert_eq!(lines.len(), 1, "{name}: {lines:#?}");
+    let fix = &lines[0]["fixes"][0];
+    let byte =
+        |end: &str| fix["edits"][0]["span"][end]["byte"].as_u64().unwrap_or_else(|| panic!("{name}: {lines:#?}"));
+    let mut text = text.to_string();
+    let edit = fix["edits"][0]["text"].as_str().unwrap_or_default();
+    text.replace_range(byte("start") as usize..byte("end") as usize, edit);
+    matterixc_in(&dir, &["check", "bench.mtx", "--fix"]);
+    let sure = std::fs::read_to_string(dir.join("bench.mtx")).expect("the file") == text;
+    (text, sure)
+}
+
+#[test]
+fn lines_are_mended_to_what_was_meant() {
+    let bench = BENCH.replace("IkaRetControl\n\n", "IkaRctBasic\nuse std::heating::IkaRetControl\n\n");
+    let bench = bench.replace("wait 5 s", "heat plate to 60 degC\n    wait 5 s");
+    for (slip, right, wrong, sure) in [
+        ("equals", "beaker = Beaker250mL", "beaker Beaker250mL", true),
+        ("colon", "beaker = Beaker250mL", "beaker: Beaker250mL", true),
+        ("of", "100 g of water", "100 g water", true),
+        ("bracket", "(300, 0) mm", "(300, 0 mm", false),
+        ("phrase", "(0, 0, 0) m\n", "(0, 0, 0 m\n", false),
+        ("degrees", "heat plate to 60 degC", "heat plate to 60 deg C", true),
+        ("case", "heat plate to 60 degC", "heat plate to 60 degc", false),
+        ("charge", "heat plate to 60 degC", "heat plate to 60 C", false),
+        ("label", "heat plate to 60 degC", "heat plate 60 degC", false),
+        ("verb", "heat plate to 60 degC", "set plate to 60 degC", false),
+        ("capital", "wait 5 s", "Wait 5 s", false),
+        ("slip", "wait 5 s", "wate 5 s", false),
+        ("use", "\nuse std::heating::IkaRetControl", "", true),
+    ] {
+        let (found, was_sure) = mended(slip, &bench.replacen(right, wrong, 1));
+        assert_eq!((found.as_str(), was_sure), (bench.as_str(), sure), "{slip}");
+    }
+    let (found, sure) = mended("elsewhere", &bench.replace("heating::IkaRct", "glassware::IkaRct"));
+    assert_eq!((found.as_str(), sure), (bench.as_str(), true));
+    let listed = bench.replace("IkaRctBasic\nuse std::heating::IkaRetControl", "{IkaRctBasic, IkaRetControl}");
+    let (found, sure) = mended("listed", &listed.replacen(", IkaRetControl}", "}", 1));
+    assert_eq!((found.as_str(), sure), (listed.as_str(), true));
+}
+
+#[test]
+fn what_follows_from_one_mistake_is_not_said() {
+    let heated = BENCH
+        .replace("wait 5 s", "heat plate to 60 degC\n    wait 5 min\n    expect beaker.contents.temperature > 30 degC");
+    for (slip, from, to, headline) in [
+        ("call", "wait 5 min", "time.sleep(10)", "a step starts with a verb"),
+        ("bracket", "(0, 0, 0) m", "(0, 0, 0 m holding 60 g of water", "`(` is not closed"),
+        ("range", "> 30 degC", "in 20 . 30 degC", "a range is written with `..`"),
+        ("nameless", "    table", "    Beaker250mL at (1, 1, 0) m\n    table", "this `Beaker250mL` has no name"),
+        (
+            "step",
+            "    table",
+            "    transfer 100 uL from a to b\n    table",
+            "a step stands in a workflow, not in a lab",
+        ),
+        ("brace", "wait 5 min", "note \"now x :.1}\"", "`}` in a text stands for a value"),
+        (
+            "result",
+            "wait 5 min",
+            "let got <- wriggle beaker\n    expect got > 1 g",
+            "no skill or command is called `wriggle`",
+        ),
+    ] {
+        let (found, _, _) = finding(&format!("one_{slip}"), &heated.replacen(from, to, 1));
+        assert_eq!(found, headline, "{slip}");
+    }
+}
+
 #[test]
 fn units_are_known_by_their_names() {
     for (said, meant) in [

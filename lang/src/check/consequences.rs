@@ -48,6 +48,25 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
     if !syntax(d) && others().any(|(e, q)| syntax(e) && q.file == p.file && q.line == p.line) {
         return true;
     }
+    // What a step that could not be read would have done, and what a lab's line would have put there, nobody knows.
+    let followed = matches!(
+        d.code.family,
+        "X0" | "K3" | "P1" | "V1" | "V2" | "V3" | "V4" | "D2" | "T1" | "T2" | "T3" | "F1" | "F4" | "C1"
+    );
+    let of_lab = |q: &Place| sources.get(q.file).and_then(|s| s.text.lines().nth(q.block.0.saturating_sub(1)));
+    let of_lab = |q: &Place| of_lab(q).is_some_and(|line| line.starts_with("lab "));
+    if followed && others().any(|(e, q)| syntax(e) && q.file == p.file && (q.block == p.block || of_lab(q))) {
+        return true;
+    }
+    // A thing of a lab whose line could not be read has nothing.
+    if [codes::UNKNOWN_MEMBER, codes::TYPE_MISMATCH, codes::WRONG_DEVICE, codes::WRONG_KIND].contains(&d.code) {
+        let used = words(line_text(sources, p));
+        let declared = |q: &Place| line_text(sources, q).split([' ', ':', '=']).find(|word| !word.is_empty());
+        let broken = |q: &Place| q.file == p.file && q.block != p.block && of_lab(q);
+        if others().any(|(e, q)| syntax(e) && broken(q) && declared(q).is_some_and(|name| used.contains(name))) {
+            return true;
+        }
+    }
     // What a broken or misspelt line would have said is missing elsewhere in its declaration.
     if d.code == codes::MISSING_FIELD || d.code == codes::MISSING_PROPERTY {
         let broken = |e: &Diagnostic| syntax(e) || e.code == codes::UNKNOWN_FIELD;

@@ -116,7 +116,16 @@ impl Elaborator<'_> {
                 format!("`{what}` expects {expected}, found {found}"),
                 format!("this is {found}"),
             );
-            if n.dimension.is_one() && n.literal {
+            let written = n.unit.as_ref().filter(|_| n.literal).map_or("", |unit| unit.symbol.as_str());
+            let meant = match written {
+                "" => Vec::new(),
+                written => self.tables.units.short_for(written, dimension, *point),
+            };
+            if let [meant] = meant.as_slice() {
+                let start = span.end.saturating_sub(written.len() as u32).max(span.start);
+                d = d.help(format!("did you mean `{meant}`?"));
+                d = d.guess(format!("replace with `{meant}`"), Span { start, ..span }, *meant);
+            } else if n.dimension.is_one() && n.literal {
                 d = d.help(format!("give the number a unit, such as `{}`", self.tables.units.symbol(dimension)));
             } else if let Some(hint) = self.tables.units.hint(&n.dimension, dimension) {
                 d = d.help(hint);

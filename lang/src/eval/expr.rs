@@ -27,7 +27,13 @@ impl<'a> Elaborator<'a> {
             ExprKind::Text(t) => Value::Text(t.clone()),
             ExprKind::Name(n) => self.name_of(n, scope),
             ExprKind::Scoped(path) => match path.segments.last() {
-                Some(n) => self.name_of(n, scope),
+                Some(n) => match self.tables.names.scoped(scope.module, path) {
+                    Some(wrong) if scope.var(&n.text).is_none() => {
+                        self.report(wrong);
+                        Value::Error
+                    }
+                    _ => self.name_of(n, scope),
+                },
                 None => Value::Error,
             },
             ExprKind::Member(base, name) => {
@@ -329,11 +335,13 @@ impl<'a> Elaborator<'a> {
         if is_unit {
             d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
         }
+        if let Some(import) = names.import_of(scope.module, &n.text, is_value).filter(|_| !is_unit) {
+            self.report(import.offered(d));
+            return Value::Error;
+        }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
             d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
-        } else if let Some(module) = names.declared_in(&n.text).filter(|m| !m.is_empty()) {
-            d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", n.text));
         }
         self.report(d);
         Value::Error

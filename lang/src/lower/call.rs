@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use matterix_ir::plan::{Argument, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{Planner, ResultSlot};
@@ -101,26 +102,44 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn unknown_verb(&mut self, call: &'a Call, scope: &Scope) {
+        if self.label_missing(call, scope) {
+            return;
+        }
         let names = self.lab.tables.names;
-        let mut all: Vec<String> = names
-            .visible(scope.module)
-            .filter(|(_, id)| matches!(names.decl(*id).item.kind, ItemKind::Skill { .. }))
-            .map(|(n, _)| n.to_string())
-            .collect();
+        let device = self.device_named(call, scope);
+        // With a device after it, a skill is meant only if it has these labels.
+        let is_meant = |id: DeclId| match &names.decl(id).item.kind {
+            ItemKind::Skill { sig, .. } => {
+                device.is_none() || call.labelled.iter().all(|(label, _)| has_label(sig, label))
+            }
+            _ => false,
+        };
+        let skills = names.visible(scope.module).filter(|(_, id)| is_meant(*id));
+        let mut all: Vec<String> = skills.map(|(n, _)| n.to_string()).collect();
+        // What this device can be told with these very labels.
+        let mut able: Vec<String> = Vec::new();
         for kind in self.lab.tables.kinds.values() {
             for m in &kind.members {
-                if let MemberKind::Command { sig, .. } = &m.member.kind {
+                let MemberKind::Command { sig, .. } = &m.member.kind else { continue };
+                let fits = device.is_none_or(|id| !sig.params.is_empty() || self.lab.instance_is(id, m.owner));
+                if fits {
                     all.push(verb_text(&sig.verb));
+                }
+                if fits && device.is_some() && sig.params.is_empty() && misfit(sig, call, false) == 0 {
+                    able.push(verb_text(&sig.verb));
                 }
             }
         }
+        able.sort();
+        able.dedup();
         let words = if call.object.is_none() && call.words.len() > 1 {
             &call.words[..call.words.len() - 1]
         } else {
             &call.words[..]
         };
         let text = verb_text(words);
-        all.extend(self.step_words(&text, call));
+        let steps = self.step_words(&text, call);
+        all.extend(steps.iter().cloned());
         let span = words.first().map_or(call.span, |w| w.span.to(words[words.len() - 1].span));
         let mut d = Diagnostic::error(
             codes::UNKNOWN_VERB,
@@ -128,15 +147,63 @@ impl<'a> Planner<'a, '_> {
             format!("no skill or command is called `{text}`"),
             "not a known verb",
         );
-        let near = near::nearest(&text, &all);
+        if let Some(import) = names.import_of(scope.module, &text, |k| matches!(k, ItemKind::Skill { .. })) {
+            self.lab.report(import.offered(d));
+            return;
+        }
+        let mut near = near::nearest(&text, &all);
+        // With a word of the language the step can be read as it stands.
+        near.sort_by_key(|word| !steps.contains(word));
+        if near.is_empty() && !call.labelled.is_empty() && able.len() <= 3 {
+            near = able;
+        }
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
             d = d.guess(format!("replace with `{best}`"), span, best.clone());
         }
-        if let Some(module) = names.declared_in(&text).filter(|m| !m.is_empty()) {
-            d.help.push(format!("it is declared in `{module}`: add `use {module}::{text}`"));
-        }
         self.lab.report(d);
+    }
+
+    /// The device that stands after a verb which is not known.
+    fn device_named(&self, call: &Call, scope: &Scope) -> Option<InstanceId> {
+        let name = call.words.last().filter(|_| call.words.len() > 1 && call.object.is_none())?;
+        match scope.var(&name.text).cloned().or_else(|| self.lab.of_lab(&name.text, scope))? {
+            Value::Instance(id) | Value::Qualified(id, _) => Some(id),
+            _ => None,
+        }
+    }
+
+    /// `heat plate 60 degC`: the verb is known with the word after it, and what follows has no label.
+    fn label_missing(&mut self, call: &Call, scope: &Scope) -> bool {
+        let (Some(object), Some(count)) = (&call.object, call.words.len().checked_sub(1).filter(|n| *n > 0)) else {
+            return false;
+        };
+        let text = verb_text(&call.words[..count]);
+        let mut missing: Vec<String> = Vec::new();
+        for verb in self.verbs(&text, scope.module) {
+            let sig = match &verb {
+                Verb::Skill(id) => match &self.lab.tables.names.decl(*id).item.kind {
+                    ItemKind::Skill { sig, .. } => sig,
+                    _ => continue,
+                },
+                Verb::Command(_, m) => match &m.member.kind {
+                    MemberKind::Command { sig, .. } => sig,
+                    _ => continue,
+                },
+            };
+            let given = |label: &Name| call.labelled.iter().any(|(l, _)| l.text == label.text);
+            missing.extend(sig.labelled.iter().map(|(l, _)| l).find(|l| !given(l)).map(|l| l.text.clone()));
+        }
+        missing.sort();
+        missing.dedup();
+        let Some(first) = missing.first().cloned() else { return false };
+        let value = self.text(object.span);
+        let words: Vec<String> = missing.iter().map(|label| format!("`{label}`")).collect();
+        let at = Span { end: object.span.start, ..object.span };
+        let headline = format!("{} is missing before `{value}`", words.join(" or "));
+        let d = Diagnostic::error(codes::WRONG_ARGUMENTS, object.span, headline, "what is this to be?");
+        self.lab.report(d.guess(format!("add `{first}`"), at, format!("{first} ")));
+        true
     }
 
     /// Words of the language near to an unknown verb with which the step can be read.
@@ -633,6 +700,10 @@ impl<'a> Planner<'a, '_> {
             })
             .collect()
     }
+}
+
+fn has_label(sig: &Sig, label: &Name) -> bool {
+    sig.labelled.iter().any(|(own, _)| own.text == label.text)
 }
 
 /// How badly a call's labels fit a signature; `by` may name the device.

@@ -19,7 +19,12 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Call(call) => return self.call(call, s.span, scope).map(|c| c.0),
             StmtKind::Let { name, ty, value } => return self.bind(name, ty.as_ref(), value, s.span, scope),
             StmtKind::LetDo { name, call } => {
-                let (step, value) = self.call(call, s.span, scope)?;
+                let Some((step, value)) = self.call(call, s.span, scope) else {
+                    // What is wrong with the call has been said; the name is there all the same.
+                    self.unshadowed(name, scope);
+                    scope.bind(name.text.clone(), Value::Error);
+                    return None;
+                };
                 self.unshadowed(name, scope);
                 match value {
                     Some(v) => scope.bind(name.text.clone(), v),

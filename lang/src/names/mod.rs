@@ -1,5 +1,6 @@
 //! Modules, declarations and scopes: which item a name stands for.
 
+mod imports;
 pub mod near;
 
 use std::collections::BTreeMap;
@@ -21,6 +22,8 @@ pub struct Module {
     pub file: FileId,
     /// Its tree.
     pub tree: ast::File,
+    /// Where the line with the version of the language ends.
+    pub header: usize,
 }
 
 impl Module {
@@ -163,7 +166,7 @@ fn library(
     let mut diagnostics = Vec::new();
     let module = |((module, file), (tree, found)): ((&library::Module, FileId), _)| {
         diagnostics.extend(found);
-        Arc::new(Module { name: module.name.to_string(), file, tree })
+        Arc::new(Module { name: module.name.to_string(), file, tree, header: 0 })
     };
     let modules: Vec<Arc<Module>> = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
     if diagnostics.is_empty() {
@@ -317,7 +320,10 @@ impl<'a> Names<'a> {
                     Some(&id) => {
                         scope.insert(name.text.as_str().into(), id);
                     }
-                    None => diagnostics.push(self.not_in_module(name, from)),
+                    None => {
+                        let d = self.not_in_module(name, from);
+                        diagnostics.push(self.from_elsewhere(d, path, names.as_deref(), &name.text));
+                    }
                 }
             }
         }
@@ -331,14 +337,32 @@ impl<'a> Names<'a> {
             format!("`{from}` declares no `{}`", name.text),
             "not found",
         );
+        if let Some(other) = self.declared_in(&name.text) {
+            return d.help(format!("`{}` is declared in `{other}`", name.text));
+        }
         let near = near::nearest(&name.text, self.own[module].keys());
         d.help.extend(near::question(&near));
         if let Some(best) = near.first() {
             d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        } else if let Some(other) = self.declared_in(&name.text) {
-            d.help.push(format!("`{}` is declared in `{other}`", name.text));
         }
         d
+    }
+
+    /// What is wrong with a name that is written with its module: the module is not there or declares no such name.
+    pub fn scoped(&self, module: usize, path: &ast::Path) -> Option<Diagnostic> {
+        let (name, front) = path.segments.split_last().filter(|(_, front)| !front.is_empty())?;
+        if self.lookup(module, &name.text).is_some() {
+            return None;
+        }
+        let front = front.iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
+        if let Some(from) = self.module_index(&front) {
+            return (!self.own[from].contains_key(name.text.as_str())).then(|| self.not_in_module(name, from));
+        }
+        let near = near::nearest(&front, self.modules.iter().map(|m| &m.name));
+        let headline = format!("there is no module `{front}` here");
+        let mut d = Diagnostic::error(codes::UNKNOWN_NAME, path.span, headline, "not imported");
+        d.help.extend(near::question(&near));
+        Some(d.help(format!("import it: `use {front}`")))
     }
 
     /// The declaration.
@@ -368,7 +392,13 @@ impl<'a> Names<'a> {
 
     /// The library module that declares a name, for help.
     pub fn declared_in(&self, name: &str) -> Option<&str> {
-        (0..self.modules.len()).find(|&m| self.own[m].contains_key(name)).map(|m| self.modules[m].name.as_str())
+        self.declaring(name).next().map(|(module, _)| module.name.as_str())
+    }
+
+    /// The modules that declare a name, with what they declare.
+    fn declaring(&self, name: &str) -> impl Iterator<Item = (&Module, DeclId)> {
+        let all = self.modules.iter().zip(&self.own);
+        all.filter_map(move |(module, own)| Some((&**module, *own.get(name)?)))
     }
 
     /// A name that nothing visible has, with suggestions among what `fits`.
@@ -381,9 +411,8 @@ impl<'a> Names<'a> {
             format!("there is no {what} `{}`", name.text),
             "not declared",
         );
-        let import = self.declared_in(&name.text).filter(|m| !m.is_empty());
-        if let Some(module) = import {
-            d.help.push(format!("it is declared in `{module}`: add `use {module}::{}`", name.text));
+        if let Some(import) = self.import_of(module, &name.text, &fits) {
+            d = import.offered(d);
         } else if let Some(best) = near.first() {
             d.help.extend(near::question(&near));
             d = d.guess(format!("replace with `{best}`"), name.span, best.clone());

@@ -11,6 +11,10 @@ pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S
                 return None;
             }
             let candidate = c.to_lowercase();
+            // Capitals are easily mistaken.
+            if candidate == lower {
+                return Some((0, false, c.to_string()));
+            }
             // A word cut short, such as `temp`, is far by its letters and yet plain.
             if lower.len() >= 3 && candidate.starts_with(&lower) {
                 return Some((1, true, c.to_string()));

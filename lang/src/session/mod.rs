@@ -83,7 +83,7 @@ impl Session {
     ) -> (Arc<Module>, Vec<Diagnostic>) {
         let Some(source) = sources.get(file) else {
             let tree = ast::File { version: None, docs: Vec::new(), items: Vec::new() };
-            return (Arc::new(Module { name: name.to_string(), file, tree }), Vec::new());
+            return (Arc::new(Module { name: name.to_string(), file, tree, header: 0 }), Vec::new());
         };
         let text = self.package(package).texts.entry(source.name.clone()).or_default();
         text.asked = true;
@@ -95,7 +95,8 @@ impl Session {
             return (module.clone(), found.clone());
         }
         let (tree, found) = syntax::parse_again(file, &source.text, &mut text.memo);
-        let module = Arc::new(Module { name: name.to_string(), file, tree });
+        let header = syntax::header_end(&source.text);
+        let module = Arc::new(Module { name: name.to_string(), file, tree, header });
         text.read = Some((source.text.clone(), module.clone(), found.clone()));
         (module, found)
     }

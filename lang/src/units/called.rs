@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::{PREFIXES, Units};
+use super::{Dimension, PREFIXES, UnitDef, Units};
 use crate::names::near::same_letters;
 
 /// What the documentation of a unit calls it, in lower case: `The litre, a cubic decimetre.` is `litre`.
@@ -32,6 +32,15 @@ impl Units {
         }
         let part = |called: &str| called.split(' ').any(|own| is(&word, own) || is_nearly(&word, own));
         all().filter(|(_, _, called)| part(called)).map(|(symbol, ..)| symbol.clone()).collect()
+    }
+}
+
+impl Units {
+    /// The units of a dimension that a symbol is short for: `degC` where `C` is written and a temperature is meant.
+    pub(crate) fn short_for(&self, symbol: &str, dimension: &Dimension, point: bool) -> Vec<&str> {
+        let longer = |own: &str| own.len() > symbol.len() && own.ends_with(symbol) && own.is_ascii();
+        let fits = |unit: &UnitDef| unit.dimension == *dimension && unit.offset.is_some() == point;
+        self.units.iter().filter(|(own, unit)| longer(own) && fits(unit)).map(|(own, _)| own.as_str()).collect()
     }
 }
 

@@ -180,7 +180,7 @@ impl Balance<'_> {
         if self.scan.open_texts.iter().any(swallowed) {
             return;
         }
-        let end = self.code_before(at).max(top.at + 1);
+        let end = self.within_phrase(top, self.code_before(at).max(top.at + 1));
         let (opener, insert) = if top.byte == b'(' { ("(", ")") } else { ("[", "]") };
         self.insert(end, insert);
         let span = self.span(top.at, top.at + 1);
@@ -193,6 +193,24 @@ impl Balance<'_> {
             )
             .guess(format!("add `{insert}`"), self.span(end, end), insert),
         );
+    }
+
+    /// Where a round bracket that must close before `end` is best closed: before a word that begins a phrase of its own, and in a tuple
+    /// of numbers before their common unit.
+    fn within_phrase(&self, top: Bracket, end: usize) -> usize {
+        let inside = self.text.get(top.at + 1..end).unwrap_or_default();
+        if top.byte != b'(' || inside.contains(['(', '[', '{', '"', '\n', '/']) {
+            return end;
+        }
+        let starts = inside.match_indices(' ').map(|(at, _)| at);
+        let phrase = starts.filter(|at| PHRASE_WORDS.contains(&first_word(inside[*at..].trim_start()))).min();
+        let inside = phrase.map_or(inside, |at| &inside[..at]).trim_end();
+        let plain = |item: &str| item.trim().parse::<f64>().is_ok();
+        let tuple = inside.rsplit_once(',').and_then(|(items, last)| {
+            let number = last.trim_start().split(' ').next().filter(|number| plain(number))?;
+            items.split(',').all(plain).then(|| inside.len() - last.trim_start().len() + number.len())
+        });
+        top.at + 1 + tuple.unwrap_or(inside.len())
     }
 
     /// The end of the last thing before `at` that is neither blank nor comment.
@@ -388,6 +406,10 @@ const BLOCK_WORDS: &[&str] = &[
     "finally",
     "between",
 ];
+
+/// The words that begin a phrase behind a value in brackets.
+const PHRASE_WORDS: &[&str] =
+    &["holding", "labelled", "at", "on", "onto", "into", "from", "to", "by", "using", "through", "with"];
 
 /// The words that start a clause.
 const CLAUSE_WORDS: &[&str] = &[

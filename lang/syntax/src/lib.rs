@@ -103,6 +103,19 @@ pub fn is_name(word: &str) -> bool {
     Grammar::parse(Rule::ident, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
 }
 
+/// Where the line with the version ends; where there is none, at the start.
+pub fn header_end(text: &str) -> usize {
+    let mut at = 0;
+    for line in text.split_inclusive('\n') {
+        let code = line.split("//").next().unwrap_or_default().trim_start_matches('\u{feff}').trim();
+        if !code.is_empty() {
+            return if scan::first_word(code) == "mtx" { at + line.trim_end().len() } else { 0 };
+        }
+        at += line.len();
+    }
+    0
+}
+
 /// Whether a short text is one step.
 pub fn is_step(text: &str) -> bool {
     text.len() <= MAX_STEP && Grammar::parse(Rule::only_stmt, text).is_ok()

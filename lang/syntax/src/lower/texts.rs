@@ -53,7 +53,7 @@ impl Lower<'_> {
                 self.report(
                     Diagnostic::error(codes::SYNTAX, place, format!("`{brace}` in a text stands for a value"), other)
                         .help(format!("a brace itself is written `{brace}{brace}`"))
-                        .fix("write the brace itself", place, format!("{brace}{brace}")),
+                        .guess("write the brace itself", place, format!("{brace}{brace}")),
                 );
                 at += 1;
                 continue;

@@ -5,9 +5,10 @@ mod signs;
 mod values;
 
 use matterix_ir::{Diagnostic, Span, codes};
+use pest::Parser;
 
 use super::{
-    grammar::Rule,
+    grammar::{Grammar, Rule},
     scan::{ITEM_WORDS, STEP_WORDS, first_word},
     words::{either, expected},
 };
@@ -67,6 +68,9 @@ impl Mistake {
     }
 }
 
+/// The longest line that is tried another way, bytes.
+const MAX_LINE: usize = 400;
+
 /// The rules of thumb, in the order in which they are tried.
 const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::lookalike,
@@ -81,8 +85,11 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     lines::because,
     values::decimal_comma,
     values::bare_point,
+    values::range,
     values::split_unit,
+    values::instance,
     values::colon,
+    values::lab_line,
     values::value_with_equals,
     lines::function_call,
     lines::reserved,
@@ -155,6 +162,21 @@ impl<'a> Spot<'a> {
 
     fn expects(&self, word: &str) -> bool {
         self.words().contains(&word)
+    }
+
+    /// Whether the failing token stands right behind what is before it.
+    fn is_tight(&self) -> bool {
+        self.start + self.before.len() == self.at
+    }
+
+    /// Whether a line in place of this one can be read as a form; a block that it opens goes on below.
+    fn reads(&self, line: &str) -> bool {
+        let code = line.split("//").next().unwrap_or_default().trim_end();
+        // The end of the line may close the block around it.
+        let (opened, ended) = (code.matches('{').count(), code.matches('}').count());
+        let code = (opened..ended).fold(code, |code, _| code.trim_end().strip_suffix('}').unwrap_or(code));
+        let closed = if code.ends_with('{') { " }" } else { "" };
+        code.len() <= MAX_LINE && Grammar::parse(self.only, &format!("{code}{closed}")).is_ok()
     }
 
     fn is_at_start(&self) -> bool {

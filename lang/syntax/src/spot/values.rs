@@ -1,6 +1,6 @@
 //! Mistakes in numbers, units and fields.
 
-use super::{Mistake, RESERVED, Rule, Spot, is_word, last_word};
+use super::{Mistake, RESERVED, Rule, Spot, first_word, is_word, last_word};
 
 pub(super) fn decimal_comma(spot: &Spot) -> Option<Mistake> {
     let next = spot.after.strip_prefix(',')?;
@@ -18,10 +18,26 @@ pub(super) fn bare_point(spot: &Spot) -> Option<Mistake> {
         let mistake = Mistake::new("a number starts with a digit", format!("write `0{}`", spot.token));
         return Some(mistake.fix("add `0`", spot.at, spot.at, "0"));
     }
-    let digit = spot.before.ends_with(|c: char| c.is_ascii_digit()) && !next.starts_with('.');
-    digit.then(|| {
+    let number = spot.is_tight() && last_word(spot.before).starts_with(|c: char| c.is_ascii_digit());
+    (number && !next.starts_with('.')).then(|| {
         let mistake = Mistake::new("a digit is missing after the decimal point", "here");
         mistake.fix("remove the point", spot.at, spot.at + 1, "")
+    })
+}
+
+/// `plate[A1 . H1]`.
+pub(super) fn range(spot: &Spot) -> Option<Mistake> {
+    let next = spot.after.strip_prefix('.')?;
+    let last = last_word(spot.before);
+    let ends = last.ends_with(|c: char| c.is_ascii_digit()) && next.trim_start().starts_with(char::is_alphanumeric);
+    if spot.is_tight() || !ends || next.starts_with('.') {
+        return None;
+    }
+    let mistake = Mistake::new("a range is written with `..`", format!("write `{last} ..`"));
+    // Between wells nothing else is meant; between numbers it may be a decimal point.
+    Some(match last.starts_with(|c: char| c.is_ascii_digit()) {
+        true => mistake.guess("write `..`", spot.at, spot.at + 1, ".."),
+        false => mistake.fix("write `..`", spot.at, spot.at + 1, ".."),
     })
 }
 
@@ -30,7 +46,10 @@ pub(super) fn split_unit(spot: &Spot) -> Option<Mistake> {
     const PREFIXES: [&str; 9] = ["µ", "μ", "u", "m", "k", "n", "p", "c", "d"];
     let unit = spot.before.rsplit(|c: char| c.is_ascii_digit() || c == ' ').next()?;
     let number = spot.before[..spot.before.len() - unit.len()].trim_end();
+    // What follows is no longer than a unit is.
+    let short = spot.token.chars().count() <= 3 && !RESERVED.contains(&spot.token);
     if !PREFIXES.contains(&unit)
+        || !short
         || !number.ends_with(|c: char| c.is_ascii_digit())
         || !spot.token.starts_with(char::is_alphabetic)
     {
@@ -39,7 +58,12 @@ pub(super) fn split_unit(spot: &Spot) -> Option<Mistake> {
     let gap = spot.start + spot.before.len();
     let whole = format!("{unit}{}", spot.token);
     let mistake = Mistake::new("a unit is one word", format!("write `{whole}`"));
-    Some(mistake.fix(format!("write `{whole}`"), gap, spot.at, ""))
+    let title = format!("write `{whole}`");
+    // The metre and the day are units by themselves.
+    Some(match unit {
+        "m" | "d" => mistake.guess(title, gap, spot.at, ""),
+        _ => mistake.fix(title, gap, spot.at, ""),
+    })
 }
 
 fn is_field(only: Rule) -> bool {
@@ -56,12 +80,68 @@ pub(super) fn colon(spot: &Spot) -> Option<Mistake> {
     let end = spot.start + spot.before.len();
     if spot.token == "=" {
         let mistake = Mistake::new("a field is written with `:`", format!("write `{name}: ...`"));
-        return Some(mistake.fix("write `:`", end, spot.at + 1, ":"));
+        // `=` before a type declares a thing: the brace above may not have been closed.
+        let thing = spot.after[1..].trim_start().starts_with(char::is_uppercase);
+        return Some(match thing {
+            true => mistake.guess("write `:`", end, spot.at + 1, ":"),
+            false => mistake.fix("write `:`", end, spot.at + 1, ":"),
+        });
     }
     let value = spot.token.starts_with(|c: char| c.is_alphanumeric() || matches!(c, '"' | '(' | '-'));
-    value.then(|| {
+    let fits =
+        spot.only != Rule::only_lab_line || !RESERVED.contains(&name) && spot.reads(&format!("{name}: {}", spot.after));
+    (value && fits).then(|| {
         let mistake = Mistake::new(format!("`:` is missing after `{name}`"), format!("write `{name}: {}`", spot.token));
         mistake.fix("add `:`", end, end, ":")
+    })
+}
+
+/// `cup Beaker100mL on plate` and `cup: Beaker100mL on plate` for `cup = Beaker100mL on plate`.
+pub(super) fn instance(spot: &Spot) -> Option<Mistake> {
+    if spot.only != Rule::only_lab_line {
+        return None;
+    }
+    let name = first_word(spot.before);
+    let sign = spot.before.get(name.len()..)?.trim_start();
+    let end = spot.start + name.len();
+    let (headline, from, rest) = match sign.strip_prefix(':') {
+        Some(ty) => {
+            let colon = spot.start + spot.before.len() - sign.len();
+            let blank = if colon == end { " " } else { "" };
+            let headline = format!("`{name}` is a thing: it is declared with `=`");
+            (headline, (colon, colon + 1, format!("{blank}=")), format!("{} {}", ty.trim_start(), spot.after))
+        }
+        None if sign.is_empty() => {
+            (format!("`=` is missing after `{name}`"), (end, end, " =".into()), spot.after.into())
+        }
+        None => return None,
+    };
+    let ty = first_word(&rest);
+    if !is_word(name) || RESERVED.contains(&name) || !ty.starts_with(char::is_uppercase) {
+        return None;
+    }
+    let (start, stop, text) = from;
+    let mistake = Mistake::new(headline, format!("write `{name} = {ty}`"));
+    let mistake = if start == stop { mistake } else { mistake.at(start, stop) };
+    Some(match spot.reads(&format!("{name} = {rest}")) {
+        true => mistake.fix(if start == stop { "add `=`" } else { "write `=`" }, start, stop, text),
+        false => mistake.guess(if start == stop { "add `=`" } else { "write `=`" }, start, stop, text),
+    })
+}
+
+/// `Beaker100mL at (0, 0, 0) m` without a name, and a step, as lines of a lab.
+pub(super) fn lab_line(spot: &Spot) -> Option<Mistake> {
+    let (first, line) = (spot.form(), format!("{} {}", spot.before, spot.after));
+    if spot.only != Rule::only_lab_line || !is_word(first) || spot.before != first || RESERVED.contains(&first) {
+        return None;
+    }
+    if first.starts_with(char::is_uppercase) && spot.reads(&format!("x = {line}")) {
+        let mistake = Mistake::new(format!("this `{first}` has no name"), "what is it called?");
+        return Some(mistake.at(spot.start, spot.start + first.len()).help(format!("write `name = {first} ...`")));
+    }
+    crate::is_step(&line).then(|| {
+        let mistake = Mistake::new("a step stands in a workflow, not in a lab", "this reads as a step");
+        mistake.at(spot.start, spot.start + first.len())
     })
 }
 
@@ -88,7 +168,7 @@ pub(super) fn missing_comma(spot: &Spot) -> Option<Mistake> {
     Some(mistake.fix("add `,`", end, end, ","))
 }
 
-/// `10 g water`.
+/// `10 g water` and `60 deg C`.
 pub(super) fn missing_of(spot: &Spot) -> Option<Mistake> {
     let unit = spot.before.rsplit(' ').next().unwrap_or_default();
     let number = spot.before[..spot.before.len() - unit.len()].trim_end();
@@ -100,7 +180,17 @@ pub(super) fn missing_of(spot: &Spot) -> Option<Mistake> {
     {
         return None;
     }
-    let mistake = Mistake::new(format!("`{}` is not expected after `{unit}`", spot.token), "a unit is one word")
-        .help(format!("an amount of something is written with `of`: `1 {unit} of {}`", spot.token));
-    Some(mistake)
+    let (token, last) = (spot.token, last_word(number));
+    let headline = format!("`{token}` is not expected after `{unit}`");
+    let mistake = Mistake::new(headline, "a unit is one word");
+    if matches!(unit, "deg" | "degree" | "degrees") && matches!(token, "C" | "F") {
+        let start = spot.start + spot.before.len() - unit.len();
+        return Some(mistake.fix(format!("write `deg{token}`"), start, spot.end, format!("deg{token}")));
+    }
+    let mistake = mistake.help(format!("an amount of something is written with `of`: `{last} {unit} of {token}`"));
+    // Elsewhere another word may be missing: `transfer 50 uL stock to vial`.
+    Some(match spot.only {
+        Rule::only_lab_line | Rule::only_fill => mistake.fix("add `of`", spot.at, spot.at, "of "),
+        _ => mistake,
+    })
 }
