@@ -5,7 +5,7 @@ use matterix_ir::{FileId, Span, Unit};
 use matterix_lang::meanings::{Seen, Sort};
 
 use crate::Index;
-use crate::index::{Def, DefId, Kind, Meaning};
+use crate::index::{Def, DefId, Kind, Meaning, Use};
 
 /// What is said, in Markdown.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,8 +19,16 @@ pub struct Said {
 impl Index {
     /// What is said of the name at a place.
     pub fn about(&self, file: FileId, offset: usize) -> Option<Said> {
-        let found = self.at(file, offset)?;
+        let found = self.at(file, offset).or_else(|| self.behind_prefix(file, offset))?;
         let text = match found.meaning {
+            Meaning::Def(def) if self.def(def).kind == Kind::Unit => {
+                let whole = self.with_prefix(found.span);
+                let name = self.text(whole);
+                let size = Some(whole).filter(|whole| *whole != found.span).and_then(|_| self.size(name));
+                let size = size.map(|size| format!("\n\n`{name}`: {size}")).unwrap_or_default();
+                let text = self.about_def(def, self.seen(found.span)) + &size;
+                return Some(Said { span: whole, text });
+            }
             Meaning::Def(def) => self.about_def(def, self.seen(found.span)),
             Meaning::Module(module) => self.about_module(module)?,
             Meaning::Language(what) => {
@@ -87,16 +95,38 @@ impl Index {
         out
     }
 
+    /// How large a unit is in SI, with or without prefix.
+    fn size(&self, name: &str) -> Option<String> {
+        let (unit, factor) = self.units().find(name)?;
+        let si = self.units().symbol(&unit.dimension);
+        let size = show_number(unit.factor * factor);
+        let zero = unit.offset.filter(|o| *o != 0.0).map(|o| format!(", 0 {name} is {} {si}", show_number(o)));
+        Some(format!("1 {name} is {size} {si}{}", zero.unwrap_or_default()))
+    }
+
+    /// The unit whose prefix stands at a place: `m` of `mmol`.
+    fn behind_prefix(&self, file: FileId, offset: usize) -> Option<Use> {
+        let uses = self.uses(file);
+        let next = uses.get(uses.partition_point(|u| (u.span.start as usize) <= offset))?;
+        let unit = matches!(next.meaning, Meaning::Def(def) if self.def(def).kind == Kind::Unit);
+        (unit && self.with_prefix(next.span).start as usize <= offset).then_some(*next)
+    }
+
+    /// The span of a unit with the prefix before it.
+    fn with_prefix(&self, unit: Span) -> Span {
+        let text = self.sources().get(unit.file).map_or("", |source| &source.text);
+        let before = text.get(..unit.start as usize).unwrap_or_default();
+        let length: usize = before.chars().rev().take_while(|c| c.is_alphabetic()).map(char::len_utf8).sum();
+        let whole = Span { start: unit.start - length as u32, ..unit };
+        if self.units().find(self.text(whole)).is_some() { whole } else { unit }
+    }
+
     fn value_line(&self, def: &Def, seen: Option<&Seen>) -> Option<String> {
         match def.kind {
             Kind::Unit => {
-                let (unit, factor) = self.units().find(&def.name)?;
+                let (unit, _) = self.units().find(&def.name)?;
                 let dimension = self.units().describe(&unit.dimension, unit.offset.is_some());
-                let si = self.units().symbol(&unit.dimension);
-                let size = show_number(unit.factor * factor);
-                let zero =
-                    unit.offset.filter(|o| *o != 0.0).map(|o| format!(", 0 {} is {} {si}", def.name, show_number(o)));
-                Some(format!("{dimension}; 1 {} is {size} {si}{}", def.name, zero.unwrap_or_default()))
+                Some(format!("{dimension}; {}", self.size(&def.name)?))
             }
             Kind::Dimension => match &def.sort {
                 Sort::Quantity(dimension, point) => {

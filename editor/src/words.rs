@@ -53,6 +53,7 @@ pub struct Word {
 /// The words of a text in its order. Where a verb ends is known from the skills and commands of the modules.
 pub fn words(text: &str, modules: &[Arc<Module>]) -> Vec<Word> {
     let verbs = verbs(modules);
+    let species = species(modules);
     let found = classes::words(text);
     let mut out = Vec::new();
     let mut i = 0;
@@ -74,7 +75,16 @@ pub fn words(text: &str, modules: &[Arc<Module>]) -> Vec<Word> {
             i += run;
             continue;
         }
-        let (kind, declared) = kind(word.class);
+        let (mut kind, declared) = kind(word.class);
+        let before = || i.checked_sub(1).and_then(|i| found.get(i)).and_then(|w| text.get(w.start..w.end));
+        if declared && before() == Some("lab") {
+            // Where a lab is named it is coloured as items are.
+            kind = Kind::Type;
+        } else if kind == Kind::Species && is_indexed(text, word) && !modules.is_empty() {
+            // The grammar takes the place of a grid for a species: `trough[A1]`.
+            let known = text.get(word.start..word.end).is_some_and(|name| species.contains(name));
+            kind = if known { Kind::Species } else { Kind::Name };
+        }
         out.push(Word { range: word.start..word.end, kind, declared });
         i += 1;
     }
@@ -114,6 +124,22 @@ fn kind(class: Class) -> (Kind, bool) {
     }
 }
 
+/// Whether a word is all that stands in square brackets.
+fn is_indexed(text: &str, word: &classes::Word) -> bool {
+    let before = text.get(..word.start).is_some_and(|before| before.trim_end().ends_with('['));
+    before && text.get(word.end..).is_some_and(|after| after.trim_start().starts_with(']'))
+}
+
+/// The names of all species.
+fn species(modules: &[Arc<Module>]) -> BTreeSet<&str> {
+    let items = modules.iter().flat_map(|module| &module.tree.items);
+    let names = items.filter_map(|item| match &item.kind {
+        ItemKind::Species { name, .. } => Some(name.text.as_str()),
+        _ => None,
+    });
+    names.collect()
+}
+
 /// The words of all verbs.
 fn verbs(modules: &[Arc<Module>]) -> BTreeSet<String> {
     let mut out = BTreeSet::new();
@@ -130,4 +156,26 @@ fn verbs(modules: &[Arc<Module>]) -> BTreeSet<String> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use matterix_lang::{LibraryOnly, Session};
+
+    use super::*;
+    use crate::Analysis;
+
+    #[test]
+    fn what_is_alike_is_coloured_alike() {
+        let text = "mtx 1\nlab bench {\n    ambient: 22 degC\n}\nworkflow w in bench {\n    expect trough[A1].volume > \
+            cup[water] and all(w in wells[A2 .. A3]: w.volume > 1 mL)\n}\n";
+        let analysis = Analysis::of("a.mtx", text, &LibraryOnly, &mut Session::default());
+        let found = words(text, &analysis.modules);
+        let kinds = |name: &str| -> Vec<Kind> {
+            found.iter().filter(|w| text.get(w.range.clone()) == Some(name)).map(|w| w.kind).collect()
+        };
+        assert_eq!((kinds("A1"), kinds("A2")), (vec![Kind::Name], vec![Kind::Name]));
+        assert_eq!(kinds("water"), [Kind::Species]);
+        assert_eq!(kinds("bench"), [Kind::Type, Kind::Type]);
+    }
 }

@@ -178,3 +178,22 @@ fn symbols_are_found_by_their_letters() {
 fn marks_are_taken_out() {
     assert_eq!(marked("a$0b$1"), ("ab".to_string(), vec![1, 2]));
 }
+
+#[test]
+fn a_prefix_belongs_to_its_unit() {
+    let text = "mtx 1\nconst a = 3 uL\nconst b = 2 mmol/uL\nconst c = 4 L\n";
+    let (analysis, index) = analysed("a.mtx", text, &Files::default());
+    for (what, word, size) in [
+        ("|uL", "uL", "1 uL is"),
+        ("u|L", "uL", "1 uL is"),
+        ("|mmol", "mmol", "1 mmol is"),
+        ("m|mol", "mmol", "1 mmol is"),
+        ("mmo|l", "mmol", "1 mmol is"),
+        ("/|uL", "uL", "1 uL is"),
+        ("4 |L", "L", "1 L is"),
+    ] {
+        let said = index.about(analysis.root, place(text, what)).unwrap_or_else(|| panic!("`{what}` is a unit"));
+        assert_eq!(index.text(said.span), word);
+        assert!(said.text.contains(size), "{}", said.text);
+    }
+}
