@@ -135,13 +135,13 @@ fn a_file_without_findings_is_looked_through_again_when_what_it_read_has_changed
 fn advice_that_is_not_shown_is_not_looked_for_again() {
     let dir = folder("beforehand_advice");
     let clean = |dir: &Path| kept(dir).iter().filter(|f| f.to_string_lossy().contains(CLEAN)).count();
-    let text = "mtx 1\n\nlab room {\n    ambient: 22 degC\n    cup = Beaker { capacity: 50 mL }\n    jug = Beaker { capacity: 90 mL } \
-                holding 9 mL of water\n}\n\nworkflow look in room {\n    expect jug.volume > 1 mL\n}\n";
+    let text = "mtx 1\nuse std::glassware::Beaker50mL\n\nlab room {\n    ambient: 22 degC\n    cup = Beaker50mL\n    \
+                jug = Beaker50mL holding 9 mL of water\n}\n\nworkflow look in room {\n    expect jug.volume > 1 mL\n}\n";
     assert_eq!(check(&dir, text, &[]), "");
     assert_eq!(clean(&dir), 1);
     assert_eq!(check(&dir, text, &[]), "");
     let strict = check(&dir, text, &["--strict"]);
-    assert!(strict.contains("bench.mtx:5:5: warning[unused]"), "{strict}");
+    assert!(strict.contains("bench.mtx:6:5: warning[unused]"), "{strict}");
     assert_eq!(check(&dir, text, &["--strict"]), strict);
 }
 

@@ -54,7 +54,7 @@ impl Names<'_> {
 
 impl Names<'_> {
     /// The correction of an import whose name only another module declares, where it imports nothing else.
-    pub(super) fn from_elsewhere(&self, d: Diagnostic, path: &Path, list: Option<&[Name]>, name: &str) -> Diagnostic {
+    pub(super) fn with_import(&self, d: Diagnostic, path: &Path, list: Option<&[Name]>, name: &str) -> Diagnostic {
         let mut all = self.declaring(name).map(|(module, _)| &module.name).filter(|module| !module.is_empty());
         let (Some(from), None) = (all.next(), all.next()) else { return d };
         let text = match list {

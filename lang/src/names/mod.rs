@@ -322,7 +322,7 @@ impl<'a> Names<'a> {
                     }
                     None => {
                         let d = self.not_in_module(name, from);
-                        diagnostics.push(self.from_elsewhere(d, path, names.as_deref(), &name.text));
+                        diagnostics.push(self.with_import(d, path, names.as_deref(), &name.text));
                     }
                 }
             }

@@ -1,16 +1,15 @@
 //! What operations need and do.
 
 use std::collections::BTreeSet;
-use std::rc::Rc;
 use std::sync::Arc;
 
 use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption};
 
-use super::Flow;
 use super::facts::Facts;
 use super::value::{Known, Why};
+use super::{Flow, Passage};
 use crate::elaborate::ExtensiveKey;
 
 /// Events that set each other off at one instant before the rest is left to the run.
@@ -193,8 +192,8 @@ impl Flow<'_, '_> {
         self.write(changes, facts)
     }
 
-    /// The states of a mixture that a transfer takes from, each with that of another mixture which it adds to.
-    fn passage(&mut self, from: usize, to: usize) -> Rc<[(u32, u32)]> {
+    /// The states that a transfer between two mixtures changes.
+    fn passage(&mut self, from: usize, to: usize) -> Passage {
         let (sources, targets) = (&self.mixtures[from], &self.mixtures[to]);
         let known = self.passages.entry((from, to)).or_insert_with(|| {
             let pair = |(key, source): &(ExtensiveKey, u32)| {

@@ -40,6 +40,9 @@ use crate::eval::ReactionId;
 /// Steps followed before the rest of a plan is left to the run.
 const MOST_STEPS: usize = 400_000;
 
+/// The states of a mixture that a transfer takes from, each with that of the other mixture which it adds to.
+type Passage = Rc<[(u32, u32)]>;
+
 /// What a failure is called, and what is known when it is raised.
 type Raised = (String, Facts);
 
@@ -61,7 +64,7 @@ struct Flow<'l, 'a> {
     /// Extensive states by mixture index.
     mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
     /// The pairs of states that transfers between two of them change.
-    passages: FxHashMap<(usize, usize), Rc<[(u32, u32)]>>,
+    passages: FxHashMap<(usize, usize), Passage>,
     params: Vec<Known>,
     /// The states that a node depends on.
     parts: Vec<Option<Rc<eval::Parts>>>,
