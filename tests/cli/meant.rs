@@ -63,7 +63,7 @@ fn mended(name: &str, text: &str) -> (String, bool) {
 #[test]
 fn lines_are_mended_to_what_was_meant() {
     let bench = BENCH.replace("IkaRetControl\n\n", "IkaRctBasic\nuse std::heating::IkaRetControl\n\n");
-    let bench = bench.replace("wait 5 s", "heat plate to 60 degC\n    wait 5 s");
+    let bench = bench.replace("wait 5 s", "heat plate to 60 degC\n    wait 5 s\n    stop heating plate");
     for (slip, right, wrong, sure) in [
         ("equals", "beaker = Beaker250mL", "beaker Beaker250mL", true),
         ("colon", "beaker = Beaker250mL", "beaker: Beaker250mL", true),
