@@ -4,6 +4,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+use crate::reads;
+
 /// Bytes of the largest text that is read.
 pub const LARGEST_TEXT: u64 = 16 << 20;
 /// The same of recordings.
@@ -22,6 +24,7 @@ pub fn read_recording(path: &Path) -> Result<Vec<u8>, String> {
 fn read_up_to(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
     // Asked first, since what opening a folder says differs between systems.
     if path.is_dir() {
+        reads::note(path, largest, None);
         return Err(format!("`{}` is a directory, not a file", path.display()));
     }
     contents(path, largest).map_err(|why| format!("cannot read `{}`: {why}", path.display()))
@@ -29,6 +32,12 @@ fn read_up_to(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
 
 /// What a file of at most so many bytes holds, or why not. A pipe or a device may never end, or never begin.
 pub fn contents(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
+    let found = bytes(path, largest);
+    reads::note(path, largest, found.as_deref().ok());
+    found
+}
+
+fn bytes(path: &Path, largest: u64) -> Result<Vec<u8>, String> {
     let about = fs::metadata(path).map_err(|e| reason(&e))?;
     if about.is_dir() {
         return Err("it is a directory".to_string());
@@ -127,6 +136,7 @@ pub fn replace(path: &Path, text: impl AsRef<[u8]>) -> Result<(), String> {
     let written = fill(&beside, text.as_ref())
         .and_then(|()| fs::set_permissions(&beside, permissions))
         .and_then(|()| fs::rename(&beside, &target));
+    reads::note(path, LARGEST_TEXT, written.is_ok().then_some(text.as_ref()));
     written.map_err(|e| {
         // What is left of a failed attempt is of no use; that it cannot be removed either changes nothing.
         let _ = fs::remove_file(&beside);

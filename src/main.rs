@@ -14,6 +14,7 @@ mod lsp;
 mod mcp;
 mod pipeline;
 mod progress;
+mod reads;
 mod report;
 mod terminal;
 mod uri;

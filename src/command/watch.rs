@@ -1,4 +1,4 @@
-//! Looks at files again whenever something in their folders changes.
+//! Looks at files again whenever one of those that were read changes.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use notify::{Event, RecursiveMode, Watcher};
 
+use crate::reads::Account;
 use crate::terminal::{self, Stream, print};
 use crate::{Exit, cancel};
 
@@ -33,7 +34,7 @@ pub(super) fn watch(files: &[PathBuf], look: impl Fn(&[PathBuf]) -> (String, Exi
     }
     let mut first = true;
     loop {
-        let (found, exit) = look(files);
+        let ((found, exit), read) = Account::of(|| look(files));
         match (terminal::is_terminal(Stream::Out), first) {
             (true, _) => print(Stream::Out, CLEAR),
             (false, false) => print(Stream::Out, BETWEEN),
@@ -41,12 +42,19 @@ pub(super) fn watch(files: &[PathBuf], look: impl Fn(&[PathBuf]) -> (String, Exi
         }
         print(Stream::Out, &found);
         first = false;
-        while !changed(&changes, PATIENCE)? {
+        loop {
             if stop.load(Ordering::SeqCst) {
                 return Ok(exit);
             }
+            if !changed(&changes, &read, PATIENCE)? {
+                continue;
+            }
+            while changed(&changes, &read, QUIET)? {}
+            // A file that was only touched, or written as it was, says nothing new.
+            if read.is_outdated() {
+                break;
+            }
         }
-        while changed(&changes, QUIET)? {}
     }
 }
 
@@ -59,17 +67,12 @@ fn folders(files: &[PathBuf]) -> BTreeSet<PathBuf> {
     files.iter().map(folder).collect()
 }
 
-/// Whether something was written, made or removed within a time.
-fn changed(changes: &Changes, within: Duration) -> Result<bool, String> {
+/// Whether one of the files that were read may have been written, made or removed within a time.
+fn changed(changes: &Changes, read: &Account, within: Duration) -> Result<bool, String> {
     match changes.recv_timeout(within) {
-        Ok(Ok(event)) => Ok(!event.kind.is_access() && event.paths.iter().any(|p| !is_hidden(p))),
+        Ok(Ok(event)) => Ok(!event.kind.is_access() && event.paths.iter().any(|path| read.may_name(path))),
         Ok(Err(e)) => Err(format!("files cannot be watched any more: {e}")),
         Err(RecvTimeoutError::Timeout) => Ok(false),
         Err(RecvTimeoutError::Disconnected) => Err("files cannot be watched any more".to_owned()),
     }
-}
-
-/// What editors and version control keep for themselves.
-fn is_hidden(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }

@@ -5,6 +5,7 @@ mod capabilities;
 mod documents;
 mod findings;
 mod frames;
+mod held;
 mod judge;
 mod lines;
 mod publish;

@@ -10,7 +10,7 @@ use crossbeam_channel::{Receiver, Sender};
 use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types::notification::{self as told, Notification as _};
 use lsp_types::request::{self as asked, Request as _};
-use lsp_types::{InitializeParams, MessageType};
+use lsp_types::{InitializeParams, MessageType, Uri};
 use matterix_editor::Analysis;
 use matterix_lang::{LibraryOnly, Session};
 use serde::de::DeserializeOwned;
@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 use super::capabilities::{self, Client};
 use super::documents::Documents;
 use super::frames::{self, Frame};
+use super::held::Held;
 use super::judge::{Judge, Round, Said, Verdict, Wish};
 use super::publish::Published;
 use super::shelf::Shelf;
@@ -96,6 +97,8 @@ pub struct Server {
     asked: i32,
     /// The document that was changed last: it is checked first.
     urgent: Option<String>,
+    /// Requests about texts that were not checked yet.
+    held: Held,
 }
 
 impl Server {
@@ -111,6 +114,7 @@ impl Server {
             tokens: BTreeMap::new(),
             asked: 0,
             urgent: None,
+            held: Held::default(),
         }
     }
 
@@ -124,6 +128,7 @@ impl Server {
         let mut waiting: VecDeque<Frame> = VecDeque::new();
         loop {
             if waiting.is_empty() {
+                let late = self.held.until().map_or_else(crossbeam_channel::never, crossbeam_channel::at);
                 crossbeam_channel::select_biased! {
                     recv(coming) -> frame => match frame {
                         Ok(frame) => waiting.push_back(frame),
@@ -131,6 +136,11 @@ impl Server {
                     },
                     recv(verdicts) -> verdict => {
                         verdict.into_iter().for_each(|verdict| self.hear(verdict));
+                        self.answer_held();
+                        continue;
+                    }
+                    recv(late) -> _ => {
+                        self.answer_held();
                         continue;
                     }
                 }
@@ -163,6 +173,9 @@ impl Server {
             .collect();
         if cancelled.is_empty() {
             return;
+        }
+        for id in self.held.cancel(&cancelled) {
+            self.refuse(id, ErrorCode::RequestCanceled, "cancelled");
         }
         let mut kept = VecDeque::new();
         for frame in waiting.drain(..) {
@@ -197,19 +210,39 @@ impl Server {
             (Stage::Strange, _) => self.refuse(request.id, ErrorCode::ServerNotInitialized, "nothing was agreed yet"),
             (Stage::Open, asked::Shutdown::METHOD) => {
                 self.stage = Stage::Ending;
+                self.held.ready(|_| true).into_iter().for_each(|held| self.give(held));
                 self.send(Response::new_ok(request.id, ()));
             }
             (Stage::Open, asked::Initialize::METHOD) | (Stage::Ending, _) => {
                 self.refuse(request.id, ErrorCode::InvalidRequest, "this is not the time for it");
             }
-            (Stage::Open, _) => {
-                let id = request.id.clone();
-                match answers::answer(self, request) {
-                    Ok(result) => self.send(Response { id, response_result: Ok(result) }),
-                    Err((code, why)) => self.refuse(id, code, &why),
-                }
-            }
+            (Stage::Open, _) => match Held::about(&request).filter(|uri| self.is_unchecked(uri)) {
+                Some(uri) => self.held.keep(uri, request),
+                None => self.give(request),
+            },
         }
+    }
+
+    /// Answers a request from what is known now.
+    fn give(&mut self, request: Request) {
+        let id = request.id.clone();
+        match answers::answer(self, request) {
+            Ok(result) => self.send(Response { id, response_result: Ok(result) }),
+            Err((code, why)) => self.refuse(id, code, &why),
+        }
+    }
+
+    /// Whether a text is open whose first check is still to come.
+    fn is_unchecked(&self, uri: &Uri) -> bool {
+        self.documents.get(uri).is_some_and(|d| d.last().is_none()) && self.shelf.module_at(uri).is_none()
+    }
+
+    /// Answers what need not wait any more.
+    fn answer_held(&mut self) {
+        let mut held = std::mem::take(&mut self.held);
+        let ready = held.ready(|uri| !self.is_unchecked(uri));
+        self.held = held;
+        ready.into_iter().for_each(|request| self.give(request));
     }
 
     fn begin(&mut self, request: Request) {
@@ -241,6 +274,10 @@ impl Server {
                 if let Some(params) = self.params::<told::DidChangeTextDocument>(note) {
                     let document = params.text_document;
                     self.urgent = Some(document.uri.as_str().to_string());
+                    // Places that were asked about are those of the text before.
+                    for id in self.held.of(&document.uri) {
+                        self.refuse(id, ErrorCode::ContentModified, "the text has changed since");
+                    }
                     self.documents.edit(&document.uri, document.version, params.content_changes);
                 }
             }
@@ -248,6 +285,7 @@ impl Server {
                 if let Some(params) = self.params::<told::DidCloseTextDocument>(note) {
                     let uri = params.text_document.uri;
                     self.documents.close(&uri);
+                    self.answer_held();
                     self.tokens.remove(uri.as_str());
                     self.published.forget(uri.as_str());
                     self.publish();

@@ -85,3 +85,50 @@ fn a_file_is_looked_at_again_when_it_changes() {
     rustix::process::kill_process(id, rustix::process::Signal::INT).expect("it runs");
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
 }
+
+#[cfg(unix)]
+#[test]
+fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
+    use std::io::Read;
+    let dir = folder("mend_watch_once");
+    let lab = "mtx 1\nlab bench { ambient: 22 degC }\n";
+    let text = "mtx 1\nuse labs::bench\nworkflow w in bench { wait 1 min }\n";
+    write(&dir, "labs.mtx", lab);
+    write(&dir, "w.mtx", text);
+    let mut command = command();
+    command.args(["check", "w.mtx", "--watch"]).current_dir(&dir).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the command starts");
+    let mut lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    // How often it looked until it says something.
+    let mut looks = |what: &str| {
+        let said = lines.by_ref().take_while(|line| !line.contains(what)).filter(|line| line == "---").count();
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        said
+    };
+    assert_eq!(looks("no findings"), 0);
+    // Beside it, as it was, and away for a while.
+    write(&dir, "w.mtx~", "x");
+    write(&dir, "notes.txt", "x");
+    write(&dir, "w.mtx", text);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    // By another file in its place.
+    write(&dir, "sedX", text.replace("1 min", "1 mL"));
+    std::fs::rename(dir.join("sedX"), dir.join("w.mtx")).expect("a name");
+    assert_eq!(looks("unit-mismatch"), 1);
+    // A file that it imports.
+    write(&dir, "w.mtx", text);
+    assert_eq!(looks("no findings"), 1);
+    write(&dir, "labs.mtx", lab.replace("degC", "mL"));
+    assert_eq!(looks("unit-mismatch"), 1);
+    std::fs::remove_file(dir.join("w.mtx")).expect("it was there");
+    for i in 0..3 {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        write(&dir, "notes.txt", format!("{i}"));
+    }
+    let id = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("it runs");
+    let mut complaints = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut complaints).expect("text");
+    child.wait().expect("it ends");
+    assert_eq!(complaints.matches("there is no such file").count(), 1, "{complaints}");
+}

@@ -24,7 +24,7 @@ impl Token<'_> {
 /// What encloses the cursor.
 #[derive(Clone, Debug)]
 pub(crate) struct Open<'t> {
-    /// `{`, `(` or `[`.
+    /// `{`, `(` or `[`; `"` where it is the brace of a text in quotes.
     pub(crate) bracket: char,
     /// Where.
     pub(crate) at: usize,
@@ -45,6 +45,10 @@ pub(crate) struct Context<'t> {
     pub(crate) word: (usize, &'t str),
     /// Whether a blank or a bracket stands before the word.
     pub(crate) apart: bool,
+    /// The statement whose block has ended just before, in the same line.
+    pub(crate) ended: Option<Vec<Token<'t>>>,
+    /// Named steps of the item around the cursor that begin before it.
+    pub(crate) steps: Vec<&'t str>,
 }
 
 /// Prepositions: with one of them a statement goes on.
@@ -67,6 +71,8 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
     let bytes = text.as_bytes();
     let mut at = 0;
     let mut line_break = false;
+    let mut ended: Option<(usize, Vec<Token<'_>>)> = None;
+    let mut steps: Vec<&str> = Vec::new();
     while at < cursor {
         let c = text[at..].chars().next().unwrap_or(' ');
         let depth = open.len();
@@ -86,8 +92,10 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                 let token = Token { start: at, text: &text[at..end] };
                 let inside_braces = open.last().is_none_or(|o| o.bracket == '{');
                 if line_break && inside_braces {
+                    // A loop, where it is not a condition that waits for its time.
+                    let begins = token.text == "for" && statements[depth].first().is_none_or(|t| t.text != "hold");
                     let goes_on = LABELS.contains(&token.text)
-                        || GOES_ON.contains(&token.text)
+                        || GOES_ON.contains(&token.text) && !begins
                         || continues(statements[depth].last());
                     if !goes_on && !matches!(c, ')' | ']' | '}' | '*' | '+' | '-' | '/' | '=' | '<' | '>') {
                         statements[depth].clear();
@@ -102,7 +110,7 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                             if !quiet {
                                 // A value in a text is an expression of its own.
                                 let from = at + 1 + text[at + 1..cursor].rfind('{').unwrap_or(0);
-                                open.push(Open { bracket: '(', at: from, head: Vec::new() });
+                                open.push(Open { bracket: '"', at: from, head: Vec::new() });
                                 statements.push(Vec::new());
                                 at = from + 1;
                                 continue;
@@ -112,6 +120,14 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                     }
                     '{' | '(' | '[' => {
                         let head = statements[depth].clone();
+                        if open.is_empty() {
+                            steps.clear();
+                        }
+                        if let [step, name, ..] = head.as_slice()
+                            && step.text == "step"
+                        {
+                            steps.push(name.text);
+                        }
                         statements[depth].push(token);
                         open.push(Open { bracket: c, at, head });
                         statements.push(Vec::new());
@@ -124,7 +140,7 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                         }
                         statements[depth].push(token);
                         if c == '}' && open.last().is_none_or(|o| o.bracket == '{') && !followed(text, end) {
-                            statements[depth].clear();
+                            ended = Some((end, std::mem::take(&mut statements[depth])));
                         }
                     }
                     ';' => statements[depth].clear(),
@@ -146,8 +162,10 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
     } else if line_break && !continues(before.last()) && open.last().is_none_or(|o| o.bracket == '{') {
         before.clear();
     }
+    let at_once = |end: usize| text[end..word.0].chars().all(|c| c == ' ' || c == '\t');
+    let ended = ended.filter(|(end, _)| *end <= word.0 && at_once(*end)).map(|(_, statement)| statement);
     let apart = text[..word.0].chars().next_back().is_none_or(|c| c.is_whitespace() || "([{,".contains(c));
-    Context { quiet, open, before, word, apart }
+    Context { quiet, open, before, word, apart, ended, steps }
 }
 
 /// Whether a statement goes on in the next line after this token.
@@ -252,6 +270,11 @@ impl<'t> Context<'t> {
     /// The innermost braces that are open.
     pub(crate) fn block(&self) -> Option<&Open<'t>> {
         self.open.iter().rev().find(|o| o.bracket == '{')
+    }
+
+    /// Whether the cursor stands in the braces of a text in quotes.
+    pub(crate) fn in_text(&self) -> bool {
+        self.open.iter().rev().take_while(|o| o.bracket != '{').any(|o| o.bracket == '"')
     }
 
     /// The word that begins the item around the cursor.

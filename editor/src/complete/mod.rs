@@ -1,7 +1,9 @@
 //! What can be written at a cursor. The text at the cursor need not be whole: where it stands is found without the grammar
 //! (`context`), what is known comes from the last analysis.
 
+mod bound;
 mod context;
+mod follow;
 mod items;
 mod signature;
 mod steps;
@@ -72,7 +74,7 @@ pub fn complete(index: &Index, file: FileId, text: &str, cursor: usize) -> Offer
     if context.quiet {
         return out;
     }
-    let place = Place::of(index, file, text, context.word.0);
+    let place = Place::of(index, file, text, context.word.0).bind(&context);
     place.offers(&context, &mut out);
     let typed = context.word.1.to_lowercase();
     out.all.retain(|c| fits(&c.label.to_lowercase(), &typed));
@@ -105,8 +107,10 @@ impl Place<'_> {
             Some("::") => return self.after_scope(context, out),
             Some(_) if tokens.first().is_some_and(|t| t.text == "use") => return self.imports(context, out),
             Some(text) if text.starts_with(|c: char| c.is_ascii_digit()) => {
-                let wanted = self.wanted(context);
-                self.units(wanted.sort.as_ref(), context.word.1, out);
+                let counts = tokens.len() == 2 && tokens[0].text == "repeat";
+                if !counts {
+                    self.units(&self.measured(context), context.word.1, out);
+                }
                 if context.apart {
                     self.after_value(context, out);
                 }
@@ -114,19 +118,27 @@ impl Place<'_> {
             }
             Some("as") if !matches!(context.item(), "use") && tokens.first().is_none_or(|t| t.text != "include") => {
                 let of = self.value(primary(&tokens[..tokens.len() - 1]));
-                self.units(of.as_ref().map(|o| &o.1), context.word.1, out);
+                self.units(&of.map(|o| o.1).into_iter().collect::<Vec<_>>(), context.word.1, out);
                 return;
             }
             Some(")") if context.apart => {
                 // `(1, 2) mm`.
-                self.units(None, context.word.1, out);
+                if self.is_tuple(tokens) {
+                    self.units(&self.measured(context), context.word.1, out);
+                }
             }
             _ => {}
+        }
+        if self.after_block(context, out) {
+            return;
         }
         if let Some(open) = context.open.last().filter(|o| o.bracket == '[')
             && open.head.last().is_some_and(|t| t.is_word() && t.end() == open.at)
         {
             return self.places(&open.head, out);
+        }
+        if context.in_text() {
+            return self.in_text(context, out);
         }
         match context.block() {
             None => self.top(context, out),
@@ -191,6 +203,14 @@ impl Place<'_> {
 
     /// Local names, members of the thing whose text it is, and things of the lab.
     pub(crate) fn locals(&self, wanted: &dyn Fn(&Sort, Kind) -> bool, rank: u8, out: &mut Offers) {
+        for (name, sort) in self.bound.iter().rev() {
+            let kind = if *sort == Sort::Step { Kind::Step } else { Kind::Variable };
+            if wanted(sort, kind) && !out.all.iter().any(|c| c.label == *name) {
+                let detail = self.index.sort_words(sort);
+                let (label, text) = (name.clone(), name.clone());
+                out.all.push(Completion { label, text, kind: Offer::Def(kind), detail, def: None, rank });
+            }
+        }
         let mut names: Vec<DefId> = self.index.names_at(self.file, self.offset);
         // Where the text around was not read, things of the package's labs may be meant.
         if !names.iter().any(|d| self.index.def(*d).kind == Kind::Thing) {

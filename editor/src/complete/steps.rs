@@ -7,11 +7,11 @@ use matterix_lang::names::DeclId;
 
 use super::context::{Context, LABELS};
 use super::values::{Place, Wanted};
-use super::{Completion, Offer, Offers};
+use super::{Completion, Offer, Offers, follow};
 use crate::index::{DefId, Kind};
 
 /// Steps of the language.
-const STEPS: &[(&str, &str)] = &[
+pub(crate) const STEPS: &[(&str, &str)] = &[
     ("let", "let ${1:name} = $0"),
     ("wait", "wait ${1:10 s}"),
     ("wait until", "wait until ${1:condition} timeout ${2:10 min}"),
@@ -50,7 +50,7 @@ const LAWS: &[(&str, &str)] = &[
 const VALUES: &[&str] = &["true", "false", "nothing", "unlimited", "elapsed", "not"];
 
 /// Folds.
-const FOLDS: &[&str] = &["sum", "product", "min", "max", "all", "any"];
+pub(crate) const FOLDS: &[&str] = &["sum", "product", "min", "max", "all", "any"];
 
 impl Place<'_> {
     /// The beginning of a step.
@@ -103,7 +103,8 @@ impl Place<'_> {
                     kind,
                     detail,
                     def: Some(def),
-                    rank: 10 + own,
+                    // What makes a verb whole goes before things.
+                    rank: if words.is_empty() { 10 } else { 2 } + own,
                 });
             }
         }
@@ -207,6 +208,10 @@ impl Place<'_> {
             self.labels(call, rest.iter().map(|t| t.text).collect(), out);
             return self.after_value(context, out);
         }
+        let unfinished_verb = words.len() == statement.len() && !words.first().is_some_and(|w| follow::begins_step(w));
+        if context.apart && !unfinished_verb && context.before.last().is_some_and(follow::ends_value) {
+            return self.after_value(context, out);
+        }
         match statement.last().map(|t| t.text) {
             Some("start" | "let" | "step") => {}
             Some("wait") => {
@@ -276,20 +281,6 @@ impl Place<'_> {
         if d.inside.iter().any(|p| self.index.def(*p).kind == Kind::Option) {
             self.keyword("{ }", "{ $0 }", 3, out);
         }
-    }
-
-    /// What can stand after a value.
-    pub(crate) fn after_value(&self, context: &Context<'_>, out: &mut Offers) {
-        let first = context.before.first().map(|t| t.text);
-        let more: &[&str] = match first {
-            Some("wait" | "hold") => &["timeout", "for", "and", "or", "in", "is"],
-            Some("record") => &["every", "as"],
-            Some("within") => &["after"],
-            Some("repeat") => &["times", "max", "and", "or"],
-            Some("if" | "expect" | "keep") => &["and", "or", "in", "is", "as"],
-            _ => &["of", "as"],
-        };
-        more.iter().for_each(|w| self.keyword(w, &format!("{w} "), 40, out));
     }
 
     /// Values: the words that are expected, then things and other names that fit, then everything else.

@@ -29,13 +29,15 @@ pub(crate) struct Place<'i> {
     pub(crate) file: FileId,
     /// The cursor in the text of the last analysis.
     pub(crate) offset: usize,
+    /// What the text before the cursor binds, outermost first.
+    pub(crate) bound: Vec<(String, Sort)>,
 }
 
 impl<'i> Place<'i> {
     /// A place of the current text of a file.
     pub(crate) fn of(index: &'i Index, file: FileId, text: &str, at: usize) -> Place<'i> {
         let drift = Drift::between(index.sources().get(file).map_or("", |s| &s.text), text);
-        Place { index, file, offset: drift.back(at) }
+        Place { index, file, offset: drift.back(at), bound: Vec::new() }
     }
 
     /// What a name stands for here, with its kind of value.
@@ -57,11 +59,13 @@ impl<'i> Place<'i> {
     /// What kind of value a name with members, places and arguments has.
     pub(crate) fn value(&self, tokens: &[Token<'_>]) -> Option<(Option<DefId>, Sort)> {
         let (first, mut rest) = tokens.split_first()?;
-        let (mut def, mut sort) = match first.text {
-            "self" => (None, self.this()?),
-            "elapsed" => (None, self.index.duration()),
-            "(" => return None,
-            name => self.named(name).map(|(d, s)| (Some(d), s))?,
+        let bound = self.bound.iter().rev().find(|b| b.0 == first.text);
+        let (mut def, mut sort) = match (first.text, bound) {
+            (_, Some((_, sort))) => (None, sort.clone()),
+            ("self", None) => (None, self.this()?),
+            ("elapsed", None) => (None, self.index.duration()),
+            ("(", None) => return None,
+            (name, None) => self.named(name).map(|(d, s)| (Some(d), s))?,
         };
         while let Some((token, after)) = rest.split_first() {
             match token.text {
@@ -155,6 +159,9 @@ impl<'i> Place<'i> {
             return param.map_or(none, |p| Wanted::of(self.index, *p));
         }
         let tokens = &context.before;
+        if self.is_duration(tokens) {
+            return Wanted { sort: Some(self.index.duration()), words: Vec::new() };
+        }
         // What it is compared with.
         if let Some(at) = tokens.iter().rposition(|t| {
             matches!(t.text, "==" | "!=" | "<" | "<=" | ">" | ">=" | "is" | "=" | "+=" | "-=")
@@ -191,6 +198,9 @@ impl<'i> Place<'i> {
         {
             return Wanted::of(self.index, def);
         }
+        if let Some(sort) = self.setting(context) {
+            return Wanted { sort: Some(sort), words: Vec::new() };
+        }
         // An argument of a call.
         if let Some((call, words)) = self.call(self.statement(context)) {
             let statement = self.statement(context);
@@ -214,6 +224,36 @@ impl<'i> Place<'i> {
         }
     }
 
+    /// Whether the last clause of a step asks for a time, and nothing but a number was given yet.
+    fn is_duration(&self, tokens: &[Token<'_>]) -> bool {
+        let Some(at) = tokens.iter().rposition(|t| t.is_word()) else { return false };
+        let given = tokens[at + 1..].iter().all(|t| t.is_number());
+        let first = tokens.first().map_or("", |t| t.text);
+        given
+            && match tokens[at].text {
+                "timeout" | "every" => at > 0,
+                "for" => first == "hold",
+                "within" | "wait" => at == 0,
+                _ => false,
+            }
+    }
+
+    /// What kind of value a setting in the lines of a lab has.
+    fn setting(&self, context: &Context<'_>) -> Option<Sort> {
+        let [name, colon, ..] = context.before.as_slice() else { return None };
+        let in_lab = context.block().is_some_and(|open| open.head.first().is_some_and(|t| t.text == "lab"));
+        if !in_lab || colon.text != ":" {
+            return None;
+        }
+        // The one setting that every lab has.
+        if name.text == "ambient" {
+            return Some(Sort::Quantity(self.index.units().named("Temperature"), true));
+        }
+        // A number whose unit is still to come says nothing.
+        let known = self.index.setting(name.text).map(|def| self.index.def(def).sort.clone());
+        known.filter(|sort| !matches!(sort, Sort::Any) && *sort != Sort::number())
+    }
+
     fn is_label(&self, context: &Context<'_>) -> bool {
         self.call(self.statement(context)).is_some()
     }
@@ -221,7 +261,7 @@ impl<'i> Place<'i> {
     /// The tokens of the call at the cursor, without what stands before it in its line.
     pub(crate) fn statement<'a, 't>(&self, context: &'a Context<'t>) -> &'a [Token<'t>] {
         let tokens = match context.open.last() {
-            Some(open) if open.bracket != '{' => &open.head,
+            Some(open) if matches!(open.bracket, '(' | '[') => &open.head,
             _ => &context.before,
         };
         let at = tokens.iter().position(|t| t.text == "<-").map_or(0, |i| i + 1);
@@ -265,11 +305,27 @@ impl<'i> Place<'i> {
             let inside = of.map(|d| self.index.def(d).inside.clone()).unwrap_or_default();
             return inside.into_iter().filter(|d| self.index.def(*d).kind == Kind::Parameter).collect();
         }
+        if head.first().is_some_and(|t| t.text == "between") {
+            return self.pairs();
+        }
         if let Some((call, _)) = self.call(head) {
             let inside = self.index.def(call).inside.iter().copied();
             return inside.filter(|d| self.index.def(*d).kind == Kind::Option).collect();
         }
         Vec::new()
+    }
+
+    /// What can be stated of two things of a lab: functions of two things, and relations that have no definition.
+    fn pairs(&self) -> Vec<DefId> {
+        let Some(module) = self.index.module_of(self.file) else { return Vec::new() };
+        let of_two = |def: &DefId| {
+            let d = self.index.def(*def);
+            let params: Vec<&Sort> = d.inside.iter().map(|p| &self.index.def(*p).sort).collect();
+            let things = matches!(params.as_slice(), [Sort::Thing(..), Sort::Thing(..)]);
+            let open = d.kind == Kind::Function || d.kind == Kind::Relation && !self.index.text(d.whole).contains('=');
+            things && open
+        };
+        self.index.visible(module).map(|(_, def)| def).filter(of_two).collect()
     }
 
     /// The capability or asset of a name.

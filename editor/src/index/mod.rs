@@ -9,6 +9,7 @@ mod collect;
 mod def;
 mod members;
 mod settle;
+mod views;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};

@@ -1,6 +1,6 @@
 //! What can be written at `$0`, in texts that are not whole there.
 
-use matterix_editor::complete::{complete, signature};
+use matterix_editor::complete::{Completion, complete, signature};
 
 use crate::names::LAB;
 use crate::support::{Files, analysed, marked};
@@ -10,10 +10,24 @@ fn offers(line: &str) -> Vec<String> {
     in_text(&LAB.replace("    for x in", &format!("    {line}\n    for x in")))
 }
 
+/// The same where the analysis is that of the lab without the line.
+fn while_typing(line: &str) -> Vec<String> {
+    let whole = LAB.replace("use std::heating", "use std::opentrons::{Corning96, OT2}\nuse std::heating").replace(
+        "    crate = Crate",
+        "    ot2 = OT2 at (3, 0, 0) m\n    wells = Corning96 on ot2.slot[2]\n    crate = Crate",
+    );
+    let (analysis, index) = analysed("cook.mtx", &whole, &Files::default());
+    let (text, places) = marked(&whole.replace("    for x in", &format!("    {line}\n    for x in")));
+    sorted(complete(&index, analysis.root, &text, places[0]).all)
+}
+
 fn in_text(text: &str) -> Vec<String> {
     let (text, places) = marked(text);
     let (analysis, index) = analysed("cook.mtx", &text, &Files::default());
-    let mut found = complete(&index, analysis.root, &text, places[0]).all;
+    sorted(complete(&index, analysis.root, &text, places[0]).all)
+}
+
+fn sorted(mut found: Vec<Completion>) -> Vec<String> {
     found.sort_by(|a, b| a.rank.cmp(&b.rank).then_with(|| a.label.cmp(&b.label)));
     found.into_iter().map(|c| c.label).collect()
 }
@@ -144,4 +158,69 @@ fn signatures_say_which_part_is_written() {
     assert!(label.starts_with("clamp(x, low, high)"), "{label}");
     assert_eq!(part.as_deref(), Some("low"));
     assert_eq!(at("note \"bring $0\""), None);
+}
+
+#[test]
+fn values_stand_in_the_braces_of_a_text() {
+    for found in [offers("note \"{$0}\""), while_typing("note \"{$0}\"")] {
+        has(&found, &["beaker", "elapsed", "target"], &["heat", "wait", "bring"]);
+    }
+    has(&while_typing("note \"it took {el$0}\""), &["elapsed"], &["heat"]);
+    has(&while_typing("note \"{max(beaker.volume, $0\""), &["beaker"], &["heat"]);
+    has(&while_typing("note \"{target $0}\""), &["as"], &["heat", "beaker"]);
+    has(&while_typing("note \"{target as $0}\""), &["degC"], &["mL"]);
+}
+
+#[test]
+fn whole_conditions_are_followed_by_words() {
+    let operands = ["beaker", "elapsed", "clamp"];
+    let follows = |line: &str, wanted: &[&str]| {
+        for found in [offers(line), while_typing(line)] {
+            has(&found, wanted, &operands);
+        }
+    };
+    follows("wait until beaker.contents.temperature >= 40 degC $0", &["timeout", "and", "or"]);
+    follows("wait until crate.lid == open $0", &["timeout", "and", "or"]);
+    follows("hold beaker.temperature in 40 degC .. 50 degC $0", &["for", "and"]);
+    follows("hold beaker.temperature in 40 degC .. 50 degC for 1 min $0", &["timeout"]);
+    follows("within 5 min $0", &["after"]);
+    follows("expect beaker.contents.volume > 3 mL $0", &["and", "or"]);
+    follows("expect beaker.contents.volume $0", &["in", "is", "as"]);
+    follows("repeat 3 $0", &["times"]);
+    follows("repeat while crate.lid == open $0", &["max"]);
+    has(&while_typing("expect beaker.contents.volume > 3 mL and $0"), &["beaker"], &["timeout"]);
+    has(&while_typing("wait until beaker.contents.volume > 3 mL timeout 5 $0"), &["min", "s"], &["mL"]);
+    has(&while_typing("try { wait 1 s } $0"), &["else", "on", "finally"], &["heat", "let"]);
+    has(&while_typing("sequence { wait 1 s } $0"), &["on", "finally"], &["heat", "else"]);
+    has(&while_typing("if crate.lid == open { wait 1 s } $0"), &["else"], &["heat", "on"]);
+    has(&while_typing("sequence { wait 1 s }\n    $0"), &["heat", "let"], &["else"]);
+    let found = while_typing("stop $0");
+    assert_eq!(found[0], "heating", "{found:?}");
+}
+
+#[test]
+fn names_that_are_being_written_have_members() {
+    has(&while_typing("for w in wells[A1 .. A3] { expect w.$0 }"), &["contents", "volume"], &[]);
+    has(&while_typing("wait 10 min\n    for w in wells[A1 .. A3] { expect w.$0 }"), &["contents"], &[]);
+    has(&while_typing("for w in wells.row(1) { expect $0 }"), &["w"], &[]);
+    has(&while_typing("expect all(w in wells[A1 .. A3]: w.$0)"), &["contents", "volume"], &[]);
+    has(&while_typing("expect all(p in wells.row(1).pairs: p.first.$0)"), &["contents", "volume"], &[]);
+    has(&while_typing("step rest { wait 1 s }\n    expect rest.$0"), &["start", "end", "elapsed"], &[]);
+}
+
+#[test]
+fn units_of_concentrations_and_of_lines_of_labs_are_known() {
+    let found = while_typing("let x = beaker[water] as $0");
+    has(&found, &["mol/kg", "mol/L", "g/L", "mol/kg_solvent", "%w/w"], &["s", "mL", "degC"]);
+    has(&while_typing("expect beaker[water] > 1 $0"), &["mol/kg", "mol/L"], &["s", "degC"]);
+    let lab = |line: &str| in_text(&LAB.replace("    crate = Crate", &format!("    {line}\n    crate = Crate")));
+    let found = in_text(&LAB.replace("ambient: 22 degC", "ambient: 22 $0"));
+    assert_eq!(found[0], "degC", "{found:?}");
+    has(&found, &["K"], &["mL"]);
+    has(&lab("other = Crate holding 10 $0"), &["mL", "g", "mmol"], &["degC", "s"]);
+    let found = lab("other = Crate on plate at (0, 0) $0");
+    assert_eq!(found[0], "m", "{found:?}");
+    has(&found, &["mm"], &["degC", "mL"]);
+    has(&lab("other = Crate { lid: open } $0"), &["on", "at", "holding"], &["ambient"]);
+    has(&lab("between plate and beaker { $0 }"), &["conductance"], &["ambient", "clamp", "heat"]);
 }

@@ -17,6 +17,8 @@ pub struct Client {
     input: Option<ChildStdin>,
     came: Receiver<Value>,
     asked: i64,
+    /// Answers that came before they were waited for, by the numbers of their requests.
+    answers: BTreeMap<i64, Value>,
     /// What was told of texts, by address: the version, and the findings.
     pub told: BTreeMap<String, (Option<i64>, Vec<Value>)>,
     /// What the server says of itself.
@@ -56,7 +58,7 @@ impl Client {
             }
         });
         let input = child.stdin.take();
-        Client { child, input, came, asked: 0, told: BTreeMap::new(), server: Value::Null }
+        Client { child, input, came, asked: 0, answers: BTreeMap::new(), told: BTreeMap::new(), server: Value::Null }
     }
 
     /// Writes bytes as they are.
@@ -92,24 +94,25 @@ impl Client {
 
     /// The answer to a request.
     pub fn answer(&mut self, id: i64) -> Result<Value, Value> {
-        loop {
-            let message = self.next();
-            if message["id"] == json!(id) && message.get("method").is_none() {
-                return match message.get("error") {
-                    Some(error) => Err(error.clone()),
-                    None => Ok(message["result"].clone()),
-                };
-            }
+        while !self.answers.contains_key(&id) {
+            self.next();
+        }
+        let message = self.answers.remove(&id).unwrap();
+        match message.get("error") {
+            Some(error) => Err(error.clone()),
+            None => Ok(message["result"].clone()),
         }
     }
 
-    /// The next message; findings are kept.
+    /// The next message; findings and answers are kept.
     pub fn next(&mut self) -> Value {
         let message = self.came.recv_timeout(PATIENCE).expect("the server says something");
         if message["method"] == "textDocument/publishDiagnostics" {
             let params = &message["params"];
             let found = params["diagnostics"].as_array().unwrap().clone();
             self.told.insert(params["uri"].as_str().unwrap().to_string(), (params["version"].as_i64(), found));
+        } else if let Some(id) = message["id"].as_i64().filter(|_| message.get("method").is_none()) {
+            self.answers.insert(id, message.clone());
         }
         message
     }

@@ -241,3 +241,44 @@ fn requests_can_be_taken_back() {
     }
     assert_eq!(editor.close(), Some(0));
 }
+
+#[test]
+fn what_is_asked_before_the_first_check_waits_for_it() {
+    let mut editor = Client::new(BINARY, "utf-8");
+    let at = uri(&folder("first").join("warm.mtx"));
+    let here = json!({ "uri": at });
+    editor.open(&at, TEXT);
+    let place = range(TEXT, "plate to 40")["start"].clone();
+    let about = json!({ "textDocument": here, "position": place });
+    let all = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 99, "character": 0 } });
+    let in_all = json!({ "textDocument": here, "range": all });
+    let ask = |editor: &mut Client, what: &str, params: &Value| {
+        editor.request(&format!("textDocument/{what}"), params.clone())
+    };
+    let hover = ask(&mut editor, "hover", &about);
+    let hints = ask(&mut editor, "inlayHint", &in_all);
+    let taken_back = ask(&mut editor, "completion", &about);
+    editor.tell("$/cancelRequest", json!({ "id": taken_back }));
+    let prepared = ask(&mut editor, "prepareRename", &about);
+    let folds = ask(&mut editor, "foldingRange", &json!({ "textDocument": here }));
+    // What comes from the text alone does not wait.
+    assert_eq!(editor.answer(folds).unwrap().as_array().unwrap().len(), 3);
+    assert_eq!(editor.answer(taken_back).unwrap_err()["code"], json!(-32800));
+    let said = editor.answer(hover).unwrap();
+    assert!(said["contents"]["value"].as_str().unwrap().contains("target 40 degC"), "{said}");
+    assert_eq!(editor.answer(hints).unwrap()[0]["label"], "at 0 s");
+    assert_eq!(editor.answer(prepared).unwrap()["range"]["start"], place);
+
+    // Where the text changes meanwhile the place is another.
+    let other = uri(&folder("first").join("other.mtx"));
+    editor.open(&other, TEXT);
+    let about = json!({ "textDocument": { "uri": other }, "position": place });
+    let early = ask(&mut editor, "definition", &about);
+    editor.change(&other, 2, None, TEXT);
+    let late = ask(&mut editor, "definition", &about);
+    if let Err(error) = editor.answer(early) {
+        assert_eq!(error["code"], json!(-32801));
+    }
+    assert_eq!(editor.answer(late).unwrap()[0]["uri"], json!(other));
+    assert_eq!(editor.close(), Some(0));
+}
