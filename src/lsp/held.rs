@@ -1,5 +1,7 @@
 //! Requests about a text that was just opened: what they ask for is known once the text was checked for the first time.
 
+#![allow(clippy::disallowed_methods, reason = "how long an answer waits is a matter of the clock")]
+
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 

@@ -121,11 +121,9 @@ impl Place<'_> {
                 self.units(&of.map(|o| o.1).into_iter().collect::<Vec<_>>(), context.word.1, out);
                 return;
             }
-            Some(")") if context.apart => {
-                // `(1, 2) mm`.
-                if self.is_tuple(tokens) {
-                    self.units(&self.measured(context), context.word.1, out);
-                }
+            // `(1, 2) mm`.
+            Some(")") if context.apart && self.is_tuple(tokens) => {
+                self.units(&self.measured(context), context.word.1, out);
             }
             _ => {}
         }
