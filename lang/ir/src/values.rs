@@ -36,15 +36,13 @@ impl Formulas {
         if self.made.len() != count {
             *self = Formulas { made: vec![None; count], places: vec![(0, 0); count], number: 0 };
         }
-        if self.made[node.0 as usize].is_none() {
-            self.number += 1;
-            let formula = self.make(graph, node);
-            self.made[node.0 as usize] = Some(formula);
-        }
-        self.made[node.0 as usize].get_or_insert_with(|| Formula(Box::default()))
+        let at = node.0 as usize;
+        let formula = self.made[at].take().unwrap_or_else(|| self.make(graph, node));
+        self.made[at].insert(formula)
     }
 
     fn make(&mut self, graph: &Graph, node: NodeId) -> Formula {
+        self.number += 1;
         let mut ops: Vec<Op> = Vec::new();
         let mut todo = vec![node];
         while let Some(&next) = todo.last() {

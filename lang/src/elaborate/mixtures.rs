@@ -1,10 +1,12 @@
 //! The mixtures of the model: their numbers, their extensive states, and what operations change of them.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::Operation;
 use matterix_ir::scene::InstanceId;
+use rustc_hash::FxHashMap;
 
 use super::{Elaborator, ExtensiveKey};
 
@@ -23,6 +25,28 @@ impl Elaborator<'_> {
     /// Index of a mixture in the model.
     pub fn mixture_index(&self, id: InstanceId) -> u32 {
         self.mixtures.partition_point(|m| *m < id) as u32
+    }
+}
+
+/// The states of a mixture that a transfer takes from, each with that of the other mixture which it adds to, if any.
+pub type Passage = Rc<[(u32, Option<u32>)]>;
+
+/// Passages between mixtures, each found once.
+#[derive(Default)]
+pub struct Passages(FxHashMap<(u32, u32), Passage>);
+
+impl Passages {
+    /// What goes from one mixture to another; `extensive` as [`Elaborator::extensive_by_mixture`] gives them.
+    pub fn between(&mut self, from: u32, to: u32, extensive: &[Vec<(ExtensiveKey, u32)>]) -> Passage {
+        let find = || {
+            let held = |mixture: u32| extensive.get(mixture as usize).map_or(&[][..], Vec::as_slice);
+            let target = |key: &ExtensiveKey| {
+                let same = |(k, _): &&(ExtensiveKey, u32)| k.member == key.member && k.species == key.species;
+                held(to).iter().find(same).map(|(_, state)| *state)
+            };
+            held(from).iter().map(|(key, source)| (*source, target(key))).collect()
+        };
+        self.0.entry((from, to)).or_insert_with(find).clone()
     }
 }
 

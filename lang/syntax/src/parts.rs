@@ -31,6 +31,13 @@ pub(super) struct Part {
     pub(super) pieces: Vec<Piece>,
 }
 
+impl Part {
+    /// Whether it was read without a mistake.
+    pub(super) fn is_right(&self) -> bool {
+        self.found.is_empty() && self.hidden == 0
+    }
+}
+
 /// The version of a file, for its parts behind the first.
 pub(super) type Known = Option<Option<u32>>;
 

@@ -67,6 +67,9 @@ fn whole(
     let around = Change { at: body.open + 1, remove: body.close - body.open - 1, insert: "" };
     let (hollow, offsets) = repair::apply(text, &[around]);
     let mut part = once(FileId(0), &hollow, &offsets, known);
+    if !part.is_right() {
+        return None;
+    }
     let earlier = earlier(before, body.begin);
     let kept: Vec<Option<(&[Stmt], usize)>> =
         ranges.iter().map(|range| earlier.get(text.get(range.clone())?).copied()).collect();
@@ -84,14 +87,14 @@ fn whole(
         stmts.extend(own);
     }
     block(&mut part)?.stmts = stmts;
-    (part.found.is_empty() && part.hidden == 0).then_some(part)
+    Some(part)
 }
 
 /// The statements of a piece, counted from its beginning; none where there is a mistake.
 fn statements(piece: &str, begin: &str, known: Known) -> Option<Vec<Stmt>> {
     let text = format!("{begin}{piece}}}");
     let mut part = once(FileId(0), &text, &Offsets::behind(begin.len()), known);
-    if !part.found.is_empty() || part.hidden > 0 {
+    if !part.is_right() {
         return None;
     }
     block(&mut part).map(|block| std::mem::take(&mut block.stmts))

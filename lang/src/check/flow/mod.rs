@@ -34,14 +34,12 @@ pub use self::evolve::Window;
 use self::facts::Facts;
 pub use self::points::{After, Seen};
 pub use self::value::Known;
+use crate::elaborate::mixtures::Passages;
 use crate::elaborate::{Elaborator, ExtensiveKey};
 use crate::eval::ReactionId;
 
 /// Steps followed before the rest of a plan is left to the run.
 const MOST_STEPS: usize = 400_000;
-
-/// The states of a mixture that a transfer takes from, each with that of the other mixture which it adds to.
-type Passage = Rc<[(u32, u32)]>;
 
 /// What a failure is called, and what is known when it is raised.
 type Raised = (String, Facts);
@@ -64,7 +62,7 @@ struct Flow<'l, 'a> {
     /// Extensive states by mixture index.
     mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
     /// The pairs of states that transfers between two of them change.
-    passages: FxHashMap<(usize, usize), Passage>,
+    passages: Passages,
     params: Vec<Known>,
     /// The states that a node depends on.
     parts: Vec<Option<Rc<eval::Parts>>>,
@@ -173,7 +171,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             events,
             derivatives,
             mixtures: lab.extensive_by_mixture(),
-            passages: FxHashMap::default(),
+            passages: Passages::default(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
             parts: vec![None; lab.graph.ops().len()],
             orders: vec![None; lab.graph.ops().len()],

@@ -2,19 +2,15 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::rc::Rc;
 
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
-use rustc_hash::FxHashMap;
 
 use super::world::World;
-use crate::elaborate::{Elaborator, SpeciesId};
-
-/// The states of a mixture that a transfer takes from, each with that of the other mixture which it adds to, if any.
-pub type Passage = Rc<[(u32, Option<u32>)]>;
+use crate::elaborate::mixtures::{Passage, Passages};
+use crate::elaborate::{Elaborator, ExtensiveKey, SpeciesId};
 
 /// Evaluates nodes of the lab at states of the world.
 pub struct Eyes<'l, 'a> {
@@ -25,13 +21,11 @@ pub struct Eyes<'l, 'a> {
     formulas: RefCell<(Formulas, Vec<(f64, bool)>)>,
     /// By state: whether time changes it.
     moving: Vec<bool>,
-    /// The mixtures in the order in which actions number them.
-    pub order: Vec<InstanceId>,
     /// The amount states of each mixture.
     pub amounts: BTreeMap<InstanceId, Vec<(SpeciesId, u32)>>,
-    /// Every extensive state of each mixture by what it is.
-    extensive: BTreeMap<InstanceId, BTreeMap<(String, Option<SpeciesId>), u32>>,
-    passages: RefCell<FxHashMap<(InstanceId, InstanceId), Passage>>,
+    /// The extensive states of each mixture.
+    extensive: Vec<Vec<(ExtensiveKey, u32)>>,
+    passages: RefCell<Passages>,
     /// Whose lineage a state is.
     pub lineage: BTreeMap<u32, InstanceId>,
     /// The states that are amounts.
@@ -41,39 +35,29 @@ pub struct Eyes<'l, 'a> {
 impl<'l, 'a> Eyes<'l, 'a> {
     /// Looks at a lab whose states are all declared.
     pub fn new(lab: &'l Elaborator<'a>) -> Self {
-        let mixture = |i: &InstanceId| lab.per_species(*i).is_some();
-        let order: Vec<InstanceId> = (0..lab.instances.len() as u32).map(InstanceId).filter(mixture).collect();
         let mut amounts: BTreeMap<InstanceId, Vec<(SpeciesId, u32)>> = BTreeMap::new();
-        let mut extensive: BTreeMap<InstanceId, BTreeMap<(String, Option<SpeciesId>), u32>> = BTreeMap::new();
         for (key, state) in &lab.extensive {
             if let Some(s) = key.species {
                 amounts.entry(key.instance).or_default().push((s, *state));
             }
-            extensive.entry(key.instance).or_default().insert((key.member.clone(), key.species), *state);
         }
         Eyes {
             lab,
             params: lab.params.iter().map(|p| p.value).collect(),
             formulas: RefCell::default(),
             moving: (0..lab.states.len() as u32).map(|state| lab.rates.contains_key(&state)).collect(),
-            order,
             counted: amounts.values().flatten().map(|a| a.1).collect(),
             lineage: lab.lineage.iter().flat_map(|(m, of)| of.values().map(|state| (*state, *m))).collect(),
             amounts,
-            extensive,
+            extensive: lab.extensive_by_mixture(),
             passages: RefCell::default(),
         }
     }
 
     /// The states that a transfer between two mixtures changes.
     pub fn passage(&self, from: InstanceId, to: InstanceId) -> Passage {
-        let find = || {
-            let (Some(have), Some(get)) = (self.extensive.get(&from), self.extensive.get(&to)) else {
-                return Passage::default();
-            };
-            have.iter().map(|(key, state)| (*state, get.get(key).copied())).collect()
-        };
-        self.passages.borrow_mut().entry((from, to)).or_insert_with(find).clone()
+        let (from, to) = (self.lab.mixture_index(from), self.lab.mixture_index(to));
+        self.passages.borrow_mut().between(from, to, &self.extensive)
     }
 
     /// A value at a point of the plan; not a number where it depends on what only a run knows.

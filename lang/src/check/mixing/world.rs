@@ -81,7 +81,7 @@ impl World {
         for (i, state) in lab.states.iter().enumerate() {
             world.states[i] = eyes.value(state.initial, &world);
         }
-        for &m in &eyes.order {
+        for &m in &lab.mixtures {
             let instance = &lab.instances[m.0 as usize];
             let mut entries = BTreeMap::new();
             for (s, amount) in &instance.contents {
@@ -97,7 +97,7 @@ impl World {
             }
             world.mixtures[m.0 as usize] = Rc::new(entries);
         }
-        for &m in &eyes.order {
+        for &m in &lab.mixtures {
             world.weigh(eyes, m);
         }
         world
@@ -172,7 +172,8 @@ impl World {
             }
             Action::Move { fraction, from, to, .. } => {
                 let share = eyes.value(*fraction, self);
-                let (Some(&from), Some(&to)) = (eyes.order.get(*from as usize), eyes.order.get(*to as usize)) else {
+                let mixtures = &eyes.lab.mixtures;
+                let (Some(&from), Some(&to)) = (mixtures.get(*from as usize), mixtures.get(*to as usize)) else {
                     return;
                 };
                 if share == 0.0 || from == to {
