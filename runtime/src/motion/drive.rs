@@ -13,7 +13,7 @@ use super::bring::Way;
 use super::effort::EFFORT;
 use super::performed::{Part, Performed};
 use super::refused::Refused;
-use super::stage::Stage;
+use super::stage::{Actor, Stage};
 use super::surroundings::Surroundings;
 use super::tilt::LEVEL;
 
@@ -149,21 +149,24 @@ impl Stage<'_> {
         let home: Vec<f64> = actor.arm.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
         let now = actor.positions(drive);
         let own = self.pose(robot).inverse();
+        let angle = |n: u32| TAU * f64::from(n) / f64::from(AROUND);
+        let shoulder = shoulder(actor);
+        // Where the arm reaches from when the base is in the middle tells where the base is for an arm elsewhere.
+        let turned = |heading: u32| {
+            let nearest = now[2] + wrapped(angle(heading) - now[2]);
+            let mut joints = actor.joints.clone();
+            (joints[*x], joints[*y], joints[*turn]) = (0.0, 0.0, nearest);
+            let links = actor.tree.poses(&joints);
+            let foot = links.get(actor.assembly.base as usize).map(matterix_motion::placement)?;
+            Some((nearest, foot.then(shoulder).position))
+        };
+        let turned: Vec<(f64, [f64; 3])> = (0..AROUND).filter_map(turned).collect();
         let mut found = Vec::new();
         for target in to {
             let at = own.point(target.position);
-            for (distance, k) in DISTANCES.iter().flat_map(|d| (0..AROUND * AROUND).map(move |k| (*d, k))) {
-                let (side, heading) = (k / AROUND, k % AROUND);
-                let [side, heading] = [side, heading].map(|n| TAU * f64::from(n) / f64::from(AROUND));
-                let mut joints = actor.joints.clone();
-                let nearest = now[2] + wrapped(heading - now[2]);
-                (joints[*x], joints[*y], joints[*turn]) = (0.0, 0.0, nearest);
-                // Where the arm's foot is when the base is in the middle tells where the base is for a foot elsewhere.
-                let links = actor.tree.poses(&joints);
-                let Some(foot) = links.get(actor.assembly.base as usize).map(matterix_motion::placement) else {
-                    continue;
-                };
-                let reach = self.reaching_from(actor, &foot);
+            let all = DISTANCES.iter().flat_map(|d| (0..AROUND).map(move |side| (*d, angle(side))));
+            for ((distance, side), (nearest, reach)) in all.flat_map(|way| turned.iter().map(move |turn| (way, *turn)))
+            {
                 let wanted = [at[0] + distance * math::cos(side), at[1] + distance * math::sin(side)];
                 let place = vec![wanted[0] - reach[0], wanted[1] - reach[1], nearest];
                 let far = place.iter().zip(&now).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
@@ -192,19 +195,13 @@ impl Stage<'_> {
         out.sort_by(|a, b| a.far.total_cmp(&b.far));
         out
     }
+}
 
-    /// Where the first joint of an arm is, in the frame of its robot, for a base there: x and y, m.
-    fn reaching_from(&self, actor: &super::stage::Actor, base: &Pose) -> [f64; 2] {
-        let first = actor.chain.variables().first().and_then(|v| actor.assembly.robot.joints.get(v.joint as usize));
-        let mut at = *base;
-        // What is fixed between the base and the arm's first joint.
-        let fixed =
-            matterix_motion::Chain::new(&actor.assembly.robot, actor.assembly.base, first.map_or(0, |j| j.parent));
-        if let Ok(chain) = fixed.map(|chain| chain.tip(&vec![0.0; chain.variables().len()])) {
-            at = base.then(matterix_motion::placement(&chain));
-        }
-        [at.position[0], at.position[1]]
-    }
+/// Where the first joint of an arm is, in the frame of the arm's base.
+fn shoulder(actor: &Actor) -> Pose {
+    let first = actor.chain.variables().first().and_then(|v| actor.assembly.robot.joints.get(v.joint as usize));
+    let fixed = matterix_motion::Chain::new(&actor.assembly.robot, actor.assembly.base, first.map_or(0, |j| j.parent));
+    fixed.map_or(Pose::IDENTITY, |chain| matterix_motion::placement(&chain.tip(&vec![0.0; chain.variables().len()])))
 }
 
 /// Whether an arm with its base there brings its tip to a pose, and some way back and forth from it.

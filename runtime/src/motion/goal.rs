@@ -5,7 +5,8 @@ use std::f64::consts::{FRAC_PI_4, PI};
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand};
 
-use super::stage::{Carried, Stage};
+use super::carried::Carried;
+use super::stage::Stage;
 
 /// Poses of a robot's tip in the lab, any of which will do for bringing what it holds, or else its empty gripper, to a
 /// frame; none where the frame is unknown.

@@ -2,7 +2,8 @@
 
 use matterix_ir::scene::{InstanceId, Stand, frame};
 
-use super::stage::{Carried, Stage};
+use super::carried::Carried;
+use super::stage::Stage;
 
 impl Stage<'_> {
     /// What a robot holds, then all that goes along with it and has a place of its own: no part of a shape.
@@ -33,7 +34,7 @@ impl Stage<'_> {
             let load = (value >= 0.0).then_some(InstanceId(value as u32));
             let has = |c: &Carried| matches!(c, Carried::Stands(Stand::PartOf(by, _)) if *by == carrier.by);
             let own = |id: InstanceId| scene.get(id).owner == Some(carrier.by);
-            let had = (0u32..).zip(&self.carried).find(|(id, c)| has(c) && !own(InstanceId(*id)));
+            let had = (0u32..).zip(self.carried.iter()).find(|(id, c)| has(c) && !own(InstanceId(*id)));
             if let Some(had) = had.map(|(id, _)| InstanceId(id)).filter(|had| Some(*had) != load) {
                 self.unload(had);
             }
@@ -46,19 +47,20 @@ impl Stage<'_> {
     fn load(&mut self, id: InstanceId, by: InstanceId) {
         let Some(instance) = self.scene.instances.get(id.0 as usize) else { return };
         let mount = instance.frames.iter().find(|f| f.name == frame::MOUNT).map(|f| f.pose).unwrap_or_default();
-        let Some(slot) = self.carried.get_mut(id.0 as usize) else { return };
-        if let Carried::Stands(stood) = *slot
+        if let Some(Carried::Stands(stood)) = self.carried.get(id.0 as usize).copied()
             && stood.below() != Some(by)
         {
-            *slot = Carried::Stands(Stand::PartOf(by, mount.inverse()));
+            self.carried.set(id, Carried::Stands(Stand::PartOf(by, mount.inverse())));
             self.before.insert(id, stood);
             self.changes += 1;
         }
     }
 
     fn unload(&mut self, id: InstanceId) {
-        let (Some(slot), Some(stood)) = (self.carried.get_mut(id.0 as usize), self.before.remove(&id)) else { return };
-        *slot = Carried::Stands(stood);
-        self.changes += 1;
+        if let Some(stood) = self.before.remove(&id)
+            && self.carried.set(id, Carried::Stands(stood)).is_some()
+        {
+            self.changes += 1;
+        }
     }
 }

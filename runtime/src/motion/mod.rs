@@ -3,6 +3,7 @@
 mod approach;
 mod assembly;
 mod bring;
+mod carried;
 mod drive;
 mod effort;
 pub mod exact;
@@ -36,6 +37,7 @@ mod turn;
 mod way;
 
 pub use assembly::Assembly;
+pub use carried::Carried;
 pub use fixture::Fixture;
 pub use moment::Moment;
 pub use overlap::overlaps;
@@ -43,5 +45,5 @@ pub use performed::{Part, Performed};
 pub use perturb::{Moved, Perturbation, perturb};
 pub use preflight::{Nowhere, Store, preflight, seal, supported};
 pub use refused::{Meeting, Refused};
-pub use stage::{Actor, Carried, Stage};
+pub use stage::{Actor, Stage};
 pub use together::together;

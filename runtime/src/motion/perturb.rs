@@ -4,8 +4,9 @@ use matterix_ir::Program;
 use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, Stand, frame};
 
+use super::carried::Carried;
 use super::outline::Outline;
-use super::stage::{Carried, Stage};
+use super::stage::Stage;
 use crate::backend::noise::{key, mix, uniform};
 
 /// How far apart a place and the top of a shape may be for the thing to stand on that shape, m.

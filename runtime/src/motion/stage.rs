@@ -16,18 +16,10 @@ use matterix_solids::Body;
 use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, assemble};
+use super::carried::{Carried, Carrying, write_number, write_stand};
 use super::fingers::Fingers;
 use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
-
-/// What carries a thing and where.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Carried {
-    /// It stands somewhere.
-    Stands(Stand),
-    /// In the hand of a robot, relative to its tip.
-    Held(InstanceId, Pose),
-}
 
 /// A robot and how it stands. What stays the same is shared by all copies of a stage.
 #[derive(Clone, Debug)]
@@ -57,7 +49,7 @@ pub struct Stage<'p> {
     /// What there is.
     pub scene: &'p Scene,
     /// By instance.
-    pub carried: Vec<Carried>,
+    pub carried: Carrying,
     /// Where things stood before they were picked up.
     pub(super) before: BTreeMap<InstanceId, Stand>,
     /// By instance.
@@ -128,7 +120,7 @@ impl<'p> Stage<'p> {
     pub fn still(scene: &'p Scene) -> Self {
         Stage {
             scene,
-            carried: scene.stands().into_iter().map(Carried::Stands).collect(),
+            carried: Carrying::at_first(scene),
             before: BTreeMap::new(),
             actors: BTreeMap::new(),
             fixtures: BTreeMap::new(),
@@ -244,8 +236,7 @@ impl<'p> Stage<'p> {
 
     /// A thing stands somewhere on a surface from now on.
     pub fn put(&mut self, id: InstanceId, on: InstanceId, at: Pose) {
-        if let Some(carried) = self.carried.get_mut(id.0 as usize) {
-            *carried = Carried::Stands(Stand::On(on, at));
+        if self.carried.set(id, Carried::Stands(Stand::On(on, at))).is_some() {
             self.changes += 1;
         }
     }
@@ -285,13 +276,18 @@ impl<'p> Stage<'p> {
         }
     }
 
+    /// An instance, and what [`Stage::carriers`] gives; over and over where things carry each other, which ends as well.
+    fn down(&self, id: InstanceId) -> impl Iterator<Item = InstanceId> {
+        std::iter::successors(Some(id), |id| self.below(*id)).take(self.carried.len() + 1)
+    }
+
     /// Whether it cannot be told where an instance is in the lab.
     pub fn is_unknown(&self, id: InstanceId) -> bool {
         let here = |i: InstanceId| {
             let in_hand = matches!(self.carried.get(i.0 as usize), Some(Carried::Held(by, _)) if self.unknown.postures.contains(by));
             in_hand || self.unknown.places.contains(&i)
         };
-        here(id) || self.carriers(id).into_iter().any(here)
+        self.down(id).any(here)
     }
 
     /// Whether it cannot be told where a frame of an instance is in the lab.
@@ -304,7 +300,7 @@ impl<'p> Stage<'p> {
 
     /// Whether a robot stands on a thing, or on what it carries: it cannot take that in its hand.
     pub fn stands_on(&self, robot: InstanceId, id: InstanceId) -> bool {
-        robot == id || self.carriers(robot).contains(&id)
+        self.down(robot).any(|below| below == id)
     }
 
     /// A robot's gripper still stands about what it has let go.
@@ -324,7 +320,7 @@ impl<'p> Stage<'p> {
 
     /// The robot that holds an instance, or something it is part of or stands on.
     pub fn held_by(&self, id: InstanceId) -> Option<InstanceId> {
-        std::iter::once(id).chain(self.carriers(id)).find_map(|i| match self.carried.get(i.0 as usize)? {
+        self.down(id).find_map(|i| match self.carried.get(i.0 as usize)? {
             Carried::Held(by, _) => Some(*by),
             Carried::Stands(_) => None,
         })
@@ -353,12 +349,7 @@ impl<'p> Stage<'p> {
 
     /// Whether a thing, and all that carries it, is where it was when the run began.
     pub fn is_where_it_was(&self, id: InstanceId) -> bool {
-        let first = self.scene.stands();
-        let unmoved = |i: InstanceId| {
-            let (now, first) = (self.carried.get(i.0 as usize), first.get(i.0 as usize));
-            matches!((now, first), (Some(Carried::Stands(now)), Some(first)) if now == first)
-        };
-        unmoved(id) && self.carriers(id).into_iter().all(unmoved)
+        self.down(id).all(|id| !self.carried.is_moved(id))
     }
 
     /// What an instance is part of, and what that is part of.
@@ -393,8 +384,7 @@ impl<'p> Stage<'p> {
             return;
         }
         let now = self.pose(id);
-        let index = id.0 as usize;
-        let Some(old) = self.carried.get(index).copied() else { return };
+        let Some(old) = self.carried.get(id.0 as usize).copied() else { return };
         let new = match by {
             None => Carried::Stands(Stand::Lab(now)),
             Some(by) => match self.hand_of(by) {
@@ -405,7 +395,7 @@ impl<'p> Stage<'p> {
         if let (Carried::Held(..), Carried::Stands(old)) = (new, old) {
             self.before.insert(id, old);
         }
-        self.carried[index] = new;
+        self.carried.set(id, new);
         self.changes += 1;
     }
 }
@@ -425,7 +415,6 @@ pub struct Change {
 impl Stage<'_> {
     /// What became different since an earlier moment, in what a motion can change.
     pub fn since(&self, before: &Stage<'_>) -> Change {
-        let things = self.carried.iter().zip(&before.carried).enumerate();
         let moved = self.actors.iter().filter(|(id, a)| before.actors.get(id).is_none_or(|b| a.joints != b.joints));
         let freed = |id: &&InstanceId| self.freed.get(id) != before.freed.get(id);
         let came = |id: &&InstanceId| self.came.get(id) != before.came.get(id);
@@ -436,7 +425,7 @@ impl Stage<'_> {
             parts: swung.map(|(id, f)| (*id, f.joints.clone())).collect(),
             led: self.led.symmetric_difference(&before.led).map(|id| (*id, self.led.contains(id))).collect(),
             tools: self.actors.iter().filter(tool).map(|(id, a)| (*id, a.assembly.tip)).collect(),
-            carried: things.filter(|(_, (a, b))| a != b).map(|(i, (a, _))| (InstanceId(i as u32), *a)).collect(),
+            carried: self.carried.since(&before.carried),
             joints: moved.map(|(id, a)| (*id, a.joints.clone())).collect(),
             came: self.actors.keys().filter(came).map(|id| (*id, self.came.get(id).cloned())).collect(),
             freed: self.actors.keys().filter(freed).map(|id| (*id, self.freed.get(id).copied())).collect(),
@@ -446,7 +435,7 @@ impl Stage<'_> {
     /// Makes a change that has been seen before from the same moment. `None` where it is not of this lab.
     pub fn change(&mut self, change: &Change) -> Option<()> {
         for (id, carried) in &change.carried {
-            *self.carried.get_mut(id.0 as usize)? = *carried;
+            self.carried.set(*id, *carried)?;
         }
         for (robot, link) in &change.tools {
             self.take_link(*robot, *link).ok()?;
@@ -484,15 +473,7 @@ impl Stage<'_> {
     /// less than that (m, rad) mostly count as the same.
     pub fn digest(&self, coarse: Option<f64>, hash: &mut impl Hasher) {
         let Stage { carried, before, actors, fixtures, freed, came, led, shared, unknown, .. } = self;
-        for one in carried {
-            match one {
-                Carried::Stands(s) => write_stand(hash, s, coarse),
-                Carried::Held(by, p) => {
-                    hash.write_u64(u64::from(by.0) | 1 << 32);
-                    write_pose(hash, p, coarse);
-                }
-            }
-        }
+        carried.digest(coarse, hash);
         for (id, s) in before {
             hash.write_u64(u64::from(id.0) | 2 << 32);
             write_stand(hash, s, coarse);
@@ -519,21 +500,6 @@ impl Stage<'_> {
         hash.write_u64(u64::MAX);
         unknown.postures.iter().for_each(|id| hash.write_u32(id.0));
     }
-}
-
-fn write_number(hash: &mut impl Hasher, v: f64, coarse: Option<f64>) {
-    // Adding zero makes one number of the two zeros.
-    hash.write_u64(coarse.map_or(v, |step| (v / step).round() + 0.0).to_bits());
-}
-
-fn write_pose(hash: &mut impl Hasher, pose: &Pose, coarse: Option<f64>) {
-    pose.position.iter().chain(&pose.rotation).for_each(|v| write_number(hash, *v, coarse));
-}
-
-fn write_stand(hash: &mut impl Hasher, stand: &Stand, coarse: Option<f64>) {
-    hash.write_u64(stand.below().map_or(u64::MAX, |id| u64::from(id.0)));
-    let (Stand::Lab(pose) | Stand::On(_, pose) | Stand::PartOf(_, pose)) = stand;
-    write_pose(hash, pose, coarse);
 }
 
 impl Actor {

@@ -66,6 +66,11 @@ impl Surroundings {
         let carriers = stage.carriers(robot);
         for index in 0..stage.scene.instances.len() {
             let id = InstanceId(index as u32);
+            // What a gantry runs in stands there whatever moves.
+            let has_shapes = stage.actors.contains_key(&id) || !stage.is_inside_a_shape(id);
+            if !has_shapes {
+                continue;
+            }
             let mine = stage.actor_of(id) == Some(robot) || stage.held_by(id) == Some(robot);
             if mine || !wanted(id) || stage.is_unknown(id) {
                 continue;
@@ -74,10 +79,7 @@ impl Surroundings {
             if stage.actors.contains_key(&id) && !stage.unknown.postures.contains(&id) {
                 out.add_robot(stage, id);
             }
-            // What a gantry runs in stands there whatever moves.
-            if stage.actors.contains_key(&id) || !stage.is_inside_a_shape(id) {
-                out.add_shapes(stage, id, !bodiless.contains(&id));
-            }
+            out.add_shapes(stage, id, !bodiless.contains(&id));
             if stage.is_in_any(id, &carriers) {
                 out.world.beneath.extend(first..out.world.bodies.len());
             }

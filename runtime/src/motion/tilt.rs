@@ -9,9 +9,10 @@ use matterix_motion::inverse::Request;
 use matterix_motion::plan::Upright;
 use matterix_motion::pose::{distance, pose};
 
+use super::carried::Carried;
 use super::performed::{Part, Performed};
 use super::refused::Refused;
-use super::stage::{Carried, Stage};
+use super::stage::Stage;
 
 /// What tilts by less than this counts as upright, rad.
 pub(super) const LEVEL: f64 = 0.1;

@@ -50,7 +50,7 @@ impl<'a> Checker<'a> {
             near.push(match figure.anchor(group) {
                 Some(anchor) => {
                     let anchor = Point3::from(anchor);
-                    let in_reach = |b: &&crate::world::Body| b.nearest(&anchor).distance <= group.reach + 1e-6;
+                    let in_reach = |b: &&crate::world::Body| b.is_within(group.reach + 1e-6, &anchor);
                     let mut near: Vec<Obstacle> = world.bodies.iter().filter(in_reach).map(Obstacle::new).collect();
                     // Alike next to alike, so that branches are foreseen.
                     near.sort_by_key(Obstacle::kind);

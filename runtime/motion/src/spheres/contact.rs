@@ -45,7 +45,7 @@ impl Figure {
         for &(link, center, radius) in &placed {
             let still = self.is_still(link);
             for (index, body) in world.bodies.iter().enumerate() {
-                if still && world.beneath.contains(&index) {
+                if still && world.beneath.contains(&index) || !body.is_within(radius, &center) {
                     continue;
                 }
                 let nearest = body.nearest(&center);

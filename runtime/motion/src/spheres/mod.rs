@@ -15,7 +15,9 @@ pub use contact::{Contact, Other};
 pub use placed::Placed;
 pub use referee::Referee;
 
+use std::f64::consts::PI;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use matterix_ir::robot::{Ball, Robot};
 use nalgebra::{Point3, Vector3};
@@ -23,7 +25,7 @@ use nalgebra::{Point3, Vector3};
 use crate::chain::Tree;
 use crate::halton::Samples;
 use crate::pose::Pose;
-use crate::variables::Malformed;
+use crate::variables::{Malformed, Variable};
 use cover::{Round, cover};
 use frames::{Frame, Seat};
 
@@ -79,7 +81,8 @@ pub struct Figure {
     rounds: Vec<(u32, Round)>,
     apart: Vec<[u32; 2]>,
     limits: Vec<[f64; 2]>,
-    samples: Samples,
+    /// Drawn when they are first asked for: what goes straight asks for none.
+    samples: OnceLock<Samples>,
     frames: Vec<Frame>,
     groups: Vec<Group>,
     parts: Vec<Part>,
@@ -114,10 +117,6 @@ impl Figure {
         }
         let limits: Vec<[f64; 2]> =
             moved.iter().map(|&m| tree.variables()[m].limits).map(|l| [l.lower, l.upper]).collect();
-        // Of joints without end any one turn has all there is.
-        let turn = [-std::f64::consts::PI, std::f64::consts::PI];
-        let sampled: Vec<[f64; 2]> =
-            moved.iter().zip(&limits).map(|(&m, l)| if tree.variables()[m].is_bounded() { *l } else { turn }).collect();
         let rounds = balls.iter().map(|b| (b.link, Round { center: b.center.into(), radius: b.radius })).collect();
         let mut figure = Self {
             tree,
@@ -128,7 +127,7 @@ impl Figure {
             holders: held.iter().map(|h| h.link).collect(),
             rounds,
             apart: Vec::new(),
-            samples: Samples::new(&sampled),
+            samples: OnceLock::new(),
             limits,
             frames,
             still: seats.iter().map(|seat| seat.frame.is_none()).collect(),
@@ -159,7 +158,13 @@ impl Figure {
 
     /// Configurations spread over the limits.
     pub(crate) fn samples(&self) -> &Samples {
-        &self.samples
+        // Of joints without end any one turn has all there is.
+        const TURN: [f64; 2] = [-PI, PI];
+        self.samples.get_or_init(|| {
+            let bounded = |m: &usize| self.tree.variables().get(*m).is_some_and(Variable::is_bounded);
+            let limits = self.moved.iter().zip(&self.limits).map(|(m, limits)| if bounded(m) { *limits } else { TURN });
+            Samples::new(&limits.collect::<Vec<_>>())
+        })
     }
 
     /// The name of a link, or of a held thing by the index that follows the links'.

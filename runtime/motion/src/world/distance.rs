@@ -14,6 +14,23 @@ pub struct Nearest {
 }
 
 impl Body {
+    /// Whether it comes as near to a point as this, m.
+    pub fn is_within(&self, reach: f64, from: &Point3<f64>) -> bool {
+        // The middle is in the solid, and all of the solid is around it: most bodies are near or far by that alone.
+        let off = (from.coords - self.pose.translation.vector).norm();
+        off <= reach || off - self.extent() <= reach && self.nearest(from).distance <= reach
+    }
+
+    /// How far it reaches from its middle, m.
+    fn extent(&self) -> f64 {
+        match self.shape {
+            Shape::Sphere(radius) => radius,
+            Shape::Capsule(radius, half) => radius + half,
+            Shape::Cuboid([x, y, z]) => x.hypot(y).hypot(z),
+            Shape::Cylinder(radius, half) => radius.hypot(half),
+        }
+    }
+
     /// The point of the surface nearest to `from`.
     pub fn nearest(&self, from: &Point3<f64>) -> Nearest {
         let p = self.pose.inverse_transform_point(from).coords;
@@ -64,4 +81,30 @@ fn on_cylinder(p: Vector3<f64>, radius: f64, half: f64) -> Vector3<f64> {
         }
     }
     Vector3::new(out.x * r, out.y * r, z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pose::Pose;
+
+    #[test]
+    fn what_is_within_reach_is_what_is_near_enough() {
+        let shapes =
+            [Shape::Sphere(0.2), Shape::Capsule(0.1, 0.3), Shape::Cuboid([0.1, 0.2, 0.4]), Shape::Cylinder(0.2, 0.1)];
+        let mut within = 0;
+        for (index, shape) in shapes.into_iter().enumerate() {
+            let turn = nalgebra::Rotation3::from_euler_angles(0.3, 0.2 * index as f64, -0.4);
+            let pose = Pose::from_parts(nalgebra::Translation3::new(0.1, -0.2, 0.3), turn);
+            let body = Body { name: String::new(), pose, shape };
+            for place in (-6i32..=6).flat_map(|x| (-6i32..=6).map(move |y| [x, y])) {
+                let from = Point3::new(f64::from(place[0]) * 0.15, f64::from(place[1]) * 0.15, 0.1);
+                for reach in [0.0, 0.05, 0.3, 0.7, f64::INFINITY] {
+                    assert_eq!(body.is_within(reach, &from), body.nearest(&from).distance <= reach, "{from} {reach}");
+                    within += usize::from(body.is_within(reach, &from));
+                }
+            }
+        }
+        assert!(within > 100);
+    }
 }

@@ -5,9 +5,10 @@ use matterix_ir::scene::{InstanceId, Stand};
 
 use super::may_meet;
 use super::solid::Solids;
+use crate::motion::carried::Carried;
 use crate::motion::outline::Outline;
 use crate::motion::perturb::{LEVEL, pieces};
-use crate::motion::stage::{Carried, Stage};
+use crate::motion::stage::Stage;
 
 /// Places are given to this, m.
 const ROUND: f64 = 0.01;

@@ -11,7 +11,8 @@ use siphasher::sip128::{Hasher128, SipHasher13};
 
 use super::offer::Missed;
 use super::values::Values;
-use crate::motion::stage::{Carried, Stage};
+use crate::motion::carried::Carried;
+use crate::motion::stage::Stage;
 use crate::motion::supported;
 
 /// Moments that differ by less than this, m and rad, mostly count as the same.

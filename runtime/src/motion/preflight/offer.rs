@@ -6,9 +6,10 @@ use matterix_ir::scene::{InstanceId, Stand};
 use matterix_motion::inverse::{Request, Solver};
 use matterix_motion::pose::pose;
 
+use crate::motion::carried::Carried;
 use crate::motion::outline::Outline;
 use crate::motion::perturb::{LEVEL, others, pieces, with_load};
-use crate::motion::stage::{Carried, Stage};
+use crate::motion::stage::Stage;
 
 /// A goal that an arm does not reach.
 #[derive(Clone, Debug)]
@@ -84,9 +85,7 @@ pub fn places(stage: &Stage<'_>, plan: &Plan, id: StepId, missed: &Missed) -> Ve
     for shift in shifts {
         let moved = moved(stage, *stand, shift);
         let mut there = stage.clone();
-        if let Some(carried) = there.carried.get_mut(thing.0 as usize) {
-            *carried = Carried::Stands(moved);
-        }
+        there.carried.set(thing, Carried::Stands(moved));
         let by = there.pose(thing).position;
         let by = [by[0] - at[0], by[1] - at[1]];
         if reaches(&mut solver, &back, targets, by, &now) && has_room(stage, &there, thing) {

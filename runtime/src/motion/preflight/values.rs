@@ -1,22 +1,26 @@
 //! What is known of a lab's states while a plan is followed without being run.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::rc::Rc;
 
-use matterix_ir::graph::{BinaryOp, apply};
+use matterix_ir::graph::{BinaryOp, UnaryOp, binary, unary};
 use matterix_ir::model::{Action, Domain, Model};
 use matterix_ir::plan::{Motion, Operation, Step};
+use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{NodeId, Op, Program};
 
 use crate::motion::stage::Stage;
 
 /// Values of states that are words, truths or instances, as far as they are known; quantities only where motions depend on
 /// them and nothing but operations changes them.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Values {
-    by_state: BTreeMap<u32, f64>,
+    by_state: Vec<Option<f64>>,
     /// The quantities among them.
-    followed: Arc<BTreeSet<u32>>,
+    followed: Rc<BTreeSet<u32>>,
+    /// What expressions are made of, as far as they were asked for, and room for values in between.
+    formulas: Rc<RefCell<(Formulas, Vec<Option<f64>>)>>,
 }
 
 impl Values {
@@ -28,15 +32,18 @@ impl Values {
             Action::Move { .. } => None,
         });
         let changes: BTreeSet<u32> = changes.collect();
-        let mut out = Values { followed: Arc::new(followed(program, &changes)), ..Values::default() };
+        let mut out = Values {
+            by_state: vec![None; model.states.len()],
+            followed: Rc::new(followed(program, &changes)),
+            formulas: Rc::default(),
+        };
         for (index, state) in model.states.iter().enumerate() {
             let index = index as u32;
             if !out.follows(model, index) || changes.contains(&index) {
                 continue;
             }
-            if let Some(value) = out.value(model, state.initial) {
-                out.by_state.insert(index, value);
-            }
+            let value = out.value(model, state.initial);
+            out.set(index, value);
         }
         out
     }
@@ -51,12 +58,15 @@ impl Values {
     pub fn assign(&mut self, model: &Model, state: u32, value: NodeId) -> Option<f64> {
         let value = self.value(model, value);
         if self.follows(model, state) {
-            match value {
-                Some(value) => self.by_state.insert(state, value),
-                None => self.by_state.remove(&state),
-            };
+            self.set(state, value);
         }
         value
+    }
+
+    fn set(&mut self, state: u32, value: Option<f64>) {
+        if let Some(known) = self.by_state.get_mut(state as usize) {
+            *known = value;
+        }
     }
 
     /// What is known when actions have been carried out, the quantities that they set included.
@@ -64,10 +74,8 @@ impl Values {
         let mut out = self.clone();
         for action in actions {
             let Action::Assign { state, value, .. } = action else { continue };
-            match out.value(model, *value) {
-                Some(value) => out.by_state.insert(*state, value),
-                None => out.by_state.remove(state),
-            };
+            let value = out.value(model, *value);
+            out.set(*state, value);
         }
         out
     }
@@ -89,44 +97,66 @@ impl Values {
 
     /// The value of an expression, if what is known settles it.
     pub fn value(&self, model: &Model, node: NodeId) -> Option<f64> {
-        let graph = &model.graph;
-        let mut values: BTreeMap<NodeId, f64> = BTreeMap::new();
-        for node in graph.schedule([node]) {
-            let op = graph.op(node);
-            let leaf = |op: Op| match op {
-                Op::Const(v) => Some(v),
-                Op::State(s) => self.by_state.get(&s).copied(),
-                Op::Param(p) => model.params.get(p as usize).map(|p| p.value),
-                _ => None,
-            };
-            let at = |n: NodeId| values.get(&n).copied();
-            let value = match op {
-                _ if op.operands().next().is_none() => leaf(op),
-                // One side may settle it.
-                Op::Binary(BinaryOp::And, a, b) if at(a) == Some(0.0) || at(b) == Some(0.0) => Some(0.0),
-                Op::Binary(BinaryOp::Or, a, b) if [a, b].into_iter().any(|n| at(n).is_some_and(|v| v != 0.0)) => {
-                    Some(1.0)
-                }
-                Op::Select(c, a, b) => match at(c) {
-                    Some(c) => at(if c != 0.0 { a } else { b }),
-                    None => at(a).filter(|v| at(b) == Some(*v)),
-                },
-                _ if op.operands().all(|n| values.contains_key(&n)) => {
-                    Some(apply(op, |_| f64::NAN, |n| values.get(&n).copied().unwrap_or(f64::NAN)))
-                }
-                _ => None,
-            };
-            if let Some(value) = value.filter(|v| !v.is_nan()) {
-                values.insert(node, value);
-            }
-        }
-        values.get(&node).copied()
+        let (formulas, room) = &mut *self.formulas.borrow_mut();
+        formulas.of(&model.graph, node).value(&Settled { model, by_state: &self.by_state }, room).flatten()
     }
 
     /// All of them, in order.
     pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
-        self.by_state.iter().map(|(state, value)| (*state, *value))
+        (0..).zip(&self.by_state).filter_map(|(state, value)| Some((state, (*value)?)))
     }
+}
+
+/// What is known settles a value, or does not.
+struct Settled<'v> {
+    model: &'v Model,
+    by_state: &'v [Option<f64>],
+}
+
+impl Rules for Settled<'_> {
+    type Value = Option<f64>;
+
+    fn leaf(&self, op: Op) -> Option<Option<f64>> {
+        let value = match op {
+            Op::Const(v) => Some(v),
+            Op::State(s) => self.by_state.get(s as usize).copied().flatten(),
+            Op::Param(p) => self.model.params.get(p as usize).map(|p| p.value),
+            _ => None,
+        };
+        Some(number(value))
+    }
+
+    fn unary(&self, op: UnaryOp, a: Option<f64>) -> Option<Option<f64>> {
+        Some(number(a.map(|a| unary(op, a))))
+    }
+
+    fn binary(&self, op: BinaryOp, a: Option<f64>, b: Option<f64>) -> Option<Option<f64>> {
+        let either = |settles: fn(f64) -> bool| [a, b].into_iter().flatten().any(settles);
+        Some(match op {
+            // One side may settle it.
+            BinaryOp::And if either(|v| v == 0.0) => Some(0.0),
+            BinaryOp::Or if either(|v| v != 0.0) => Some(1.0),
+            _ => number(a.zip(b).map(|(a, b)| binary(op, a, b))),
+        })
+    }
+
+    fn select(&self, condition: Option<f64>, a: Option<f64>, b: Option<f64>) -> Option<f64> {
+        match condition {
+            Some(condition) => {
+                if condition != 0.0 {
+                    a
+                } else {
+                    b
+                }
+            }
+            None => a.filter(|v| b == Some(*v)),
+        }
+    }
+}
+
+/// What is not a number is not known.
+fn number(value: Option<f64>) -> Option<f64> {
+    value.filter(|v| !v.is_nan())
 }
 
 /// Quantities that motions depend on, such as how far a tip hangs below its nozzle, as far as no law and no event changes them.

@@ -15,8 +15,9 @@ use super::offer::{self, Missed};
 use super::starts::Starts;
 use super::told;
 use super::values::Values;
+use crate::motion::carried::Carried;
 use crate::motion::refused::Refused;
-use crate::motion::stage::{Carried, Stage};
+use crate::motion::stage::Stage;
 
 /// How many courses are followed at a time.
 const COURSES: usize = 6;
@@ -174,9 +175,7 @@ impl<'p> Walk<'p, '_> {
             places.retain(|other| other.is_apart(&place));
             let mut course = start.clone();
             course.stage.hasty = true;
-            if let Some(carried) = course.stage.carried.get_mut(place.thing.0 as usize) {
-                *carried = place.stand;
-            }
+            course.stage.carried.set(place.thing, place.stand);
             let ends = self.inside(id, vec![course]);
             let fails =
                 |lost: &Option<Box<Refusal>>| lost.as_ref().is_some_and(|l| l.cause.things.contains(&place.thing));
@@ -468,16 +467,16 @@ impl<'p> Walk<'p, '_> {
             if times.is_some_and(|times| f64::from(turn) >= times) {
                 break;
             }
-            let ends = self.step(body, now.clone());
-            let new: Courses<'p> = ends.iter().filter(|c| seen.insert(c.digest())).cloned().collect();
-            match times {
-                Some(_) => now = ends,
+            let ends = self.step(body, now);
+            let news: Vec<bool> = ends.iter().map(|c| seen.insert(c.digest())).collect();
+            now = match times {
+                Some(_) => ends,
                 None => {
-                    after.extend(ends);
-                    now.clone_from(&new);
+                    after.extend(ends.iter().cloned());
+                    ends.into_iter().zip(&news).filter_map(|(course, new)| new.then_some(course)).collect()
                 }
-            }
-            if new.is_empty() {
+            };
+            if !news.contains(&true) {
                 break;
             }
         }

@@ -188,12 +188,12 @@ impl<'p> Replay<'p> {
     }
 
     fn set(&mut self, id: InstanceId, carried: Carried) {
-        let Some(slot) = self.stage.carried.get_mut(id.0 as usize) else { return };
-        let same = match (*slot, carried) {
+        let Some(before) = self.stage.carried.get(id.0 as usize).copied() else { return };
+        let same = match (before, carried) {
             (Carried::Held(a, _), Carried::Held(b, _)) => a == b,
             (a, b) => a == b,
         };
-        *slot = carried;
+        self.stage.carried.set(id, carried);
         if !same {
             self.riders.clear();
         }

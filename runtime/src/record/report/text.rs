@@ -39,9 +39,11 @@ impl Table {
                 if width == 0 {
                     continue;
                 }
+                // Texts may be longer than what a format fills up to.
+                let blanks = " ".repeat(width - cell.chars().count());
                 match align {
-                    Align::Left => line += &format!("  {cell:<width$}"),
-                    Align::Right => line += &format!("  {cell:>width$}"),
+                    Align::Left => line += &format!("  {cell}{blanks}"),
+                    Align::Right => line += &format!("  {blanks}{cell}"),
                 }
             }
             out += line.trim_end();
