@@ -683,6 +683,7 @@ fn build<'a>(
             let item = tables.names.decl(task.item).item;
             if let ItemKind::Workflow { name, .. } = &item.kind {
                 elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
+                elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
             }
             uses = checks::uses(&elaborator, sources, lab, &plan);
             if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {

@@ -54,6 +54,24 @@ pub fn unhandled(plan: &Plan, name: Span, within: Span) -> Option<Diagnostic> {
     )
 }
 
+/// Steps of a file that nothing gets to, as a `fail` stands before them in their block; each place once.
+pub fn beyond(plan: &Plan, within: Span) -> Vec<Diagnostic> {
+    let mut out: Vec<Diagnostic> = Vec::new();
+    for step in &plan.steps {
+        let Step::Sequence(list) = &step.step else { continue };
+        let all: Vec<&PlanStep> = list.iter().map(|id| plan.get(*id)).collect();
+        let Some(at) = all.iter().position(|step| matches!(step.step, Step::Fail { .. })) else { continue };
+        let (fails, Some(next)) = (all[at].span, all.get(at + 1).map(|step| step.span)) else { continue };
+        if next.file != within.file || next.is_empty() || out.iter().any(|d| d.span() == next) {
+            continue;
+        }
+        let headline = "what follows a `fail` is never done";
+        let d = Diagnostic::warning(codes::DEAD_BRANCH, next, headline, "never done");
+        out.push(d.because(fails, "always fails here").help("take it out, or say with `if` when it fails"));
+    }
+    out
+}
+
 fn fails(clause: &Clause) -> Option<&Vec<crate::ast::Name>> {
     match &clause.kind {
         ClauseKind::Fails(names) => Some(names),

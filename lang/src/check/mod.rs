@@ -28,7 +28,7 @@ use crate::names::{self, DeclId};
 
 pub use consequences::without_consequences;
 pub use declarations::{bind, declarations, declarations_and};
-pub use failures::{undeclared, unhandled};
+pub use failures::{beyond, undeclared, unhandled};
 pub use unused::{Uses, reagents, things, uses};
 
 /// Checks a lab that no workflow of its file uses, and notes what names mean where that is asked for.

@@ -141,11 +141,7 @@ impl<'a> Elaborator<'a> {
             return parts.into_iter().map(|(s, per_kg)| (s, self.scaled(n.node, per_kg))).collect();
         }
         if n.dimension == volume {
-            let mut per_kg = 0.0;
-            for (s, amount) in &parts {
-                let Some(v) = self.molar_volume(*s, name) else { return Vec::new() };
-                per_kg += amount * v;
-            }
+            let Some(per_kg) = self.volume_of(&parts, name.span) else { return Vec::new() };
             return parts.into_iter().map(|(s, amount)| (s, self.scaled(n.node, amount / per_kg))).collect();
         }
         if let Substance::Species(s) = what
@@ -186,9 +182,24 @@ impl<'a> Elaborator<'a> {
         self.graph.binary(BinaryOp::Mul, node, factor)
     }
 
+    /// Volume, m^3, of amounts of species together; salts as the ions they become where there is water.
+    pub fn volume_of(&mut self, parts: &[(SpeciesId, f64)], at: Span) -> Option<f64> {
+        let species = &self.tables.species;
+        let wet = parts.iter().any(|(s, _)| species.get(*s).is_water());
+        let mut there: Vec<(SpeciesId, f64)> = Vec::new();
+        for (s, amount) in parts {
+            match species.get(*s).dissolves.as_slice() {
+                ions @ [_, ..] if wet => there.extend(ions.iter().map(|(ion, count)| (*ion, count * amount))),
+                _ => there.push((*s, *amount)),
+            }
+        }
+        let volumes = there.into_iter().map(|(s, amount)| Some(amount * self.molar_volume(s, at)?));
+        volumes.sum()
+    }
+
     /// Molar volume, m^3/mol, of a species that is measured out by volume.
-    fn molar_volume(&mut self, s: SpeciesId, at: &Name) -> Option<f64> {
-        let probe = Name { text: "molar_volume".into(), span: at.span };
+    fn molar_volume(&mut self, s: SpeciesId, at: Span) -> Option<f64> {
+        let probe = Name { text: "molar_volume".into(), span: at };
         match self.member(Value::Species(s), &probe) {
             Value::Num(n) => self.graph.constant(n.node),
             _ => None,

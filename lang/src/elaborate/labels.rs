@@ -163,15 +163,8 @@ impl<'a> Elaborator<'a> {
         if *kind == amount.over(&solvent) && !by_mass {
             return Some(per_kg / (1.0 - per_kg * molar_mass));
         }
-        let name = crate::ast::Name { text: String::new(), span: self.tables.species.get(s).span };
         if *kind == amount.over(&volume) || *kind == mass.over(&volume) {
-            let mut litres = 0.0;
-            for (p, n) in parts {
-                let probe = crate::ast::Name { text: "molar_volume".into(), ..name.clone() };
-                let Value::Num(v) = self.member(Value::Species(*p), &probe) else { return None };
-                litres += n * self.graph.constant(v.node)?;
-            }
-            let c = per_kg / litres;
+            let c = per_kg / self.volume_of(parts, self.tables.species.get(s).span)?;
             return Some(if *kind == mass.over(&volume) { c * molar_mass } else { c });
         }
         None

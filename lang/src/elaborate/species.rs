@@ -37,6 +37,11 @@ pub struct SpeciesDef<'a> {
 }
 
 impl SpeciesDef<'_> {
+    /// Whether it is what `dissolves` is about.
+    pub fn is_water(&self) -> bool {
+        self.formula.as_ref().is_some_and(|formula| formula.to_string() == "H2O")
+    }
+
     /// The phase it states: `solid`, `liquid`, `gas`.
     pub fn phase(&self) -> Option<&str> {
         text(self.fields, "phase").map(|t| t.0)

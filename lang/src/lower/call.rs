@@ -386,7 +386,8 @@ impl<'a> Planner<'a, '_> {
                     unknown = true;
                     good = false;
                     if v != Value::Error {
-                        self.unknown_label(sig, label, e.span);
+                        let missing = missing_label(sig, call, device && by);
+                        self.unknown_label(sig, label, e.span, missing);
                     }
                 }
             }
@@ -484,17 +485,14 @@ impl<'a> Planner<'a, '_> {
         self.argument(p, v, e.span, module, out)
     }
 
-    fn unknown_label(&mut self, sig: &Sig, label: &Name, span: Span) {
-        let form = self.form(sig);
-        self.lab.report(
-            Diagnostic::error(
-                codes::WRONG_ARGUMENTS,
-                label.span.to(span),
-                format!("`{}` does not take `{}`", verb_text(&sig.verb), label.text),
-                "not expected",
-            )
-            .help(format!("its form is `{form}`")),
-        );
+    fn unknown_label(&mut self, sig: &Sig, label: &Name, span: Span, missing: Option<&str>) {
+        let headline = format!("`{}` does not take `{}`", verb_text(&sig.verb), label.text);
+        let mut d = Diagnostic::error(codes::WRONG_ARGUMENTS, label.span.to(span), headline, "not expected");
+        if let Some(missing) = missing {
+            d.help.push(format!("did you mean `{missing}`?"));
+            d = d.guess(format!("replace with `{missing}`"), label.span, missing);
+        }
+        self.lab.report(d.help(format!("its form is `{}`", self.form(sig))));
     }
 
     /// The call form of a signature: `place ITEM on TARGET by ARM`.
@@ -549,6 +547,9 @@ impl<'a> Planner<'a, '_> {
                         "not an option",
                     );
                     d.help.extend(near::question(&near));
+                    if let Some(best) = near.first() {
+                        d = d.guess(format!("replace with `{best}`"), o.name.span, best.clone());
+                    }
                     self.lab.report(d);
                     good = false;
                 }
@@ -718,4 +719,15 @@ fn misfit(sig: &Sig, call: &Call, by: bool) -> usize {
         })
         .count();
     unknown + missing
+}
+
+/// What the one word of a call that its form does not have is meant for: the one label that is missing.
+fn missing_label<'s>(sig: &'s Sig, call: &Call, by: bool) -> Option<&'s str> {
+    let known = |label: &str| sig.labelled.iter().any(|(l, _)| l.text == label) || by && label == "by";
+    let given = |label: &str| call.labelled.iter().any(|(l, _)| l.text == label);
+    let mut missing =
+        sig.labelled.iter().filter(|(l, params)| !given(&l.text) && params.iter().any(|p| p.default.is_none()));
+    let (label, _) = missing.next()?;
+    let alone = missing.next().is_none() && call.labelled.iter().filter(|(l, _)| !known(&l.text)).count() == 1;
+    alone.then_some(label.text.as_str())
 }

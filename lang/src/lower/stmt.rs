@@ -67,20 +67,20 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::Wait { duration } => Step::Wait { duration: self.duration_node(duration, scope, "wait")? },
             StmtKind::WaitUntil { cond, timeout, handlers } => {
-                let condition = self.condition(cond, scope)?;
+                let condition = self.deciding(cond, scope)?;
                 let timeout = self.optional_duration(timeout.as_ref(), scope)?;
                 let id = self.add(label.clone(), s.span, Step::WaitUntil { condition, timeout });
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::Hold { cond, duration, timeout, handlers } => {
-                let condition = self.condition(cond, scope)?;
+                let condition = self.deciding(cond, scope)?;
                 let duration = self.duration_node(duration, scope, "for")?;
                 let timeout = self.optional_duration(timeout.as_ref(), scope)?;
                 let id = self.add(label.clone(), s.span, Step::Hold { condition, duration, timeout });
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::Keep { cond, body, handlers } => {
-                let condition = self.condition(cond, scope)?;
+                let condition = self.deciding(cond, scope)?;
                 let body = self.block(body, scope);
                 let id = self.add(label.clone(), s.span, Step::Keep { condition, body });
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
@@ -93,7 +93,7 @@ impl<'a> Planner<'a, '_> {
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::If { cond, then, otherwise } => {
-                let condition = self.condition(cond, scope)?;
+                let condition = self.deciding(cond, scope)?;
                 // In a skill the arguments may decide it: the other branch need not make sense then.
                 if !self.open.is_empty()
                     && !self.lab.prototype
@@ -111,7 +111,7 @@ impl<'a> Planner<'a, '_> {
                 Step::Repeat { times, body: self.block(body, scope) }
             }
             StmtKind::RepeatWhile { cond, max, body } => {
-                let condition = self.condition(cond, scope)?;
+                let condition = self.deciding(cond, scope)?;
                 let Some(max) = max else {
                     self.lab.report(
                         Diagnostic::error(codes::MISSING_FIELD, s.span, "a loop needs a bound", "could go on for ever")
@@ -123,7 +123,11 @@ impl<'a> Planner<'a, '_> {
                 Step::RepeatWhile { condition, max, body: self.block(body, scope) }
             }
             StmtKind::For { var, set, body } => {
-                let items = self.lab.set(set, scope)?;
+                let items = match self.lab.set(set, scope) {
+                    // Of a stand-in not everything is known: what would be done with each is looked at all the same.
+                    None if self.lab.prototype => vec![Value::Error],
+                    items => items?,
+                };
                 self.unshadowed(var, scope);
                 let mut turns = Vec::new();
                 for item in items {

@@ -10,7 +10,7 @@ use super::Planner;
 use super::call::Bound;
 use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
 use crate::elaborate::Compared;
-use crate::eval::{Scope, Value};
+use crate::eval::{Scope, Type, Value};
 use crate::names::{Names, near, verb_text};
 
 /// Failures the executor itself raises, and `failure`, which stands for all.
@@ -132,6 +132,18 @@ impl<'a> Planner<'a, '_> {
         let each = each.collect();
         let compared = self.in_words(compared);
         Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None, each })
+    }
+
+    /// A condition on which steps hang. One of a stand-in that has no value is open, so that the steps are looked at all the
+    /// same.
+    pub fn deciding(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Condition> {
+        let condition = self.condition(e, scope);
+        if condition.is_some() || !self.lab.prototype {
+            return condition;
+        }
+        let Value::Bool(node) = self.lab.placeholder(&Type::Bool, "condition") else { return None };
+        let (text, span) = (self.text(e.span), e.span);
+        Some(Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() })
     }
 
     /// Comparisons with what is compared as it is written.

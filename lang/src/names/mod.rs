@@ -302,6 +302,9 @@ impl<'a> Names<'a> {
                     let headline = format!("there is no module `{wanted}`");
                     let mut d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
                     d.help.extend(near::question(&near));
+                    if let Some(best) = near.first() {
+                        d = d.guess(format!("replace with `{best}`"), path.span, best.clone());
+                    }
                     diagnostics.push(d);
                 }
                 continue;

@@ -5,8 +5,58 @@ use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name, Role, Text, TextPart,
 use crate::eval::Value;
 
 impl<'a> Prose<'a, '_> {
-    /// What an expression is called.
+    /// What an expression is called; what constants settle is said with its value.
     pub(super) fn say(&mut self, e: &'a Expr) -> String {
+        match self.settled(e) {
+            Some(value) => format!("{value} (`{}`)", self.written(e)),
+            None => self.called_as_written(e),
+        }
+    }
+
+    /// The value of a call of a function or a calculation that depends on constants only.
+    fn settled(&mut self, e: &'a Expr) -> Option<String> {
+        let computed = match &*e.kind {
+            ExprKind::Call(callee, _) => matches!(&*callee.kind, ExprKind::Name(_)),
+            ExprKind::Binary(Binary::Add | Binary::Sub | Binary::Mul | Binary::Div, ..) => true,
+            _ => false,
+        };
+        if !computed || !self.is_plain(e) {
+            return None;
+        }
+        self.constant(|prose| prose.value(e))
+    }
+
+    /// Whether an expression is made of numbers, constants and functions of them, and of nothing that a lab holds.
+    fn is_plain(&self, e: &Expr) -> bool {
+        match &*e.kind {
+            ExprKind::Quantity(..) | ExprKind::Number(_) => true,
+            ExprKind::Name(name) => !self.vars.contains(&name.text) && self.lab.find_instance(&name.text).is_none(),
+            ExprKind::Call(_, args) => args.iter().all(|arg| self.is_plain(&arg.value)),
+            ExprKind::Binary(_, a, b) => self.is_plain(a) && self.is_plain(b),
+            ExprKind::Unary(_, inner) => self.is_plain(inner),
+            ExprKind::Tuple(items, None) => items.iter().all(|item| self.is_plain(item)),
+            _ => false,
+        }
+    }
+
+    /// A quantity that is known before the run.
+    fn constant(&mut self, value: impl FnOnce(&mut Self) -> Value) -> Option<String> {
+        let (found, reported) = (self.lab.diagnostics.len(), self.lab.reported);
+        let value = value(self);
+        self.lab.diagnostics.truncate(found);
+        self.lab.reported = reported;
+        let Value::Num(n) = value else { return None };
+        let number = self.lab.graph.constant(n.node)?;
+        let units = &self.lab.tables.units;
+        Some(match &n.unit {
+            Some(unit) => words::quantity(&unit.show(number)),
+            None if n.dimension == units.named("Volume") => words::volume(number),
+            None if n.dimension == units.named("Mass") => words::mass(number),
+            None => words::quantity(&self.lab.unit_of(&n).show(number)),
+        })
+    }
+
+    fn called_as_written(&mut self, e: &'a Expr) -> String {
         match &*e.kind {
             ExprKind::Name(name) => self.say_name(name),
             ExprKind::Quantity(_, unit) => {
@@ -88,9 +138,13 @@ impl<'a> Prose<'a, '_> {
         if self.lab.find_instance(text).is_some() {
             return format!("**{text}**");
         }
-        match text {
-            "elapsed" => "the time since the start".to_string(),
-            _ => words::plain(text),
+        if text == "elapsed" {
+            return "the time since the start".to_string();
+        }
+        let mut scope = self.scope.clone();
+        match self.constant(|prose| prose.lab.name_of(name, &mut scope)) {
+            Some(value) => format!("{value} ({})", words::plain(text)),
+            None => words::plain(text),
         }
     }
 

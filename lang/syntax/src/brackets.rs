@@ -203,7 +203,9 @@ impl Balance<'_> {
             return end;
         }
         let starts = inside.match_indices(' ').map(|(at, _)| at);
-        let phrase = starts.filter(|at| PHRASE_WORDS.contains(&first_word(inside[*at..].trim_start()))).min();
+        let workflow = first_word(self.line(&top).code(self.text)) == "workflow";
+        let begins = |word: &str| PHRASE_WORDS.contains(&word) || workflow && word == "in";
+        let phrase = starts.filter(|at| begins(first_word(inside[*at..].trim_start()))).min();
         let inside = phrase.map_or(inside, |at| &inside[..at]).trim_end();
         let plain = |item: &str| item.trim().parse::<f64>().is_ok();
         let tuple = inside.rsplit_once(',').and_then(|(items, last)| {

@@ -7,13 +7,15 @@ use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption};
 
+use super::Flow;
 use super::facts::Facts;
 use super::value::{Known, Why};
-use super::{Flow, Passage};
-use crate::elaborate::ExtensiveKey;
 
 /// Events that set each other off at one instant before the rest is left to the run.
 const MOST_EVENTS: usize = 200;
+
+/// Two mixtures are the same where the shares of their species differ by less than this, relative to the larger.
+const SAME: f64 = 1e-9;
 
 impl Flow<'_, '_> {
     /// Looks at needs; whether none fails for certain. What a failed need looks at counts as unknown from here on, so
@@ -153,16 +155,47 @@ impl Flow<'_, '_> {
                 self.write(vec![(*state, value)], facts)
             }
             Action::Move { fraction, from, to, .. } => {
-                let fraction = self.eval(*fraction, facts);
-                self.transfer(&fraction, *from as usize, *to as usize, facts)
+                let share = self.eval(*fraction, facts);
+                let ends = if share.exact().is_none() { self.shares(*fraction, *from, facts) } else { None };
+                self.transfer(&share, ends, *from, *to, facts)
             }
         }
     }
 
-    fn transfer(&mut self, fraction: &Known, from: usize, to: usize, facts: &mut Facts) -> Vec<u32> {
+    /// The shares that a transfer takes of the least and of the most that its source may hold, where the source holds one
+    /// mixture of which only the whole amount is not known. Of each species it then takes what lies between the two: a volume
+    /// that is drawn is that volume, however much there is.
+    fn shares(&mut self, fraction: NodeId, from: u32, facts: &Facts) -> Option<[f64; 2]> {
+        let held: Vec<(u32, [f64; 2])> = self.mixtures[from as usize]
+            .iter()
+            .filter(|(_, state)| self.amounts.contains(state))
+            .map(|(_, state)| (*state, <[f64; 2]>::from(facts.states[*state as usize].bounds())))
+            .filter(|(_, [_, most])| *most != 0.0)
+            .collect();
+        let (_, [least, most]) = *held.first()?;
+        let alike = |[a, b]: [f64; 2]| a > 0.0 && b.is_finite() && (a * most - b * least).abs() <= SAME * b * most;
+        if !held.iter().all(|(_, ends)| alike(*ends)) {
+            return None;
+        }
+        let mut share = |end: usize| {
+            let mut facts = facts.clone();
+            held.iter().for_each(|(state, ends)| facts.states[*state as usize] = Known::Point(ends[end]));
+            self.eval(fraction, &facts).exact().filter(|share| (0.0..=1.0).contains(share))
+        };
+        Some([share(0)?, share(1)?])
+    }
+
+    fn transfer(
+        &mut self,
+        fraction: &Known,
+        ends: Option<[f64; 2]>,
+        from: u32,
+        to: u32,
+        facts: &mut Facts,
+    ) -> Vec<u32> {
         let (low, high) = fraction.bounds();
         if low > 1.0 + 1e-9 || high < 0.0 {
-            self.too_much(from, low);
+            self.too_much(from as usize, low);
         }
         let fraction = match fraction.exact() {
             Some(f) if (0.0..=1.0).contains(&f) => Known::Point(f),
@@ -173,8 +206,23 @@ impl Flow<'_, '_> {
             },
         };
         let mut changes = Vec::new();
-        for (source, target) in self.passage(from, to).iter() {
+        for (source, target) in self.passages.between(from, to, &self.mixtures).iter() {
+            let Some(target) = target.filter(|target| target != source) else { continue };
             let held = &facts.states[*source as usize];
+            if let (Some(ends), Some(why), true) = (ends, held.why(), self.amounts.contains(source)) {
+                let (least, most) = held.bounds();
+                // One of two, or all between.
+                let two = matches!(held, Known::Few(all, _) if all.len() == 2);
+                let of = |a: f64, b: f64| match Known::between(a, b, why) {
+                    Known::Range(..) if two => Known::Point(a).join(&Known::Point(b), why),
+                    other => other,
+                };
+                let moved = of(ends[0] * least, ends[1] * most);
+                let rest = of((1.0 - ends[0]) * least, (1.0 - ends[1]) * most);
+                let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[target as usize], &moved);
+                changes.extend([(*source, rest), (target, more)]);
+                continue;
+            }
             let moved = Known::binary(matterix_ir::BinaryOp::Mul, &fraction, held);
             // A share of what is there leaves the rest: exact where the share is.
             let rest = match fraction.exact() {
@@ -185,25 +233,11 @@ impl Flow<'_, '_> {
                     Known::binary(matterix_ir::BinaryOp::Mul, &share, held)
                 }
             };
-            let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[*target as usize], &moved);
+            let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[target as usize], &moved);
             changes.push((*source, rest));
-            changes.push((*target, more));
+            changes.push((target, more));
         }
         self.write(changes, facts)
-    }
-
-    /// The states that a transfer between two mixtures changes.
-    fn passage(&mut self, from: usize, to: usize) -> Passage {
-        let (sources, targets) = (&self.mixtures[from], &self.mixtures[to]);
-        let known = self.passages.entry((from, to)).or_insert_with(|| {
-            let pair = |(key, source): &(ExtensiveKey, u32)| {
-                let same = |(k, _): &&(ExtensiveKey, u32)| k.member == key.member && k.species == key.species;
-                let target = targets.iter().find(same)?.1;
-                (*source != target).then_some((*source, target))
-            };
-            sources.iter().filter_map(pair).collect()
-        });
-        known.clone()
     }
 
     /// Fires those of the events that became true, and what they set off, until none does.

@@ -69,14 +69,14 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a `finally` without a note of what is known after it: what is told is the way without these failures.
-    fn unnoted(&mut self, finally: StepId, facts: Facts) -> Option<Facts> {
+    pub fn unnoted(&mut self, finally: StepId, facts: Facts) -> Option<Facts> {
         let notes = self.notes.take();
         let end = self.walk(finally, facts);
         self.notes = notes;
         end
     }
 
-    fn joined(&self, base: &Facts, raised: &[Raised]) -> Option<Facts> {
+    pub fn joined(&self, base: &Facts, raised: &[Raised]) -> Option<Facts> {
         let facts = raised.iter().map(|(_, facts)| facts.clone());
         facts.reduce(|a, b| base.join(a, &b, self.site(), Why::Paths))
     }

@@ -131,6 +131,14 @@ impl Known {
         if low == high { Known::Point(low) } else { Known::Range(low, high, why) }
     }
 
+    /// Between two numbers, in any order; numbers that are not told apart are one.
+    pub fn between(a: f64, b: f64, why: Why) -> Self {
+        if (a - b).abs() <= CLOSE * a.abs().max(b.abs()) {
+            return Known::point(a);
+        }
+        Known::range(a.min(b), a.max(b), why)
+    }
+
     /// Either of two, depending on the way taken.
     pub fn join(&self, other: &Known, because: Why) -> Known {
         if self == other {

@@ -9,7 +9,7 @@ use matterix_ir::{BinaryOp, NodeId, Op};
 use super::facts::Facts;
 use super::report::Finding;
 use super::value::{Known, Why};
-use super::{Flow, MOST_STEPS, Site};
+use super::{Flow, MOST_STEPS, Raised, Site};
 use crate::elaborate::mixtures::written;
 
 /// Turns of a loop followed one by one.
@@ -409,6 +409,8 @@ impl Flow<'_, '_> {
         let mut raised = self.guards.pop().unwrap_or_default();
         let reported = self.reported.pop().unwrap_or_default();
         self.caught.pop();
+        // What handlers raise leaves as well.
+        self.guards.push(Vec::new());
         for (caught, handler) in handlers {
             let (taken, rest): (Vec<_>, Vec<_>) = raised.into_iter().partition(|(name, _)| match caught {
                 Caught::Named(n) => n == name,
@@ -423,22 +425,52 @@ impl Flow<'_, '_> {
                 after = self.meet(id, &facts, after, end);
             }
         }
-        let out = match (finally, after) {
-            (Some(finally), after) => {
-                let ends = after.is_some();
-                let entry = after.or_else(|| raised.first().map(|(_, facts)| facts.clone()));
-                self.cleaning += 1;
-                let end = entry.and_then(|facts| self.walk(finally, facts));
-                self.cleaning -= 1;
-                end.filter(|_| ends)
-            }
-            (None, after) => after,
-        };
+        raised.extend(self.guards.pop().unwrap_or_default());
+        if let Some(finally) = finally {
+            (after, raised) = self.leaving(finally, &facts, after, raised);
+        }
         self.after_report(&facts, reported, handlers, finally);
         if let Some(outer) = self.guards.last_mut() {
             outer.extend(raised);
         }
-        out
+        after
+    }
+
+    /// What is known behind a `finally`: on the way that goes on, and where failures go on outwards. What goes wrong in it is
+    /// said once.
+    fn leaving(
+        &mut self,
+        finally: StepId,
+        base: &Facts,
+        after: Option<Facts>,
+        raised: Vec<Raised>,
+    ) -> (Option<Facts>, Vec<Raised>) {
+        self.cleaning += 1;
+        let mut said = after.is_some();
+        let after = after.and_then(|facts| self.walk(finally, facts));
+        let mut names: Vec<&str> = Vec::new();
+        raised.iter().for_each(|(name, _)| {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        });
+        let mut left = Vec::new();
+        for name in names {
+            let alike: Vec<Raised> = raised.iter().filter(|(other, _)| other == name).cloned().collect();
+            let Some(entry) = self.joined(base, &alike) else { continue };
+            let end = match std::mem::replace(&mut said, true) {
+                false => self.walk(finally, entry),
+                true => {
+                    self.quiet += 1;
+                    let end = self.unnoted(finally, entry);
+                    self.quiet -= 1;
+                    end
+                }
+            };
+            left.extend(end.map(|end| (name.to_owned(), end)));
+        }
+        self.cleaning -= 1;
+        (after, left)
     }
 
     fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: Facts) -> Option<Facts> {

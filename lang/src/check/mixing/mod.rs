@@ -28,6 +28,9 @@ use world::{Before, World};
 /// Steps after which loops are followed once only, so that nested loops stay cheap.
 const PATIENCE: usize = 20_000;
 
+/// Turns of a loop that are followed one by one.
+const TURNS: f64 = 100.0;
+
 /// Judges what the vessels of a lab hold, for a lab without a workflow.
 pub fn contents(lab: &mut Elaborator<'_>) {
     let nothing = PlanStep { label: String::new(), span: lab.lab_name, step: Step::Sequence(Vec::new()) };
@@ -104,7 +107,7 @@ fn moves_of_plan(plan: &Plan, order: &[InstanceId]) -> BTreeSet<(InstanceId, Ins
 
 /// The transfers that events make between mixtures.
 fn moves_of_events(eyes: &Eyes<'_, '_>, plan: &Plan) -> BTreeSet<(InstanceId, InstanceId)> {
-    let by_plan = moves_of_plan(plan, &eyes.order);
+    let by_plan = moves_of_plan(plan, &eyes.lab.mixtures);
     let by_process: BTreeSet<_> = eyes.lab.streams.keys().map(|(_, from, to)| (*from, *to)).collect();
     eyes.lab.moves.iter().filter(|m| !by_process.contains(m) && !by_plan.contains(m)).copied().collect()
 }
@@ -160,7 +163,7 @@ struct Walk<'w, 'a> {
 impl Walk<'_, '_> {
     /// What the vessels hold when the plan begins.
     fn begin(&mut self, world: &mut World) {
-        for m in self.eyes.order.clone() {
+        for &m in &self.eyes.lab.mixtures {
             let all: Vec<SpeciesId> = world.present(m).map(|p| p.0.0).collect();
             for (i, s) in all.iter().enumerate() {
                 self.meet(world, m, *s, &all[..i], None);
@@ -254,15 +257,7 @@ impl Walk<'_, '_> {
             },
             Step::Repeat { times, body } => {
                 let times = self.eyes.value(*times, &world);
-                if times == 0.0 {
-                    return world;
-                }
-                let once = self.step(*body, world);
-                if times == 1.0 || self.steps > PATIENCE {
-                    return once;
-                }
-                let twice = self.step(*body, once.clone());
-                once.join(twice)
+                self.turns(times, *body, world)
             }
             Step::RepeatWhile { body, .. } => {
                 let once = self.step(*body, world.clone());
@@ -288,6 +283,25 @@ impl Walk<'_, '_> {
         }
     }
 
+    /// So many turns, or an unknown number of at least one. After those that are followed one by one, more of them leave
+    /// what the last of two leave.
+    fn turns(&mut self, times: f64, body: StepId, mut world: World) -> World {
+        let followed = if times.is_nan() { 1.0 } else { times.min(TURNS) };
+        let mut done = 0.0;
+        while done < followed {
+            world = self.step(body, world);
+            done += 1.0;
+            if self.steps > PATIENCE {
+                return world;
+            }
+        }
+        if done >= times {
+            return world;
+        }
+        let more = self.step(body, world.clone());
+        world.join(more)
+    }
+
     /// Whether nothing after a step is reached from it: it fails, or begins the body around it again.
     fn leaves(&self, id: StepId) -> bool {
         match &self.plan.get(id).step {
@@ -300,8 +314,8 @@ impl Walk<'_, '_> {
     fn action(&mut self, action: &Action, world: &mut World) {
         let before = match action {
             Action::Move { from, to, .. } => {
-                let order = &self.eyes.order;
-                order.get(*from as usize).zip(order.get(*to as usize)).map(|(a, b)| (*b, world.before(*a, *b)))
+                let mixtures = &self.eyes.lab.mixtures;
+                mixtures.get(*from as usize).zip(mixtures.get(*to as usize)).map(|(a, b)| (*b, world.before(*a, *b)))
             }
             Action::Assign { .. } => None,
         };
