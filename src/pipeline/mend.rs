@@ -112,8 +112,9 @@ fn apart(a: Span, b: Span) -> bool {
     a.end < b.start || b.end < a.start || (a.end == b.start || b.end == a.start) && !a.is_empty() && !b.is_empty()
 }
 
-/// A text with replacements that leave each other alone.
+/// A text with replacements that leave each other alone. New lines end as the others do.
 fn apply<'e>(text: &str, edits: impl Iterator<Item = &'e Edit>) -> String {
+    let returns = text.split_once('\n').is_some_and(|(line, _)| line.ends_with('\r'));
     let mut edits: Vec<&Edit> = edits.collect();
     edits.sort_by_key(|e| e.span.start);
     let mut out = String::with_capacity(text.len());
@@ -121,7 +122,10 @@ fn apply<'e>(text: &str, edits: impl Iterator<Item = &'e Edit>) -> String {
     for edit in edits {
         let (start, end) = (edit.span.start as usize, edit.span.end as usize);
         out += text.get(done..start).unwrap_or_default();
-        out += &edit.text;
+        match returns {
+            true => out += &edit.text.replace('\n', "\r\n"),
+            false => out += &edit.text,
+        }
         done = end.max(done);
     }
     out + text.get(done..).unwrap_or_default()

@@ -144,7 +144,8 @@ pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
                         }
                     }
                     ';' => statements[depth].clear(),
-                    ',' if inside_braces && fields(&statements[depth]) => statements[depth].clear(),
+                    // Outside of all braces a comma goes on with a list: `asset Mug: Container, Graspable`.
+                    ',' if depth > 0 && inside_braces && fields(&statements[depth]) => statements[depth].clear(),
                     _ => statements[depth].push(token),
                 }
                 at = end;
@@ -283,6 +284,12 @@ impl<'t> Context<'t> {
         let head = first.unwrap_or(&self.before);
         let words = head.iter().map(|t| t.text);
         words.into_iter().find(|w| *w != "extern").unwrap_or("")
+    }
+
+    /// Whether it is said here what something holds: behind `holding`, or in its braces.
+    pub(crate) fn is_holding(&self) -> bool {
+        let is = |t: Option<&Token<'_>>| t.is_some_and(|t| t.text == "holding");
+        self.before.iter().any(|t| t.text == "holding") || self.block().is_some_and(|open| is(open.head.last()))
     }
 
     /// The last token before the word at the cursor.

@@ -217,6 +217,12 @@ impl Place<'_> {
         if steps && call == 0 {
             return if begins { self.step(out) } else { self.in_step(context, out) };
         }
+        if begins
+            && context.is_holding()
+            && let Some(thing) = block.head.first()
+        {
+            return self.places_of(thing.text, out);
+        }
         if begins {
             let fields = self.fields(context);
             for field in &fields {

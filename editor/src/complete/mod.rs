@@ -116,6 +116,10 @@ impl Place<'_> {
                 }
                 return;
             }
+            // `5 mL of water`, wherever it stands.
+            Some("of") if tokens.len() > 1 => {
+                return self.globals(&[Kind::Species, Kind::Solution], 5, out);
+            }
             Some("as") if !matches!(context.item(), "use") && tokens.first().is_none_or(|t| t.text != "include") => {
                 let of = self.value(primary(&tokens[..tokens.len() - 1]));
                 self.units(&of.map(|o| o.1).into_iter().collect::<Vec<_>>(), context.word.1, out);
@@ -167,24 +171,21 @@ impl Place<'_> {
         });
         let chain: String = primary(head).iter().map(|t| t.text).collect();
         let names = [grid.unwrap_or_default(), chain];
-        let places = names.iter().filter(|n| !n.is_empty()).flat_map(|n| self.index.built_places(n));
-        for place in places {
-            if !out.all.iter().any(|c| c.label == place) {
-                let detail = "a place of the grid".to_string();
-                out.all.push(Completion {
-                    text: place.clone(),
-                    label: place,
-                    kind: Offer::Place,
-                    detail,
-                    def: None,
-                    rank: 5,
-                });
-            }
-        }
+        names.iter().filter(|n| !n.is_empty()).for_each(|name| self.places_of(name, out));
         if out.all.is_empty() {
             self.globals(&[Kind::Species], 10, out);
         }
         self.locals(&|_, _| true, 20, out);
+    }
+
+    /// Places of a grid, by its full name.
+    pub(crate) fn places_of(&self, name: &str, out: &mut Offers) {
+        for place in self.index.built_places(name) {
+            if !out.all.iter().any(|c| c.label == place) {
+                let (text, detail) = (place.clone(), "a place of the grid".to_string());
+                out.all.push(Completion { text, label: place, kind: Offer::Place, detail, def: None, rank: 5 });
+            }
+        }
     }
 
     /// Names that a module sees, of these kinds.

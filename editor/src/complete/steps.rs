@@ -121,13 +121,33 @@ impl Place<'_> {
                 Sort::Thing(kinds, Some(full)) => {
                     all.push(Sort::Thing(self.index.built(full).unwrap_or(kinds).clone(), None));
                     // Parts do things, too: the pipette of a robot.
-                    all.extend(self.index.built_parts(full));
+                    all.extend(self.index.built_parts(full).into_iter().map(|part| part.1));
                 }
                 Sort::List(inner) => all.push((**inner).clone()),
                 other => all.push(other.clone()),
             }
         }
         all
+    }
+
+    /// Parts that fit, of things that have no more than a few such: the pipettes of a robot.
+    fn parts(&self, wanted: &Sort, out: &mut Offers) {
+        let mut things = Offers::default();
+        self.locals(&|sort, _| matches!(sort, Sort::Thing(_, Some(_))), 0, &mut things);
+        for thing in things.all {
+            let Some(Sort::Thing(_, Some(full))) = thing.def.map(|def| &self.index.def(def).sort) else { continue };
+            let fitting = self.index.built_parts(full).into_iter().filter(|(_, sort)| self.index.suits(sort, wanted));
+            let fitting: Vec<(String, Sort)> = fitting.take(FEW + 1).collect();
+            if fitting.len() > FEW {
+                continue;
+            }
+            for (name, sort) in fitting {
+                let label =
+                    name.strip_prefix(full.as_str()).map_or(name.clone(), |rest| format!("{}{rest}", thing.label));
+                let (text, detail) = (label.clone(), self.index.sort_words(&sort));
+                out.all.push(Completion { label, text, kind: Offer::Member, detail, def: None, rank: 6 });
+            }
+        }
     }
 
     /// A call with places to fill: its object and the prepositions that have no default.
@@ -226,6 +246,7 @@ impl Place<'_> {
                 let jobs = self.index.own_defs().filter(|(_, d)| d.kind == Kind::Job);
                 jobs.for_each(|(id, d)| out.all.push(self.offer(&d.name, id, 5)));
             }
+            Some("run") if statement.len() == 1 => self.globals(&[Kind::Workflow], 5, out),
             Some("on") => self.failures(out),
             Some("fail") => self.failures(out),
             _ => self.value_offers(&self.wanted(context), out),
@@ -303,6 +324,9 @@ impl Place<'_> {
         }
         let fits = |sort: &Sort| wanted.sort.as_ref().is_none_or(|w| self.index.suits(sort, w));
         self.locals(&|sort, _| fits(sort), 5, out);
+        if let Some(sort @ Sort::Thing(..)) = &wanted.sort {
+            self.parts(sort, out);
+        }
         match &wanted.sort {
             Some(Sort::Species | Sort::Concentration) => self.globals(&[Kind::Species, Kind::Solution], 10, out),
             Some(Sort::Material) => self.globals(&[Kind::Material], 10, out),
@@ -345,15 +369,18 @@ impl crate::Index {
         }
     }
 
-    /// The parts of a thing of a lab, as they were built.
-    fn built_parts(&self, full: &str) -> Vec<Sort> {
+    /// The parts of a thing of a lab, as they were built, with their full names.
+    fn built_parts(&self, full: &str) -> Vec<(String, Sort)> {
         let begin = format!("{full}.");
         let labs = self.labs_built();
         let parts =
             labs.flat_map(|lab| lab.range(begin.clone()..).take_while(|n| n.0.starts_with(&begin)).take(MOST_PARTS));
-        parts.map(|(_, kinds)| Sort::Thing(kinds.clone(), None)).collect()
+        parts.map(|(name, kinds)| (name.clone(), Sort::Thing(kinds.clone(), None))).collect()
     }
 }
+
+/// Of a thing with more parts that fit none is offered by name.
+const FEW: usize = 8;
 
 /// So many parts of a thing are looked at.
 const MOST_PARTS: usize = 200;

@@ -7,8 +7,8 @@ use super::context::{Context, Token};
 use super::values::Place;
 use super::{Completion, Offer, Offers};
 
-/// Prefixes that people use.
-const PREFIXES: &[&str] = &["k", "m", "u", "n", "c"];
+/// Prefixes that people use, with how much farther down the list they put a unit.
+const PREFIXES: &[(&str, u8)] = &[("m", 1), ("u", 1), ("k", 2), ("n", 2), ("c", 2)];
 
 impl Place<'_> {
     /// What the number before the cursor measures; of several kinds where all of them can stand there.
@@ -19,8 +19,14 @@ impl Place<'_> {
             let wanted = self.wanted(context).sort.filter(|sort| dimension_of(sort).is_some());
             return vec![wanted.unwrap_or_else(|| named("Length"))];
         }
-        if tokens.len() > 1 && tokens[tokens.len() - 2].text == "holding" {
+        if context.is_holding() {
             return ["Volume", "Mass", "Amount"].map(named).to_vec();
+        }
+        if tokens.iter().any(|t| t.text == "labelled") {
+            return vec![Sort::Concentration];
+        }
+        if context.item() == "solution" {
+            return ["Volume", "Mass", "Amount", "MassFraction"].map(named).to_vec();
         }
         self.wanted(context).sort.into_iter().collect()
     }
@@ -86,7 +92,7 @@ impl Place<'_> {
             add(name.to_string(), rank);
             let prefixed = def.prefixes && (dimension.is_some() || typed.chars().count() > 1);
             if prefixed {
-                PREFIXES.iter().for_each(|p| add(format!("{p}{name}"), rank + 1));
+                PREFIXES.iter().for_each(|(p, further)| add(format!("{p}{name}"), rank + further));
             }
         }
         if let Some(symbol) = symbol {

@@ -308,7 +308,9 @@ impl<'i> Place<'i> {
         if head.first().is_some_and(|t| t.text == "between") {
             return self.pairs();
         }
-        if let Some((call, _)) = self.call(head) {
+        // `let warm <- heat ... {`.
+        let given = head.iter().rposition(|t| t.text == "<-").map_or(0, |at| at + 1);
+        if let Some((call, _)) = self.call(&head[given..]) {
             let inside = self.index.def(call).inside.iter().copied();
             return inside.filter(|d| self.index.def(*d).kind == Kind::Option).collect();
         }

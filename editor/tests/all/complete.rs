@@ -12,9 +12,9 @@ fn offers(line: &str) -> Vec<String> {
 
 /// The same where the analysis is that of the lab without the line.
 fn while_typing(line: &str) -> Vec<String> {
-    let whole = LAB.replace("use std::heating", "use std::opentrons::{Corning96, OT2}\nuse std::heating").replace(
+    let whole = LAB.replace("use std::heating", "use std::opentrons::{Corning96, OT2, P300Single}\nuse std::heating").replace(
         "    crate = Crate",
-        "    ot2 = OT2 at (3, 0, 0) m\n    wells = Corning96 on ot2.slot[2]\n    crate = Crate",
+        "    ot2 = OT2 { left: P300Single } at (3, 0, 0) m\n    wells = Corning96 on ot2.slot[2]\n    crate = Crate",
     );
     let (analysis, index) = analysed("cook.mtx", &whole, &Files::default());
     let (text, places) = marked(&whole.replace("    for x in", &format!("    {line}\n    for x in")));
@@ -60,6 +60,43 @@ fn arguments_are_what_the_call_asks_for() {
     assert_eq!(found[0], "plate", "{found:?}");
     has(&offers("bring beaker to 40 degC with plate { $0 }"), &["limit"], &["beaker"]);
     has(&offers("swing crate to $0")[..2], &["open", "closed"], &[]);
+}
+
+#[test]
+fn options_of_a_call_that_is_named_are_known() {
+    let found = offers("let warm <- bring beaker to 40 degC with plate { $0 }");
+    assert_eq!(found[0], "limit", "{found:?}");
+    has(&offers("let warm <- bring beaker to 40 degC with plate { limit: 5 $0 }"), &["min", "s"], &["mL"]);
+}
+
+#[test]
+fn what_is_held_is_measured_and_named() {
+    let lab = |line: &str| in_text(&LAB.replace("    crate = Crate", &format!("    {line}\n    crate = Crate")));
+    for line in ["cup = Beaker250mL on plate holding 3 $0", "cup = Beaker250mL on plate holding 3 g of water + 1 $0"] {
+        let found = lab(line);
+        has(&found[..16], &["mL", "g", "mg"], &["cL"]);
+        has(&found, &["mol", "uL", "mg"], &["degC", "s"]);
+    }
+    let deck = |held: &str| {
+        let deck = "mtx 1\nuse std::opentrons::{Corning96, OT2}\nlab deck {\n    ambient: 22 degC\n    ot2 = OT2 at (0, 0, 0) m\n";
+        let line = |held: &str| format!("    plate = Corning96 on ot2.slot[2]{held}\n}}\n");
+        let whole = format!("{deck}{}", line(""));
+        let (analysis, index) = analysed("a.mtx", &whole, &Files::default());
+        let (text, places) = marked(&format!("{deck}{}", line(&format!(" holding {{ {held} }}"))));
+        sorted(complete(&index, analysis.root, &text, places[0]).all)
+    };
+    has(&deck("$0"), &["A1", "H12"], &["mass"]);
+    has(&deck("A1: 5 mL of water, $0"), &["A1", "H12"], &["mass"]);
+    has(&deck("A1: 5 $0"), &["mL", "mg"], &["degC"]);
+    has(&deck("A1: 5 mL of wa$0"), &["water"], &[]);
+    has(&in_text("mtx 1\nsolution s { NaCl: 5 $0, water: rest }"), &["g", "mL", "mmol"], &["degC", "s"]);
+    has(&in_text("mtx 1\nasset Mug: Container, Graspable {\n    $0\n}"), &["mass"], &["lab"]);
+}
+
+#[test]
+fn parts_that_fit_are_offered_with_their_things() {
+    let found = while_typing("pick up tip from rack by $0");
+    has(&found, &["ot2.left"], &["ot2.bin"]);
 }
 
 #[test]

@@ -29,7 +29,8 @@ pub fn actions(server: &mut Server, params: CodeActionParams) -> Option<CodeActi
         let offered = fixes_at(&analysis, analysis.root, start, end);
         for (finding, fix) in &offered {
             let Some(edit) = edit(&places, fix.edits.iter()) else { continue };
-            let alone = finding.fixes.len() == 1;
+            // What an editor does at one key is what nobody doubts.
+            let alone = finding.fixes.len() == 1 && fix.sure;
             out.push(action(fix.title.clone(), CodeActionKind::QUICKFIX, edit, Some((finding, &places)), alone));
         }
     }
@@ -37,7 +38,7 @@ pub fn actions(server: &mut Server, params: CodeActionParams) -> Option<CodeActi
         let all = all_fixes(&analysis, analysis.root);
         if let Some(edit) = edit(&places, all.iter().copied()).filter(|_| !all.is_empty()) {
             out.push(action(
-                "fix all that has one correction".to_string(),
+                "make all corrections that leave no doubt".to_string(),
                 CodeActionKind::SOURCE_FIX_ALL,
                 edit,
                 None,
