@@ -80,6 +80,17 @@ fn check(dir: &Path) {
         edited_and_not(&file, &generate::program(lines), "generated lines", repeats);
     }
     edited_and_not(&dir.join("plate.mtx"), &plate::program(), "lines on a plate of 96 wells", 31);
+    // Another plan: what was found in the whole one before says nothing of it, the motions are the same.
+    let (file, text) = (dir.join("waits.mtx"), plate::program());
+    let mut edits = 0;
+    let replanned = time(31, || {
+        edits += 1;
+        fs::write(&file, text.replacen("wait 2 s\n", &format!("wait {} s\n", 10 + edits), 1)).unwrap();
+        command(&["check", file.to_str().unwrap()]);
+    });
+    show("matterixc check, the same with another wait each time", &replanned);
+    let first = time(7, || command(&["check", file.to_str().unwrap(), "--no-cache"]));
+    show("matterixc check, the same for the first time", &first);
 }
 
 /// A file that is changed before each check, in a comment, and one that is not.

@@ -10,7 +10,7 @@ use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
 
-use crate::ast::{Expr, ItemKind, MemberKind, Name, Role};
+use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
 use crate::elaborate::geometry::Geometry;
 use crate::elaborate::reach::Reach;
@@ -159,7 +159,8 @@ fn examine(
         {
             diagnostics.push(*d);
         }
-        diagnostics.extend(built.findings);
+        let item = names.decl(task.item).item;
+        diagnostics.extend(built.findings.into_iter().map(|d| of_test(d, item)));
         meanings.pieces.extend(built.noted.take());
         diagnostics.extend(built.moved.into_iter().flatten());
         starts.extend(built.starts);
@@ -386,6 +387,16 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         diagnostics.extend(checks::declarations(&tables, sources, root));
     }
     (tests, finish(diagnostics, sources))
+}
+
+/// What a test finds in the workflow that it runs, with its name: the workflow itself may be right.
+fn of_test(d: Diagnostic, item: &Item) -> Diagnostic {
+    let at = d.span();
+    let own = at.file == item.span.file && (item.span.start..=item.span.end).contains(&at.start);
+    match &item.kind {
+        ItemKind::Test { name, lab: None, .. } if !own => d.because(name.span, "in this test"),
+        _ => d,
+    }
 }
 
 /// The workflows and tests that a module declares.

@@ -8,7 +8,7 @@ use matterix_lang::names::DeclId;
 use super::context::{Context, LABELS};
 use super::values::{Place, Wanted};
 use super::{Completion, Offer, Offers, follow};
-use crate::index::{DefId, Kind};
+use crate::index::{Def, DefId, Kind};
 
 /// Steps of the language.
 pub(crate) const STEPS: &[(&str, &str)] = &[
@@ -254,11 +254,14 @@ impl Place<'_> {
     }
 
     fn failures(&self, out: &mut Offers) {
-        let all: Vec<_> =
-            self.index.defs().filter(|(_, d)| d.kind == Kind::Failure).map(|(id, d)| (id, d.name.clone())).collect();
-        for (id, name) in all {
+        // Those of the package before those of the library.
+        let rank = |d: &Def| 8 + 2 * u8::from(self.index.is_library(d.span.file));
+        let all = self.index.defs().filter(|(_, d)| d.kind == Kind::Failure);
+        let mut all: Vec<_> = all.map(|(id, d)| (rank(d), id, d.name.clone())).collect();
+        all.sort_by_key(|failure| failure.0);
+        for (rank, id, name) in all {
             if !out.all.iter().any(|c| c.label == name) {
-                out.all.push(self.offer(&name, id, 10));
+                out.all.push(self.offer(&name, id, rank));
             }
         }
         for name in

@@ -25,7 +25,7 @@ use eyes::Eyes;
 use hazards::Hazards;
 use world::{Before, World};
 
-/// Steps after which loops are followed once only, so that nested loops stay cheap.
+/// Steps after which loops are followed no further than once, so that nested loops stay cheap.
 const PATIENCE: usize = 20_000;
 
 /// Turns of a loop that are followed one by one.
@@ -289,10 +289,12 @@ impl Walk<'_, '_> {
         let followed = if times.is_nan() { 1.0 } else { times.min(TURNS) };
         let mut done = 0.0;
         while done < followed {
+            let before = world.clone();
             world = self.step(body, world);
             done += 1.0;
-            if self.steps > PATIENCE {
-                return world;
+            // What another turn would change is not known.
+            if self.steps > PATIENCE && done != times {
+                return before.join(world);
             }
         }
         if done >= times {
