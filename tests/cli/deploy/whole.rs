@@ -31,10 +31,11 @@ fn a_dry_run_prints_every_byte_and_sends_none() {
 fn a_plate_heats_and_stirs_on_its_emulator() {
     let dir = bench("heat", HEAT, "plate", "");
     let emulated = Emulated::start(&dir, &["plate", "--file", "lab.mtx"]);
+    // At forty times the clock a machine that is busy for a second leaves the two far apart.
     write(
         &dir,
         "lab.toml",
-        format!("[plate]\naddress = \"{}\"\ntolerance = {{ temperature = \"3 K\" }}\n", emulated.address),
+        format!("[plate]\naddress = \"{}\"\ntolerance = {{ temperature = \"15 K\" }}\n", emulated.address),
     );
     let ended = deploy(&dir, &["--mode", "shadow"]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
