@@ -82,27 +82,27 @@ fn check(dir: &Path) {
     edited_and_not(&dir.join("plate.mtx"), &plate::program(), "lines on a plate of 96 wells", 31);
     // Another plan: what was found in the whole one before says nothing of it, the motions are the same.
     let (file, text) = (dir.join("waits.mtx"), plate::program());
-    let mut edits = 0;
-    let replanned = time(31, || {
-        edits += 1;
-        fs::write(&file, text.replacen("wait 2 s\n", &format!("wait {} s\n", 10 + edits), 1)).unwrap();
-        command(&["check", file.to_str().unwrap()]);
-    });
+    let replanned = edited(&file, 31, |edit| text.replacen("wait 2 s\n", &format!("wait {} s\n", 10 + edit), 1));
     show("matterixc check, the same with another wait each time", &replanned);
     let first = time(7, || command(&["check", file.to_str().unwrap(), "--no-cache"]));
     show("matterixc check, the same for the first time", &first);
 }
 
+/// Checks of a file that is written anew before each of them; `text` is told how often.
+fn edited(file: &Path, repeats: usize, text: impl Fn(usize) -> String) -> Times {
+    let mut edits = 0;
+    time(repeats, || {
+        edits += 1;
+        fs::write(file, text(edits)).unwrap();
+        command(&["check", file.to_str().unwrap()]);
+    })
+}
+
 /// A file that is changed before each check, in a comment, and one that is not.
 fn edited_and_not(file: &Path, text: &str, lines: &str, repeats: usize) {
     let what = format!("matterixc check, {} {lines}", text.lines().count());
-    let mut edits = 0;
-    let edited = time(repeats, || {
-        edits += 1;
-        fs::write(file, format!("{text}// edited {edits} times\n")).unwrap();
-        command(&["check", file.to_str().unwrap()]);
-    });
-    show(&format!("{what}, edited"), &edited);
+    let commented = edited(file, repeats, |edit| format!("{text}// edited {edit} times\n"));
+    show(&format!("{what}, edited"), &commented);
     show(&format!("{what}, unchanged"), &time(repeats, || command(&["check", file.to_str().unwrap()])));
 }
 

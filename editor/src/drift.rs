@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use similar::{Algorithm, DiffTag, capture_diff_slices};
+use crate::edits::stretches;
 
 /// What was replaced between two states of a text, stretch by stretch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -18,22 +18,10 @@ struct Stretch {
 }
 
 impl Drift {
-    /// Small stretches that tell two texts apart: what is typed at one place is one, whatever lines it spans.
+    /// Small stretches that tell two texts apart: of the lines that differ, from the first letter that does to the last.
     pub fn between(old: &str, new: &str) -> Drift {
-        let Some(whole) = Stretch::of(old, 0..old.len(), new, 0..new.len()) else { return Drift::default() };
-        let (a, b) = (lines(old, &whole.old), lines(new, &whole.new));
-        // Within one line there is nothing to be told apart.
-        if a.len() < 2 || b.len() < 2 {
-            return Drift { stretches: vec![whole] };
-        }
-        let texts =
-            |text, lines: &[Range<usize>]| -> Vec<&str> { lines.iter().map(|line| slice(text, line)).collect() };
-        let ops = capture_diff_slices(Algorithm::Patience, &texts(old, &a), &texts(new, &b));
-        let stretch = |op: similar::DiffOp| {
-            let (from, to) = (over(&a, op.old_range(), whole.old.end), over(&b, op.new_range(), whole.new.end));
-            (op.tag() != DiffTag::Equal).then(|| Stretch::of(old, from, new, to)).flatten()
-        };
-        Drift { stretches: ops.into_iter().filter_map(stretch).collect() }
+        let small = |(from, to)| Stretch::of(old, from, new, to);
+        Drift { stretches: stretches(old, new).into_iter().filter_map(small).collect() }
     }
 
     /// Whether nothing has changed.
@@ -89,23 +77,6 @@ impl Stretch {
 
 fn slice<'t>(text: &'t str, range: &Range<usize>) -> &'t str {
     text.get(range.clone()).unwrap_or_default()
-}
-
-/// The lines of a part of a text, the first and the last as far as they belong to it.
-fn lines(text: &str, part: &Range<usize>) -> Vec<Range<usize>> {
-    let mut start = part.start;
-    let line = |line: &str| {
-        let range = start..start + line.len();
-        start = range.end;
-        range
-    };
-    slice(text, part).split_inclusive('\n').map(line).collect()
-}
-
-/// Where some of the lines stand; `end` is where all of them end.
-fn over(lines: &[Range<usize>], which: Range<usize>, end: usize) -> Range<usize> {
-    let at = |line: usize| lines.get(line).map_or(end, |line| line.start);
-    at(which.start)..at(which.end)
 }
 
 #[cfg(test)]

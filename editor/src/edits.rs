@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use similar::{Algorithm, DiffTag, capture_diff_slices};
+
 /// A stretch of the old text and what stands for it in the new one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Replacement {
@@ -16,57 +18,36 @@ const MOST: usize = 4 << 20;
 
 /// Whole lines to be replaced so that the old text becomes the new one, in order.
 pub fn replacements(old: &str, new: &str) -> Vec<Replacement> {
+    let text = |range: Range<usize>| new.get(range).unwrap_or_default().to_string();
+    stretches(old, new).into_iter().map(|(range, by)| Replacement { range, text: text(by) }).collect()
+}
+
+/// Where whole lines differ: bytes of the old text, and those of the new one that stand for them, in order.
+pub(crate) fn stretches(old: &str, new: &str) -> Vec<(Range<usize>, Range<usize>)> {
     let (a, b): (Vec<&str>, Vec<&str>) = (old.split_inclusive('\n').collect(), new.split_inclusive('\n').collect());
     let head = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
     let tail = a[head..].iter().rev().zip(b[head..].iter().rev()).take_while(|(a, b)| a == b).count();
-    let (middle_a, middle_b) = (&a[head..a.len() - tail], &b[head..b.len() - tail]);
-    let mut at: usize = a[..head].iter().map(|line| line.len()).sum();
-    let mut out: Vec<Replacement> = Vec::new();
-    let mut add = |range: Range<usize>, text: &str| match out.last_mut() {
-        Some(last) if last.range.end == range.start => {
-            last.range.end = range.end;
-            last.text.push_str(text);
-        }
-        _ => out.push(Replacement { range, text: text.to_string() }),
+    let (from, to) = (head..a.len() - tail, head..b.len() - tail);
+    let (starts, starts_new) = (starts(&a), starts(&b));
+    let bytes = |from: Range<usize>, to: Range<usize>| {
+        (starts[from.start]..starts[from.end], starts_new[to.start]..starts_new[to.end])
     };
-    if middle_a.len().saturating_mul(middle_b.len()) > MOST {
-        let length: usize = middle_a.iter().map(|line| line.len()).sum();
-        add(at..at + length, &middle_b.concat());
-        return out;
+    if from.len().saturating_mul(to.len()) > MOST {
+        return vec![bytes(from, to)];
     }
-    let common = common(middle_a, middle_b);
-    let (mut i, mut j) = (0, 0);
-    while i < middle_a.len() || j < middle_b.len() {
-        let (left, right) = (middle_a.get(i), middle_b.get(j));
-        match (left, right) {
-            (Some(left), Some(right)) if left == right => {
-                at += left.len();
-                i += 1;
-                j += 1;
-            }
-            (Some(left), _) if right.is_none() || common[i + 1][j] >= common[i][j + 1] => {
-                add(at..at + left.len(), "");
-                at += left.len();
-                i += 1;
-            }
-            (_, right) => {
-                add(at..at, right.copied().unwrap_or_default());
-                j += 1;
-            }
-        }
-    }
-    out
+    let all = capture_diff_slices(Algorithm::Myers, &a[from], &b[to]);
+    let differ = all.into_iter().filter(|op| op.tag() != DiffTag::Equal);
+    let behind = |lines: Range<usize>| lines.start + head..lines.end + head;
+    differ.map(|op| bytes(behind(op.old_range()), behind(op.new_range()))).collect()
 }
 
-/// How many lines the rests of two texts have in common at most.
-fn common(a: &[&str], b: &[&str]) -> Vec<Vec<u32>> {
-    let mut table = vec![vec![0; b.len() + 1]; a.len() + 1];
-    for i in (0..a.len()).rev() {
-        for j in (0..b.len()).rev() {
-            table[i][j] = if a[i] == b[j] { table[i + 1][j + 1] + 1 } else { table[i + 1][j].max(table[i][j + 1]) };
-        }
-    }
-    table
+/// Where each line begins, and where the last one ends.
+fn starts(lines: &[&str]) -> Vec<usize> {
+    let ends = lines.iter().scan(0, |at, line| {
+        *at += line.len();
+        Some(*at)
+    });
+    std::iter::once(0).chain(ends).collect()
 }
 
 #[cfg(test)]

@@ -85,7 +85,7 @@ pub fn rename(
         let text = std::iter::once(&index).chain(all).find_map(|i| i.text_at(&place)).unwrap_or_default();
         // A label or an alias stands for the same thing under a name of its own.
         if same(text, &d.name) {
-            if name.contains(' ') && std::iter::once(&index).chain(all).any(|i| is_imported(i, &place)) {
+            if name.contains(' ') && std::iter::once(&index).chain(all).any(|i| i.is_imported(&place)) {
                 return Err(format!(
                     "`{}` is imported by name in `{}`, and `use` takes single words",
                     d.name, place.file
@@ -101,19 +101,6 @@ pub fn rename(
 fn prepare_there(index: &Index, def: DefId) -> Result<(), String> {
     let span = index.def(def).span;
     prepare(index, span.file, span.start as usize).map(|_| ())
-}
-
-/// Whether a place stands in a `use`.
-fn is_imported(index: &Index, place: &Place) -> bool {
-    let source = index.file(&place.file).and_then(|file| index.sources().get(file));
-    let before = source.and_then(|source| source.text.get(..place.start as usize)).unwrap_or_default();
-    let Some(from) = before.rfind("use ").filter(|at| *at == 0 || before[..*at].ends_with('\n')) else { return false };
-    // Names in braces may go over lines.
-    let item = &before[from..];
-    match item.find(['{', '\n']) {
-        Some(at) if item[at..].starts_with('{') => !item[at..].contains('}'),
-        end => end.is_none(),
-    }
 }
 
 /// Whether two texts are the same words.

@@ -126,10 +126,7 @@ pub fn check_given(tables: &Tables<'_>, item: DeclId, given: &[Given<'_>]) -> Ve
             let headline = format!("`{}` has no parameter `{key}`", name.text);
             let mut d = Diagnostic::error(codes::UNKNOWN_PARAMETER, g.name.span, headline, "not a parameter");
             d = d.because(name.span, "this workflow");
-            d.help.extend(near::question(&near));
-            if let Some(best) = near.first() {
-                d = d.guess(format!("replace with `{best}`"), g.name.span, best.clone());
-            }
+            d = near::proposed(d, &near, g.name.span);
             out.push(d);
         }
     }

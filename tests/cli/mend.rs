@@ -28,6 +28,31 @@ fn what_leaves_no_doubt_is_mended_and_the_rest_is_left() {
 }
 
 #[test]
+fn what_is_imported_from_a_misspelt_module_stays() {
+    let dir = folder("mend_module");
+    let text = "mtx 1\nuse std::heatng::IkaRetControl\nuse std::glasware::{Beaker100mL}\nlab bench {\n    ambient: 22 degC\n    \
+        plate = IkaRetControl at (0, 0, 0) m\n    cup = Beaker100mL on plate\n}\n";
+    write(&dir, "w.mtx", text);
+    let ended = matterixc_in(&dir, &["check", "w.mtx", "--fix=all"]);
+    assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+    let mended = text.replace("heatng", "heating").replace("glasware", "glassware");
+    assert_eq!(fs::read_to_string(dir.join("w.mtx")).expect("the file"), mended);
+}
+
+#[test]
+fn new_lines_end_as_those_of_the_file() {
+    let dir = folder("mend_returns");
+    write(
+        &dir,
+        "w.mtx",
+        "mtx 1\r\nlab bench {\r\n    ambient: 22 degC\r\n    cup = Beaker100mL at (0, 0, 0) m\r\n}\r\n",
+    );
+    assert_eq!(matterixc_in(&dir, &["check", "w.mtx", "--fix=all"]).code, 0);
+    let mended = fs::read_to_string(dir.join("w.mtx")).expect("the file");
+    assert!(mended.contains("use std::glassware") && !mended.replace("\r\n", "").contains('\n'), "{mended:?}");
+}
+
+#[test]
 fn a_file_that_needs_nothing_is_not_written() {
     let dir = folder("mend_nothing");
     let path = write(&dir, "w.mtx", "mtx 1\nlab bench { ambient: 22 degC }\n");

@@ -58,6 +58,11 @@ pub(crate) const LABELS: &[&str] =
 /// Words with which a statement goes on in the next line.
 const GOES_ON: &[&str] = &["and", "or", "timeout", "else", "while", "holding", "pitch", "because", "when", "for", "is"];
 
+/// A call without the name that its result gets: `heat plate to goal` of `let warm <- heat plate to goal`.
+pub(crate) fn unnamed<'a, 't>(tokens: &'a [Token<'t>]) -> &'a [Token<'t>] {
+    &tokens[tokens.iter().position(|t| t.text == "<-").map_or(0, |at| at + 1)..]
+}
+
 /// Looks at a text up to a cursor.
 pub(crate) fn context(text: &str, cursor: usize) -> Context<'_> {
     let mut cursor = cursor.min(text.len());

@@ -2,7 +2,7 @@
 
 use matterix_lang::meanings::Sort;
 
-use super::context::Context;
+use super::context::{Context, unnamed};
 use super::values::{Place, Wanted};
 use super::{Completion, Offer, Offers};
 use crate::index::{DefId, Kind};
@@ -212,9 +212,9 @@ impl Place<'_> {
         if matches!(item, "species" | "solution" | "reaction" | "reactive_group" | "incompatible") && begins {
             return self.globals(&[Kind::Species, Kind::Solution], 10, out);
         }
-        let call = block.head.iter().position(|t| t.text == "<-").map_or(0, |i| i + 1);
+        let named = unnamed(&block.head).len() < block.head.len();
         let steps = BLOCKS.contains(&head) && !(head == "start" && self.is_call(&block.head));
-        if steps && call == 0 {
+        if steps && !named {
             return if begins { self.step(out) } else { self.in_step(context, out) };
         }
         if begins
@@ -258,16 +258,14 @@ impl Place<'_> {
         }
         let tokens = &context.before;
         let last = context.last().unwrap_or_default();
-        let holding = tokens.iter().any(|t| t.text == "holding");
         match last {
             "=" => self.assets(None, 5, out),
-            "of" => self.globals(&[Kind::Species, Kind::Solution], 5, out),
             "include" => self.globals(&[Kind::Lab], 5, out),
             "on" | "in" | "between" | "and" => {
                 self.locals(&|sort, _| matches!(sort, Sort::Thing(..) | Sort::Lab(_)), 5, out);
             }
             "at" | "with" | "holding" | "+" | ":" => self.value_offers(&self.wanted(context), out),
-            _ if tokens.get(1).is_some_and(|t| t.text == "=") && !holding => {
+            _ if tokens.get(1).is_some_and(|t| t.text == "=") && !context.is_holding() => {
                 ["on", "at", "in", "with", "holding"].iter().for_each(|w| self.keyword(w, &format!("{w} "), 5, out));
                 if tokens.len() == 3 {
                     self.keyword("{ }", "{ $0 }", 6, out);

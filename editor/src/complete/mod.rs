@@ -116,8 +116,8 @@ impl Place<'_> {
                 }
                 return;
             }
-            // `5 mL of water`, wherever it stands.
-            Some("of") if tokens.len() > 1 => {
+            // `5 mL of water`, in whatever block; outside of them a study is `of` a workflow.
+            Some("of") if context.block().is_some() => {
                 return self.globals(&[Kind::Species, Kind::Solution], 5, out);
             }
             Some("as") if !matches!(context.item(), "use") && tokens.first().is_none_or(|t| t.text != "include") => {

@@ -3,7 +3,7 @@
 use matterix_ir::FileId;
 use matterix_lang::meanings::Sort;
 
-use super::context::{Context, Token, primary};
+use super::context::{Context, Token, primary, unnamed};
 use crate::index::{DefId, Kind, Meaning};
 use crate::{Drift, Index};
 
@@ -264,13 +264,13 @@ impl<'i> Place<'i> {
             Some(open) if matches!(open.bracket, '(' | '[') => &open.head,
             _ => &context.before,
         };
-        let at = tokens.iter().position(|t| t.text == "<-").map_or(0, |i| i + 1);
-        let start = if at == 0 && tokens.first().is_some_and(|t| t.text == "start") {
-            tokens.iter().position(|t| t.text == "=").map_or(0, |i| i + 1)
-        } else {
-            at
-        };
-        &tokens[start..]
+        let call = unnamed(tokens);
+        match tokens.first() {
+            Some(first) if first.text == "start" && call.len() == tokens.len() => {
+                &tokens[tokens.iter().position(|t| t.text == "=").map_or(0, |at| at + 1)..]
+            }
+            _ => call,
+        }
     }
 
     /// The function of a name.
@@ -308,9 +308,7 @@ impl<'i> Place<'i> {
         if head.first().is_some_and(|t| t.text == "between") {
             return self.pairs();
         }
-        // `let warm <- heat ... {`.
-        let given = head.iter().rposition(|t| t.text == "<-").map_or(0, |at| at + 1);
-        if let Some((call, _)) = self.call(&head[given..]) {
+        if let Some((call, _)) = self.call(unnamed(head)) {
             let inside = self.index.def(call).inside.iter().copied();
             return inside.filter(|d| self.index.def(*d).kind == Kind::Option).collect();
         }

@@ -16,6 +16,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, LazyLock, OnceLock, RwLock};
 
 use matterix_ir::{FileId, Sources, Span};
+use matterix_lang::ast::{Item, ItemKind};
 use matterix_lang::names::{DeclId, Module};
 use matterix_lang::units::Dimension;
 use matterix_lang::{Gathered, Meanings};
@@ -24,6 +25,7 @@ pub use def::{Def, DefId, Kind, Local, Meaning, Region, Use};
 pub use members::Member;
 
 use crate::Analysis;
+use crate::references::Place;
 
 /// What a set of modules declares and names.
 #[derive(Clone, Debug, Default)]
@@ -180,6 +182,14 @@ impl Index {
     /// The index of the module that a file is.
     pub(crate) fn module_of(&self, file: FileId) -> Option<usize> {
         self.modules.iter().position(|m| m.file == file)
+    }
+
+    /// Whether a place stands in a `use`.
+    pub(crate) fn is_imported(&self, place: &Place) -> bool {
+        let module = self.file(&place.file).and_then(|file| self.module_of(file));
+        let items = module.and_then(|module| self.modules.get(module)).map_or(&[][..], |module| &module.tree.items);
+        let here = |item: &&Item| (item.span.start..item.span.end).contains(&place.start);
+        items.iter().find(here).is_some_and(|item| matches!(item.kind, ItemKind::Use { .. }))
     }
 
     /// Commands with this verb, and skills.

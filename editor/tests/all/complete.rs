@@ -154,6 +154,7 @@ fn files_begin_with_items() {
     has(&in_text("mtx 1\nuse std::heating::$0\n"), &["IkaRetControl"], &["FrankaPanda"]);
     has(&in_text("mtx 1\nuse std::heating::{$0}\n"), &["IkaRetControl"], &["FrankaPanda"]);
     has(&in_text(&format!("{LAB}\nworkflow w in $0")), &["bench"], &["Crate"]);
+    has(&in_text(&format!("{LAB}\nstudy s of $0")), &["cook"], &["water"]);
     has(&in_text("mtx 1\nasset A: $0"), &["Vessel", "Body"], &["heat"]);
     has(&in_text("mtx 1\ncapability A {\n    $0\n}"), &["state", "param", "command"], &["heat"]);
     has(&in_text("mtx 1\ncapability A {\n    param x: $0\n}"), &["Temperature", "Bool"], &[]);

@@ -75,6 +75,25 @@ fn a_rename_goes_through_the_files_of_a_package() {
     assert_eq!(counts, [("main.mtx", 2), ("parts.mtx", 1)]);
 }
 
+#[test]
+fn what_is_imported_by_name_keeps_a_single_word() {
+    let mut files = Files::default();
+    let skill = "mtx 1\nuse std::heating\nskill bring(h: Heater) {\n    heat h to 30 degC\n    stop heating h\n}\n";
+    files.texts.insert("skills".into(), skill.into());
+    let lab =
+        "lab x {\n    ambient: 22 degC\n    plate = IkaRetControl at (0, 0, 0) m\n}\nworkflow w in x { bring plate }\n";
+    for import in ["use skills::bring", "use skills::{\n    bring\n}"] {
+        let text = format!("mtx 1\nuse std::heating\n{import}\n{lab}");
+        let (analysis, index) = analysed("main.mtx", &text, &files);
+        let named = |name: &str| rename(&[], &index, analysis.root, place(&text, "{ |bring plate"), name);
+        assert_eq!(named("warm").expect("can be renamed")["main.mtx"].len(), 2);
+        assert_eq!(
+            named("warm up").unwrap_err(),
+            "`bring` is imported by name in `main.mtx`, and `use` takes single words"
+        );
+    }
+}
+
 /// What a check found, with one name for another.
 fn findings(analysis: &Analysis, from: &str, to: &str) -> Vec<(String, String)> {
     analysis.findings.iter().map(|d| (d.code.name.to_string(), d.headline.replace(from, to))).collect()

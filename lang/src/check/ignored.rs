@@ -38,13 +38,8 @@ fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {
     unknown
         .map(|o| {
             let headline = format!("{what} has no option `{}`", o.name.text);
-            let mut d = Diagnostic::error(codes::UNKNOWN_FIELD, o.name.span, headline, "not an option");
-            let near = near::nearest(&o.name.text, known);
-            d.help.extend(near::question(&near));
-            match near.first() {
-                Some(best) => d.guess(format!("replace with `{best}`"), o.name.span, best.clone()),
-                None => d,
-            }
+            let d = Diagnostic::error(codes::UNKNOWN_FIELD, o.name.span, headline, "not an option");
+            near::proposed(d, &near::nearest(&o.name.text, known), o.name.span)
         })
         .chain(words)
         .collect()

@@ -34,10 +34,7 @@ pub fn unknown_fields(fields: &[Field], known: &[&str], owner: &str, diagnostics
                 format!("{owner} has no field `{}`", f.key.text),
                 "not a field",
             );
-            d.help.extend(near::question(&near));
-            if let Some(best) = near.first() {
-                d = d.guess(format!("replace with `{best}`"), f.key.span, best.clone());
-            }
+            d = near::proposed(d, &near, f.key.span);
             diagnostics.push(d);
         }
     }

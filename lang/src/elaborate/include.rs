@@ -100,10 +100,7 @@ impl<'a> Elaborator<'a> {
         let near = near::nearest(&name.text, known);
         let headline = format!("`{lab}` holds no `{}`", name.text);
         let mut d = Diagnostic::error(codes::UNKNOWN_MEMBER, name.span, headline, "not in this lab");
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        }
+        d = near::proposed(d, &near, name.span);
         self.report(d);
         Value::Error
     }

@@ -127,8 +127,7 @@ impl Elaborator<'_> {
                 d = d.guess(format!("replace with `{meant}`"), Span { start, ..span }, *meant);
             } else if n.dimension.is_one() && n.literal {
                 // A bare number for a temperature is hardly meant in kelvin.
-                let usual = self.tables.units.preferred_point(dimension).filter(|_| *point).map(|unit| unit.symbol);
-                let usual = usual.unwrap_or_else(|| self.tables.units.symbol(dimension));
+                let usual = if *point { self.type_unit(ty).symbol } else { self.tables.units.symbol(dimension) };
                 d = d.help(format!("give the number a unit, such as `{usual}`"));
             } else if let Some(hint) = self.tables.units.hint(&n.dimension, dimension) {
                 d = d.help(hint);

@@ -339,10 +339,7 @@ impl<'a> Elaborator<'a> {
             self.report(import.offered(d));
             return Value::Error;
         }
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
-        }
+        d = near::proposed(d, &near, n.span);
         self.report(d);
         Value::Error
     }

@@ -170,10 +170,7 @@ impl<'a> Elaborator<'a> {
         if !self.prototype {
             d = d.because(span, format!("`{inst_name}` is declared here"));
         }
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        }
+        d = near::proposed(d, &near, name.span);
         self.report(d);
         Value::Error
     }

@@ -139,10 +139,7 @@ impl Tables<'_> {
         let kinds = self.names.visible(module).filter(|(_, id)| self.kinds.contains_key(id)).map(|(n, _)| n);
         let names: Vec<&str> = kinds.chain(self.units.dimension_names()).chain(BUILT_IN.iter().copied()).collect();
         let near = near::nearest(&name.text, names);
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        }
+        d = near::proposed(d, &near, name.span);
         d
     }
 

@@ -41,10 +41,7 @@ impl<'a> Elaborator<'a> {
         let near = near::nearest(&n.text, words.iter());
         let headline = format!("`{}` is not one of {}", n.text, list(words));
         let mut d = Diagnostic::error(codes::UNKNOWN_NAME, n.span, headline, "no such word");
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), n.span, best.clone());
-        }
+        d = near::proposed(d, &near, n.span);
         self.report(d);
         Value::Error
     }

@@ -157,10 +157,7 @@ impl<'a> Planner<'a, '_> {
         if near.is_empty() && !call.labelled.is_empty() && able.len() <= 3 {
             near = able;
         }
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), span, best.clone());
-        }
+        d = near::proposed(d, &near, span);
         self.lab.report(d);
     }
 
@@ -546,10 +543,7 @@ impl<'a> Planner<'a, '_> {
                         format!("`{what}` has no option `{}`", o.name.text),
                         "not an option",
                     );
-                    d.help.extend(near::question(&near));
-                    if let Some(best) = near.first() {
-                        d = d.guess(format!("replace with `{best}`"), o.name.span, best.clone());
-                    }
+                    d = near::proposed(d, &near, o.name.span);
                     self.lab.report(d);
                     good = false;
                 }

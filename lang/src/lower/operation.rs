@@ -318,9 +318,7 @@ impl<'a> Planner<'a, '_> {
         };
         let (a, b) = self.lab.sides(target, value, inner);
         let Value::Bool(node) = self.lab.compare(Binary::Eq, a, b, target.span, value.span) else { return None };
-        let span = target.span.to(value.span);
-        let text = self.text(span);
-        Some(Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() })
+        Some(self.bare(node, target.span.to(value.span)))
     }
 }
 

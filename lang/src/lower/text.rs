@@ -142,8 +142,13 @@ impl<'a> Planner<'a, '_> {
             return condition;
         }
         let Value::Bool(node) = self.lab.placeholder(&Type::Bool, "condition") else { return None };
-        let (text, span) = (self.text(e.span), e.span);
-        Some(Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() })
+        Some(self.bare(node, e.span))
+    }
+
+    /// A condition of which nothing is known but its text.
+    pub fn bare(&self, node: NodeId, span: Span) -> Condition {
+        let (compared, terms, each) = (Vec::new(), Vec::new(), Vec::new());
+        Condition { node, text: self.text(span), span, compared, terms, refusal: None, each }
     }
 
     /// Comparisons with what is compared as it is written.
@@ -314,10 +319,7 @@ impl<'a> Planner<'a, '_> {
             format!("nothing fails with `{}`", name.text),
             "no step or skill declares this failure",
         );
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        }
+        d = near::proposed(d, &near, name.span);
         self.lab.report(d);
     }
 }

@@ -300,12 +300,10 @@ impl<'a> Names<'a> {
                     let wanted = candidates.iter().find(|c| c.contains("::")).unwrap_or(&candidates[0]);
                     let near = near::nearest(wanted, self.modules.iter().map(|m| &m.name));
                     let headline = format!("there is no module `{wanted}`");
-                    let mut d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
-                    d.help.extend(near::question(&near));
-                    if let Some(best) = near.first() {
-                        d = d.guess(format!("replace with `{best}`"), path.span, best.clone());
-                    }
-                    diagnostics.push(d);
+                    let d = Diagnostic::error(codes::UNKNOWN_MODULE, path.span, headline, "imported here");
+                    // What is imported from the module stays as it is.
+                    let end = path.segments.get(wanted.matches("::").count()).map_or(path.span.end, |s| s.span.end);
+                    diagnostics.push(near::proposed(d, &near, Span { end, ..path.span }));
                 }
                 continue;
             };
@@ -344,10 +342,7 @@ impl<'a> Names<'a> {
             return d.help(format!("`{}` is declared in `{other}`", name.text));
         }
         let near = near::nearest(&name.text, self.own[module].keys());
-        d.help.extend(near::question(&near));
-        if let Some(best) = near.first() {
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
-        }
+        d = near::proposed(d, &near, name.span);
         d
     }
 
@@ -416,9 +411,8 @@ impl<'a> Names<'a> {
         );
         if let Some(import) = self.import_of(module, &name.text, &fits) {
             d = import.offered(d);
-        } else if let Some(best) = near.first() {
-            d.help.extend(near::question(&near));
-            d = d.guess(format!("replace with `{best}`"), name.span, best.clone());
+        } else {
+            d = near::proposed(d, &near, name.span);
         }
         d
     }

@@ -1,5 +1,7 @@
 //! Did you mean.
 
+use matterix_ir::{Diagnostic, Span};
+
 /// The candidates closest to `word`, best first, at most three; none where nothing is close.
 pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S>) -> Vec<String> {
     let lower = word.to_lowercase();
@@ -58,6 +60,15 @@ pub fn question(near: &[String]) -> Option<String> {
         [a] => Some(format!("did you mean `{a}`?")),
         [a, b] => Some(format!("did you mean `{a}` or `{b}`?")),
         [a, b, c, ..] => Some(format!("did you mean `{a}`, `{b}` or `{c}`?")),
+    }
+}
+
+/// A finding with what may be meant by what stands at `at`: a question, and the nearest of all as a correction.
+pub fn proposed(mut d: Diagnostic, near: &[String], at: Span) -> Diagnostic {
+    d.help.extend(question(near));
+    match near.first() {
+        Some(best) => d.guess(format!("replace with `{best}`"), at, best.as_str()),
+        None => d,
     }
 }
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption};
+use matterix_ir::{BinaryOp, NodeId};
 
 use super::Flow;
 use super::facts::Facts;
@@ -209,33 +209,23 @@ impl Flow<'_, '_> {
         for (source, target) in self.passages.between(from, to, &self.mixtures).iter() {
             let Some(target) = target.filter(|target| target != source) else { continue };
             let held = &facts.states[*source as usize];
-            if let (Some(ends), Some(why), true) = (ends, held.why(), self.amounts.contains(source)) {
-                let (least, most) = held.bounds();
-                // One of two, or all between.
-                let two = matches!(held, Known::Few(all, _) if all.len() == 2);
-                let of = |a: f64, b: f64| match Known::between(a, b, why) {
-                    Known::Range(..) if two => Known::Point(a).join(&Known::Point(b), why),
-                    other => other,
-                };
-                let moved = of(ends[0] * least, ends[1] * most);
-                let rest = of((1.0 - ends[0]) * least, (1.0 - ends[1]) * most);
-                let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[target as usize], &moved);
-                changes.extend([(*source, rest), (target, more)]);
-                continue;
-            }
-            let moved = Known::binary(matterix_ir::BinaryOp::Mul, &fraction, held);
-            // A share of what is there leaves the rest: exact where the share is.
-            let rest = match fraction.exact() {
-                Some(f) => Known::binary(matterix_ir::BinaryOp::Mul, &Known::Point(1.0 - f), held),
+            let (moved, rest) = match ends.filter(|_| self.amounts.contains(source)) {
+                Some([of_least, of_most]) => {
+                    let (least, most) = held.bounds();
+                    let rest = held.with_ends((1.0 - of_least) * least, (1.0 - of_most) * most);
+                    (held.with_ends(of_least * least, of_most * most), rest)
+                }
                 None => {
-                    let one = Known::Point(1.0);
-                    let share = Known::binary(matterix_ir::BinaryOp::Sub, &one, &fraction);
-                    Known::binary(matterix_ir::BinaryOp::Mul, &share, held)
+                    // A share of what is there leaves the rest: exact where the share is.
+                    let kept = match fraction.exact() {
+                        Some(f) => Known::Point(1.0 - f),
+                        None => Known::binary(BinaryOp::Sub, &Known::Point(1.0), &fraction),
+                    };
+                    (Known::binary(BinaryOp::Mul, &fraction, held), Known::binary(BinaryOp::Mul, &kept, held))
                 }
             };
-            let more = Known::binary(matterix_ir::BinaryOp::Add, &facts.states[target as usize], &moved);
-            changes.push((*source, rest));
-            changes.push((target, more));
+            let more = Known::binary(BinaryOp::Add, &facts.states[target as usize], &moved);
+            changes.extend([(*source, rest), (target, more)]);
         }
         self.write(changes, facts)
     }

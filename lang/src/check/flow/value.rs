@@ -131,12 +131,15 @@ impl Known {
         if low == high { Known::Point(low) } else { Known::Range(low, high, why) }
     }
 
-    /// Between two numbers, in any order; numbers that are not told apart are one.
-    pub fn between(a: f64, b: f64, why: Why) -> Self {
-        if (a - b).abs() <= CLOSE * a.abs().max(b.abs()) {
-            return Known::point(a);
+    /// What becomes of it where its least becomes one number and its most another, in any order: one of two stays that, and
+    /// numbers that are not told apart are one.
+    pub fn with_ends(&self, a: f64, b: f64) -> Self {
+        match self {
+            _ if (a - b).abs() <= CLOSE * a.abs().max(b.abs()) => Known::point(a),
+            Known::Point(_) => Known::point(a),
+            Known::Few(all, why) if all.len() == 2 => Known::of(vec![a, b], *why),
+            Known::Few(_, why) | Known::Range(_, _, why) => Known::range(a.min(b), a.max(b), *why),
         }
-        Known::range(a.min(b), a.max(b), why)
     }
 
     /// Either of two, depending on the way taken.
