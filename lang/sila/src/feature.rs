@@ -207,8 +207,6 @@ pub struct Constraints {
     pub least: Option<(f64, bool)>,
     /// The greatest, and whether it is itself left out.
     pub greatest: Option<(f64, bool)>,
-    /// Names of others, which nothing here looks at.
-    pub others: Vec<String>,
 }
 
 /// The units of the international system that all others are given by.

@@ -13,6 +13,26 @@ pub const MOST_BYTES: usize = 4 << 20;
 /// Types in types beyond this are refused.
 const DEEPEST: usize = 32;
 
+/// Constraints of the standard that are left to the server that states them.
+const NOT_LOOKED_AT: &[&str] = &[
+    "Length",
+    "MinimalLength",
+    "MaximalLength",
+    "Pattern",
+    "ContentType",
+    "Schema",
+    "ElementCount",
+    "MinimalElementCount",
+    "MaximalElementCount",
+    "FullyQualifiedIdentifier",
+    "AllowedTypes",
+    // Of dates and times.
+    "MinimalInclusive",
+    "MinimalExclusive",
+    "MaximalInclusive",
+    "MaximalExclusive",
+];
+
 /// Features with more types of their own are refused.
 const MOST_TYPES: usize = 1000;
 
@@ -310,7 +330,8 @@ fn constraints(node: Node<'_, '_>, of: &DataType) -> Result<Constraints, Problem
                 out.greatest = Some((number(inner)?, name == "MaximalExclusive"));
             }
             "Unit" => return Err(wrong(inner, "only numbers have a `Unit`")),
-            other => out.others.push(other.to_owned()),
+            known if NOT_LOOKED_AT.contains(&known) => {}
+            other => return Err(wrong(inner, format!("there is no constraint `{other}`"))),
         }
     }
     if let (Some((least, _)), Some((greatest, _))) = (out.least, out.greatest)

@@ -32,11 +32,16 @@ fn what_is_wrong_is_said_with_its_line() {
         ("<DataTypeIdentifier>PlateTemperature", "<DataTypeIdentifier>Plate", "`Plate` is not defined"),
         ("<Factor>60</Factor>", "<Factor>0</Factor>", "not 0"),
         ("FeatureVersion=\"1.0\"", "FeatureVersion=\"one\"", "as in `1.0`"),
+        ("<Set>", "<Sets>", "no constraint `Sets`"),
         ("</Feature>", "", "line"),
     ];
     for (from, to, wanted) in cases {
         let text = PLATE.replacen(from, to, 1);
-        let text = if to == "<Features" { text.replace("</Feature>", "</Features>") } else { text };
+        let text = match to {
+            "<Features" => text.replace("</Feature>", "</Features>"),
+            "<Sets>" => text.replacen("</Set>", "</Sets>", 1),
+            _ => text,
+        };
         let problem = read(&text).expect_err(from).to_string();
         assert!(problem.contains(wanted) && problem.starts_with("line "), "{from}: {problem}");
     }
