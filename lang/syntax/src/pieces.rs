@@ -198,11 +198,12 @@ fn shared<T: Send>(texts: &[&str], read: impl Fn(&str) -> T + Sync) -> Vec<T> {
     if all < SHARED {
         return each(texts);
     }
-    let mut half = 0;
-    let middle = texts.partition_point(|text| {
-        half += text.len();
-        half <= all / 2
-    });
+    let mut read_by_now = 0;
+    let first_half = |text: &&&str| {
+        read_by_now += text.len();
+        read_by_now <= all / 2
+    };
+    let middle = texts.iter().take_while(first_half).count();
     let (first, rest) = texts.split_at(middle);
     std::thread::scope(|scope| {
         let other = std::thread::Builder::new().spawn_scoped(scope, || each(rest));
