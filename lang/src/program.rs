@@ -17,13 +17,13 @@ use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
-use crate::lower::Planner;
-use crate::lower::wires::Wires;
+use crate::lower::Wires;
 use crate::meanings::{Around as Declared, Gathered, Noted};
 use crate::measured::{self, Measured};
 use crate::names::{self, DeclId, Module, Names, near};
 use crate::points::Questions;
 use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
+use crate::settle::{self, Purpose, Settled};
 use crate::study::{self, Many};
 use crate::task::{self, Given, Task};
 
@@ -265,7 +265,7 @@ fn compile_and<T>(
     let Some(task) = task_of(&tables, sources, (root, item), &set, options, &mut diagnostics) else {
         return (None, finish(diagnostics, sources));
     };
-    let built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
+    let built = build(&tables, sources, &task, wanted, None, &|| false).unwrap_or_default();
     diagnostics.extend(built.findings);
     // A reaction may be meant for another workflow of the file: `check` looks at them all.
     if runnable(&names, root).len() == 1 {
@@ -338,7 +338,7 @@ pub fn many_runs(
         return (None, finish(diagnostics, sources));
     };
     let wanted = Wanted::Program(Wires::default());
-    let mut built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
+    let mut built = build(&tables, sources, &task, wanted, None, &|| false).unwrap_or_default();
     diagnostics.extend(built.findings);
     if let Some(Many::Fit(fit)) = &mut built.many
         && let Err(d) = study::data::read(fit, &tables, sources, loader)
@@ -372,7 +372,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
                 let (task, wanted) = (Task { item, lab, given }, Wanted::Program(Wires::Off));
-                let built = build(&tables, sources, &task, wanted, &|| false).unwrap_or_default();
+                let built = build(&tables, sources, &task, wanted, None, &|| false).unwrap_or_default();
                 found.extend(built.findings);
                 program = built.program;
             }
@@ -529,6 +529,8 @@ struct Built {
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+    /// What can get where, where that was found anew.
+    reach: Option<Reach>,
     /// What looking at motions has found, where that was asked for.
     moved: Option<Vec<Diagnostic>>,
 }
@@ -583,14 +585,22 @@ fn judge_anew<'a>(
     let anew: Vec<About> = about.iter().zip(&known).filter_map(anew).collect();
     let mut words = now.words(file, &anew).into_iter();
     // Tasks do not depend on each other, so all processors share them.
-    let mut judged = crate::share::over(&open, |task| judge(tables, sources, task, asked)).into_iter();
+    let foreseen = std::mem::take(&mut package.foreseen);
+    let mut judged = crate::share::over(&open, |task| {
+        // A processor that is free for it makes the draft.
+        let foreseen = foreseen.of(names, task).filter(|_| 2 * open.len() <= crate::share::processors());
+        judge(tables, sources, task, asked, foreseen)
+    })
+    .into_iter();
     let mut all = Vec::with_capacity(tasks.len());
     let mut broken_off = false;
-    for (about, known) in about.into_iter().zip(known) {
+    for ((about, known), task) in about.into_iter().zip(known).zip(tasks) {
         let (built, words) = match known {
             Some((verdict, words)) => (Some(Built::from(verdict)), Some(words)),
             None => (judged.next().flatten(), about.as_ref().and_then(|_| words.next())),
         };
+        let reach = built.as_ref().and_then(|built| built.reach.clone());
+        package.foreseen.keep(names, task, reach.or_else(|| foreseen.of(names, task).cloned()));
         let Some(built) = built else {
             broken_off = true;
             continue;
@@ -605,8 +615,14 @@ fn judge_anew<'a>(
 }
 
 /// Judges a task, what robots do in it too where that is asked for.
-fn judge<'a>(tables: &'a Tables<'a>, sources: &Sources, task: &Task<'a>, asked: &Asked<'_>) -> Option<Built> {
-    let mut built = build(tables, sources, task, asked.wanted, asked.stop)?;
+fn judge<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    task: &Task<'a>,
+    asked: &Asked<'_>,
+    foreseen: Option<&Reach>,
+) -> Option<Built> {
+    let mut built = build(tables, sources, task, asked.wanted, foreseen, asked.stop)?;
     if asked.wanted == Wanted::Motions {
         let fine = built.findings.iter().all(|d| !d.is_error());
         // What robots do is looked at for the workflow itself.
@@ -627,13 +643,14 @@ fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<About> {
     Some(About { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
 }
 
-/// Elaborates the lab and lowers the workflow; first as a draft to learn what is moved where, then for good. A program comes
-/// of it only where it is wanted, nothing where `stop` says that it is of no use any more.
+/// Elaborates the lab, lowers the workflow and checks both. A program comes of it only where it is wanted, nothing where `stop` says that
+/// it is of no use any more.
 fn build<'a>(
     tables: &'a Tables<'a>,
     sources: &Sources,
     task: &Task<'a>,
     wanted: Wanted,
+    foreseen: Option<&Reach>,
     stop: &dyn Fn() -> bool,
 ) -> Option<Built> {
     let (to_run, wires) = match wanted {
@@ -641,96 +658,69 @@ fn build<'a>(
         Wanted::Scripted(_) => (true, Wires::Off),
         _ => (false, Wires::Off),
     };
+    let transport = if let Wanted::Scripted(transport) = wanted { Some(transport) } else { None };
+    let purpose = Purpose { to_run, wires, transport, meanings: wanted == Wanted::Contents };
     let lab = task.lab;
-    let mut reach = Reach::default();
-    let mut draft = true;
-    loop {
-        if stop() {
-            return None;
+    let settled = settle::settled(tables, sources, task, purpose, foreseen, stop)?;
+    let Settled { lab: mut elaborator, plan, wiring, events, reach } = settled;
+    let (derivatives, balances) = elaborator.close();
+    // A look at motions asks for neither what is recorded nor what is used up.
+    let told = matches!(wanted, Wanted::Program(_) | Wanted::Scripted(_) | Wanted::Contents);
+    let observables = if told { observables(&mut elaborator) } else { Vec::new() };
+    let mut starts = checks::starts(&elaborator, lab);
+    checks::model(&mut elaborator);
+    let questions = (wanted == Wanted::Contents)
+        .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
+    let asked = questions.as_ref().map(|q| q.nodes.as_slice());
+    let (windows, seen) = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
+    starts.windows = windows;
+    let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
+    let starts = Some(starts);
+    let many = study::resolve(&mut elaborator, task);
+    elaborator.note_things(lab);
+    let noted = Noted::of(elaborator.meanings.take(), tables.names);
+    let mut uses = None;
+    if !to_run {
+        let item = tables.names.decl(task.item).item;
+        if let ItemKind::Workflow { name, .. } = &item.kind {
+            elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
+            elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
         }
-        let mut elaborator = Elaborator::new(tables, reach.clone());
-        elaborator.meanings = (wanted == Wanted::Contents && !draft).then(Box::default);
-        elaborator.draft = draft;
-        elaborator.lab(lab);
-        let mut planner = Planner::new(&mut elaborator, sources);
-        planner.to_run = to_run;
-        planner.draft = draft;
-        planner.wires = wires;
-        if let Wanted::Scripted(transport) = wanted {
-            planner.wiring = Some(Wiring { transport: transport.to_string(), ..Wiring::default() });
+        uses = checks::uses(&elaborator, sources, lab, &plan);
+        if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
+            let findings = elaborator.diagnostics;
+            let reach = Some(reach);
+            return Some(Built { wiring, points, noted, findings, starts, uses, many, reach, ..Built::default() });
         }
-        let (plan, wiring) = planner.task(task);
-        if !draft {
-            elaborator.initialise();
-        }
-        elaborator.close_holds();
-        let mut events = elaborator.events();
-        elaborator.close_holds();
-        elaborator.processes();
-        events.extend(elaborator.stream_events());
-        let next = Reach::compute(&elaborator);
-        if std::mem::take(&mut draft) || next != reach {
-            reach = next;
-            continue;
-        }
-        let (derivatives, balances) = elaborator.close();
-        // A look at motions asks for neither what is recorded nor what is used up.
-        let told = matches!(wanted, Wanted::Program(_) | Wanted::Scripted(_) | Wanted::Contents);
-        let observables = if told { observables(&mut elaborator) } else { Vec::new() };
-        let mut starts = checks::starts(&elaborator, lab);
-        checks::model(&mut elaborator);
-        let questions = (wanted == Wanted::Contents)
-            .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
-        let asked = questions.as_ref().map(|q| q.nodes.as_slice());
-        let (windows, seen) = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
-        starts.windows = windows;
-        let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
-        let starts = Some(starts);
-        let many = study::resolve(&mut elaborator, task);
-        elaborator.note_things(lab);
-        let noted = Noted::of(elaborator.meanings.take(), tables.names);
-        let mut uses = None;
-        if !to_run {
-            let item = tables.names.decl(task.item).item;
-            if let ItemKind::Workflow { name, .. } = &item.kind {
-                elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
-                elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
-            }
-            uses = checks::uses(&elaborator, sources, lab, &plan);
-            if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
-                let findings = elaborator.diagnostics;
-                return Some(Built { wiring, points, noted, findings, starts, uses, many, ..Built::default() });
-            }
-        }
-        let mixtures = mixtures(&elaborator, &observables);
-        let scene = scene(&mut elaborator, lab);
-        let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
-        let stock =
-            if told { crate::stock::stock(&mut elaborator, sources, &mixtures, workflow) } else { Stock::default() };
-        let model = Model {
-            params: elaborator.params,
-            states: elaborator.states,
-            derivatives,
-            processes: elaborator
-                .processes
-                .iter()
-                .map(|p| matterix_ir::model::Process { name: p.name.clone(), guard: p.guard, span: p.span })
-                .collect(),
-            events,
-            readings: elaborator.readings,
-            species: tables.species.iter().map(|(_, s)| species(s)).collect(),
-            mixtures,
-            observables: observables.into_iter().map(|o| o.2).collect(),
-            balances,
-            graph: elaborator.graph,
-        };
-        let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
-        let (drivers, offers) = (elaborator.drivers, elaborator.offers);
-        let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
-        let findings = elaborator.diagnostics;
-        let program = Some(program);
-        return Some(Built { program, wiring, points, noted, findings, starts, uses, many, moved: None });
     }
+    let mixtures = mixtures(&elaborator, &observables);
+    let scene = scene(&mut elaborator, lab);
+    let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
+    let stock =
+        if told { crate::stock::stock(&mut elaborator, sources, &mixtures, workflow) } else { Stock::default() };
+    let model = Model {
+        params: elaborator.params,
+        states: elaborator.states,
+        derivatives,
+        processes: elaborator
+            .processes
+            .iter()
+            .map(|p| matterix_ir::model::Process { name: p.name.clone(), guard: p.guard, span: p.span })
+            .collect(),
+        events,
+        readings: elaborator.readings,
+        species: tables.species.iter().map(|(_, s)| species(s)).collect(),
+        mixtures,
+        observables: observables.into_iter().map(|o| o.2).collect(),
+        balances,
+        graph: elaborator.graph,
+    };
+    let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
+    let (drivers, offers) = (elaborator.drivers, elaborator.offers);
+    let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
+    let findings = elaborator.diagnostics;
+    let program = Some(program);
+    Some(Built { program, wiring, points, noted, findings, starts, uses, many, reach: Some(reach), moved: None })
 }
 
 fn species(s: &crate::elaborate::species::SpeciesDef<'_>) -> matterix_ir::model::Species {

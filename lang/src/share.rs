@@ -1,9 +1,30 @@
 //! Work on many things that do not depend on each other, shared by all processors.
 
 use std::collections::BTreeMap;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::names::STACK;
+
+/// How many processors there are to share work.
+pub(crate) fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Does two things at the same time, or one after the other where there is no thread to be had.
+pub(crate) fn two<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
+    let task = Mutex::new(Some(one));
+    let perform = || task.lock().ok().and_then(|mut task| task.take()).map(|one| one()).unwrap_or_default();
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, perform);
+        let other = other();
+        match thread.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(one)) => (one, other),
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => (perform(), other),
+        }
+    })
+}
 
 /// What comes of each thing, in their order. Whoever is free takes the next one, so that a long one holds up nobody.
 pub(crate) fn over<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
@@ -17,7 +38,7 @@ pub(crate) fn over<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
         }
         done
     };
-    let others = std::thread::available_parallelism().map_or(1, usize::from).min(items.len()).saturating_sub(1);
+    let others = processors().min(items.len()).saturating_sub(1);
     let mut done: BTreeMap<usize, R> = std::thread::scope(|scope| {
         // Where there is no thread to be had, this one does the work.
         let start = |_| std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, take).ok();

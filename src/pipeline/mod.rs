@@ -5,6 +5,7 @@ mod clean;
 mod deploy;
 mod emit;
 mod emulate;
+mod foreseen;
 mod many;
 mod mend;
 mod neighbours;
@@ -123,13 +124,19 @@ pub fn check(input: &Input, fidelity: Fidelity, advice: Advice, store: &dyn Stor
         return (sources, Vec::new());
     }
     let read = clean::Noted::new(&neighbours);
-    let session = &mut Session::default();
+    let mut session = Session::default();
+    let foreseen = foreseen::Entry::of(input, store, &mut session);
     let found = match fidelity {
-        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps, session),
+        Fidelity::Process => matterix_lang::check_and(&mut sources, file, &read, &overlaps, &mut session),
         Fidelity::Motion => {
-            matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store), session)
+            matterix_lang::check_and(&mut sources, file, &read, &|program| preflight(program, store), &mut session)
         }
     };
+    if let Some(entry) = foreseen {
+        entry.keep(input, &mut session);
+    }
+    // To give all trees back takes a while, which nobody waits for.
+    let _ = std::thread::Builder::new().spawn(|| drop(session));
     let found = match advice {
         Advice::Given => found,
         Advice::LeftOut => without_advice(found),

@@ -27,10 +27,11 @@ fn check(dir: &Path, text: &str, more: &[&str]) -> String {
     String::from_utf8(ended.stdout).expect("text")
 }
 
-/// The files of the cache that say what was found in whole programs, and in which files nothing; each of the others is
-/// about a lab.
+/// The files of the cache that say what was found in whole programs, in which files nothing, and what was found to get where; each
+/// of the others is about a lab.
 const PROGRAMS: &str = "programs-";
 const CLEAN: &str = "clean-";
+const FORESEEN: &str = "foreseen-";
 
 /// The files of the cache.
 fn kept(dir: &Path) -> Vec<PathBuf> {
@@ -81,7 +82,7 @@ fn process_fidelity_leaves_motions_out() {
 /// What is kept of motions in labs, and what of findings in programs.
 fn labs_and_programs(dir: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let is = |file: &PathBuf, of: &str| file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(of));
-    kept(dir).into_iter().filter(|file| !is(file, CLEAN)).partition(|file| !is(file, PROGRAMS))
+    kept(dir).into_iter().filter(|file| !is(file, CLEAN) && !is(file, FORESEEN)).partition(|file| !is(file, PROGRAMS))
 }
 
 #[test]

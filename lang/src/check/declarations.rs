@@ -140,7 +140,7 @@ pub fn bind<'a>(lab: &mut Elaborator<'a>, params: &'a [Param], module: usize, sc
 
 fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
     let this = lab.prototype_of(vec![id], lab.tables.kind_name(id));
-    for m in lab.all_members(this) {
+    for m in lab.all_members(this).iter().copied() {
         if m.owner != id {
             continue;
         }
@@ -220,7 +220,7 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     lab.inertial(this, &geometry);
     let moving = geometry.moving;
     lab.articulation(this, moving);
-    for m in lab.all_members(this) {
+    for m in lab.all_members(this).iter().copied() {
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
             lab.member_value(this, m, name.span);
         }

@@ -1,7 +1,6 @@
 //! What would go wrong, one family of checks a file.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 
 mod consequences;
 mod declarations;
@@ -24,7 +23,8 @@ use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::ReactionId;
 use crate::meanings::Seeing;
-use crate::names::{self, DeclId};
+use crate::names::DeclId;
+use crate::share;
 
 pub use consequences::without_consequences;
 pub use declarations::{bind, declarations, declarations_and};
@@ -78,17 +78,14 @@ pub fn plan(
     let is_whole = lab.diagnostics.iter().all(whole);
     let ready = mixing::ready(lab);
     let about = &*lab;
-    let meets = move || {
-        let mut found = ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, ready));
-        found.extend(time::plan(about, plan, derivatives, events));
-        found
-    };
+    let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, ready));
+    let takes = || time::plan(about, plan, derivatives, events);
     let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
-    let (found, followed) = match plan.steps.len() >= LARGE {
-        true => side_by_side(meets, follow),
-        false => (meets(), None),
+    let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
+        true => share::two(meets, || share::two(takes, follow)),
+        false => (meets(), (takes(), None)),
     };
-    found.into_iter().for_each(|d| lab.report(d));
+    met.into_iter().chain(taken).for_each(|d| lab.report(d));
     if !lab.diagnostics.iter().all(whole) {
         return (None, Vec::new());
     }
@@ -103,18 +100,3 @@ pub fn plan(
 
 /// Plans of fewer steps are judged faster by one thread than a second one starts.
 const LARGE: usize = 300;
-
-/// Does two things at the same time, or one after the other where there is no thread to be had.
-fn side_by_side<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
-    let task = Mutex::new(Some(one));
-    let perform = || task.lock().ok().and_then(|mut task| task.take()).map(|one| one()).unwrap_or_default();
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new().stack_size(names::STACK).spawn_scoped(scope, perform);
-        let other = other();
-        match thread.map(std::thread::ScopedJoinHandle::join) {
-            Ok(Ok(one)) => (one, other),
-            Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => (perform(), other),
-        }
-    })
-}

@@ -127,7 +127,7 @@ impl<'a> Elaborator<'a> {
                 given.push((module, name, at));
             }
         }
-        for m in self.all_members(id) {
+        for m in self.all_members(id).iter().copied() {
             if let MemberKind::Frame { name, at: Some(at) } = &m.member.kind {
                 given.push((m.module, name, at));
             }

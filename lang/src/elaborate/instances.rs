@@ -1,5 +1,6 @@
 //! Instances: an asset type with its overrides, its parts, its place.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use matterix_ir::scene::{InstanceId, Pose};
@@ -8,7 +9,7 @@ use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
 use super::grids::Grid;
-use super::tables::MemberRef;
+use super::tables::{MemberRef, Tables};
 use super::{Elaborator, MemberKey, SpeciesId};
 use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
 use crate::eval::{Scope, Type, Value};
@@ -62,7 +63,7 @@ pub struct Instance<'a> {
     /// Values of its members, as far as they were asked for.
     pub values: FxHashMap<MemberKey, Value>,
     /// State of each amount per species.
-    pub amounts: BTreeMap<(String, SpeciesId), u32>,
+    pub amounts: BTreeMap<String, BTreeMap<SpeciesId, u32>>,
     /// What it holds at the start: mol (or kg where counted by mass).
     pub contents: Vec<(SpeciesId, NodeId)>,
     /// What its contents are called as a reagent.
@@ -130,7 +131,7 @@ impl<'a> Elaborator<'a> {
 
     fn make_parts(&mut self, id: InstanceId) {
         let mut wanted = Vec::new();
-        for m in self.all_members(id) {
+        for m in self.all_members(id).iter().copied() {
             let MemberKind::Value { role: Role::Part, name, ty, .. } = &m.member.kind else { continue };
             if self.instances[id.0 as usize].parts.contains_key(&name.text) {
                 continue;
@@ -241,10 +242,11 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Every member of an instance, base first.
-    pub fn all_members(&self, id: InstanceId) -> Vec<MemberRef<'a>> {
+    pub fn all_members(&self, id: InstanceId) -> Cow<'a, [MemberRef<'a>]> {
+        let tables: &'a Tables<'a> = self.tables;
         let kinds = &self.instances[id.0 as usize].kinds;
         if let [kind] = kinds.as_slice() {
-            return self.tables.kinds.get(kind).map(|info| info.visible.clone()).unwrap_or_default();
+            return Cow::Borrowed(tables.kinds.get(kind).map_or(&[], |info| &info.visible));
         }
         let mut out: Vec<MemberRef<'a>> = Vec::new();
         for kind in kinds {
@@ -255,7 +257,7 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        self.tables.visible(out)
+        Cow::Owned(tables.visible(out))
     }
 
     /// A stand-in that has the capabilities.
@@ -329,7 +331,7 @@ impl<'a> Elaborator<'a> {
     #[allow(clippy::type_complexity)]
     pub fn views(&self, id: InstanceId) -> Vec<(usize, &'a crate::ast::Param, &'a crate::ast::Type, &'a Expr, DeclId)> {
         self.all_members(id)
-            .into_iter()
+            .iter()
             .filter_map(|m| match &m.member.kind {
                 MemberKind::View { param, ty, value } => Some((m.module, param, ty, value, m.owner)),
                 _ => None,
@@ -340,7 +342,7 @@ impl<'a> Elaborator<'a> {
     /// Derived members, base first.
     pub fn derived_members(&self, id: InstanceId) -> Vec<MemberRef<'a>> {
         let derived = |m: &MemberRef<'a>| matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });
-        self.all_members(id).into_iter().filter(derived).collect()
+        self.all_members(id).iter().copied().filter(derived).collect()
     }
 
     /// The type of an extensive quantity.

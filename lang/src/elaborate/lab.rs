@@ -12,7 +12,8 @@ use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
 
 /// Fields every asset may have beside the members of its capabilities: geometry, and what follows from it.
-const GEOMETRY: &[&str] = &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
+pub(crate) const GEOMETRY: &[&str] =
+    &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
 
 impl<'a> Elaborator<'a> {
     /// Builds the instances of a lab, then their states.

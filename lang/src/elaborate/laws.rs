@@ -58,7 +58,7 @@ impl<'a> Elaborator<'a> {
         let mut jobs = Vec::new();
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
-            for m in self.all_members(id) {
+            for m in self.all_members(id).iter().copied() {
                 let MemberKind::Process(process) = &m.member.kind else { continue };
                 if self.draft && !has_calls(&process.laws) {
                     continue;
@@ -600,7 +600,7 @@ impl<'a> Elaborator<'a> {
         let mut found: Vec<(&'a ast::Event, Scope, String)> = Vec::new();
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
-            for m in self.all_members(id) {
+            for m in self.all_members(id).iter().copied() {
                 if let MemberKind::Event(e) = &m.member.kind
                     && (!self.draft || has_calls(&e.laws))
                 {

@@ -29,17 +29,14 @@ impl Elaborator<'_> {
         Some(self.graph.add(Op::State(index)))
     }
 
-    fn origins_of(&self, mixture: InstanceId) -> Vec<String> {
-        self.reach.origins(&self.instances[mixture.0 as usize].name).map(String::from).collect()
-    }
-
     /// Whether `a` has touched something that `b` has not.
     pub fn soils(&mut self, a: InstanceId, b: InstanceId) -> NodeId {
         self.follows_lineage = true;
         let mut any = self.graph.number(0.0);
-        for origin in self.origins_of(a) {
-            let Some(mut foreign) = self.touched(a, &origin) else { continue };
-            if let Some(known) = self.touched(b, &origin) {
+        let reach = self.reach.clone();
+        for origin in reach.origins(&self.instances[a.0 as usize].name) {
+            let Some(mut foreign) = self.touched(a, origin) else { continue };
+            if let Some(known) = self.touched(b, origin) {
                 let unknown = self.graph.unary(UnaryOp::Not, known);
                 foreign = self.graph.binary(BinaryOp::And, foreign, unknown);
             }
@@ -51,8 +48,9 @@ impl Elaborator<'_> {
     /// What a transfer does to the lineage of its destination.
     pub fn inherit(&mut self, from: InstanceId, to: InstanceId, span: Span) -> Vec<Action> {
         let mut out = Vec::new();
-        for origin in self.origins_of(from) {
-            let (Some(there), Some(here)) = (self.touched(from, &origin), self.touched(to, &origin)) else { continue };
+        let reach = self.reach.clone();
+        for origin in reach.origins(&self.instances[from.0 as usize].name) {
+            let (Some(there), Some(here)) = (self.touched(from, origin), self.touched(to, origin)) else { continue };
             let value = self.graph.binary(BinaryOp::Or, here, there);
             if let Op::State(state) = self.graph.op(here) {
                 out.push(Action::Assign { state, value, span });
@@ -68,8 +66,9 @@ impl Elaborator<'_> {
         for ((process, from, to), flows) in self.streams.clone() {
             let (name, span) = (format!("{}.origins", self.processes[process].name), self.processes[process].span);
             let mut new = self.graph.number(0.0);
-            for origin in self.origins_of(from) {
-                let (Some(there), Some(here)) = (self.touched(from, &origin), self.touched(to, &origin)) else {
+            let reach = self.reach.clone();
+            for origin in reach.origins(&self.instances[from.0 as usize].name) {
+                let (Some(there), Some(here)) = (self.touched(from, origin), self.touched(to, origin)) else {
                     continue;
                 };
                 let clean = self.graph.unary(UnaryOp::Not, here);
@@ -90,8 +89,9 @@ impl Elaborator<'_> {
     pub fn rinse(&mut self, mixture: InstanceId, span: Span) -> Vec<Action> {
         let clean = self.graph.number(0.0);
         let mut out = Vec::new();
-        for origin in self.origins_of(mixture) {
-            let node = self.touched(mixture, &origin);
+        let reach = self.reach.clone();
+        for origin in reach.origins(&self.instances[mixture.0 as usize].name) {
+            let node = self.touched(mixture, origin);
             if let Some(Op::State(state)) = node.map(|n| self.graph.op(n)) {
                 out.push(Action::Assign { state, value: clean, span });
             }

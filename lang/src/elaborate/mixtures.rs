@@ -1,6 +1,5 @@
 //! The mixtures of the model: their numbers, their extensive states, and what operations change of them.
 
-use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use matterix_ir::model::Action;
@@ -50,17 +49,18 @@ impl Passages {
     }
 }
 
-/// The states that an operation's actions change; `extensive` as [`Elaborator::extensive_by_mixture`] gives them.
-pub fn written(operation: &Operation, extensive: &[Vec<(ExtensiveKey, u32)>]) -> BTreeSet<u32> {
-    let mut out = BTreeSet::new();
-    for action in operation.at_start.iter().chain(&operation.at_end) {
-        match action {
-            Action::Assign { state, .. } => out.extend([*state]),
-            Action::Move { from, to, .. } => {
-                let held = [from, to].into_iter().filter_map(|m| extensive.get(*m as usize)).flatten();
-                out.extend(held.map(|(_, state)| *state));
-            }
-        }
-    }
-    out
+/// The states that an operation's actions change, some of them more than once; `extensive` as
+/// [`Elaborator::extensive_by_mixture`] gives them.
+pub fn written<'o>(
+    operation: &'o Operation,
+    extensive: &'o [Vec<(ExtensiveKey, u32)>],
+) -> impl Iterator<Item = u32> + 'o {
+    operation.at_start.iter().chain(&operation.at_end).flat_map(|action| {
+        let (state, mixtures) = match action {
+            Action::Assign { state, .. } => (Some(*state), None),
+            Action::Move { from, to, .. } => (None, Some([*from, *to])),
+        };
+        let held = mixtures.into_iter().flatten().filter_map(|m| extensive.get(m as usize)).flatten();
+        state.into_iter().chain(held.map(|(_, state)| *state))
+    })
 }

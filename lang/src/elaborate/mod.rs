@@ -30,7 +30,7 @@ pub mod units;
 mod whereabouts;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::RwLock;
+use std::sync::{Arc, RwLock};
 
 use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
@@ -206,7 +206,7 @@ pub struct Elaborator<'a> {
     /// Readings taken by the plan.
     pub readings: Vec<model::Reading>,
     /// Species that can get into each mixture.
-    pub reach: reach::Reach,
+    pub reach: Arc<reach::Reach>,
     /// Transfers found between mixtures.
     pub moves: BTreeSet<(InstanceId, InstanceId)>,
     /// What has touched what another thing has touched, without a transfer: from, to.
@@ -247,6 +247,8 @@ pub struct Elaborator<'a> {
     pub absent: Vec<(InstanceId, SpeciesId)>,
     /// The same by the place of the condition.
     pub absent_in: BTreeMap<Span, Vec<(InstanceId, SpeciesId)>>,
+    /// Conditions of the workflow's own branches that read its parameters, by their place.
+    pub by_parameters: BTreeSet<Span>,
     /// Values are those at the start of the run.
     pub initial_mode: bool,
     /// Readings are what the device reports, not the true values behind them.
@@ -264,7 +266,11 @@ pub struct Elaborator<'a> {
     /// What a node that picks an instance may give.
     pub picks: BTreeMap<NodeId, Vec<InstanceId>>,
     /// Values of functions of instances, as far as they were asked for.
-    pub known_calls: BTreeMap<KnownCall, Value>,
+    pub known_calls: FxHashMap<KnownCall, Value>,
+    /// Values of properties of species, as far as they were asked for.
+    pub known_properties: FxHashMap<SpeciesId, Vec<(Box<str>, Value)>>,
+    /// What names that modules see stand for, as far as they were looked up, by module.
+    pub looked_up: Vec<FxHashMap<Box<str>, DeclId>>,
     /// What parts of things that are alike are shaped like.
     pub known_geometries: FxHashMap<geometry::Alike, geometry::Geometry>,
     /// Instances by kind, and how many there were when they were looked for.
@@ -315,7 +321,7 @@ impl<'a> Elaborator<'a> {
             drivers: Vec::new(),
             offers: matterix_ir::offer::Offers::default(),
             readings: Vec::new(),
-            reach,
+            reach: Arc::new(reach),
             moves: BTreeSet::new(),
             soiled: BTreeSet::new(),
             streams: BTreeMap::new(),
@@ -336,6 +342,7 @@ impl<'a> Elaborator<'a> {
             noted: Vec::new(),
             absent: Vec::new(),
             absent_in: BTreeMap::new(),
+            by_parameters: BTreeSet::new(),
             initial_mode: false,
             readings_live: false,
             prototype: false,
@@ -344,7 +351,9 @@ impl<'a> Elaborator<'a> {
             calls: Vec::new(),
             gone_through: BTreeSet::new(),
             picks: BTreeMap::new(),
-            known_calls: BTreeMap::new(),
+            known_calls: FxHashMap::default(),
+            known_properties: FxHashMap::default(),
+            looked_up: Vec::new(),
             known_geometries: FxHashMap::default(),
             by_kind: RwLock::default(),
             open_members: Vec::new(),

@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::scene::InstanceId;
+use serde::{Deserialize, Serialize};
 
 use super::{Elaborator, SpeciesId, Tables};
 
 /// Species by mixture name.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reach {
     sets: BTreeMap<String, BTreeSet<SpeciesId>>,
     origins: BTreeMap<String, BTreeSet<String>>,
@@ -25,7 +26,7 @@ impl Reach {
     }
 
     /// The reagents that can get into a mixture; known only where something asks for lineage.
-    pub fn origins(&self, mixture: &str) -> impl Iterator<Item = &str> {
+    pub fn origins<'r>(&'r self, mixture: &str) -> impl Iterator<Item = &'r str> + use<'r> {
         self.origins.get(mixture).into_iter().flatten().map(String::as_str)
     }
 

@@ -14,7 +14,7 @@ use crate::eval::{Num, Scope, Type, Value};
 impl<'a> Elaborator<'a> {
     /// Allocates the states of an instance.
     pub fn declare_states(&mut self, id: InstanceId) {
-        for m in self.all_members(id) {
+        for m in self.all_members(id).iter().copied() {
             let MemberKind::Value { role, name, ty, per, options, .. } = &m.member.kind else { continue };
             if !matches!(role, Role::State | Role::Extensive) {
                 continue;
@@ -26,7 +26,7 @@ impl<'a> Elaborator<'a> {
                 for s in self.mixture_species(id) {
                     let species = self.tables.species.get(s).name.clone();
                     let index = self.allocate(id, format!("{full}[{species}]"), &ty, options, scale, m.member.span);
-                    self.instances[id.0 as usize].amounts.insert((name.text.clone(), s), index);
+                    self.instances[id.0 as usize].amounts.entry(name.text.clone()).or_default().insert(s, index);
                     let key = ExtensiveKey { instance: id, member: name.text.clone(), species: Some(s) };
                     self.extensive.insert(key, index);
                 }
@@ -76,7 +76,7 @@ impl<'a> Elaborator<'a> {
         let mut out = Vec::new();
         for index in 0..self.instances.len() as u32 {
             let by = InstanceId(index);
-            for m in self.all_members(by) {
+            for m in self.all_members(by).iter().copied() {
                 let MemberKind::Value { role: Role::State, name, options, .. } = &m.member.kind else { continue };
                 if !options.iter().any(|o| o.name.text == "carries") {
                     continue;
@@ -204,9 +204,9 @@ impl<'a> Elaborator<'a> {
     /// Evaluates all initial values; what an instance holds goes into its amounts.
     pub fn initialise(&mut self) {
         for i in 0..self.instances.len() as u32 {
-            let amounts: Vec<((String, SpeciesId), u32)> =
-                self.instances[i as usize].amounts.iter().map(|(k, v)| (k.clone(), *v)).collect();
-            for ((_, s), index) in amounts {
+            let amounts: Vec<(SpeciesId, u32)> =
+                self.instances[i as usize].amounts.values().flatten().map(|(s, state)| (*s, *state)).collect();
+            for (s, index) in amounts {
                 let held = self.instances[i as usize].contents.iter().find(|(c, _)| *c == s).map(|c| c.1);
                 let node = held.unwrap_or_else(|| self.graph.number(0.0));
                 self.states[index as usize].initial = node;
@@ -215,7 +215,7 @@ impl<'a> Elaborator<'a> {
         // A parameter that nothing reads must be given all the same.
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
-            for m in self.all_members(id) {
+            for m in self.all_members(id).iter().copied() {
                 if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
                     self.member_value(id, m, name.span);
                 }
@@ -224,7 +224,7 @@ impl<'a> Elaborator<'a> {
         self.initial_mode = true;
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
-            for m in self.all_members(id) {
+            for m in self.all_members(id).iter().copied() {
                 let MemberKind::Value { role: Role::State | Role::Extensive, name, per: None, .. } = &m.member.kind
                 else {
                     continue;

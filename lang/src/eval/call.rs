@@ -1,6 +1,5 @@
 //! Calls of functions, relations and methods.
 
-use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
 
 use super::{Num, Scope, Type, Value};
@@ -9,29 +8,31 @@ use crate::elaborate::Elaborator;
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
-/// A function, the instances it was called with, how many instances there were, and how members are read.
-pub type KnownCall = (DeclId, Vec<InstanceId>, usize, bool, bool);
+/// A function, the instances it was called with (lists of them by [`LIST`], their length and theirs), how many instances there were,
+/// and how members are read.
+pub type KnownCall = (DeclId, Vec<u32>, usize, bool, bool);
+
+/// What no instance is numbered by.
+const LIST: u32 = u32::MAX;
 
 impl<'a> Elaborator<'a> {
     /// `f(a, b: c)`.
     pub fn call(&mut self, callee: &'a Expr, args: &'a [Arg], span: Span, scope: &mut Scope) -> Value {
         let f = match &*callee.kind {
             // A function is looked up where a name that is not a function would be refused.
-            ExprKind::Name(n) if scope.var(&n.text).is_none() => {
-                match self.tables.names.lookup(scope.module, &n.text) {
-                    Some(id) if self.is_function(id) => {
-                        self.note_declared(n.span, id);
-                        Value::Function(id)
-                    }
-                    _ => {
-                        let d = self.tables.names.unknown(scope.module, n, "function", |k| {
-                            matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
-                        });
-                        self.report(d);
-                        return Value::Error;
-                    }
+            ExprKind::Name(n) if scope.var(&n.text).is_none() => match self.lookup(scope.module, &n.text) {
+                Some(id) if self.is_function(id) => {
+                    self.note_declared(n.span, id);
+                    Value::Function(id)
                 }
-            }
+                _ => {
+                    let d = self.tables.names.unknown(scope.module, n, "function", |k| {
+                        matches!(k, ItemKind::Fn { .. } | ItemKind::Relation { .. })
+                    });
+                    self.report(d);
+                    return Value::Error;
+                }
+            },
             _ => self.expr(callee, scope),
         };
         match f {
@@ -125,17 +126,14 @@ impl<'a> Elaborator<'a> {
         v
     }
 
-    /// What a call is remembered by: a function of instances alone always gives the same node.
+    /// What a call is remembered by: a function of instances and lists of them alone always gives the same node.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
-        let instance = |v: &Value| match v {
-            Value::Instance(i) => Some(*i),
-            _ => None,
-        };
         if self.prototype || values.is_empty() || self.rate_prefix.is_some() {
             return None;
         }
-        let instances: Option<Vec<InstanceId>> = values.iter().map(instance).collect();
-        Some((id, instances?, self.instances.len(), self.initial_mode, self.readings_live))
+        let mut instances = Vec::with_capacity(values.len() + 2);
+        let all = values.iter().all(|value| only_instances(value, &mut instances));
+        all.then_some((id, instances, self.instances.len(), self.initial_mode, self.readings_live))
     }
 
     /// Arguments by position and name, in the order of the parameters. A parameter that is not given takes its default
@@ -233,7 +231,7 @@ impl<'a> Elaborator<'a> {
         let [a, b] = values else { return None };
         let (a, b) = (instance(a)?, instance(b)?);
         let found =
-            self.pairs.iter().position(|p| p.name == name && ((p.a == a && p.b == b) || (p.a == b && p.b == a)))?;
+            self.pairs.iter().position(|p| ((p.a == a && p.b == b) || (p.a == b && p.b == a)) && p.name == name)?;
         if let Some(v) = &self.pairs[found].resolved {
             return Some(v.clone());
         }
@@ -348,4 +346,17 @@ impl<'a> Elaborator<'a> {
             Type::Instance { kinds, .. } => Value::Instance(self.prototype_of(kinds.to_vec(), name)),
         }
     }
+}
+
+/// Notes the instances that a value is made of; false where it is made of anything else too.
+fn only_instances(value: &Value, out: &mut Vec<u32>) -> bool {
+    match value {
+        Value::Instance(id) => out.push(id.0),
+        Value::List(items) => {
+            out.extend([LIST, items.len() as u32]);
+            return items.iter().all(|item| only_instances(item, out));
+        }
+        _ => return false,
+    }
+    true
 }

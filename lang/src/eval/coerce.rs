@@ -64,6 +64,9 @@ impl Elaborator<'_> {
             }
             (Value::List(items), Type::List(inner)) => {
                 let items = flattened(items, inner);
+                if **inner == Type::Any && !items.contains(&Value::Error) {
+                    return Value::List(items);
+                }
                 let items: Vec<Value> = items.into_iter().map(|i| self.coerce(i, inner, span, what)).collect();
                 if items.contains(&Value::Error) { Value::Error } else { Value::List(items) }
             }

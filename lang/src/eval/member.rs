@@ -11,6 +11,7 @@ use super::{Num, Scope, SpeciesId, Type, Value};
 use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
 use crate::elaborate::grids::Place;
 use crate::elaborate::instances::Setting;
+use crate::elaborate::lab::GEOMETRY;
 use crate::elaborate::tables::MemberRef;
 use crate::elaborate::{Elaborator, MemberKey, Tables};
 use crate::names::{DeclId, near};
@@ -347,7 +348,9 @@ impl<'a> Elaborator<'a> {
         let ty = self.resolve_type(ty, m.module);
         if *role == Role::Param || *role == Role::Derived {
             let setting = self.instances[id.0 as usize].setting(&name.text);
-            if let Some(setting) = setting {
+            // What an asset's line says of its shape is no value: the `room` of a vessel is what still fits in.
+            let shape = *role == Role::Derived && GEOMETRY.contains(&name.text.as_str());
+            if let Some(setting) = setting.filter(|_| !shape) {
                 let value = self.param(id, &name.text, &ty, setting);
                 if let FieldValue::Expr(at) = setting.value() {
                     self.check_limits(&value, at.span, &name.text, &ty, options, m.module);
@@ -738,7 +741,7 @@ impl<'a> Elaborator<'a> {
     pub fn amount(&mut self, id: InstanceId, member: &str, s: SpeciesId) -> Value {
         let Some((ty, _)) = self.extensive_type(id, member) else { return Value::Error };
         let Type::Quantity { dimension, .. } = ty else { return Value::Error };
-        let index = self.instances[id.0 as usize].amounts.get(&(member.to_string(), s)).copied();
+        let index = self.instances[id.0 as usize].amounts.get(member).and_then(|of| of.get(&s)).copied();
         let node = match index {
             Some(i) if self.initial_mode => self.states[i as usize].initial,
             Some(i) => self.graph.add(Op::State(i)),
@@ -749,7 +752,7 @@ impl<'a> Elaborator<'a> {
 
     /// Notes a species asked for that can never get into this mixture.
     fn note_asked(&mut self, mixture: InstanceId, s: SpeciesId) {
-        if !self.instances[mixture.0 as usize].amounts.keys().any(|(_, there)| *there == s) {
+        if !self.instances[mixture.0 as usize].amounts.values().any(|of| of.contains_key(&s)) {
             self.absent.push((mixture, s));
         }
     }
@@ -775,8 +778,13 @@ impl<'a> Elaborator<'a> {
             _ => {}
         }
         let (module, fields, by_mass, molar_mass) = (def.module, def.fields, def.by_mass, def.molar_mass);
+        if let Some((_, known)) =
+            self.known_properties.get(&s).and_then(|of| of.iter().find(|(n, _)| **n == *name.text))
+        {
+            return known.clone();
+        }
         if let Some(v) = self.property(module, fields, &name.text) {
-            return v;
+            return self.known_property(s, &name.text, v);
         }
         let per_amount = |this: &mut Self, specific: Value| match specific {
             Value::Num(n) => {
@@ -803,7 +811,7 @@ impl<'a> Elaborator<'a> {
             _ => None,
         };
         if let Some(v) = derived {
-            return v;
+            return self.known_property(s, &name.text, v);
         }
         if self.prototype {
             return self.number(1.0, Dimension::any(), false);
@@ -827,6 +835,14 @@ impl<'a> Elaborator<'a> {
             .help(format!("add {wanted} to the species, with its source")),
         );
         Value::Error
+    }
+
+    /// Keeps the value of a species' property: it is asked for at every mixture that the species can get into.
+    fn known_property(&mut self, s: SpeciesId, name: &str, value: Value) -> Value {
+        if value != Value::Error && !self.prototype {
+            self.known_properties.entry(s).or_default().push((name.into(), value.clone()));
+        }
+        value
     }
 
     fn property(&mut self, module: usize, fields: &'a [crate::ast::Field], key: &str) -> Option<Value> {

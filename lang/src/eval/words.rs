@@ -113,7 +113,7 @@ impl<'a> Elaborator<'a> {
     pub fn is_word(&mut self, id: InstanceId, word: &Name) -> Option<Value> {
         let members: Vec<(Name, Vec<String>)> = self
             .all_members(id)
-            .into_iter()
+            .iter()
             .filter_map(|m| match &m.member.kind {
                 MemberKind::Value { name, ty, .. } if !ty.words.is_empty() => {
                     Some((name.clone(), ty.words.iter().map(|w| w.text.clone()).collect()))

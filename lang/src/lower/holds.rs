@@ -94,7 +94,7 @@ impl<'a> Planner<'a, '_> {
     /// Whether one mixture holds a substance. That it holds anything at all is for the call itself to ask.
     fn holds(&mut self, mixture: InstanceId, what: &Substance, span: Span) -> Condition {
         let amounts: Vec<(SpeciesId, u32)> =
-            self.lab.instances[mixture.0 as usize].amounts.iter().map(|((_, s), state)| (*s, *state)).collect();
+            self.lab.instances[mixture.0 as usize].amounts.values().flatten().map(|(s, state)| (*s, *state)).collect();
         let named: Vec<_> = match what {
             Substance::Species(s) => amounts.iter().filter(|(known, _)| known == s).collect(),
             Substance::Solution(_) => Vec::new(),

@@ -15,7 +15,7 @@ impl Planner<'_, '_> {
         let mut out = Vec::new();
         for i in 0..self.lab.instances.len() as u32 {
             let id = InstanceId(i);
-            for m in self.lab.all_members(id) {
+            for m in self.lab.all_members(id).iter().copied() {
                 let MemberKind::Limit { at_end: when, cond, refusal } = &m.member.kind else { continue };
                 if *when != at_end || self.is_drafted(cond.span) {
                     continue;
@@ -44,7 +44,7 @@ impl Planner<'_, '_> {
         let extensive = self.lab.extensive_by_mixture();
         for step in &mut self.steps {
             let Step::Operation(o) = &mut step.step else { continue };
-            o.limits = written(o, &extensive).iter().flat_map(|s| &of[*s as usize]).copied().collect();
+            o.limits = written(o, &extensive).flat_map(|s| &of[s as usize]).copied().collect();
             o.limits.sort_unstable();
             o.limits.dedup();
         }

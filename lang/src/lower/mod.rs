@@ -14,6 +14,7 @@ pub mod wires;
 
 pub use call::Verb;
 pub use text::declared_failures;
+pub use wires::Wires;
 
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -53,10 +54,16 @@ pub struct Planner<'a, 'e> {
     pub failures: Arc<BTreeSet<String>>,
     /// Jobs started so far.
     pub jobs: BTreeSet<String>,
+    /// Positions of the names that stand for a turn's thing in the workflow, as [`Scope::reads`] has them.
+    turns: u64,
+    /// Positions of the workflow's parameters.
+    parameters: u64,
     /// What the call that is being written out says of its sources.
     pub said: Vec<Condition>,
     /// Only what the plan moves where is asked for, not how it reads or what it needs.
     pub draft: bool,
+    /// Whether the plan is of no use any more: then no more of it is written out.
+    pub of_no_use: &'e dyn Fn() -> bool,
     /// What is asked of drivers.
     pub wires: wires::Wires,
     /// What is to be sent may be missing: then a driver has nothing to do with the device.
@@ -107,8 +114,11 @@ impl<'a, 'e> Planner<'a, 'e> {
             handlers: 0,
             failures,
             jobs: BTreeSet::new(),
+            turns: 0,
+            parameters: 0,
             said: Vec::new(),
             draft: false,
+            of_no_use: &|| false,
             wires: wires::Wires::Off,
             lenient: false,
             drivers: Vec::new(),
@@ -192,7 +202,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         let ItemKind::Workflow { name, params, body, handlers, .. } = &self.lab.tables.names.decl(id).item.kind else {
             return self.add("nothing", Span::default(), Step::Sequence(Vec::new()));
         };
+        let first = scope.vars.len();
         *shown = self.workflow_parameters(params, given, scope);
+        self.parameters = (first..scope.vars.len()).fold(0, |all, position| all | Scope::read_bit(position));
         self.lab.readings_live = true;
         self.guarded(&name.text, name.span, body, handlers, scope)
     }

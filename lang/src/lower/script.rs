@@ -8,7 +8,6 @@ use matterix_ir::{Diagnostic, Span, TextPart, codes};
 use super::Planner;
 use super::call::Bound;
 use crate::ast::{Arg, Exchange, ExprKind, ItemKind, MemberKind, Name, Path, Sig, Text, Wire, WireKind};
-use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -204,7 +203,7 @@ impl<'a> Planner<'a, '_> {
         let Some(driver) = self.script(id) else { return };
         let Some(kind) = self.lab.kind_named(driver.device, driver.module) else { return };
         let device = self.lab.prototype_of(vec![kind], self.lab.tables.kind_name(kind));
-        let commands: Vec<MemberRef<'a>> = self.lab.all_members(device);
+        let commands = self.lab.all_members(device);
         for wire in driver.wires {
             match &wire.kind {
                 WireKind::Command { sig, exchange } => {

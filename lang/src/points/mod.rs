@@ -189,7 +189,7 @@ fn head(sources: &Sources, span: Span, block: bool) -> String {
 /// The states of an instance that are not hidden, by name of the member.
 fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
     let mut out = Vec::new();
-    for m in lab.all_members(id) {
+    for m in lab.all_members(id).iter().copied() {
         let MemberKind::Value { role: Role::State, name, options, .. } = &m.member.kind else { continue };
         if options.iter().any(|o| o.name.text == "hidden") {
             continue;

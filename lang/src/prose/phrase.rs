@@ -178,7 +178,7 @@ impl<'a> Prose<'a, '_> {
             if self.lab.find_part(&part) && !self.is_contents(id, &name.text) {
                 return format!("**{}**", part);
             }
-            let reading = self.lab.all_members(id).into_iter().any(|m| {
+            let reading = self.lab.all_members(id).iter().any(|m| {
                 matches!(&m.member.kind, MemberKind::Value { role: Role::Reading, name: n, .. } if n.text == name.text)
             });
             if reading {

@@ -2,6 +2,7 @@
 //! session is a check like any other, so that what an editor shows is what the command says.
 
 mod files;
+mod foreseen;
 mod items;
 mod reach;
 mod verdicts;
@@ -14,6 +15,8 @@ use matterix_ir::{Diagnostic, FileId, Sources};
 use crate::ast;
 use crate::names::Module;
 use crate::syntax::{self, Memo};
+
+pub use foreseen::Foreseen;
 
 pub(crate) use files::{features, imported};
 pub(crate) use reach::Words;
@@ -42,6 +45,8 @@ pub(crate) struct Package {
     texts: BTreeMap<String, Text>,
     /// What was judged of it.
     pub(crate) earlier: Option<Earlier>,
+    /// What was found to get where.
+    pub(crate) foreseen: Foreseen,
 }
 
 #[derive(Debug, Default)]
@@ -64,6 +69,17 @@ impl Session {
         let last = self.packages.len();
         self.packages.push(package);
         &mut self.packages[last].1
+    }
+
+    /// What checks of a file have found to get where, for another session.
+    pub fn foreseen(&mut self, name: &str) -> &Foreseen {
+        &self.package(name).foreseen
+    }
+
+    /// Begins the next check of a file with what another session has found. It is no more than an expectation: what comes of the
+    /// check does not depend on it.
+    pub fn foresee(&mut self, name: &str, foreseen: Foreseen) {
+        self.package(name).foreseen = foreseen;
     }
 
     /// What is wrong with a text by itself, before anything else of it is looked at. A check of it under this name does not read it again.

@@ -90,7 +90,7 @@ fn tallies(lab: &mut Elaborator<'_>) -> Vec<Tally> {
     let mut out = Vec::new();
     for i in 0..lab.instances.len() as u32 {
         let instance = InstanceId(i);
-        for m in lab.all_members(instance) {
+        for m in lab.all_members(instance).iter().copied() {
             let MemberKind::Value { name, options, .. } = &m.member.kind else { continue };
             let Some(count) = options.iter().find(|o| o.name.text == COUNTS_AS).and_then(count_of) else { continue };
             let value = match lab.member_value(instance, m, name.span) {

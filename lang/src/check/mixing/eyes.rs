@@ -108,6 +108,7 @@ struct Look<'w, M> {
 impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
     type Value = (f64, bool);
 
+    #[inline]
     fn leaf(&self, op: Op) -> Option<(f64, bool)> {
         let value = match op {
             Op::Const(v) => return Some((v, true)),

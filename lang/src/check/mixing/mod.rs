@@ -126,7 +126,7 @@ fn materials(lab: &mut Elaborator<'_>) -> BTreeMap<InstanceId, DeclId> {
 }
 
 fn material_of(lab: &mut Elaborator<'_>, id: InstanceId) -> Option<DeclId> {
-    for member in lab.all_members(id) {
+    for member in lab.all_members(id).iter().copied() {
         let MemberKind::Value { role: Role::Param, ty, name, .. } = &member.member.kind else { continue };
         if !matches!(lab.resolve_type(ty, member.module), Type::Material { .. }) {
             continue;

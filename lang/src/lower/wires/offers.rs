@@ -23,7 +23,7 @@ impl<'a> Planner<'a, '_> {
             let id = InstanceId(index);
             let members = self.lab.all_members(id);
             let is_top = self.lab.instances[index as usize].owner.is_none();
-            for m in members {
+            for m in members.iter().copied() {
                 match &m.member.kind {
                     MemberKind::Command { .. } => self.offer(id, m),
                     MemberKind::Value { role: Role::Reading | Role::State | Role::Derived, .. }

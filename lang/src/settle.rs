@@ -1,0 +1,118 @@
+//! A task in its lab, written out: first as a draft to learn what is moved where, then for good, with a state for every species that
+//! can get into a mixture.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use matterix_ir::Sources;
+use matterix_ir::model::Event;
+use matterix_ir::plan::Plan;
+use matterix_ir::script::Wiring;
+
+use crate::elaborate::reach::Reach;
+use crate::elaborate::{Elaborator, Tables};
+use crate::lower::{Planner, Wires};
+use crate::share;
+use crate::task::Task;
+
+/// What a task is written out for.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Purpose {
+    /// The plan is to be run: parameters without a default must have been given.
+    pub(crate) to_run: bool,
+    /// What is asked of drivers.
+    pub(crate) wires: Wires,
+    /// The transport of which drivers say what goes over it, where that is asked for.
+    pub(crate) transport: Option<&'static str>,
+    /// Whether what names and expressions mean is noted.
+    pub(crate) meanings: bool,
+}
+
+/// A task that is written out: what its plan moves where is what its lab was made for.
+pub(crate) struct Settled<'a> {
+    pub(crate) lab: Elaborator<'a>,
+    pub(crate) plan: Plan,
+    pub(crate) wiring: Option<Wiring>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) reach: Reach,
+}
+
+/// Writes a task out. Where it is `foreseen` what can get where, the draft is made beside and tells whether that is so: what
+/// comes of it is what comes of it without. Nothing where `stop` says that it is of no use any more.
+pub(crate) fn settled<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    task: &Task<'a>,
+    purpose: Purpose,
+    foreseen: Option<&Reach>,
+    stop: &dyn Fn() -> bool,
+) -> Option<Settled<'a>> {
+    let draft =
+        || written(tables, sources, task, purpose, None, &|| false).map(|draft| draft.reach).unwrap_or_default();
+    let mut reach = match foreseen {
+        None => draft(),
+        Some(foreseen) => {
+            let mistaken = AtomicBool::new(false);
+            let judge = || {
+                let drafted = draft();
+                mistaken.store(drafted != *foreseen, Ordering::Relaxed);
+                drafted
+            };
+            let of_no_use = || mistaken.load(Ordering::Relaxed);
+            let write = || written(tables, sources, task, purpose, Some(foreseen), &of_no_use);
+            match share::two(judge, write) {
+                (drafted, Some(whole)) if drafted == *foreseen => match whole.reach == drafted {
+                    true => return Some(whole),
+                    false => whole.reach,
+                },
+                (drafted, _) => drafted,
+            }
+        }
+    };
+    loop {
+        if stop() {
+            return None;
+        }
+        let whole = written(tables, sources, task, purpose, Some(&reach), &|| false)?;
+        if whole.reach == reach {
+            return Some(whole);
+        }
+        reach = whole.reach;
+    }
+}
+
+/// A task written out for what can get where; as a draft where that is not known. Nothing where it is of no use any more.
+fn written<'a>(
+    tables: &'a Tables<'a>,
+    sources: &Sources,
+    task: &Task<'a>,
+    purpose: Purpose,
+    reach: Option<&Reach>,
+    of_no_use: &dyn Fn() -> bool,
+) -> Option<Settled<'a>> {
+    let draft = reach.is_none();
+    let mut lab = Elaborator::new(tables, reach.cloned().unwrap_or_default());
+    lab.meanings = (purpose.meanings && !draft).then(Box::default);
+    lab.draft = draft;
+    lab.lab(task.lab);
+    let mut planner = Planner::new(&mut lab, sources);
+    planner.to_run = purpose.to_run;
+    planner.draft = draft;
+    planner.wires = purpose.wires;
+    planner.of_no_use = of_no_use;
+    let wiring = |transport: &str| Wiring { transport: transport.to_string(), ..Wiring::default() };
+    planner.wiring = purpose.transport.map(wiring);
+    let (plan, wiring) = planner.task(task);
+    if of_no_use() {
+        return None;
+    }
+    if !draft {
+        lab.initialise();
+    }
+    lab.close_holds();
+    let mut events = lab.events();
+    lab.close_holds();
+    lab.processes();
+    events.extend(lab.stream_events());
+    let reach = Reach::compute(&lab);
+    Some(Settled { lab, plan, wiring, events, reach })
+}
