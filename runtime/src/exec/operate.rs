@@ -86,7 +86,8 @@ impl<'p> Executor<'p, '_> {
         let Some(position) = within.iter().position(|f| earlier.within.contains(f)) else { return false };
         let parallel = self.frames.get(&within[position]).is_some_and(|f| matches!(f.kind, Kind::Parallel { .. }));
         let is_job = |f: &FrameId| self.frames.get(f).is_some_and(|f| f.job);
-        let jobs = within[..position].iter().any(is_job)
+        // What was done before a job was started is not beside it.
+        let jobs = within[..position].iter().any(|f| is_job(f) && *f < earlier.frame)
             || earlier.within.iter().take_while(|f| !within.contains(f)).any(is_job);
         parallel || jobs
     }
