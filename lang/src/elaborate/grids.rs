@@ -355,6 +355,11 @@ impl<'a> Elaborator<'a> {
         from: &Name,
         to: Option<&Name>,
     ) -> Option<Vec<InstanceId>> {
+        if let Some(any) = self.stand_in_place(id, grid)
+            && [Some(from), to].into_iter().flatten().all(|name| Place::parse(&name.text).is_some())
+        {
+            return Some(vec![any]);
+        }
         let first = self.child_at(id, grid, from)?;
         let Some(end) = to else { return Some(vec![first.1]) };
         let last = self.child_at(id, grid, end)?;
@@ -371,6 +376,12 @@ impl<'a> Elaborator<'a> {
                 None
             }
         }
+    }
+
+    /// The one place that stands for all in a grid of a stand-in, of which it is not known how many it has.
+    fn stand_in_place(&self, id: InstanceId, grid: usize) -> Option<InstanceId> {
+        let children = &self.instances[id.0 as usize].grids[grid].children;
+        children.values().next().copied().filter(|_| self.prototype && children.len() == 1)
     }
 
     fn child_at(&mut self, id: InstanceId, grid: usize, name: &Name) -> Option<(Place, InstanceId)> {
@@ -474,6 +485,9 @@ impl<'a> Elaborator<'a> {
                 ("well", [one]) => Value::Instance(*one),
                 _ => list(group),
             };
+        }
+        if let Some(any) = self.stand_in_place(id, grid).filter(|_| number >= 1.0 && number.fract() == 0.0) {
+            return if name == "well" { Value::Instance(any) } else { list(vec![any]) };
         }
         let thing = self.grid_name(id, grid);
         self.report(Diagnostic::error(

@@ -1,12 +1,13 @@
 //! Expressions, one construct at a time.
 
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
+use rustc_hash::FxHashMap;
 
 use super::{Num, Scope, Value};
-use crate::ast::{Binary, Expr, ExprKind, ItemKind, Name, Unary, UnitText};
+use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
 use crate::elaborate::units::unit_error;
 use crate::elaborate::{Asked, Elaborator};
-use crate::names::near;
+use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
 impl<'a> Elaborator<'a> {
@@ -213,11 +214,24 @@ impl<'a> Elaborator<'a> {
         if let Some(value) = self.setting(&n.text) {
             return value;
         }
-        if let Some(id) = self.tables.names.lookup(scope.module, &n.text) {
+        if let Some(id) = self.lookup(scope.module, &n.text) {
             self.note_declared(n.span, id);
             return self.declared(id, n);
         }
         self.unknown_name(n, scope)
+    }
+
+    /// What a name that a module sees stands for. Those of laws are asked for again and again.
+    pub fn lookup(&mut self, module: usize, name: &str) -> Option<DeclId> {
+        if let Some(known) = self.looked_up.get(module).and_then(|of| of.get(name)) {
+            return Some(*known);
+        }
+        let found = self.tables.names.lookup(module, name)?;
+        if self.looked_up.len() <= module {
+            self.looked_up.resize_with(module + 1, FxHashMap::default);
+        }
+        self.looked_up[module].insert(name.into(), found);
+        Some(found)
     }
 
     /// What a name of the lab's text stands for: a parameter of the lab, an instance or an included lab.
@@ -290,6 +304,21 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// A lab of the module that has a thing of this name, and where that is declared.
+    fn elsewhere(&self, n: &Name, scope: &Scope) -> Option<(String, Span)> {
+        let names = self.tables.names;
+        names.declared_by(scope.module).find_map(|id| {
+            let ItemKind::Lab { name, lines, .. } = &names.decl(id).item.kind else { return None };
+            let lines = lines.iter().filter(|_| name.span != self.lab_name);
+            lines.into_iter().find_map(|line| match &line.kind {
+                LabLineKind::Instance { name: thing, .. } if thing.text == n.text => {
+                    Some((name.text.clone(), thing.span))
+                }
+                _ => None,
+            })
+        })
+    }
+
     fn unknown_name(&mut self, n: &Name, scope: &Scope) -> Value {
         let mut candidates: Vec<String> = scope.vars.iter().map(|v| v.0.clone()).collect();
         candidates.extend(self.settings.keys().cloned());
@@ -339,7 +368,15 @@ impl<'a> Elaborator<'a> {
             self.report(import.offered(d));
             return Value::Error;
         }
-        d = near::proposed(d, &near, n.span);
+        d = match self.elsewhere(n, scope) {
+            Some((lab, span)) if scope.lab => {
+                d.because(span, format!("declared in the lab `{lab}`")).help("this is another lab")
+            }
+            Some((lab, span)) => d
+                .because(span, format!("declared in the lab `{lab}`"))
+                .help("what is no workflow or test sees no lab: make it a parameter, and give it in the call"),
+            None => near::proposed(d, &near, n.span),
+        };
         self.report(d);
         Value::Error
     }

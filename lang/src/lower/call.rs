@@ -583,7 +583,19 @@ impl<'a> Planner<'a, '_> {
     ) -> Option<(StepId, Option<Value>)> {
         let decl = self.lab.tables.names.decl(id);
         let ItemKind::Skill { sig, clauses, body, handlers, .. } = &decl.item.kind else { return None };
-        let bound = self.bind_arguments(sig, clauses, decl.module, call, object, false, scope)?;
+        let mut bound = self.bind_arguments(sig, clauses, decl.module, call, object, false, scope)?;
+        let mut kept = Vec::new();
+        if body.is_some() {
+            // An argument is what it is when the skill is called, whatever the skill changes.
+            for (name, value) in &mut bound.values {
+                if self.is_kept(value) {
+                    continue;
+                }
+                let (now, steps) = self.keep(name, std::mem::replace(value, Value::Error), span);
+                *value = now;
+                kept.extend(steps);
+            }
+        }
         let mut inner = Scope::module(decl.module);
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
@@ -610,7 +622,13 @@ impl<'a> Planner<'a, '_> {
         let result = self.skill_body(sig, clauses, body, handlers, &label, span, &mut inner);
         self.lab.calls.pop();
         self.open.pop();
-        result
+        match (result, kept.is_empty()) {
+            (Some((step, value)), false) => {
+                kept.push(step);
+                Some((self.add(label, span, Step::Sequence(kept)), value))
+            }
+            (result, _) => result,
+        }
     }
 
     #[allow(clippy::too_many_arguments)]

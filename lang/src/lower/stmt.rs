@@ -13,6 +13,9 @@ use crate::task::Given;
 impl<'a> Planner<'a, '_> {
     /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
     pub fn stmt(&mut self, s: &'a Stmt, scope: &mut Scope) -> Option<StepId> {
+        if (self.of_no_use)() {
+            return None;
+        }
         let label = self.text(head(s));
         let step = match &s.kind {
             StmtKind::Error => return None,
@@ -93,12 +96,18 @@ impl<'a> Planner<'a, '_> {
                 return Some(self.with_handlers(&label, s.span, id, handlers, scope));
             }
             StmtKind::If { cond, then, otherwise } => {
+                let seen = scope.reads.replace(0);
                 let condition = self.deciding(cond, scope)?;
-                // In a skill the arguments may decide it: the other branch need not make sense then.
-                if !self.open.is_empty()
-                    && !self.lab.prototype
-                    && let Some(truth) = self.lab.graph.constant(condition.node)
-                {
+                let read = scope.reads.replace(scope.reads.get() | seen);
+                // In a skill the arguments may decide it, in a loop the turn: the other branch need not make sense then.
+                let given = match self.open.as_slice() {
+                    [] => read & self.turns != 0,
+                    [_, ..] => !self.lab.prototype || self.open.len() > 1,
+                };
+                if self.open.is_empty() && read & self.parameters != 0 {
+                    self.lab.by_parameters.insert(cond.span);
+                }
+                if given && let Some(truth) = self.lab.graph.constant(condition.node) {
                     let chosen = if truth != 0.0 { Some(then) } else { otherwise.as_ref() };
                     return chosen.map(|block| self.block(block, scope));
                 }
@@ -130,6 +139,8 @@ impl<'a> Planner<'a, '_> {
                 };
                 self.unshadowed(var, scope);
                 let mut turns = Vec::new();
+                let outside = self.turns;
+                self.turns |= Scope::read_bit(scope.vars.len());
                 for item in items {
                     let depth = scope.vars.len();
                     let shown = self.lab.spoken(&item);
@@ -139,8 +150,10 @@ impl<'a> Planner<'a, '_> {
                         self.steps[turn.0 as usize].label = format!("{} = {shown}", var.text);
                     }
                     turns.push(turn);
-                    super::leave(scope, depth);
+                    // A step of a turn is that turn's own.
+                    scope.vars.truncate(depth);
                 }
+                self.turns = outside;
                 Step::Sequence(turns)
             }
             StmtKind::Try { alternatives, handlers } => {
@@ -373,7 +386,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// Keeps what depends on the run in locals; returns how later text sees it.
-    fn keep(&mut self, name: &str, v: Value, span: Span) -> (Value, Vec<StepId>) {
+    pub(super) fn keep(&mut self, name: &str, v: Value, span: Span) -> (Value, Vec<StepId>) {
         match v {
             Value::Num(n) => {
                 if !self.depends_on_run(n.node) {
@@ -416,6 +429,16 @@ impl<'a> Planner<'a, '_> {
         let local = self.local(name, unit);
         let step = self.add(format!("let {name}"), span, Step::Let { local, value });
         (self.lab.graph.add(Op::Local(local)), step)
+    }
+
+    /// Whether a value is one that is kept already.
+    pub(super) fn is_kept(&self, value: &Value) -> bool {
+        let (Value::Num(Num { node, .. }) | Value::Bool(node) | Value::InstanceNode(node) | Value::Enum(node, _)) =
+            value
+        else {
+            return false;
+        };
+        matches!(self.lab.graph.op(*node), Op::Local(_))
     }
 
     fn depends_on_run(&self, node: NodeId) -> bool {
@@ -542,6 +565,11 @@ impl<'a> Planner<'a, '_> {
                         self.lab.defaulted.insert(i);
                     }
                     Value::Num(named)
+                }
+                Value::Bool(node) => {
+                    let truth = self.lab.graph.constant(node).map(|v| if v == 0.0 { "false" } else { "true" });
+                    shown.extend(truth.map(|t| (p.name.text.clone(), t.to_string())));
+                    Value::Bool(node)
                 }
                 Value::Enum(node, words) => {
                     let word = self.lab.graph.constant(node).and_then(|v| words.get(v as usize));

@@ -82,8 +82,9 @@ impl<'a> Planner<'a, '_> {
             let (_, value) = bound.values.iter().find(|(name, _)| *name == p.name.text)?;
             match value {
                 Value::Num(n) => {
+                    // What only a run can tell is called what the skill calls it.
                     let unit = self.lab.unit_of(n);
-                    Some(unit.show(self.lab.glance(n.node)?))
+                    Some(self.lab.glance(n.node).map_or_else(|| p.name.text.clone(), |v| unit.show(v)))
                 }
                 Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
                 Value::Frame(id, frame) => Some(format!("{}.{frame}", self.lab.spoken(&Value::Instance(*id))?)),

@@ -26,7 +26,8 @@ pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S
                 // Any two letters are one change apart: only another case, a longer or a shorter form is near.
                 0..=2 if candidate.starts_with(&lower) || lower.starts_with(&candidate) => 9,
                 0..=2 => 0,
-                3..=5 => 2,
+                3 => 1,
+                4..=5 => 2,
                 n => n / 3 + 1,
             };
             // Of equally near ones that with the same letters in another order is the likelier.

@@ -39,7 +39,9 @@ impl Flow<'_, '_> {
                     break;
                 }
                 None => {
-                    if value.why() == Some(Why::Paths) && !self.is_shared(need.node) {
+                    if value.why() == Some(Why::Paths) && self.is_cleared(need.span) {
+                        self.assume(need.node, true, facts);
+                    } else if value.why() == Some(Why::Paths) && !self.is_shared(need.node) {
                         let name = need.failure();
                         if !self.is_taken(name) {
                             self.unmet(label, need, facts, true);
@@ -133,6 +135,7 @@ impl Flow<'_, '_> {
             let some = match value.truth() {
                 Some(true) => continue,
                 Some(false) => false,
+                None if self.is_cleared(limit.condition.span) => continue,
                 None if value.why() == Some(Why::Paths) && !self.is_shared(limit.condition.node) => true,
                 None => continue,
             };
@@ -299,6 +302,7 @@ impl Flow<'_, '_> {
         }
         if met {
             self.perform(&operation.at_end, &mut facts);
+            self.still_kept(label, &facts);
         }
         facts
     }

@@ -67,25 +67,26 @@ impl Flow<'_, '_> {
     }
 
     /// A job begins: what the rest of the plan changes is not known in it.
-    pub fn begin_job(&mut self, body: StepId) {
+    pub fn begin_job(&mut self, others: &BTreeSet<u32>) {
         if self.notes.is_none() {
             return;
         }
-        let below = self.below(body);
-        let others: BTreeSet<u32> = (0..self.plan.steps.len() as u32)
-            .map(StepId)
-            .filter(|id| !below.contains(id))
-            .filter_map(|id| match &self.plan.get(id).step {
-                Step::Operation(o) => Some(o),
-                _ => None,
-            })
-            .flat_map(|o| written(o, &self.mixtures))
-            .collect();
-        let states = self.behind(&others);
+        let states = self.behind(others);
         if let Some(notes) = &mut self.notes {
             notes.untimed = true;
             notes.busy.push((None, states));
         }
+    }
+
+    /// The states that the plan changes without a job.
+    pub fn beside(&self, job: StepId) -> BTreeSet<u32> {
+        let below = self.below(job);
+        let others = (0..self.plan.steps.len() as u32).map(StepId).filter(|id| !below.contains(id));
+        let operations = others.filter_map(|id| match &self.plan.get(id).step {
+            Step::Operation(o) => Some(o),
+            _ => None,
+        });
+        operations.flat_map(|o| written(o, &self.mixtures)).collect()
     }
 
     /// Its steps have been followed: from now until it is waited for, what they change is not known.

@@ -11,6 +11,9 @@ use super::facts::Facts;
 use super::value::{Known, Why};
 use super::{Flow, Raised};
 
+/// So many cases are told apart.
+const MOST_CASES: usize = 16;
+
 /// What a node depends on.
 #[derive(Debug, Default)]
 pub struct Parts {
@@ -30,6 +33,7 @@ struct Exact<'f> {
 impl Rules for Exact<'_> {
     type Value = f64;
 
+    #[inline]
     fn leaf(&self, op: Op) -> Option<f64> {
         match op {
             Op::Const(v) => Some(v).filter(|v| !v.is_nan()),
@@ -45,12 +49,43 @@ impl Rules for Exact<'_> {
         Some(unary(op, a)).filter(|v| !v.is_nan())
     }
 
+    #[inline]
     fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
-        Known::points(op, a, b).exact()
+        Known::exactly(op, a, b)
     }
 
     fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
         if condition != 0.0 { a } else { b }
+    }
+}
+
+/// The same, with these numbers as the values of some states.
+struct Supposed<'f> {
+    exact: Exact<'f>,
+    states: &'f [(u32, f64)],
+}
+
+impl Rules for Supposed<'_> {
+    type Value = f64;
+
+    fn leaf(&self, op: Op) -> Option<f64> {
+        let supposed = |state: u32| self.states.iter().find(|(s, _)| *s == state).map(|(_, value)| *value);
+        match op {
+            Op::State(i) => supposed(i).or_else(|| self.exact.leaf(op)),
+            other => self.exact.leaf(other),
+        }
+    }
+
+    fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
+        self.exact.unary(op, a)
+    }
+
+    fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
+        self.exact.binary(op, a, b)
+    }
+
+    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
+        self.exact.select(condition, a, b)
     }
 }
 
@@ -150,8 +185,38 @@ impl Flow<'_, '_> {
         let exact = Exact { params: &self.params, facts };
         match formula.value(&exact, &mut self.numbers) {
             Some(value) => Known::Point(value),
-            None => self.enclose(node, facts),
+            None => self.case_by_case(node, facts).unwrap_or_else(|| self.enclose(node, facts)),
         }
+    }
+
+    /// The value of a node that rests on one or two states which are one of a few numbers each, and else on what is known
+    /// exactly: that of each case. What a state decides at several places of an expression it decides alike at all of them.
+    fn case_by_case(&mut self, node: NodeId, facts: &Facts) -> Option<Known> {
+        let parts = self.parts(node);
+        let open: Vec<u32> =
+            parts.states.iter().copied().filter(|s| facts.states[*s as usize].exact().is_none()).take(3).collect();
+        let few = |state: &u32| match &facts.states[*state as usize] {
+            Known::Few(all, why) => Some((all.clone(), *why)),
+            _ => None,
+        };
+        let mut cases: Vec<Vec<(u32, f64)>> = vec![Vec::new()];
+        let mut why = Why::Paths;
+        for state in open.iter().filter(|_| open.len() < 3) {
+            let (all, because) = few(state)?;
+            why = why.max(because);
+            let with = |case: Vec<(u32, f64)>| all.iter().map(move |v| [case.clone(), vec![(*state, *v)]].concat());
+            cases = cases.into_iter().flat_map(with).collect();
+        }
+        if !(2..=MOST_CASES).contains(&cases.len()) {
+            return None;
+        }
+        let formula = self.formulas.of(&self.lab.graph, node);
+        let mut values = Vec::with_capacity(cases.len());
+        for states in &cases {
+            let exact = Exact { params: &self.params, facts };
+            values.push(formula.value(&Supposed { exact, states }, &mut self.numbers)?);
+        }
+        Some(Known::of(values, why))
     }
 
     /// The value of a node with those of all that it rests on, which stay in `values`. Of its operations those are done again

@@ -8,12 +8,15 @@
 
 mod actions;
 mod beside;
+mod demands;
 mod eval;
 mod evolve;
 mod facts;
 mod history;
+mod jobs;
 mod lasting;
 mod otherwise;
+mod parted;
 mod points;
 mod report;
 mod reported;
@@ -27,7 +30,7 @@ use std::rc::Rc;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::values::Formulas;
-use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
+use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span, codes};
 use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
@@ -109,6 +112,18 @@ struct Flow<'l, 'a> {
     cleaning: usize,
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
+    /// Conditions that `keep` asks for all the time.
+    kept: Vec<&'l Condition>,
+    /// Jobs that go on.
+    jobs: jobs::Jobs,
+    /// Steps of jobs are followed when these are waited for, not when they are started.
+    late: bool,
+    /// Loops of which a turn is followed.
+    turning: usize,
+    /// Ways that have met.
+    ways: parted::Ways,
+    /// Whether the plan was followed to its end, and that looked at.
+    ended: bool,
     steps: usize,
     /// What is known after each statement, where it is asked for.
     notes: Option<points::Notes>,
@@ -133,11 +148,25 @@ pub fn check(
     derivatives: &[Derivative],
     asked: Option<&[NodeId]>,
 ) -> Followed {
-    let mut flow = Flow::new(lab, sources, plan, events, derivatives);
-    if let Some(asked) = asked {
-        flow.take_notes(asked);
+    let begin = || {
+        let mut flow = Flow::new(lab, sources, plan, events, derivatives);
+        if let Some(asked) = asked {
+            flow.take_notes(asked);
+        }
+        flow
+    };
+    let mut flow = parted::follow(begin);
+    if jobs::any(plan) {
+        let mut late = Flow::new(lab, sources, plan, events, derivatives);
+        late.late = true;
+        late.follow();
+        let first = std::mem::take(&mut flow.findings);
+        flow.findings = jobs::in_both(first, &late.findings);
+        // What a mistake kept from being looked at that is none after all.
+        if !flow.ended && late.ended {
+            flow.findings.extend(late.findings.into_iter().filter(|f| f.is(codes::UNFINISHED)));
+        }
     }
-    flow.follow();
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
@@ -196,6 +225,12 @@ impl<'l, 'a> Flow<'l, 'a> {
             doubt: 0,
             cleaning: 0,
             shared: Vec::new(),
+            kept: Vec::new(),
+            jobs: jobs::Jobs::new(),
+            late: false,
+            turning: 0,
+            ways: parted::Ways::default(),
+            ended: false,
             steps: 0,
             notes: None,
         };
@@ -233,10 +268,12 @@ impl<'l, 'a> Flow<'l, 'a> {
         let begun = facts.clone();
         self.note_start(&begun);
         // What a mistake cut short is not finished for another reason.
-        if let Some(ended) = self.walk(self.plan.root, facts)
+        let ended = self.walk(self.plan.root, facts).and_then(|facts| self.await_all(facts));
+        if let Some(ended) = ended
             && !self.findings.iter().any(report::Finding::is_error)
         {
             self.ends(&begun, &ended);
+            self.ended = true;
         }
         self.dead_branches();
     }
@@ -268,7 +305,8 @@ impl<'l, 'a> Flow<'l, 'a> {
     fn note_branch(&mut self, condition: &Condition, otherwise: bool) {
         let in_skill = self.sites.iter().any(|s| s.calls);
         let constant = self.lab.graph.constant(condition.node);
-        if let Some(v) = constant.filter(|_| !in_skill && !self.in_library(condition.span)) {
+        let by_parameters = self.lab.by_parameters.contains(&condition.span);
+        if let Some(v) = constant.filter(|_| !in_skill && !by_parameters && !self.in_library(condition.span)) {
             let entry = self.branches.entry(condition.span);
             let (_, seen, _) = entry.or_insert_with(|| (condition.text.clone(), BTreeSet::new(), otherwise));
             seen.insert(v != 0.0);
@@ -287,11 +325,11 @@ impl<'l, 'a> Flow<'l, 'a> {
 
     /// Whether a condition may depend on what other branches do meanwhile.
     fn is_shared(&mut self, node: NodeId) -> bool {
-        if self.shared.is_empty() {
+        if self.shared.is_empty() && self.jobs.is_empty() {
             return false;
         }
         let states = self.parts(node).states.clone();
-        self.shared.iter().any(|set| states.iter().any(|s| set.contains(s)))
+        self.shared.iter().chain(self.of_jobs()).any(|set| states.iter().any(|s| set.contains(s)))
     }
 }
 

@@ -6,7 +6,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, Severity, Span, codes};
 
 use super::facts::Facts;
-use super::value::Known;
+use super::parted::Place;
+use super::value::{Known, Why};
 use super::{Flow, forbidden_on_any_way, only_advice};
 
 /// A finding, and how often it was made.
@@ -15,6 +16,10 @@ pub struct Finding {
     /// The condition or construct it is about.
     about: Span,
     count: usize,
+    /// How many ways had met before it, where it was made on some of them.
+    some: Option<usize>,
+    /// It was made in a turn of a loop.
+    turn: bool,
 }
 
 impl Finding {
@@ -30,6 +35,26 @@ impl Finding {
         let names: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
         self.diagnostic.severity = Severity::Warning;
         self.diagnostic.help.push(format!("so it is where a device reports {}", names.join(" or ")));
+    }
+
+    /// The statement it is at, and what it is about.
+    pub(super) fn place(&self) -> Place {
+        (self.diagnostic.span(), self.about)
+    }
+
+    /// Where it was made, if that was on some ways only, and how many had met before.
+    pub(super) fn open_at(&self) -> Option<(Place, usize)> {
+        Some((self.place(), self.some?))
+    }
+
+    /// Whether it was made in a turn of a loop.
+    pub(super) fn in_turn(&self) -> bool {
+        self.turn
+    }
+
+    /// Whether it is of a kind.
+    pub(super) fn is(&self, code: Code) -> bool {
+        self.diagnostic.code == code
     }
 
     /// Whether it is an error.
@@ -56,13 +81,20 @@ impl Flow<'_, '_> {
 
     /// Adds a finding, or counts it if it was made before.
     pub fn found(&mut self, diagnostic: Diagnostic, about: Span) {
+        self.found_on(diagnostic, about, None);
+    }
+
+    /// Adds a finding that is made on some ways, of which so many had met before.
+    fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>) {
         if self.quiet > 0 {
             return;
         }
-        let new = Finding { diagnostic, about, count: 1 };
+        let new = Finding { diagnostic, about, count: 1, some, turn: self.turning > 0 };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
                 old.count += 1;
+                old.some =
+                    old.some.and(new.some).map(|meetings| old.some.map_or(meetings, |first| first.min(meetings)));
                 if new.is_error() && !old.is_error() {
                     old.diagnostic = new.diagnostic;
                 }
@@ -94,6 +126,7 @@ impl Flow<'_, '_> {
 
     fn demand(&mut self, what: String, need: &Condition, facts: &Facts, some: bool) {
         let code = need.code();
+        let open = some.then(|| self.ways.meetings());
         let some = some || self.doubt > 0;
         let headline = if some { format!("{what}, on some ways through the plan") } else { what };
         let failing = self.failing(need, facts);
@@ -118,7 +151,7 @@ impl Flow<'_, '_> {
         }
         d = self.history_of(d, asked, facts, !words.is_empty());
         d.help.extend(need.advice());
-        self.found(d, need.span);
+        self.found_on(d, need.span, open);
     }
 
     /// Of several things of which the same is asked, those for which it does not hold, or may not.
@@ -204,11 +237,18 @@ impl Flow<'_, '_> {
 
     /// A wait for something that cannot come: at all, or in the time given.
     pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &Facts, after: &Facts) {
+        // What is within bounds only is on its way.
         let still = self.eval(condition.node, before) == self.eval(condition.node, after)
-            && condition.compared.iter().all(|c| self.eval(c.value, before) == self.eval(c.value, after));
+            && condition.compared.iter().all(|c| {
+                let then = self.eval(c.value, before);
+                then.exact().is_some() && then == self.eval(c.value, after)
+            });
+        let mut ever = before.clone();
+        self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut ever);
+        let in_time = limited && self.eval(condition.node, &ever).truth() != Some(false);
         let absent = self.not_made(condition, after);
         let text = &condition.text;
-        let (code, headline) = match (&absent, still, limited) {
+        let (code, headline) = match (&absent, still, in_time) {
             (Some(absent), ..) => (codes::NEVER_MADE, format!("`{text}` never comes true: {absent}")),
             (None, true, _) => (codes::WAITS_FOR_EVER, format!("`{text}` never comes true: nothing changes it")),
             (None, false, true) => (codes::NOT_REACHED, format!("`{text}` cannot come true in the time given")),
@@ -285,7 +325,7 @@ impl Flow<'_, '_> {
     }
 
     /// What a condition compares, in numbers: `` `a + b` is 600 uL, at most 360 uL``.
-    fn measured(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
+    pub(super) fn measured(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
         let mut out = Vec::new();
         for c in &condition.compared {
             let value = self.eval(c.value, facts);

@@ -111,7 +111,8 @@ impl Known {
         }
     }
 
-    fn of(mut all: Vec<f64>, why: Why) -> Self {
+    /// One of these numbers.
+    pub fn of(mut all: Vec<f64>, why: Why) -> Self {
         if all.iter().any(|v| v.is_nan()) {
             return Known::nothing();
         }
@@ -215,12 +216,13 @@ impl Known {
 
     /// Two exact numbers. Where a comparison hangs on rounding, it is left open.
     pub fn points(op: BinaryOp, a: f64, b: f64) -> Known {
-        let result = binary(op, a, b);
-        let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
-        if compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) {
-            return Known::either(Why::Unknown);
-        }
-        Known::point(result)
+        if hangs_on_rounding(op, a, b) { Known::either(Why::Unknown) } else { Known::point(binary(op, a, b)) }
+    }
+
+    /// The same where it comes to one number.
+    #[inline]
+    pub fn exactly(op: BinaryOp, a: f64, b: f64) -> Option<f64> {
+        if hangs_on_rounding(op, a, b) { None } else { Some(binary(op, a, b)).filter(|v| !v.is_nan()) }
     }
 
     fn ranges(op: BinaryOp, (a, b): (f64, f64), (c, d): (f64, f64), why: Why) -> Known {
@@ -271,6 +273,13 @@ impl Known {
             None => a.join(b, c.why().unwrap_or(Why::Paths)),
         }
     }
+}
+
+/// Whether a comparison is of numbers that are not told apart. Nothing is close to what has no limit.
+#[inline]
+fn hangs_on_rounding(op: BinaryOp, a: f64, b: f64) -> bool {
+    let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
+    compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) && a.is_finite() && b.is_finite()
 }
 
 /// A product of bounds, where nothing times without bound is nothing.
@@ -343,5 +352,7 @@ mod tests {
         let tenth = (0..10).map(|_| 0.1).sum::<f64>();
         assert_eq!(Known::binary(BinaryOp::Le, &Known::Point(1.0), &Known::Point(tenth)).truth(), None);
         assert_eq!(Known::binary(BinaryOp::Le, &Known::Point(1.0), &Known::Point(1.0)).truth(), Some(true));
+        let without_limit = Known::Point(f64::INFINITY);
+        assert_eq!(Known::binary(BinaryOp::Le, &Known::Point(3.0), &without_limit).truth(), Some(true));
     }
 }

@@ -7,6 +7,9 @@ use matterix_ir::plan::{Caught, Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op};
 
 use super::facts::Facts;
+use super::jobs::in_both;
+use super::parted::MOST_WAYS;
+use super::points::at_least;
 use super::report::Finding;
 use super::value::{Known, Why};
 use super::{Flow, MOST_STEPS, Raised, Site};
@@ -65,14 +68,18 @@ impl Flow<'_, '_> {
             Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
             Step::Retry { .. } => None,
             Step::Try(alternatives) => self.alternatives(id, alternatives, facts),
-            Step::Skill { needs, body, .. } => {
+            Step::Skill { needs, promises, body, .. } => {
                 let met = self.needs(&node.label, needs, &mut facts);
                 self.quiet += usize::from(!met);
                 let mut after = self.walk(*body, facts);
                 self.quiet -= usize::from(!met);
                 // What never begins does nothing: of what it would have done nothing is known.
-                if let Some(after) = after.as_mut().filter(|_| !met) {
-                    self.widen(*body, after);
+                if let Some(after) = after.as_mut() {
+                    if met {
+                        self.promised(&node.label, promises, after);
+                    } else {
+                        self.widen(*body, after);
+                    }
                 }
                 after
             }
@@ -107,7 +114,10 @@ impl Flow<'_, '_> {
                 if self.eval(condition.node, &facts).truth() == Some(false) && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
                 }
-                self.walk(*body, facts)
+                self.kept.push(condition);
+                let after = self.walk(*body, facts);
+                self.kept.pop();
+                after
             }
             Step::During { body, .. } => {
                 // It breaks after any time, with any part of the body done.
@@ -130,17 +140,15 @@ impl Flow<'_, '_> {
                 let max = self.turns(*max, &facts);
                 self.repeat_while(id, condition, &max, *body, facts)
             }
-            Step::Claim { body, .. } => self.walk(*body, facts),
-            Step::Start { job, body } => {
-                self.begin_job(*body);
-                let after = self.walk(*body, facts);
-                self.begun_job(job, *body);
-                after
+            Step::Claim { body, .. } => {
+                // Others may have what is claimed for any time.
+                if !self.shared.is_empty() {
+                    facts.time = at_least(&facts.time);
+                }
+                self.walk(*body, facts)
             }
-            Step::Await { job } => {
-                self.end_job(job);
-                Some(facts)
-            }
+            Step::Start { job, body } => self.start_job(job, *body, facts),
+            Step::Await { job } => self.await_job(job, facts),
             Step::Fail { name, .. } => {
                 self.raise(name, facts);
                 None
@@ -191,7 +199,7 @@ impl Flow<'_, '_> {
         }
         // Another branch may do what is waited for.
         if value.truth() == Some(false) && shared {
-            let states: Vec<u32> = self.shared.iter().flatten().copied().collect();
+            let states: Vec<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
             self.forget(&states, &mut facts);
         }
         self.assume(condition.node, true, &mut facts);
@@ -230,19 +238,8 @@ impl Flow<'_, '_> {
             Some(holds) => branch(holds, &facts),
             None => {
                 let (yes, no) = (branch(true, &facts), branch(false, &facts));
-                self.meet(id, &facts, yes, no)
+                self.meet(id, &facts, yes.into_iter().chain(no))
             }
-        }
-    }
-
-    /// What is known after one of two ways from `base`.
-    fn meet(&self, id: StepId, base: &Facts, a: Option<Facts>, b: Option<Facts>) -> Option<Facts> {
-        match (a, b) {
-            (Some(a), Some(b)) => {
-                let span = self.plan.get(id).span;
-                Some(base.join(a, &b, if self.in_library(span) { self.site() } else { span }, Why::Paths))
-            }
-            (one, other) => one.or(other),
         }
     }
 
@@ -255,8 +252,16 @@ impl Flow<'_, '_> {
                 return Some(facts);
             }
             let before = facts.clone();
-            let after = self.walk(body, facts);
-            facts = if done >= low { self.meet(id, &before, Some(before.clone()), after)? } else { after? };
+            let after = self.turn(body, facts);
+            facts = match done >= low {
+                true => {
+                    self.turning += 1;
+                    let either = self.meet(id, &before, after.into_iter().chain([before.clone()]));
+                    self.turning -= 1;
+                    either?
+                }
+                false => after?,
+            };
             if facts.states == before.states {
                 self.more_turns(body, true, &facts);
                 let left = (low == high).then_some(high - done - 1.0);
@@ -277,44 +282,58 @@ impl Flow<'_, '_> {
         mut facts: Facts,
     ) -> Option<Facts> {
         let start = facts.clone();
-        let mut ends: Option<Facts> = None;
+        let mut ends: Vec<Facts> = Vec::new();
         let (_, most) = max.bounds();
         for turn in 0..MOST_TURNS {
             let holds = self.eval(condition.node, &facts).truth();
             if holds != Some(true) {
                 let mut out = facts.clone();
                 self.assume(condition.node, false, &mut out);
-                ends = self.meet(id, &start, ends, Some(out));
+                // The last ends are told apart, and what many others before them come to.
+                if ends.len() == MOST_WAYS {
+                    let early = ends.remove(0);
+                    ends[0] = start.join(early, &ends[0], self.plan.get(id).span, Why::Paths);
+                }
+                ends.push(out);
             }
             if holds == Some(false) {
-                return ends;
+                return self.meet(id, &start, ends);
             }
             if turn as f64 >= most {
+                if holds == Some(true) && ends.is_empty() {
+                    self.runs_out(condition, most, &facts);
+                }
                 self.raise("max", facts);
-                return ends;
+                return self.meet(id, &start, ends);
             }
             let before = facts.clone();
             self.assume(condition.node, true, &mut facts);
-            let open = turn > 0 && ends.is_some();
+            let open = turn > 0 && !ends.is_empty();
             self.doubt += usize::from(open);
-            let after = self.walk(body, facts);
+            let after = self.turn(body, facts);
             self.doubt -= usize::from(open);
-            let Some(after) = after else { return ends };
+            let Some(after) = after else { return self.meet(id, &start, ends) };
             facts = after;
             if facts.states == before.states {
                 self.more_turns(body, true, &facts);
                 self.raise("max", facts.clone());
                 // A loop that changes nothing it looks at ends by what only a run can tell.
-                let facts = later(facts, &Moment::of(&before));
-                return match ends {
-                    Some(ends) => self.meet(id, &start, Some(ends), Some(facts)),
-                    None => Some(facts),
-                };
+                ends.push(later(facts, &Moment::of(&before)));
+                return self.meet(id, &start, ends);
             }
         }
         self.more_turns(body, false, &facts);
         self.widen(body, &mut facts);
-        self.meet(id, &start, ends, Some(facts))
+        ends.push(facts);
+        self.meet(id, &start, ends)
+    }
+
+    /// A turn of a loop.
+    fn turn(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
+        self.turning += 1;
+        let after = self.walk(body, facts);
+        self.turning -= 1;
+        after
     }
 
     /// Forgets what a body changes.
@@ -353,10 +372,7 @@ impl Flow<'_, '_> {
         let second = self.in_order(branches, &backward, &writes, facts.clone());
         self.once_more(false);
         let other: Vec<Finding> = self.findings.split_off(mark);
-        let both = one.iter().any(|f| other.iter().any(|o| o.is_like(f)));
-        // Something goes wrong in either order, if not at the same place: the first order tells it.
-        let either = !both && one.iter().any(Finding::is_error) && other.iter().any(Finding::is_error);
-        self.findings.extend(one.into_iter().filter(|f| either || other.iter().any(|o| o.is_like(f))));
+        self.findings.extend(in_both(one, &other));
         match (first, second) {
             (Some(a), Some(b)) => Some(facts.join(a, &b, self.site(), Why::Unknown)),
             (a, b) => a.or(b),
@@ -422,7 +438,7 @@ impl Flow<'_, '_> {
                 self.cleaning += 1;
                 let end = self.walk(*handler, entry);
                 self.cleaning -= 1;
-                after = self.meet(id, &facts, after, end);
+                after = self.meet(id, &facts, after.into_iter().chain(end));
             }
         }
         raised.extend(self.guards.pop().unwrap_or_default());
@@ -474,7 +490,7 @@ impl Flow<'_, '_> {
     }
 
     fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: Facts) -> Option<Facts> {
-        let mut end = None;
+        let mut ends = Vec::new();
         let mut entry = facts.clone();
         for (i, step) in alternatives.iter().enumerate() {
             let last = i + 1 == alternatives.len();
@@ -483,7 +499,7 @@ impl Flow<'_, '_> {
             let after = self.walk(*step, entry.clone());
             let raised = self.guards.pop().unwrap_or_default();
             self.caught.pop();
-            end = self.meet(id, &facts, end, after);
+            ends.extend(after);
             if last {
                 if let Some(outer) = self.guards.last_mut() {
                     outer.extend(raised);
@@ -499,7 +515,7 @@ impl Flow<'_, '_> {
                 }
             }
         }
-        end
+        self.meet(id, &facts, ends)
     }
 }
 

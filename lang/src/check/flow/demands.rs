@@ -1,0 +1,85 @@
+//! What the plan itself asks of its steps: conditions that are kept, promises of skills, loops that end.
+
+use matterix_ir::plan::Condition;
+use matterix_ir::quantity::show_number;
+use matterix_ir::{Code, Span, codes};
+
+use super::Flow;
+use super::facts::Facts;
+
+impl Flow<'_, '_> {
+    /// Looks whether what is kept still holds after an operation.
+    pub(super) fn still_kept(&mut self, label: &str, facts: &Facts) {
+        for condition in self.kept.clone() {
+            if self.fails(condition, "broken", facts) {
+                let label = self.called(label);
+                let headline = format!("`{label}` breaks `{}`, which is kept here", condition.text);
+                let about = Some((condition.span, "kept from here on"));
+                self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
+            }
+        }
+    }
+
+    /// Looks whether a skill has done what it promises.
+    pub(super) fn promised(&mut self, label: &str, promises: &[Condition], facts: &Facts) {
+        for promise in promises {
+            if self.fails(promise, "promise", facts) {
+                let label = self.called(label);
+                let headline = format!("`{label}` promises `{}`, which does not hold at its end", promise.text);
+                self.asked_in_vain(
+                    codes::PROMISE_BROKEN,
+                    headline,
+                    promise,
+                    Some((promise.span, "promised here")),
+                    facts,
+                );
+            }
+        }
+    }
+
+    /// A loop that goes on at its last turn.
+    pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &Facts) {
+        if self.fails_not(condition, "max", facts) {
+            let turns = if most == 1.0 { "1 turn".to_string() } else { format!("{} turns", show_number(most)) };
+            let headline = format!("`{}` still holds after {turns}, and the loop fails with `max`", condition.text);
+            self.asked_in_vain(codes::NOT_REACHED, headline, condition, None, facts);
+        }
+    }
+
+    /// Whether a condition does not hold, nobody else may see to it, and nothing takes the failure that follows.
+    fn fails(&mut self, condition: &Condition, failure: &str, facts: &Facts) -> bool {
+        self.eval(condition.node, facts).truth() == Some(false)
+            && !self.is_taken(failure)
+            && !self.is_shared(condition.node)
+    }
+
+    /// The same of a condition that holds.
+    fn fails_not(&mut self, condition: &Condition, failure: &str, facts: &Facts) -> bool {
+        self.eval(condition.node, facts).truth() == Some(true)
+            && !self.is_taken(failure)
+            && !self.is_shared(condition.node)
+    }
+
+    /// A step as the reader wrote it.
+    fn called(&self, label: &str) -> String {
+        self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone())
+    }
+
+    fn asked_in_vain(
+        &mut self,
+        code: Code,
+        headline: String,
+        condition: &Condition,
+        about: Option<(Span, &str)>,
+        facts: &Facts,
+    ) {
+        let measured = self.measured(condition, facts);
+        let said = if measured.is_empty() { "not so here".to_string() } else { measured.join(", ") };
+        let mut d = self.at_site(code, headline, said, self.doubt > 0);
+        if let Some((span, label)) = about.filter(|(span, _)| *span != d.span()) {
+            d = d.because(span, label);
+        }
+        let d = self.with_history(d, condition, facts);
+        self.found(d, condition.span);
+    }
+}

@@ -1,0 +1,99 @@
+//! Jobs that `start` begins: their steps are followed where they begin, and once more where they are waited for. What goes wrong in
+//! one order only may be right in the order of the run.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::BinaryOp;
+use matterix_ir::plan::{Plan, Step, StepId};
+
+use super::Flow;
+use super::facts::Facts;
+use super::report::Finding;
+use super::value::Known;
+
+/// A job that was started and not waited for yet.
+#[derive(Clone, Debug)]
+pub(super) struct Job {
+    body: StepId,
+    /// When it began, s.
+    start: Known,
+    /// When it ended, s; not yet where its steps are followed when it is waited for.
+    end: Option<Known>,
+    /// The states that it changes.
+    writes: BTreeSet<u32>,
+}
+
+/// Jobs that go on, by name.
+pub(super) type Jobs = BTreeMap<String, Job>;
+
+/// Whether a plan starts any.
+pub(super) fn any(plan: &Plan) -> bool {
+    plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. }))
+}
+
+impl Flow<'_, '_> {
+    /// Starts a job.
+    pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: Facts) -> Option<Facts> {
+        let (start, writes) = (facts.time.clone(), self.writes(body));
+        let end = match self.late {
+            true => None,
+            false => {
+                let after = self.job(body, facts);
+                self.begun_job(name, body);
+                facts = after?;
+                Some(std::mem::replace(&mut facts.time, start.clone()))
+            }
+        };
+        self.jobs.insert(name.to_owned(), Job { body, start, end, writes });
+        Some(facts)
+    }
+
+    /// Waits for a job.
+    pub(super) fn await_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
+        self.end_job(name);
+        let Some(Job { body, start, end, .. }) = self.jobs.remove(name) else { return Some(facts) };
+        let now = facts.time.clone();
+        let end = match end {
+            Some(end) => end,
+            None => {
+                facts.time = start;
+                facts = self.job(body, facts)?;
+                facts.time.clone()
+            }
+        };
+        facts.time = Known::binary(BinaryOp::Max, &now, &end);
+        Some(facts)
+    }
+
+    /// The jobs that nothing waits for: a run ends when they have.
+    pub(super) fn await_all(&mut self, mut facts: Facts) -> Option<Facts> {
+        while let Some(name) = self.jobs.keys().next().cloned() {
+            facts = self.await_job(&name, facts)?;
+        }
+        Some(facts)
+    }
+
+    fn job(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
+        let others = self.beside(body);
+        self.begin_job(&others);
+        self.shared.push(others);
+        let after = self.walk(body, facts);
+        self.shared.pop();
+        after
+    }
+
+    /// The states that jobs which go on change.
+    pub(super) fn of_jobs(&self) -> impl Iterator<Item = &BTreeSet<u32>> {
+        self.jobs.values().map(|job| &job.writes)
+    }
+}
+
+/// What goes wrong in both orders. Where it does in either, if nowhere in both, the first order tells it: two that put something
+/// in one place. What goes wrong in turns of a loop may be right turn by turn.
+pub(super) fn in_both(first: Vec<Finding>, second: &[Finding]) -> Vec<Finding> {
+    let both = first.iter().any(|f| second.iter().any(|o| o.is_like(f)));
+    let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && !f.in_turn());
+    let either = !both && wrong(&first) && wrong(second);
+    let stays = |f: &Finding| (either && !f.in_turn()) || second.iter().any(|o| o.is_like(f));
+    first.into_iter().filter(stays).collect()
+}
