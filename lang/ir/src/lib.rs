@@ -25,6 +25,7 @@ pub mod mesh;
 pub mod message;
 pub mod model;
 pub mod offer;
+pub mod pages;
 pub mod plan;
 pub mod points;
 pub mod pose;

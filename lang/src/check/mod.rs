@@ -9,7 +9,6 @@ mod flow;
 mod ignored;
 mod kinetics;
 mod mixing;
-mod pages;
 mod time;
 mod unused;
 

@@ -21,7 +21,8 @@ pub enum Carried {
 /// What carries every instance, by instance. Few of them ever move, so those that have are noted.
 #[derive(Clone, Debug)]
 pub struct Carrying {
-    now: Vec<Carried>,
+    /// Shared by moments at which all is carried alike.
+    now: Arc<Vec<Carried>>,
     /// When the run begins.
     first: Arc<[Carried]>,
     /// Those that are carried otherwise than at first.
@@ -32,12 +33,14 @@ impl Carrying {
     /// When the run begins.
     pub fn at_first(scene: &Scene) -> Self {
         let now: Vec<Carried> = scene.stands().into_iter().map(Carried::Stands).collect();
-        Carrying { first: now.as_slice().into(), now, moved: BTreeSet::new() }
+        Carrying { first: now.as_slice().into(), now: Arc::new(now), moved: BTreeSet::new() }
     }
 
     /// Something else carries an instance from now on; nothing where there is no such instance.
     pub fn set(&mut self, id: InstanceId, carried: Carried) -> Option<()> {
-        *self.now.get_mut(id.0 as usize)? = carried;
+        if *self.now.get(id.0 as usize)? != carried {
+            *Arc::make_mut(&mut self.now).get_mut(id.0 as usize)? = carried;
+        }
         match self.is_moved(id) {
             true => self.moved.insert(id),
             false => self.moved.remove(&id),

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
+use matterix_ir::pages::Pages;
 use matterix_ir::{NodeId, Span};
 
-use super::super::pages::Pages;
 use super::evolve::Barrier;
 use super::value::{Known, Why};
 

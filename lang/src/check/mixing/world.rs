@@ -5,9 +5,9 @@ use std::rc::Rc;
 
 use matterix_ir::Span;
 use matterix_ir::model::Action;
+use matterix_ir::pages::Pages;
 use matterix_ir::scene::InstanceId;
 
-use super::super::pages::Pages;
 use super::eyes::Eyes;
 use crate::elaborate::SpeciesId;
 use crate::screen::Presence;

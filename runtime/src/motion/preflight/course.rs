@@ -122,10 +122,7 @@ impl Course<'_> {
     pub fn digest(&self) -> u128 {
         let mut hash = SipHasher13::new();
         self.stage.digest(Some(COARSE), &mut hash);
-        for (state, value) in self.values.iter() {
-            hash.write_u32(state);
-            hash.write_u64(value.to_bits());
-        }
+        hash.write_u128(self.values.digest());
         self.assumed.iter().for_each(|id| hash.write_u32(id.0));
         hash.write_u8(u8::from(self.lost.is_some()));
         hash.finish128().as_u128()

@@ -2,13 +2,16 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::Hasher;
 use std::rc::Rc;
 
 use matterix_ir::graph::{BinaryOp, UnaryOp, binary, unary};
 use matterix_ir::model::{Action, Domain, Model};
+use matterix_ir::pages::Pages;
 use matterix_ir::plan::{Motion, Operation, Step};
 use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{NodeId, Op, Program};
+use siphasher::sip128::{Hasher128, SipHasher13};
 
 use crate::motion::stage::Stage;
 
@@ -16,7 +19,9 @@ use crate::motion::stage::Stage;
 /// them and nothing but operations changes them.
 #[derive(Clone, Debug)]
 pub struct Values {
-    by_state: Vec<Option<f64>>,
+    by_state: Pages<Option<f64>>,
+    /// The sum of a hash of each that is known: what tells all of them from others.
+    sum: u128,
     /// The quantities among them.
     followed: Rc<BTreeSet<u32>>,
     /// What expressions are made of, as far as they were asked for, and room for values in between.
@@ -33,7 +38,8 @@ impl Values {
         });
         let changes: BTreeSet<u32> = changes.collect();
         let mut out = Values {
-            by_state: vec![None; model.states.len()],
+            by_state: model.states.iter().map(|_| None).collect(),
+            sum: 0,
             followed: Rc::new(followed(program, &changes)),
             formulas: Rc::default(),
         };
@@ -64,9 +70,12 @@ impl Values {
     }
 
     fn set(&mut self, state: u32, value: Option<f64>) {
-        if let Some(known) = self.by_state.get_mut(state as usize) {
-            *known = value;
+        if self.by_state.get(state as usize).is_none_or(|known| *known == value) {
+            return;
         }
+        let known = self.by_state.get_mut(state as usize).and_then(|known| std::mem::replace(known, value));
+        let of = |value: Option<f64>| value.map_or(0, |value| hash(state, value));
+        self.sum = self.sum.wrapping_sub(of(known)).wrapping_add(of(value));
     }
 
     /// What is known when actions have been carried out, the quantities that they set included.
@@ -101,16 +110,24 @@ impl Values {
         formulas.of(&model.graph, node).value(&Settled { model, by_state: &self.by_state }, room).flatten()
     }
 
-    /// All of them, in order.
-    pub fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
-        (0..).zip(&self.by_state).filter_map(|(state, value)| Some((state, (*value)?)))
+    /// What tells them from others of the same lab.
+    pub fn digest(&self) -> u128 {
+        self.sum
     }
+}
+
+/// A hash of one value of a state.
+fn hash(state: u32, value: f64) -> u128 {
+    let mut hash = SipHasher13::new();
+    hash.write_u32(state);
+    hash.write_u64(value.to_bits());
+    hash.finish128().as_u128()
 }
 
 /// What is known settles a value, or does not.
 struct Settled<'v> {
     model: &'v Model,
-    by_state: &'v [Option<f64>],
+    by_state: &'v Pages<Option<f64>>,
 }
 
 impl Rules for Settled<'_> {

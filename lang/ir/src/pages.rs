@@ -13,6 +13,16 @@ pub struct Pages<T> {
 }
 
 impl<T: Clone> Pages<T> {
+    /// A value, if there are so many.
+    pub fn get(&self, index: usize) -> Option<&T> {
+        self.pages.get(index / SIZE)?.get(index % SIZE)
+    }
+
+    /// A value to be changed, if there are so many.
+    pub fn get_mut(&mut self, index: usize) -> Option<&mut T> {
+        Rc::make_mut(self.pages.get_mut(index / SIZE)?).get_mut(index % SIZE)
+    }
+
     /// All values in order.
     pub fn iter(&self) -> impl Iterator<Item = &T> {
         self.pages.iter().flat_map(|page| page.iter())
