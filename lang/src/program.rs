@@ -685,6 +685,10 @@ fn build<'a>(
         if let ItemKind::Workflow { name, .. } = &item.kind {
             elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
             elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
+            // A step that is wrong is not in the plan.
+            if !elaborator.diagnostics.iter().any(Diagnostic::is_error) {
+                elaborator.diagnostics.extend(checks::idle(&plan, item.span, tables));
+            }
         }
         uses = checks::uses(&elaborator, sources, lab, &plan);
         if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {

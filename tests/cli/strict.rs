@@ -25,7 +25,7 @@ workflow w(n: Int = 2) in bench {
     let first = 1 stride
     for t in [1 s, 2 s] { wait t }
     go (cup, plate) to (cup, n)
-    sequence { wait 1 s } on timeout { wait 1 s } on failure { wait 2 s }
+    sequence { wait until elapsed > 1 s timeout 1 min } on timeout { wait 1 s } on failure { wait 2 s }
     expect piped(cup, plate) and first > 0.7 m
 }
 ";

@@ -102,7 +102,7 @@ codes! {
     VOLUME_OVERFLOW "volume-overflow" "V1" "a vessel gets more than it holds";
     VOLUME_UNDERFLOW "volume-underflow" "V2" "more is taken from a vessel than there is";
     WRONG_TIP "wrong-tip" "T1" "a tip that does not fit the pipette";
-    DEAD_BRANCH "dead-branch" "F2" "a part of the plan is never done: constants decide a branch, or a `fail` stands before it";
+    DEAD_BRANCH "dead-branch" "F2" "a part of the plan is never done: constants decide a branch, a `fail` stands before it, or nothing raises what a handler is for";
     UNDECLARED_FAILURE "undeclared-failure" "F1" "a skill fails with what its `fails` does not name";
     UNHANDLED_FAILURE "unhandled-failure" "F1" "a workflow has no handler for what a device may report";
     UNUSED "unused" "F4" "a thing or a reagent is declared and never used";

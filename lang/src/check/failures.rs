@@ -1,11 +1,12 @@
 //! Failures that leave a skill or a workflow without a word about them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use crate::ast::{Clause, ClauseKind, Sig};
+use crate::ast::{Clause, ClauseKind, ItemKind, Sig, WireKind};
+use crate::elaborate::Tables;
 use crate::names::verb_text;
 
 /// Names of failures, each with the first statement that it comes from.
@@ -68,6 +69,81 @@ pub fn beyond(plan: &Plan, within: Span) -> Vec<Diagnostic> {
         let headline = "what follows a `fail` is never done";
         let d = Diagnostic::warning(codes::DEAD_BRANCH, next, headline, "never done");
         out.push(d.because(fails, "always fails here").help("take it out, or say with `if` when it fails"));
+    }
+    out
+}
+
+/// Handlers of a workflow for failures that nothing in their block raises, though others do; each once.
+pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
+    // A driver may know failures that no step declares.
+    let drivers = tables.names.decls.iter().filter_map(|decl| match &decl.item.kind {
+        ItemKind::Driver { wires, .. } => Some(wires),
+        _ => None,
+    });
+    let told: BTreeSet<&str> = drivers
+        .flatten()
+        .filter_map(|wire| match &wire.kind {
+            WireKind::Reply { fails, .. } => Some(fails.text.as_str()),
+            _ => None,
+        })
+        .collect();
+    let declared = tables.failures();
+    let mut out: Vec<Diagnostic> = Vec::new();
+    let mut needed: BTreeSet<Span> = BTreeSet::new();
+    for step in &plan.steps {
+        let Step::Guarded { body, handlers, .. } = &step.step else { continue };
+        let raised = raised(plan, *body);
+        for (caught, handler) in handlers {
+            let (Caught::Named(name), at) = (caught, plan.get(*handler).span) else { continue };
+            let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
+            if raised.contains(name) || told.contains(name.as_str()) {
+                needed.insert(at);
+            } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
+                let headline = format!("nothing before it fails with `{name}`");
+                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never done");
+                out.push(d.help("take it out, or name the failure that is meant"));
+            }
+        }
+    }
+    // A turn of a loop may raise what another does not.
+    out.retain(|d| !needed.contains(&d.span()));
+    out
+}
+
+/// All that a step may fail with.
+fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
+    let mut out: BTreeSet<String> = BTreeSet::new();
+    let mut todo = vec![root];
+    while let Some(id) = todo.pop() {
+        let step = &plan.get(id).step;
+        let mut add = |name: &str| {
+            out.insert(name.to_string());
+        };
+        match step {
+            Step::Operation(o) => {
+                o.fails.iter().for_each(|name| add(name));
+                o.needs.iter().for_each(|need| add(need.failure()));
+                o.limits.iter().filter_map(|i| plan.limits.get(*i as usize)).for_each(|l| add(l.condition.failure()));
+                add("claimed");
+            }
+            Step::Skill { needs, invariants, promises, takes, .. } => {
+                needs.iter().for_each(|need| add(need.failure()));
+                if !invariants.is_empty() {
+                    add("broken");
+                }
+                if !promises.is_empty() || takes.is_some_and(|t| t.bounds.is_some()) {
+                    add("promise");
+                }
+            }
+            Step::Keep { .. } | Step::During { .. } => add("broken"),
+            Step::Within { .. } => add("late"),
+            Step::WaitUntil { timeout: Some(_), .. } | Step::Hold { timeout: Some(_), .. } => add("timeout"),
+            Step::RepeatWhile { .. } => add("max"),
+            Step::Start { .. } | Step::Await { .. } => add("job"),
+            Step::Fail { name, .. } => add(name),
+            _ => {}
+        }
+        todo.extend(step.children());
     }
     out
 }

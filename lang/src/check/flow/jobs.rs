@@ -3,11 +3,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::BinaryOp;
-use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::plan::{Step, StepId};
+use matterix_ir::{BinaryOp, codes};
 
 use super::Flow;
 use super::facts::Facts;
+use super::parted;
 use super::report::Finding;
 use super::value::Known;
 
@@ -26,9 +27,22 @@ pub(super) struct Job {
 /// Jobs that go on, by name.
 pub(super) type Jobs = BTreeMap<String, Job>;
 
-/// Whether a plan starts any.
-pub(super) fn any(plan: &Plan) -> bool {
-    plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. }))
+/// Follows a plan way by way, and in both orders where it starts jobs; `begin` gives one that was not followed yet.
+pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
+    let mut flow = parted::follow(&begin);
+    if flow.plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. })) {
+        let mut late = begin();
+        late.notes = None;
+        late.late = true;
+        late.follow();
+        let first = std::mem::take(&mut flow.findings);
+        flow.findings = in_both(first, &late.findings);
+        // What was not looked at for a mistake that is none after all.
+        if !flow.ended && late.ended {
+            flow.findings.extend(late.findings.into_iter().filter(|f| f.is(codes::UNFINISHED)));
+        }
+    }
+    flow
 }
 
 impl Flow<'_, '_> {

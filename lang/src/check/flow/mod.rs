@@ -30,7 +30,7 @@ use std::rc::Rc;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::values::Formulas;
-use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span, codes};
+use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
@@ -148,39 +148,29 @@ pub fn check(
     derivatives: &[Derivative],
     asked: Option<&[NodeId]>,
 ) -> Followed {
-    let begin = || {
-        let mut flow = Flow::new(lab, sources, plan, events, derivatives);
+    let begin = || Flow::new(lab, sources, plan, events, derivatives);
+    let noting = || {
+        let mut flow = begin();
         if let Some(asked) = asked {
             flow.take_notes(asked);
         }
         flow
     };
-    let mut flow = parted::follow(begin);
-    if jobs::any(plan) {
-        let mut late = Flow::new(lab, sources, plan, events, derivatives);
-        late.late = true;
-        late.follow();
-        let first = std::mem::take(&mut flow.findings);
-        flow.findings = jobs::in_both(first, &late.findings);
-        // What a mistake kept from being looked at that is none after all.
-        if !flow.ended && late.ended {
-            flow.findings.extend(late.findings.into_iter().filter(|f| f.is(codes::UNFINISHED)));
-        }
-    }
+    let mut flow = jobs::follow(noting);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
     for (param, value) in others {
-        let mut flow = Flow::new(lab, sources, plan, events, derivatives);
-        flow.params[param as usize] = Known::point(value);
-        flow.follow();
-        let new = otherwise::said_of(lab, param, value, flow.diagnostics());
-        found.extend(
-            new.into_iter()
-                .filter(|d| !found.iter().any(|f| f.code == d.code && f.span() == d.span()))
-                .collect::<Vec<_>>(),
-        );
+        let supposing = || {
+            let mut flow = begin();
+            flow.params[param as usize] = Known::point(value);
+            flow
+        };
+        let new = otherwise::said_of(lab, param, value, jobs::follow(supposing).diagnostics());
+        let is_new = |d: &Diagnostic| !found.iter().any(|f| f.code == d.code && f.span() == d.span());
+        let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
+        found.extend(new);
     }
     Followed { found, windows, seen }
 }

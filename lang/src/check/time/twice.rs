@@ -70,16 +70,19 @@ fn clash(times: &Times<'_>, a: &Use, b: &Use) -> Option<bool> {
     Some(false)
 }
 
-/// Whether both stand in a `claim` of the instance that is not around the other.
+/// Whether each stands in a `claim` that is not around the other, and both claim something in common: what they use, or
+/// what else they need for it.
 fn take_turns(times: &Times<'_>, a: &Use, b: &Use) -> bool {
-    let claimed = |own: &Use, other: &Use| {
+    let claimed = |own: &Use, other: &Use| -> BTreeSet<InstanceId> {
         let others: Vec<StepId> = times.timing.around(other.step).collect();
-        times.timing.around(own.step).filter(|s| !others.contains(s)).any(|s| match &times.plan.get(s).step {
-            Step::Claim { claims, .. } => claims.contains(&own.instance),
-            _ => false,
-        })
+        let own = times.timing.around(own.step).filter(|s| !others.contains(s));
+        let claims = own.filter_map(|s| match &times.plan.get(s).step {
+            Step::Claim { claims, .. } => Some(claims),
+            _ => None,
+        });
+        claims.flatten().copied().collect()
     };
-    claimed(a, b) && claimed(b, a)
+    !claimed(a, b).is_disjoint(&claimed(b, a))
 }
 
 /// Two commands that are over at once meet only by chance, and only those that set the same are then in doubt.
