@@ -25,7 +25,12 @@ fn main() {
     if let [flag, what] = arguments.as_slice()
         && flag == "generate"
     {
-        print!("{}", if what == "plate" { plate::program() } else { generate::program(what.parse().unwrap()) });
+        let text = match what.as_str() {
+            "plate" => plate::program(),
+            "rows" => plate::rows(),
+            lines => generate::program(lines.parse().unwrap()),
+        };
+        print!("{text}");
         return;
     }
     let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
@@ -80,28 +85,37 @@ fn check(dir: &Path) {
         edited_and_not(&file, &generate::program(lines), "generated lines", repeats);
     }
     edited_and_not(&dir.join("plate.mtx"), &plate::program(), "lines on a plate of 96 wells", 31);
-    // Another plan: what was found in the whole one before says nothing of it, the motions are the same.
-    let (file, text) = (dir.join("waits.mtx"), plate::program());
-    let replanned = edited(&file, 31, |edit| text.replacen("wait 2 s\n", &format!("wait {} s\n", 10 + edit), 1));
-    show("matterixc check, the same with another wait each time", &replanned);
-    let first = time(7, || command(&["check", file.to_str().unwrap(), "--no-cache"]));
-    show("matterixc check, the same for the first time", &first);
+    replanned(&dir.join("waits.mtx"), &plate::program(), "with 1,388 operations");
+    replanned(&dir.join("rows.mtx"), &plate::rows(), "with 600 operations, most of them in loops");
+}
+
+/// A file with another `wait` before each check: what was found in the whole plan before says nothing of it, the motions are the
+/// same. Then for the first time.
+fn replanned(file: &Path, text: &str, what: &str) {
+    let path = file.to_str().unwrap();
+    for (options, how) in [(&[][..], ""), (&["--fidelity", "process"][..], " at --fidelity process")] {
+        let name = format!("matterixc check{how}, {} lines {what}", text.lines().count());
+        let wait = |edit| text.replacen("wait 2 s\n", &format!("wait {} s\n", 10 + edit), 1);
+        show(&format!("{name}, another wait each time"), &edited(file, 31, options, wait));
+        let first = time(7, || command(&[&["check", path, "--no-cache"], options].concat()));
+        show(&format!("{name}, for the first time"), &first);
+    }
 }
 
 /// Checks of a file that is written anew before each of them; `text` is told how often.
-fn edited(file: &Path, repeats: usize, text: impl Fn(usize) -> String) -> Times {
+fn edited(file: &Path, repeats: usize, options: &[&str], text: impl Fn(usize) -> String) -> Times {
     let mut edits = 0;
     time(repeats, || {
         edits += 1;
         fs::write(file, text(edits)).unwrap();
-        command(&["check", file.to_str().unwrap()]);
+        command(&[&["check", file.to_str().unwrap()], options].concat());
     })
 }
 
 /// A file that is changed before each check, in a comment, and one that is not.
 fn edited_and_not(file: &Path, text: &str, lines: &str, repeats: usize) {
     let what = format!("matterixc check, {} {lines}", text.lines().count());
-    let commented = edited(file, repeats, |edit| format!("{text}// edited {edit} times\n"));
+    let commented = edited(file, repeats, &[], |edit| format!("{text}// edited {edit} times\n"));
     show(&format!("{what}, edited"), &commented);
     show(&format!("{what}, unchanged"), &time(repeats, || command(&["check", file.to_str().unwrap()])));
 }

@@ -57,6 +57,80 @@ fn total(out: &mut String, row: char) {
     );
 }
 
+/// A program of 500 lines with as many wells, most of its 600 operations in loops over rows and columns; every well is looked at
+/// by itself.
+pub fn rows() -> String {
+    let mut out = String::from(ROWS_HEAD);
+    for row in ROWS.chars() {
+        let name = row.to_ascii_lowercase();
+        let _ = writeln!(out, "    // Row {row}, from left to right.\n    step read_{name} {{");
+        for column in 1..=COLUMNS {
+            let _ = write!(
+                out,
+                "        // Well {row}{column}.
+        wait {} s
+        expect plate[{row}{column}].contents.volume in 69 uL .. 71 uL
+        let v_{name}{column} = plate[{row}{column}].contents.volume
+",
+                1 + column % 3,
+            );
+        }
+        let _ = writeln!(out, "        note \"row {name} is read\"\n    }}");
+    }
+    for (index, row) in ROWS.to_lowercase().chars().enumerate() {
+        let _ = write!(
+            out,
+            "    // What the row holds together.
+    let total_{row} = sum(w in plate.row({}): w.contents.volume)
+    if total_{row} < 0.8 mL {{
+        note \"row {row} holds less than expected\"
+    }}
+    expect total_{row} in 0.83 mL .. 0.85 mL
+",
+            index + 1,
+        );
+    }
+    out.push_str("}\n");
+    out
+}
+
+const ROWS_HEAD: &str = "mtx 1
+//! Generated: a stain in every well of a plate, row by row and column by column.
+
+use std::opentrons::{Corning96, OT2, P300Single, Reservoir12, TipRack300}
+
+species dye { by: mass, density: 1 g/mL, specific_heat: 4 J/(g*K) }
+
+solution buffer { NaCl: 0.9 %w/w, water: rest }
+solution stain { dye: 0.1 %w/w, buffer: rest }
+
+lab deck {
+    ambient: 22 degC
+    ot2 = OT2 { left: P300Single } at (0, 0, 0) m
+    first = TipRack300 on ot2.slot[1]
+    second = TipRack300 on ot2.slot[4]
+    plate = Corning96 on ot2.slot[2]
+    stock = Reservoir12 on ot2.slot[3] holding { A1: 14 mL of buffer, A2: 8 mL of stain }
+}
+
+workflow screen in deck {
+    // A fresh tip for each well: what is in it must not get into the buffer.
+    for row in plate.rows {
+        for well in row {
+            transfer 50 uL from stock[A1] to well by ot2.left using first { tips: each }
+        }
+    }
+    // One tip for each column: the wells hold the same.
+    for column in plate.columns {
+        pick up tip from second by ot2.left
+        for well in column {
+            aspirate 20 uL from stock[A2] by ot2.left
+            dispense 20 uL into well by ot2.left
+        }
+        drop tip by ot2.left
+    }
+";
+
 const HEAD: &str = "mtx 1
 //! Generated: samples on a plate with a dilution series in each row.
 

@@ -8,7 +8,7 @@ use crate::elaborate::Elaborator;
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
-/// A function, the instances it was called with (lists of them by [`LIST`], their length and theirs), how many instances there were,
+/// A function, the instances it was called with (lists of them by a mark, their length and theirs), how many instances there were,
 /// and how members are read.
 pub type KnownCall = (DeclId, Vec<u32>, usize, bool, bool);
 

@@ -369,12 +369,12 @@ impl<'a> Elaborator<'a> {
             return Value::Error;
         }
         d = match self.elsewhere(n, scope) {
-            Some((lab, span)) if scope.lab => {
-                d.because(span, format!("declared in the lab `{lab}`")).help("this is another lab")
-            }
+            Some((lab, span)) if scope.lab => d
+                .because(span, format!("declared in the lab `{lab}`"))
+                .help(format!("this is another lab than `{lab}`")),
             Some((lab, span)) => d
                 .because(span, format!("declared in the lab `{lab}`"))
-                .help("what is no workflow or test sees no lab: make it a parameter, and give it in the call"),
+                .help("only workflows and tests see a lab: make it a parameter, and give it in the call"),
             None => near::proposed(d, &near, n.span),
         };
         self.report(d);

@@ -1,11 +1,12 @@
 //! What the plan itself asks of its steps: conditions that are kept, promises of skills, loops that end.
 
-use matterix_ir::plan::Condition;
+use matterix_ir::plan::{Comparison, Condition};
 use matterix_ir::quantity::show_number;
 use matterix_ir::{Code, Span, codes};
 
 use super::Flow;
 use super::facts::Facts;
+use super::report::shown;
 
 impl Flow<'_, '_> {
     /// Looks whether what is kept still holds after an operation.
@@ -42,7 +43,13 @@ impl Flow<'_, '_> {
         if self.fails_not(condition, "max", facts) {
             let turns = if most == 1.0 { "1 turn".to_string() } else { format!("{} turns", show_number(most)) };
             let headline = format!("`{}` still holds after {turns}, and the loop fails with `max`", condition.text);
-            self.asked_in_vain(codes::NOT_REACHED, headline, condition, None, facts);
+            let mut is =
+                |c: &Comparison| format!("`{}` is {}", c.text, shown(&self.eval(c.value, facts), |v| c.unit.show(v)));
+            let said: Vec<String> = condition.compared.iter().map(&mut is).collect();
+            let said = if said.is_empty() { "turns run out".to_string() } else { said.join(", ") };
+            let d = self.at_site(codes::NOT_REACHED, headline, said, self.doubt > 0);
+            let d = self.with_history(d, condition, facts);
+            self.found(d.help("allow more turns, or say what happens then: `on max { }`"), condition.span);
         }
     }
 
