@@ -4,6 +4,7 @@
 //! [`syntax`] text to tree, [`names`] modules and scopes, [`elaborate`] the lab's instances and laws as one flat model,
 //! [`lower`] the workflow as a plan, [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
+mod budget;
 pub mod check;
 pub mod chem;
 pub mod elaborate;
@@ -32,6 +33,7 @@ pub mod units;
 
 pub use matterix_syntax::{self as syntax, ast, fmt};
 
+pub use budget::Stop;
 pub use loader::{LibraryOnly, Loader};
 pub use lower::Wires;
 pub use meanings::{Gathered, Meanings};

@@ -2,6 +2,8 @@
 
 use matterix_ir::FileId;
 
+use crate::budget::Stop;
+
 /// Finds the text of imported modules.
 pub trait Loader {
     /// The module `module` (`sn1`, `parts::racks`) as seen from the file `from`: its display name and text.
@@ -12,6 +14,11 @@ pub trait Loader {
 
     /// The text of a data file as named in the file `from`, or in words why it cannot be read.
     fn file(&self, from: FileId, path: &str) -> Result<String, String>;
+
+    /// What may stop the compilation that asks.
+    fn stop(&self) -> Stop {
+        Stop::default()
+    }
 }
 
 /// A loader that knows the standard library only.

@@ -10,6 +10,7 @@ use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
 
+use crate::budget;
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
 use crate::elaborate::geometry::Geometry;
@@ -71,7 +72,7 @@ pub struct Examined {
 /// Checks a file: everything it declares, and every workflow in its lab.
 pub fn check(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> Vec<Diagnostic> {
     let asked = Asked { wanted: Wanted::Findings, motions: &|_| Vec::new(), stop: &|| false };
-    examine(sources, file, loader, &asked, &mut Session::default()).unwrap_or_default().findings
+    whole(examine(sources, file, loader, &asked, &mut Session::default()), file).findings
 }
 
 /// Checks a file; of a workflow without an error, what stands where in its lab and what robots with joints do is looked at by
@@ -84,13 +85,13 @@ pub fn check_and(
     session: &mut Session,
 ) -> Vec<Diagnostic> {
     let asked = Asked { wanted: Wanted::Motions, motions, stop: &|| false };
-    examine(sources, file, loader, &asked, session).unwrap_or_default().findings
+    whole(examine(sources, file, loader, &asked, session), file).findings
 }
 
 /// Checks a file as [`check`] does, and says what is known at every statement of its workflows, in the order of the text.
 /// A workflow with mistakes that keep it from being followed is left out.
 pub fn contents(sources: &mut Sources, file: FileId, loader: &dyn Loader) -> (Vec<Diagnostic>, Vec<Points>) {
-    let seen = examined(sources, file, loader, &mut Session::default(), &|| false).unwrap_or_default();
+    let seen = whole(examined(sources, file, loader, &mut Session::default(), &|| false), file);
     (seen.findings, seen.points)
 }
 
@@ -104,6 +105,12 @@ pub fn examined(
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Option<Examined> {
     examine(sources, file, loader, &Asked { wanted: Wanted::Contents, motions: &|_| Vec::new(), stop }, session)
+}
+
+/// What a check saw; of one that was stopped, that it was: no finding would say that nothing is wrong.
+fn whole(seen: Option<Examined>, file: FileId) -> Examined {
+    let stopped = || vec![budget::stopped(Span::new(file, 0, 0))];
+    seen.unwrap_or_else(|| Examined { findings: stopped(), ..Examined::default() })
 }
 
 /// What is asked of a check.
@@ -126,7 +133,8 @@ fn examine(
     let (modules, mut diagnostics) = names::load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (tables, found) = Tables::new(&names);
+    let (mut tables, found) = Tables::new(&names);
+    tables.stop = loader.stop();
     diagnostics.extend(found);
     let root = modules.len() - 1;
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
@@ -256,7 +264,8 @@ fn compile_and<T>(
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (tables, found) = Tables::new(&names);
+    let (mut tables, found) = Tables::new(&names);
+    tables.stop = loader.stop();
     diagnostics.extend(found);
     diagnostics.extend(checks::declarations(&tables, sources, root));
     let Some(item) = choose_workflow(&names, root, file, options, &mut diagnostics) else {
@@ -323,7 +332,8 @@ pub fn many_runs(
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (tables, found) = Tables::new(&names);
+    let (mut tables, found) = Tables::new(&names);
+    tables.stop = loader.stop();
     diagnostics.extend(found);
     diagnostics.extend(checks::declarations(&tables, sources, root));
     let choice = study::choose(&names, root, file, options.workflow.as_deref(), fits);
@@ -358,7 +368,8 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (tables, found) = Tables::new(&names);
+    let (mut tables, found) = Tables::new(&names);
+    tables.stop = loader.stop();
     diagnostics.extend(found);
     let mut tests = Vec::new();
     for item in names.declared_by(root) {
@@ -622,7 +633,8 @@ fn judge<'a>(
     asked: &Asked<'_>,
     foreseen: Option<&Reach>,
 ) -> Option<Built> {
-    let mut built = build(tables, sources, task, asked.wanted, foreseen, asked.stop)?;
+    let stop = || (asked.stop)() || tables.stop.asked();
+    let mut built = build(tables, sources, task, asked.wanted, foreseen, &stop)?;
     if asked.wanted == Wanted::Motions {
         let fine = built.findings.iter().all(|d| !d.is_error());
         // What robots do is looked at for the workflow itself.

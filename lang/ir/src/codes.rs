@@ -47,6 +47,7 @@ macro_rules! codes {
 
 codes! {
     SYNTAX "syntax" "P0" "the text is not what the grammar expects here";
+    BUDGET_SPENT "budget-spent" "P0" "a text asks for more work than a check does";
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
     MESH_FILE "mesh-file" "N0" "a mesh cannot be read";

@@ -19,14 +19,22 @@ pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Ve
 
 /// Checks the declarations of one module, and notes what names mean where that is asked for.
 pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, seeing: &mut Seeing) -> Vec<Diagnostic> {
-    let mut out = Vec::new();
-    for id in tables.names.declared_by(module) {
+    let stand_in = || {
         let mut lab = Elaborator::new(tables, Reach::default());
         lab.prototype = true;
+        lab
+    };
+    let mut out = Vec::new();
+    // Constants need no stand-ins of instances: what one of them is worth, the next one knows.
+    let mut constants = stand_in();
+    for id in tables.names.declared_by(module) {
+        let mut own = stand_in();
+        let constant = matches!(tables.names.decl(id).item.kind, ItemKind::Const { .. });
+        let lab = if constant { &mut constants } else { &mut own };
         lab.meanings = seeing.take();
-        declaration(&mut lab, sources, id, module);
+        declaration(lab, sources, id, module);
         *seeing = lab.meanings.take();
-        out.extend(lab.diagnostics);
+        out.append(&mut lab.diagnostics);
     }
     out
 }
@@ -75,10 +83,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             bind(lab, params, module, &mut scope);
             lab.truth(body, &mut scope);
         }
-        ItemKind::Const { value, ty, name } => {
-            let ty = ty.as_ref().map_or(Type::Any, |ty| lab.resolve_type(ty, module));
-            lab.typed(value, &ty, &mut Scope::module(module), &name.text);
-        }
+        ItemKind::Const { name, .. } => drop(lab.declared(id, name)),
         ItemKind::Solution { .. } => {
             lab.composition(id);
             lab.check_label(id);

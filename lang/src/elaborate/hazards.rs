@@ -6,7 +6,7 @@ use matterix_ir::{NodeId, Op, Span};
 
 use super::Elaborator;
 use crate::ast::ItemKind;
-use crate::eval::Value;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
 /// A hazard over instances of the lab.
@@ -32,43 +32,51 @@ pub struct Hazard {
     pub span: Span,
 }
 
-impl Elaborator<'_> {
+impl<'a> Elaborator<'a> {
     /// Every hazard on every fitting combination of instances, but for those that cannot come about.
     pub fn hazards(&mut self) -> Vec<Hazard> {
         let mut out = Vec::new();
         let names = self.tables.names;
         for index in 0..names.decls.len() as u32 {
             let decl = names.decl(DeclId(index));
-            let ItemKind::Hazard { grave, name, params, when, help } = &decl.item.kind else { continue };
-            for (mut scope, shown) in self.tuples(params, decl.module, Some(when), name) {
-                self.terms.clear();
-                let Some(node) = self.truth(when, &mut scope) else { continue };
-                let terms = std::mem::take(&mut self.terms);
-                if self.never(node) {
-                    continue;
-                }
-                let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
-                    Op::State(s) => Some(s),
-                    _ => None,
-                });
-                let states: Vec<u32> = states.collect();
-                let about = scope.vars.iter().find_map(|(_, v)| match v {
-                    Value::Instance(id) => Some(*id),
-                    _ => None,
-                });
-                out.push(Hazard {
-                    name: name.text.clone(),
-                    shown,
-                    grave: *grave,
-                    about,
-                    when: node,
-                    states,
-                    terms,
-                    help: help.clone(),
-                    span: name.span,
-                });
+            let ItemKind::Hazard { name, params, when, .. } = &decl.item.kind else { continue };
+            let mut tuples = self.tuples(params, decl.module, Some(when), name);
+            while let Some((scope, shown)) = tuples.next(self) {
+                let hazard = if self.enter(name.span) { self.hazard(&decl.item.kind, scope, shown) } else { None };
+                self.leave();
+                out.extend(hazard);
             }
         }
         out
+    }
+
+    /// One hazard on a combination; none where it cannot come about.
+    fn hazard(&mut self, kind: &'a ItemKind, mut scope: Scope, shown: String) -> Option<Hazard> {
+        let ItemKind::Hazard { grave, name, when, help, .. } = kind else { return None };
+        self.terms.clear();
+        let node = self.truth(when, &mut scope)?;
+        let terms = std::mem::take(&mut self.terms);
+        if self.never(node) {
+            return None;
+        }
+        let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
+            Op::State(s) => Some(s),
+            _ => None,
+        });
+        let about = scope.vars.iter().find_map(|(_, v)| match v {
+            Value::Instance(id) => Some(*id),
+            _ => None,
+        });
+        Some(Hazard {
+            name: name.text.clone(),
+            shown,
+            grave: *grave,
+            about,
+            when: node,
+            states: states.collect(),
+            terms,
+            help: help.clone(),
+            span: name.span,
+        })
     }
 }

@@ -6,8 +6,9 @@ use matterix_ir::model::{Action, Event};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
+use super::tuples::Tuples;
 use super::tables::MemberRef;
-use super::{Contribution, Elaborator, ProcessInstance, SpeciesId};
+use super::{Contribution, Elaborator, ProcessInstance};
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
 use crate::eval::{Num, ReactionId, Scope, Type, Value};
 use crate::names::DeclId;
@@ -43,9 +44,22 @@ impl<'a> Elaborator<'a> {
     /// Writes out every process that the plan can make run. Processes that read flows come after all others.
     pub fn processes(&mut self) {
         let mut waiting = Vec::new();
-        for job in self.process_jobs() {
+        for job in self.own_processes() {
             if !self.process(&job) {
                 waiting.push(job);
+            }
+        }
+        for (decl, process) in self.tables.processes.clone() {
+            if self.draft && !has_calls(&process.laws) {
+                continue;
+            }
+            let module = self.tables.names.decl(decl).module;
+            let mut tuples = self.tuples(&process.params, module, process.guard.as_ref(), &process.name);
+            while let Some((scope, name)) = tuples.next(self) {
+                let job = Job { process, scope, name };
+                if !self.process(&job) {
+                    waiting.push(job);
+                }
             }
         }
         self.flows_sealed = true;
@@ -54,7 +68,8 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    fn process_jobs(&mut self) -> Vec<Job<'a>> {
+    /// The processes that things have of themselves.
+    fn own_processes(&mut self) -> Vec<Job<'a>> {
         let mut jobs = Vec::new();
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
@@ -67,15 +82,6 @@ impl<'a> Elaborator<'a> {
                 jobs.push(Job { process, scope: Scope::of_member(id, m), name });
             }
         }
-        for (decl, process) in self.tables.processes.clone() {
-            if self.draft && !has_calls(&process.laws) {
-                continue;
-            }
-            let module = self.tables.names.decl(decl).module;
-            for (scope, name) in self.tuples(&process.params, module, process.guard.as_ref(), &process.name) {
-                jobs.push(Job { process, scope, name });
-            }
-        }
         jobs
     }
 
@@ -86,8 +92,8 @@ impl<'a> Elaborator<'a> {
         params: &'a [Param],
         module: usize,
         guard: Option<&'a Expr>,
-        name: &Name,
-    ) -> Vec<(Scope, String)> {
+        name: &'a Name,
+    ) -> Tuples<'a> {
         let mut sets: Vec<Vec<Value>> = Vec::new();
         for p in params {
             let ty = match &p.ty {
@@ -108,47 +114,10 @@ impl<'a> Elaborator<'a> {
             });
         }
         let unordered = params.len() == 2 && guard.is_some_and(|g| self.asks_symmetric(g, params, module));
-        let mut out: Vec<Vec<Value>> = vec![Vec::new()];
-        for set in &sets {
-            let mut longer = Vec::new();
-            for prefix in &out {
-                let after = self.second(prefix, params.len(), unordered);
-                longer.extend(
-                    set.iter().filter(|v| after(v)).map(|v| [prefix.as_slice(), std::slice::from_ref(v)].concat()),
-                );
-            }
-            out = longer;
-        }
-        out.into_iter()
-            .map(|values| {
-                let mut scope = Scope::module(module);
-                let shown: Vec<String> = values.iter().map(|v| self.show(v)).collect();
-                for (p, v) in params.iter().zip(values) {
-                    scope.bind(p.name.text.clone(), v);
-                }
-                (scope, format!("{}({})", name.text, shown.join(", ")))
-            })
-            .collect()
+        Tuples::new(params, module, name, sets, unordered)
     }
 
-    /// What may follow the first of a pair: another instance, or what can be in it. Decided before tuples are made, for
-    /// there are many more species and reactions than any one mixture meets.
-    fn second(&self, first: &[Value], length: usize, unordered: bool) -> impl Fn(&Value) -> bool {
-        let first = match (first, length) {
-            ([Value::Instance(a)], 2) => Some(*a),
-            _ => None,
-        };
-        let held = first.and_then(|a| self.reach.set(&self.instances[a.0 as usize].name));
-        let has = move |s: &SpeciesId| held.is_some_and(|held| held.contains(s));
-        move |v| match (first, v) {
-            (Some(a), Value::Instance(b)) => a != *b && (!unordered || a < *b),
-            (Some(_), Value::Reaction(r)) => self.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| has(s)),
-            (Some(_), Value::Species(s)) => has(s),
-            _ => true,
-        }
-    }
-
-    fn show(&self, v: &Value) -> String {
+    pub(super) fn show(&self, v: &Value) -> String {
         match v {
             Value::Instance(i) => self.instances[i.0 as usize].name.clone(),
             Value::Species(s) => self.tables.species.get(*s).name.clone(),
@@ -179,6 +148,12 @@ impl<'a> Elaborator<'a> {
 
     /// Writes out one process; false if it reads a flow that is not complete yet.
     fn process(&mut self, job: &Job<'a>) -> bool {
+        let written = !self.enter(job.process.name.span) || self.write_process(job);
+        self.leave();
+        written
+    }
+
+    fn write_process(&mut self, job: &Job<'a>) -> bool {
         let mut scope = job.scope.clone();
         self.touched_flow = false;
         let guard = match &job.process.guard {
@@ -614,24 +589,30 @@ impl<'a> Elaborator<'a> {
             if let ItemKind::Event(e) = &decl.item.kind
                 && (!self.draft || has_calls(&e.laws))
             {
-                for (scope, name) in self.tuples(&e.params, decl.module, Some(&e.when), &e.name) {
+                let mut tuples = self.tuples(&e.params, decl.module, Some(&e.when), &e.name);
+                while let Some((scope, name)) = tuples.next(self) {
                     found.push((e, scope, name));
                 }
             }
         }
         let mut events = Vec::new();
         for (e, mut scope, name) in found {
-            let Some(when) = self.truth(&e.when, &mut scope) else { continue };
-            if self.never(when) {
-                continue;
-            }
-            let mut actions = Vec::new();
-            self.event_body(&e.laws, &mut scope, &mut actions);
-            if !actions.is_empty() {
-                events.push(Event { name, when, actions, span: e.name.span });
-            }
+            let event = if self.enter(e.name.span) { self.event(e, &mut scope, name) } else { None };
+            self.leave();
+            events.extend(event);
         }
         events
+    }
+
+    /// Writes out one event; none where it never happens or does nothing.
+    fn event(&mut self, e: &'a ast::Event, scope: &mut Scope, name: String) -> Option<Event> {
+        let when = self.truth(&e.when, scope)?;
+        if self.never(when) {
+            return None;
+        }
+        let mut actions = Vec::new();
+        self.event_body(&e.laws, scope, &mut actions);
+        (!actions.is_empty()).then(|| Event { name, when, actions, span: e.name.span })
     }
 
     /// What the lines of an event do.

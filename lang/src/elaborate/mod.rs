@@ -26,6 +26,7 @@ pub mod species;
 mod standing;
 pub mod states;
 pub mod tables;
+mod tuples;
 pub mod units;
 mod whereabouts;
 
@@ -39,6 +40,7 @@ use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
 use rustc_hash::FxHashMap;
 
 use crate::ast::{self, Expr, FieldValue};
+use crate::budget::Budget;
 pub use crate::eval::SpeciesId;
 use crate::eval::call::KnownCall;
 use crate::eval::{ReactionId, Type, Value};
@@ -152,6 +154,8 @@ pub struct Elaborator<'a> {
     pub diagnostics: Vec<Diagnostic>,
     /// How often something was found, known findings included.
     pub reported: usize,
+    /// What writing it out has taken so far.
+    pub budget: Budget,
     /// Types without findings, by their place in the tree and the module that reads them.
     types: FxHashMap<(usize, usize), Type>,
     /// Instances; parts after owners.
@@ -295,6 +299,7 @@ impl<'a> Elaborator<'a> {
             graph: Graph::default(),
             diagnostics: Vec::new(),
             reported: 0,
+            budget: Budget::default(),
             types: FxHashMap::default(),
             instances: Vec::new(),
             top_level: FxHashMap::default(),

@@ -9,6 +9,7 @@ use rustc_hash::FxHashMap;
 use super::species::SpeciesTable;
 use super::units;
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
+use crate::budget::Stop;
 use crate::lower::declared_failures;
 use crate::names::{DeclId, Names, verb_text};
 use crate::screen::Screen;
@@ -104,6 +105,8 @@ pub struct Tables<'a> {
     pub reactions: Vec<ReactionDef<'a>>,
     /// Reactive groups, materials and what must not meet.
     pub screen: Screen,
+    /// Whether the check is of no use any more.
+    pub stop: Stop,
     /// Processes over instances, from all modules.
     pub processes: Vec<(DeclId, &'a Process)>,
 }
@@ -125,6 +128,7 @@ impl<'a> Tables<'a> {
             species: SpeciesTable::default(),
             reactions: Vec::new(),
             screen: Screen::default(),
+            stop: Stop::default(),
             processes: Vec::new(),
         };
         for index in 0..names.decls.len() as u32 {

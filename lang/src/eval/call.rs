@@ -1,19 +1,27 @@
 //! Calls of functions, relations and methods.
 
-use matterix_ir::{BinaryOp, Diagnostic, Op, Span, codes};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
 use super::{Num, Scope, Type, Value};
-use crate::ast::{Arg, Expr, ExprKind, ItemKind, Param};
+use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
 use crate::elaborate::Elaborator;
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
-/// A function, the instances it was called with (lists of them by a mark, their length and theirs), how many instances there were,
-/// and how members are read.
-pub type KnownCall = (DeclId, Vec<u32>, usize, bool, bool);
+/// A function, what it was called with, how many instances there were, and how members are read.
+pub type KnownCall = (DeclId, Vec<KnownArgument>, usize, bool, bool);
 
-/// What no instance is numbered by.
-const LIST: u32 = u32::MAX;
+/// An argument that always gives the same value of a function.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum KnownArgument {
+    /// An instance.
+    Instance(InstanceId),
+    /// A list of so many, which follow.
+    List(usize),
+    /// A number that the run does not change, with its dimension, whether it is a point or one literal, and the unit it is shown in.
+    Number(NodeId, Dimension, bool, bool, Option<String>),
+}
 
 impl<'a> Elaborator<'a> {
     /// `f(a, b: c)`.
@@ -66,6 +74,9 @@ impl<'a> Elaborator<'a> {
             }
             ItemKind::Fn { body, result, .. } => match body {
                 Some(body) => {
+                    if let Some(v) = self.stood_in(params, result.as_ref(), &values, decl.module) {
+                        return v;
+                    }
                     let ty = result.as_ref().map_or(Type::Any, |ty| self.resolve_type(ty, decl.module));
                     let v = self.call_body(id, params, values, body, &ty, decl.module);
                     self.coerce(v, &ty, body.span, name)
@@ -126,14 +137,37 @@ impl<'a> Elaborator<'a> {
         v
     }
 
-    /// What a call is remembered by: a function of instances and lists of them alone always gives the same node.
+    /// What a call is remembered by: a function of instances and lists of them alone always gives the same node, and so does one of
+    /// numbers that the run does not change.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
-        if self.prototype || values.is_empty() || self.rate_prefix.is_some() {
+        if values.is_empty() || self.rate_prefix.is_some() {
             return None;
         }
-        let mut instances = Vec::with_capacity(values.len() + 2);
-        let all = values.iter().all(|value| only_instances(value, &mut instances));
-        all.then_some((id, instances, self.instances.len(), self.initial_mode, self.readings_live))
+        let mut known = Vec::with_capacity(values.len() + 2);
+        let all = match values[0] {
+            Value::Num(_) => values.iter().all(|value| self.steady_number(value, &mut known)),
+            _ => !self.prototype && values.iter().all(|value| only_instances(value, &mut known)),
+        };
+        all.then_some((id, known, self.instances.len(), self.initial_mode, self.readings_live))
+    }
+
+    /// Notes a number that the run does not change; false for anything else.
+    fn steady_number(&self, value: &Value, out: &mut Vec<KnownArgument>) -> bool {
+        let Value::Num(n) = value else { return false };
+        let shown = n.unit.as_ref().map(|unit| unit.symbol.clone());
+        out.push(KnownArgument::Number(n.node, n.dimension.clone(), n.point, n.literal, shown));
+        !self.graph.leaves(n.node).meets(Leaves::LIVE)
+    }
+
+    /// What a call stands for while a declaration is checked by itself: a function that says what it takes and gives was checked where it is
+    /// declared, and is not written out again for values that are not known.
+    fn stood_in(&mut self, params: &[Param], result: Option<&'a ast::Type>, values: &[Value], module: usize) -> Option<Value> {
+        let typed = self.prototype && params.iter().all(|p| p.ty.is_some());
+        let open = |v: &Value| matches!(v, Value::Num(n) if self.graph.constant(n.node).is_none());
+        let numbers = values.iter().all(|v| matches!(v, Value::Num(_))) && values.iter().any(open);
+        let ty = result.filter(|_| typed && numbers)?;
+        let ty = self.resolve_type(ty, module);
+        matches!(ty, Type::Quantity { optional: false, .. } | Type::Bool).then(|| self.placeholder(&ty, "result"))
     }
 
     /// Arguments by position and name, in the order of the parameters. A parameter that is not given takes its default
@@ -349,11 +383,11 @@ impl<'a> Elaborator<'a> {
 }
 
 /// Notes the instances that a value is made of; false where it is made of anything else too.
-fn only_instances(value: &Value, out: &mut Vec<u32>) -> bool {
+fn only_instances(value: &Value, out: &mut Vec<KnownArgument>) -> bool {
     match value {
-        Value::Instance(id) => out.push(id.0),
+        Value::Instance(id) => out.push(KnownArgument::Instance(*id)),
         Value::List(items) => {
-            out.extend([LIST, items.len() as u32]);
+            out.push(KnownArgument::List(items.len()));
             return items.iter().all(|item| only_instances(item, out));
         }
         _ => return false,

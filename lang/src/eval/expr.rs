@@ -13,7 +13,8 @@ use crate::units::Dimension;
 impl<'a> Elaborator<'a> {
     /// Evaluates an expression; what is wrong is reported and gives [`Value::Error`].
     pub fn expr(&mut self, e: &'a Expr, scope: &mut Scope) -> Value {
-        let value = self.evaluate(e, scope);
+        let value = if self.enter(e.span) { self.evaluate(e, scope) } else { Value::Error };
+        self.leave();
         if self.meanings.is_some() {
             self.note_value(e.span, &value);
         }
@@ -250,7 +251,8 @@ impl<'a> Elaborator<'a> {
         self.lab_name_of(&format!("{}{name}", self.within))
     }
 
-    fn declared(&mut self, id: crate::names::DeclId, n: &Name) -> Value {
+    /// The value of a declaration by its name.
+    pub fn declared(&mut self, id: crate::names::DeclId, n: &Name) -> Value {
         let decl = self.tables.names.decl(id);
         match &decl.item.kind {
             ItemKind::Const { value, ty, .. } => {

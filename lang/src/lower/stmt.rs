@@ -16,6 +16,12 @@ impl<'a> Planner<'a, '_> {
         if (self.of_no_use)() {
             return None;
         }
+        let step = (self.lab.enter(s.span) && self.lab.has_room(self.steps.len())).then(|| self.statement(s, scope));
+        self.lab.leave();
+        step.flatten()
+    }
+
+    fn statement(&mut self, s: &'a Stmt, scope: &mut Scope) -> Option<StepId> {
         let label = self.text(head(s));
         let step = match &s.kind {
             StmtKind::Error => return None,

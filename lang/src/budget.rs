@@ -1,0 +1,154 @@
+//! How much work one task may be: expressions evaluated, tuples of instances tried, statements written out.
+//!
+//! Functions, skills and loops are written out, so a short text can ask for more work than there is time or memory. Each task (a workflow
+//! in its lab, a declaration by itself) has a budget of its own, counted in steps rather than in seconds, so that the same text gives the
+//! same findings on every machine. The caller may also stop a check from outside ([`Stop`]).
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use matterix_ir::{Diagnostic, Span, codes};
+
+use crate::elaborate::Elaborator;
+
+/// Expressions evaluated, tuples tried and statements written out for one task: some seconds of work. A protocol of 1,500 wells that
+/// are filled one by one takes under a tenth of it.
+const MOST_STEPS: u64 = 30_000_000;
+
+/// Operations of one task's graph, about 50 bytes each.
+const MOST_OPERATIONS: usize = 4_000_000;
+
+/// Statements of one plan, up to some kilobytes each.
+const MOST_STATEMENTS: usize = 200_000;
+
+/// Expressions inside each other, functions and constants followed: what the stack of a thread bears.
+const DEEPEST: u32 = 1_000;
+
+/// How many steps are made between two looks at whether the check was stopped.
+const LOOK: u64 = 1 << 12;
+
+/// Whether a check is of no use any more: shared with whoever may stop it.
+#[derive(Clone, Debug, Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    /// A stop that follows a flag.
+    pub fn when(flag: &Arc<AtomicBool>) -> Self {
+        Stop(flag.clone())
+    }
+
+    /// Whether it was asked for.
+    pub fn asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// What a task has spent.
+#[derive(Debug, Default)]
+pub struct Budget {
+    steps: u64,
+    depth: u32,
+    /// The outermost expression, statement or law under way.
+    item: Span,
+    over: bool,
+}
+
+/// Why a task is given up.
+enum Reason {
+    Steps,
+    Operations,
+    Statements,
+    Depth,
+    Stopped,
+}
+
+impl Budget {
+    /// Whether the task was given up: nothing more is worked out, and what is missing is not reported.
+    pub fn is_over(&self) -> bool {
+        self.over
+    }
+}
+
+impl Elaborator<'_> {
+    /// Begins an expression, statement or law; false where the task is given up. Each is ended by [`Self::leave`].
+    pub fn enter(&mut self, at: Span) -> bool {
+        if self.budget.depth == 0 {
+            self.budget.item = at;
+        }
+        self.budget.depth += 1;
+        self.budget.steps += 1;
+        if self.budget.depth > DEEPEST {
+            self.give_up(&Reason::Depth);
+        } else if self.budget.steps.is_multiple_of(LOOK) {
+            self.take_stock();
+        }
+        !self.budget.over
+    }
+
+    /// Ends what was begun last.
+    pub fn leave(&mut self) {
+        self.budget.depth -= 1;
+    }
+
+    /// Adds a step for something that is tried; false where the task is given up.
+    pub fn spend_on(&mut self, at: Span) -> bool {
+        let going_on = self.enter(at);
+        self.leave();
+        going_on
+    }
+
+    /// Whether a plan may have one more statement.
+    pub fn has_room(&mut self, statements: usize) -> bool {
+        if statements >= MOST_STATEMENTS {
+            self.give_up(&Reason::Statements);
+        }
+        !self.budget.over
+    }
+
+    fn take_stock(&mut self) {
+        if self.budget.steps > MOST_STEPS {
+            self.give_up(&Reason::Steps);
+        } else if self.graph.ops().len() > MOST_OPERATIONS {
+            self.give_up(&Reason::Operations);
+        } else if self.tables.stop.asked() {
+            self.give_up(&Reason::Stopped);
+        }
+    }
+
+    fn give_up(&mut self, reason: &Reason) {
+        if std::mem::replace(&mut self.budget.over, true) {
+            return;
+        }
+        let d = match reason {
+            Reason::Stopped => stopped(self.budget.item),
+            Reason::Steps => too_large(
+                self.budget.item,
+                format!("this takes more than {} million steps to write out", MOST_STEPS / 1_000_000),
+            ),
+            Reason::Operations => too_large(
+                self.budget.item,
+                format!("this needs more than {} million operations", MOST_OPERATIONS / 1_000_000),
+            ),
+            Reason::Statements => {
+                too_large(self.budget.item, format!("this makes a plan of more than {MOST_STATEMENTS} steps"))
+            }
+            Reason::Depth => {
+                too_large(self.budget.item, format!("more than {DEEPEST} expressions stand inside each other here"))
+            }
+        };
+        self.report(d);
+    }
+}
+
+fn too_large(at: Span, headline: String) -> Diagnostic {
+    Diagnostic::error(codes::BUDGET_SPENT, at, headline, "`check` gives up here").help(
+        "functions, skills and `for` are written out wherever they are used, and a law once for every combination of things that fits it: \
+         use `repeat`, a smaller set, or a narrower type",
+    )
+}
+
+/// The finding of a check that was stopped from outside: what it would have found is not known.
+pub fn stopped(at: Span) -> Diagnostic {
+    Diagnostic::error(codes::BUDGET_SPENT, at, "the check was stopped before its end", "still at work here")
+        .help("allow more time, or check a smaller protocol")
+}
