@@ -10,10 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::elaborate::Elaborator;
+use crate::eval::Value;
 
 /// Expressions evaluated, tuples tried and statements written out for one task: some seconds of work. A protocol of 1,500 wells that
 /// are filled one by one takes under a tenth of it.
-const MOST_STEPS: u64 = 30_000_000;
+const MOST_STEPS: u64 = 10_000_000;
 
 /// Operations of one task's graph, about 50 bytes each.
 const MOST_OPERATIONS: usize = 4_000_000;
@@ -23,6 +24,9 @@ const MOST_STATEMENTS: usize = 200_000;
 
 /// Expressions inside each other, functions and constants followed: what the stack of a thread bears.
 const DEEPEST: u32 = 1_000;
+
+/// Steps that an element of a list counts as: it takes some hundred bytes.
+const ELEMENT: u64 = 10;
 
 /// How many steps are made between two looks at whether the check was stopped.
 const LOOK: u64 = 1 << 12;
@@ -95,6 +99,21 @@ impl Elaborator<'_> {
         let going_on = self.enter(at);
         self.leave();
         going_on
+    }
+
+    /// Adds steps for the elements of a list that is made.
+    pub fn spend_on_items(&mut self, items: usize) {
+        self.budget.steps += items as u64 * ELEMENT;
+        self.take_stock();
+    }
+
+    /// Adds steps for a list that is copied, with all lists in it.
+    pub fn spend_on_list(&mut self, value: &Value) {
+        let Value::List(items) = value else { return };
+        self.spend_on_items(items.len());
+        if !self.budget.over {
+            items.iter().for_each(|item| self.spend_on_list(item));
+        }
     }
 
     /// Whether a plan may have one more statement.

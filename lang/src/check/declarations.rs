@@ -3,6 +3,7 @@
 use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::ignored;
+use crate::budget::Budget;
 use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
@@ -27,12 +28,15 @@ pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, s
     let mut out = Vec::new();
     // Constants need no stand-ins of instances: what one of them is worth, the next one knows.
     let mut constants = stand_in();
+    let mut budget = Budget::default();
     for id in tables.names.declared_by(module) {
         let mut own = stand_in();
         let constant = matches!(tables.names.decl(id).item.kind, ItemKind::Const { .. });
         let lab = if constant { &mut constants } else { &mut own };
         lab.meanings = seeing.take();
+        lab.budget = std::mem::take(&mut budget);
         declaration(lab, sources, id, module);
+        budget = std::mem::take(&mut lab.budget);
         *seeing = lab.meanings.take();
         out.append(&mut lab.diagnostics);
     }

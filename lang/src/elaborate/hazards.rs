@@ -47,6 +47,9 @@ impl<'a> Elaborator<'a> {
                 out.extend(hazard);
             }
         }
+        if self.budget.is_over() {
+            return Vec::new();
+        }
         out
     }
 

@@ -118,7 +118,9 @@ impl<'a> Elaborator<'a> {
         }
         let key = self.remembered_call(id, &values);
         if let Some(v) = key.as_ref().and_then(|k| self.known_calls.get(k)) {
-            return v.clone();
+            let v = v.clone();
+            self.spend_on_list(&v);
+            return v;
         }
         let flow_before = std::mem::take(&mut self.touched_flow);
         self.open_calls.push(id);
@@ -140,12 +142,13 @@ impl<'a> Elaborator<'a> {
     /// What a call is remembered by: a function of instances and lists of them alone always gives the same node, and so does one of
     /// numbers that the run does not change.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
-        if values.is_empty() || self.rate_prefix.is_some() {
+        if self.rate_prefix.is_some() {
             return None;
         }
         let mut known = Vec::with_capacity(values.len() + 2);
-        let all = match values[0] {
-            Value::Num(_) => values.iter().all(|value| self.steady_number(value, &mut known)),
+        let all = match values.first() {
+            None => !self.prototype,
+            Some(Value::Num(_)) => values.iter().all(|value| self.steady_number(value, &mut known)),
             _ => !self.prototype && values.iter().all(|value| only_instances(value, &mut known)),
         };
         all.then_some((id, known, self.instances.len(), self.initial_mode, self.readings_live))

@@ -93,6 +93,7 @@ impl<'a> Elaborator<'a> {
             ExprKind::List(items) => {
                 let values: Vec<Value> = items.iter().map(|i| self.expr(i, scope)).collect();
                 self.alike(&values, items);
+                self.spend_on_items(values.len());
                 Value::List(values)
             }
         }

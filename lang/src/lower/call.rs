@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use matterix_ir::plan::{Argument, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, Span, Text, codes};
 
 use super::{Planner, ResultSlot};
-use crate::ast::{Block, Call, Clause, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
+use crate::ast::{Block, Call, Clause, ClauseKind, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near, verb_text};
@@ -617,6 +617,9 @@ impl<'a> Planner<'a, '_> {
             );
             return None;
         }
+        if self.lab.prototype && !self.written.insert(id) {
+            return Some(self.stood_in(sig, clauses, decl.module, label, span));
+        }
         self.open.push(id);
         self.lab.calls.push(call.span);
         let result = self.skill_body(sig, clauses, body, handlers, &label, span, &mut inner);
@@ -629,6 +632,31 @@ impl<'a> Planner<'a, '_> {
             }
             (result, _) => result,
         }
+    }
+
+    /// What stands for the steps of a skill that is called again while another one is checked by itself: the failures that it declares, and
+    /// any result of its type. Its steps were written out at the first call, which is enough to find a skill that calls itself.
+    fn stood_in(
+        &mut self,
+        sig: &'a Sig,
+        clauses: &'a [Clause],
+        module: usize,
+        label: String,
+        span: Span,
+    ) -> (StepId, Option<Value>) {
+        let mut raised = Vec::new();
+        for clause in clauses {
+            let ClauseKind::Fails(names) = &clause.kind else { continue };
+            for name in names {
+                let fail = Step::Fail { name: name.text.clone(), text: Text::default() };
+                raised.push(self.add(label.clone(), span, fail));
+            }
+        }
+        let value = sig.result.as_ref().map(|ty| {
+            let ty = self.lab.resolve_type(ty, module);
+            self.lab.placeholder(&ty, "result")
+        });
+        (self.add(label, span, Step::Sequence(raised)), value)
     }
 
     #[allow(clippy::too_many_arguments)]

@@ -42,6 +42,8 @@ pub struct Planner<'a, 'e> {
     pub steps: Vec<PlanStep>,
     /// Kept values so far.
     pub locals: Vec<Local>,
+    /// Skills written out while a declaration is checked by itself.
+    written: FxHashSet<DeclId>,
     /// Skills being written out, outermost first.
     pub open: Vec<DeclId>,
     /// Where `return` puts the result, while a skill's body is lowered.
@@ -108,6 +110,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             sources,
             steps: Vec::new(),
             locals: Vec::new(),
+            written: FxHashSet::default(),
             open: Vec::new(),
             results: Vec::new(),
             to_run: false,
