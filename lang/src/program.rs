@@ -10,8 +10,8 @@ use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
 
-use crate::budget;
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
+use crate::budget;
 use crate::check as checks;
 use crate::elaborate::geometry::Geometry;
 use crate::elaborate::reach::Reach;

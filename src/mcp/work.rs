@@ -16,8 +16,8 @@ const AT_ONCE: usize = 4;
 /// How long work that is told to stop may take to do so: what `finally` says is done first, and a long run has a long report.
 const GRACE: Duration = Duration::from_secs(20);
 
-/// What a call does. It looks at the flag where it can stop halfway.
-pub type Work = Box<dyn FnOnce(&Desk, &AtomicBool) -> Result<Answer, String> + Send>;
+/// What a call does. The flag stops it halfway.
+pub type Work = Box<dyn FnOnce(&Desk, &Arc<AtomicBool>) -> Result<Answer, String> + Send>;
 
 /// Where work is done.
 #[derive(Clone)]

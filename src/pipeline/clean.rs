@@ -9,7 +9,7 @@ use std::time::UNIX_EPOCH;
 use std::{env, fs};
 
 use matterix_ir::FileId;
-use matterix_lang::Loader;
+use matterix_lang::{Loader, Stop};
 use matterix_runtime::motion::{Store, seal};
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +68,10 @@ impl Loader for Noted<'_> {
         let found = self.neighbours.file(from, path);
         self.note(Question::Text(path.to_owned()), found.as_ref().ok().map(|f| f.as_bytes()));
         found
+    }
+
+    fn stop(&self) -> Stop {
+        self.neighbours.stop()
     }
 }
 

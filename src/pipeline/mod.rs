@@ -16,11 +16,13 @@ mod serve;
 mod view;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use matterix_ir::points::Points;
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
-use matterix_lang::{Loader, Session};
+use matterix_lang::{Loader, Session, Stop};
 
 use crate::args::Fidelity;
 use matterix_runtime::motion::{Store, overlaps, preflight};
@@ -49,18 +51,20 @@ pub struct Input {
     dir: PathBuf,
     /// The folder outside of which nothing is read, where there is one.
     root: Option<PathBuf>,
+    /// What may stop what is made of it.
+    stop: Stop,
 }
 
 impl Input {
     /// What a file holds.
     pub fn file(path: &Path, bytes: Vec<u8>) -> Self {
         let dir = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Input { name: path.display().to_string(), bytes, dir, root: None }
+        Input { name: path.display().to_string(), bytes, dir, root: None, stop: Stop::default() }
     }
 
     /// What was typed or piped in; its neighbours are in the current folder.
     pub fn stdin(bytes: Vec<u8>) -> Self {
-        Input { name: "<stdin>".to_string(), bytes, dir: PathBuf::new(), root: None }
+        Input { name: "<stdin>".to_string(), bytes, dir: PathBuf::new(), root: None, stop: Stop::default() }
     }
 
     /// What a client sent; its neighbours are in the current folder.
@@ -71,6 +75,11 @@ impl Input {
     /// The same with all that it imports taken from below a folder, given by its whole path without links.
     pub fn within(self, root: &Path) -> Self {
         Input { root: Some(root.to_path_buf()), ..self }
+    }
+
+    /// The same, worked on until a flag is set: a check or a compilation that was stopped says so.
+    pub fn until(self, flag: &Arc<AtomicBool>) -> Self {
+        Input { stop: Stop::when(flag), ..self }
     }
 
     /// The text as the first file of a compilation; an error where it is not text.
@@ -97,7 +106,7 @@ impl Input {
     }
 
     fn neighbours(&self) -> Neighbours {
-        Neighbours::of(&self.dir).within(self.root.as_deref())
+        Neighbours::of(&self.dir).within(self.root.as_deref()).until(&self.stop)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use matterix_ir::FileId;
-use matterix_lang::Loader;
+use matterix_lang::{Loader, Stop};
 
 use crate::files;
 
@@ -14,17 +14,23 @@ const LARGEST_MESH: u64 = 64 << 20;
 pub struct Neighbours {
     dir: PathBuf,
     root: Option<PathBuf>,
+    stop: Stop,
 }
 
 impl Neighbours {
     /// The modules in a folder.
     pub fn of(dir: &Path) -> Self {
-        Neighbours { dir: dir.to_path_buf(), root: None }
+        Neighbours { dir: dir.to_path_buf(), root: None, stop: Stop::default() }
     }
 
     /// The same, nothing of which is read outside of a folder that is given by its whole path.
     pub fn within(self, root: Option<&Path>) -> Self {
         Neighbours { root: root.map(Path::to_path_buf), ..self }
+    }
+
+    /// The same for what may be stopped.
+    pub fn until(self, stop: &Stop) -> Self {
+        Neighbours { stop: stop.clone(), ..self }
     }
 
     /// What a file holds, where it may be read; links lead to where they lead.
@@ -64,5 +70,9 @@ impl Loader for Neighbours {
     fn file(&self, _: FileId, path: &str) -> Result<String, String> {
         let bytes = self.contents(&self.dir.join(path), files::LARGEST_TEXT)?;
         String::from_utf8(bytes).map_err(|_| "it is not text in UTF-8".to_string())
+    }
+
+    fn stop(&self) -> Stop {
+        self.stop.clone()
     }
 }

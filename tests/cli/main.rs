@@ -4,6 +4,7 @@ mod along;
 mod beforehand;
 mod bill;
 mod book;
+mod budget;
 mod contents;
 mod deploy;
 mod determinism;

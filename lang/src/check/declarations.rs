@@ -3,8 +3,8 @@
 use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::ignored;
-use crate::budget::Budget;
 use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
+use crate::budget::Budget;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;

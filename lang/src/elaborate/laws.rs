@@ -6,8 +6,8 @@ use matterix_ir::model::{Action, Event};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
-use super::tuples::Tuples;
 use super::tables::MemberRef;
+use super::tuples::Tuples;
 use super::{Contribution, Elaborator, ProcessInstance};
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
 use crate::eval::{Num, ReactionId, Scope, Type, Value};

@@ -164,7 +164,13 @@ impl<'a> Elaborator<'a> {
 
     /// What a call stands for while a declaration is checked by itself: a function that says what it takes and gives was checked where it is
     /// declared, and is not written out again for values that are not known.
-    fn stood_in(&mut self, params: &[Param], result: Option<&'a ast::Type>, values: &[Value], module: usize) -> Option<Value> {
+    fn stood_in(
+        &mut self,
+        params: &[Param],
+        result: Option<&'a ast::Type>,
+        values: &[Value],
+        module: usize,
+    ) -> Option<Value> {
         let typed = self.prototype && params.iter().all(|p| p.ty.is_some());
         let open = |v: &Value| matches!(v, Value::Num(n) if self.graph.constant(n.node).is_none());
         let numbers = values.iter().all(|v| matches!(v, Value::Num(_))) && values.iter().any(open);

@@ -7,7 +7,9 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, Text, codes};
 
 use super::{Planner, ResultSlot};
-use crate::ast::{Block, Call, Clause, ClauseKind, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig};
+use crate::ast::{
+    Block, Call, Clause, ClauseKind, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig,
+};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near, verb_text};

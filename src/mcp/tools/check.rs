@@ -1,5 +1,6 @@
 //! The tool `check`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rmcp::schemars::JsonSchema;
@@ -43,8 +44,8 @@ impl Task for Check {
         self.seconds
     }
 
-    fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
         let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
         let found = judged(named(&sources, found), self.strict);

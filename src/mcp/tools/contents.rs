@@ -1,5 +1,6 @@
 //! The tool `contents`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::Sources;
@@ -64,10 +65,10 @@ impl Task for Contents {
         self.seconds
     }
 
-    fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
         let place = place(self.line, self.column)?;
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         let (sources, found, known) = pipeline::contents(&input);
         let (findings, mut said) = told(&sources, &judged(named(&sources, found), false));
         let shown = chosen(&known, place, &sources)?;

@@ -1,5 +1,6 @@
 //! The tool `explain`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rmcp::schemars::JsonSchema;
@@ -33,7 +34,7 @@ impl Task for Explain {
         "Explains the code of a finding: what it means, an example with the mistake, and the same example mended.";
     type Data = Explained;
 
-    fn perform(self, _: &Desk, _: &AtomicBool) -> Result<Answer, String> {
+    fn perform(self, _: &Desk, _: &Arc<AtomicBool>) -> Result<Answer, String> {
         let page = explanation(self.code.as_deref())
             .map_err(|help| format!("there is no diagnostic code `{}`; {help}", self.code.unwrap_or_default()))?;
         Answer::new(page.clone(), Explained { page })

@@ -1,7 +1,8 @@
 //! The tool `fix`.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::AtomicBool;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::Fix;
 use rmcp::schemars::JsonSchema;
@@ -88,8 +89,8 @@ impl Task for FixTask {
         self.seconds
     }
 
-    fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         if self.write && self.path.is_none() {
             return Err("a `text` is in no file that could be written; give its `path`".to_string());
         }
@@ -100,6 +101,9 @@ impl Task for FixTask {
             (None, Some(Which::All)) => pipeline::mend(input, Fixes::All, fidelity, desk),
             _ => return Err("give either `ids` or `which`".to_string()),
         };
+        if stop.load(Ordering::SeqCst) {
+            return Err("the time was over before all corrections were looked at; nothing was written".to_string());
+        }
         let (left, found) = told(&sources, &judged(named(&sources, found), false));
         let text = String::from_utf8(mended.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;
         let written = self.write && !done.is_empty();

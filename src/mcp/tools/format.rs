@@ -1,5 +1,6 @@
 //! The tool `format`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rmcp::schemars::JsonSchema;
@@ -48,8 +49,8 @@ impl Task for Format {
     const WRITES: bool = true;
     type Data = Formatted;
 
-    fn perform(self, desk: &Desk, _: &AtomicBool) -> Result<Answer, String> {
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         if self.write && self.path.is_none() {
             return Err("a `text` is in no file that could be written; give its `path`".to_string());
         }

@@ -1,5 +1,6 @@
 //! The tool `library`.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use rmcp::schemars::JsonSchema;
@@ -57,7 +58,7 @@ impl Task for Library {
         materials. Gives signatures and documentation of what fits the words, or the text of one module.";
     type Data = Shelf;
 
-    fn perform(self, _: &Desk, _: &AtomicBool) -> Result<Answer, String> {
+    fn perform(self, _: &Desk, _: &Arc<AtomicBool>) -> Result<Answer, String> {
         let most = self.items.unwrap_or(ITEMS);
         if !(1..=MOST_ITEMS).contains(&most) {
             return Err(format!("`items` goes from 1 to {MOST_ITEMS}"));

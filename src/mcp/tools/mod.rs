@@ -11,6 +11,7 @@ mod library;
 mod plan;
 mod run;
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -45,7 +46,7 @@ trait Task: DeserializeOwned + JsonSchema + Send + 'static {
     }
 
     /// Does it; `stop` is set when nobody waits any more. `Err` says in words what is wrong with the call.
-    fn perform(self, desk: &Desk, stop: &AtomicBool) -> Result<Answer, String>;
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String>;
 }
 
 /// Seconds of a call that does not say.

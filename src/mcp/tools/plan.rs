@@ -1,6 +1,7 @@
 //! The tool `plan`.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -72,13 +73,13 @@ impl Task for Plan {
         Some(self.search.map_or(SEARCH + 50, |s| s.saturating_add(50).min(super::MOST_SECONDS)))
     }
 
-    fn perform(self, desk: &Desk, stop: &AtomicBool) -> Result<Answer, String> {
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
         let seconds = self.search.unwrap_or(SEARCH);
         if !(1..=super::MOST_SECONDS).contains(&seconds) {
             return Err(format!("`search` goes from 1 to {}", super::MOST_SECONDS));
         }
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
         let wrong = found.iter().any(Diagnostic::is_error);
         let Some(program) = program.filter(|_| !wrong) else { return unplanned(&sources, found) };

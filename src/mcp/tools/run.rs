@@ -1,6 +1,7 @@
 //! The tool `run`.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::{Diagnostic, Sources};
@@ -73,9 +74,9 @@ impl Task for Run {
         self.seconds
     }
 
-    fn perform(self, desk: &Desk, stop: &AtomicBool) -> Result<Answer, String> {
+    fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
-        let input = desk.input(self.path.as_deref(), self.text.as_deref())?;
+        let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
         let fidelity = self.fidelity.map_or(args::Fidelity::Process, args::Fidelity::from);
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
         let Some(program) = program.filter(|_| !is_wrong(&found)) else { return unrun(&sources, found) };

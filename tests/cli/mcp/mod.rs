@@ -1,5 +1,5 @@
 //! `matterixc mcp`: a server of the Model Context Protocol, spoken to line by line.
 
-mod client;
+pub mod client;
 mod repair;
 mod session;
