@@ -204,7 +204,7 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     for line in lines {
         let literal = match line {
             AssetLine::Field(f) => {
-                lab.check_fields(id, std::slice::from_ref(f));
+                lab.check_fields_of(id, std::slice::from_ref(f), true);
                 continue;
             }
             AssetLine::Part { literal, .. } | AssetLine::Grid(Grid { literal, .. }) => literal,
@@ -224,5 +224,6 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
             lab.member_value(this, m, name.span);
         }
+        lab.redefinition(this, m, lines);
     }
 }

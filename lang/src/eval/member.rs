@@ -347,10 +347,17 @@ impl<'a> Elaborator<'a> {
         let MemberKind::Value { role, name, ty, per, value, options } = &m.member.kind else { return Value::Error };
         let ty = self.resolve_type(ty, m.module);
         if *role == Role::Param || *role == Role::Derived {
-            let setting = self.instances[id.0 as usize].setting(&name.text);
-            // What an asset's line says of its shape is no value: the `room` of a vessel is what still fits in.
-            let shape = *role == Role::Derived && GEOMETRY.contains(&name.text.as_str());
-            if let Some(setting) = setting.filter(|_| !shape) {
+            let instance = &self.instances[id.0 as usize];
+            let setting = match role {
+                Role::Param => instance.setting(&name.text),
+                // What an asset's line says of its shape is no value: the `room` of a vessel is what still fits in.
+                _ if GEOMETRY.contains(&name.text.as_str()) => None,
+                _ => instance.redefined(id, &name.text),
+            };
+            if let Some(value) = self.started(id, m, &ty) {
+                return value;
+            }
+            if let Some(setting) = setting {
                 let value = self.param(id, &name.text, &ty, setting);
                 if let FieldValue::Expr(at) = setting.value() {
                     self.check_limits(&value, at.span, &name.text, &ty, options, m.module);
@@ -452,7 +459,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Constants become parameters of the model, so that a study can vary them.
-    fn as_param(&mut self, id: InstanceId, name: &str, ty: &Type, value: Value, span: Span) -> Value {
+    pub fn as_param(&mut self, id: InstanceId, name: &str, ty: &Type, value: Value, span: Span) -> Value {
         let full = format!("{}.{name}", self.instances[id.0 as usize].name);
         match value {
             Value::Num(n) => {
