@@ -3,7 +3,7 @@
 use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::ignored;
-use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
+use crate::ast::{AssetLine, Grid, Item, ItemKind, MemberKind, Param, Role};
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
@@ -90,18 +90,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                 }
             }
         }
-        ItemKind::Species { fields, .. } => {
-            for f in fields {
-                if let FieldValue::Expr(e) = &f.value
-                    && !matches!(
-                        f.key.text.as_str(),
-                        "by" | "same_as" | "phase" | "hazards" | "reactive_groups" | "color" | "solubility"
-                    )
-                {
-                    lab.expr(e, &mut Scope::module(module));
-                }
-            }
-        }
+        ItemKind::Species { .. } => lab.check_species(id),
         ItemKind::Skill { .. } => {
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);

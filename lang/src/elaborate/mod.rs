@@ -19,6 +19,7 @@ mod labels;
 pub mod laws;
 mod lineage;
 pub mod mixtures;
+mod properties;
 pub mod prune;
 pub mod reach;
 pub mod reactions;
