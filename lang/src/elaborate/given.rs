@@ -7,8 +7,8 @@ use rustc_hash::FxHashSet;
 use super::Elaborator;
 use super::lab::GEOMETRY;
 use super::tables::{MemberRef, Tables};
-use crate::ast::{AssetLine, Expr, ExprKind, Field, MemberKind, NamedExpr, Role};
-use crate::eval::{Scope, Type, Value};
+use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr, Role};
+use crate::eval::{Num, Scope, Type, Value};
 use crate::names::DeclId;
 
 /// The option of a derived member that says what to give in its place.
@@ -93,6 +93,31 @@ impl<'a> Elaborator<'a> {
             let help = self.instead(kind, m);
             self.report(d.help(help));
         }
+    }
+
+    /// The same for the fields of parts and of what stands in grids, in the braces of an asset's line.
+    pub fn check_nested(&mut self, kind: DeclId, f: &'a Field, module: usize) {
+        let (fields, named): (&'a [Field], _) = match &f.value {
+            FieldValue::Fields(fields) => (fields, None),
+            FieldValue::Literal(literal) => (&literal.fields, self.kind_named(&literal.ty, module)),
+            FieldValue::Expr(_) | FieldValue::Species(_) => return,
+        };
+        let tables: &'a Tables<'a> = self.tables;
+        let declared = tables.members(kind, &f.key.text).iter().find_map(|m| match &m.member.kind {
+            MemberKind::Value { role: Role::Part, ty, .. } => Some((ty, m.module)),
+            _ => None,
+        });
+        let declared = declared.and_then(|(ty, module)| match self.resolve_type(ty, module) {
+            Type::Instance { kinds, .. } => kinds.first().copied(),
+            Type::List(inner) => match &*inner {
+                Type::Instance { kinds, .. } => kinds.first().copied(),
+                _ => None,
+            },
+            _ => None,
+        });
+        let Some(part) = named.or(declared) else { return };
+        self.check_fields(part, fields);
+        fields.iter().for_each(|f| self.check_nested(part, f, module));
     }
 
     /// What to give in place of a member that cannot be given.
@@ -224,6 +249,16 @@ impl<'a> Elaborator<'a> {
         let value = self.as_param(id, &name.text, ty, value, e.span);
         self.check_limits(&value, e.span, "at", ty, options, m.module);
         Some(value)
+    }
+
+    /// What stands after `holding ... at` for a mixture.
+    pub fn start_of(&mut self, id: InstanceId) -> Option<Num> {
+        self.instances[id.0 as usize].start?;
+        let m = self.all_members(id).iter().copied().find(takes_start)?;
+        match self.member_value(id, m, m.member.span) {
+            Value::Num(n) => Some(n),
+            _ => None,
+        }
     }
 
     /// Whether an extensive quantity can be there at all: one that is there only with a parameter is left out of a lab

@@ -310,8 +310,16 @@ impl<'a> Elaborator<'a> {
                 ItemKind::Relation { params, definition, .. } => params.len() == 2 && definition.is_none(),
                 _ => false,
             };
-            let known = self.tables.names.lookup(module, &f.key.text);
-            if !known.is_some_and(|id| is_pair(&self.tables.names.decl(id).item.kind)) {
+            let names = self.tables.names;
+            let known = names.lookup(module, &f.key.text).map(|id| names.decl(id));
+            let of_things = known.is_some_and(|decl| match &decl.item.kind {
+                ItemKind::Fn { params, .. } => params.iter().all(|p| match &p.ty {
+                    Some(ty) => matches!(self.resolve_type(ty, decl.module), Type::Instance { .. } | Type::Any),
+                    None => true,
+                }),
+                _ => true,
+            });
+            if !known.is_some_and(|decl| is_pair(&decl.item.kind)) || !of_things {
                 let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
                 d.help.push("pair parameters are functions of two bodies, such as `conductance`, and relations without a definition".into());
                 self.report(d);

@@ -96,7 +96,7 @@ impl<'a> Elaborator<'a> {
                 let meant = self.other_property(def, &value, &ty);
                 let value = self.coerce(value, &ty, e.span, &what);
                 if let (Some(d), Some(meant)) = (self.diagnostics.get_mut(reported), meant) {
-                    d.help.push(format!("did you mean `{meant}`?"));
+                    d.help = vec![format!("did you mean `{meant}`?")];
                 }
                 value
             }
@@ -169,7 +169,8 @@ impl<'a> Elaborator<'a> {
         self.check_same(s, "molar_volume", "density", def.molar_mass, |molar_mass, density| molar_mass / density);
         self.check_same(s, "heat_capacity", "specific_heat", def.molar_mass, |molar_mass, heat| molar_mass * heat);
         let neutral = def.formula.as_ref().is_none_or(|f| f.charge == 0);
-        if neutral && field(def.fields, "density").is_some() && self.property_value(s, "heat_capacity") <= Some(0.0) {
+        let pure = neutral && field(def.fields, "density").is_some();
+        if pure && self.property_value(s, "heat_capacity").is_some_and(|v| v <= 0.0) {
             self.not_above_zero(def);
         }
     }
