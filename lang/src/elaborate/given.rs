@@ -251,6 +251,15 @@ impl<'a> Elaborator<'a> {
         Some(value)
     }
 
+    /// Whether a parameter that nobody gives is what another member is: what reads it asks for it.
+    pub fn is_idle(&self, id: InstanceId, m: MemberRef<'a>) -> bool {
+        let MemberKind::Value { name, value: Some(default), .. } = &m.member.kind else { return false };
+        let ExprKind::Name(other) = &*default.kind else { return false };
+        let instance = &self.instances[id.0 as usize];
+        let given = instance.start.is_some() || instance.setting(&name.text).is_some();
+        !given && (other.text == "ambient" || !self.members_of(id, &other.text).is_empty())
+    }
+
     /// What stands after `holding ... at` for a mixture.
     pub fn start_of(&mut self, id: InstanceId) -> Option<Num> {
         self.instances[id.0 as usize].start?;

@@ -228,7 +228,9 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.all_members(id).iter().copied() {
-                if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
+                if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind
+                    && !self.is_idle(id, m)
+                {
                     self.member_value(id, m, name.span);
                 }
             }
