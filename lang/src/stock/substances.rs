@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use matterix_ir::Sources;
 use matterix_ir::stock::Substance;
 
-use crate::ast::{ExprKind, FieldValue};
+use crate::ast::{Expr, ExprKind, FieldValue, Unary};
 use crate::elaborate::species::field;
 use crate::elaborate::{Elaborator, SpeciesId};
 use crate::eval::Value;
@@ -48,7 +48,16 @@ fn text(value: Value) -> Option<String> {
 fn written(lab: &mut Elaborator<'_>, sources: &Sources, s: SpeciesId, key: &str) -> Option<String> {
     let Value::Num(n) = lab.property(s, key)? else { return None };
     match &field(lab.tables.species.get(s).fields, key)?.value {
-        FieldValue::Expr(e) if matches!(&*e.kind, ExprKind::Quantity(..)) => Some(sources.slice(e.span).to_owned()),
+        FieldValue::Expr(e) if is_literal(e) => Some(sources.slice(e.span).to_owned()),
         _ => Some(lab.unit_of(&n).show(lab.graph.constant(n.node)?)),
+    }
+}
+
+/// Whether a quantity is written as such: `12 degC`, `-85.0 degC`.
+fn is_literal(e: &Expr) -> bool {
+    match &*e.kind {
+        ExprKind::Quantity(..) => true,
+        ExprKind::Unary(Unary::Neg, inner) => is_literal(inner),
+        _ => false,
     }
 }
