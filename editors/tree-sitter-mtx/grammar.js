@@ -447,12 +447,13 @@ module.exports = grammar({
       field('name', alias(choice($._any_word, 'include', 'between'), $.field_name)), ':', nl($), field('value', $.expression),
     ),
     instance: ($) => seq(
-      field('name', word_of($, 'include', 'between')), '=', nl($), $._literal, repeat($.labelled), optional($._holding),
+      field('name', word_of($, 'include', 'between')), '=', nl($), $._literal, repeat($.labelled), optional(seq($._holding, repeat($.labelled))),
     ),
     _holding: ($) => seq('holding', nl($), choice($.fills, $._operand)),
     fills: ($) => fields_of($, $.fill),
     fill: ($) => seq(
       $.place, optional(seq('..', nl($), $.place)), nl($), ':', nl($), field('value', $._operand),
+      optional(seq('at', nl($), field('at', $._operand))),
     ),
     include: ($) => seq('include', field('path', $._name), $._same_line, 'as', field('name', $.identifier), repeat($.labelled), optional($.options)),
     between: ($) => seq('between', $._operand, 'and', nl($), $._operand, $.fields),

@@ -297,6 +297,14 @@ impl<'t> Context<'t> {
         self.before.iter().any(|t| t.text == "holding") || self.block().is_some_and(|open| is(open.head.last()))
     }
 
+    /// Whether the words before the cursor end with the `at` behind what something holds.
+    pub(crate) fn is_start(&self) -> bool {
+        let held = self.before.iter().position(|t| t.text == "holding");
+        let filled = held.is_none() && self.is_holding() && self.before.iter().any(|t| t.text == ":");
+        let at = self.before.iter().rposition(|t| t.text == "at");
+        at.is_some_and(|at| filled || held.is_some_and(|held| held < at))
+    }
+
     /// The last token before the word at the cursor.
     pub(crate) fn last(&self) -> Option<&'t str> {
         self.before.last().map(|t| t.text)

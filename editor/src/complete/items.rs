@@ -271,7 +271,12 @@ impl Place<'_> {
                     self.keyword("{ }", "{ $0 }", 6, out);
                 }
             }
-            _ => self.value_offers(&self.wanted(context), out),
+            _ => {
+                if context.is_holding() && !context.is_start() {
+                    self.keyword("at", "at ", 6, out);
+                }
+                self.value_offers(&self.wanted(context), out);
+            }
         }
     }
 

@@ -19,6 +19,9 @@ impl Place<'_> {
             let wanted = self.wanted(context).sort.filter(|sort| dimension_of(sort).is_some());
             return vec![wanted.unwrap_or_else(|| named("Length"))];
         }
+        if context.is_start() {
+            return vec![Sort::Quantity(self.index.units().named("Temperature"), true)];
+        }
         if context.is_holding() {
             return ["Volume", "Mass", "Amount"].map(named).to_vec();
         }
@@ -26,7 +29,8 @@ impl Place<'_> {
             return vec![Sort::Concentration];
         }
         if context.item() == "solution" {
-            return ["Volume", "Mass", "Amount", "MassFraction"].map(named).to_vec();
+            let kinds = ["Volume", "Mass", "Amount", "MassFraction", "AmountConcentration", "MassConcentration"];
+            return kinds.map(named).to_vec();
         }
         self.wanted(context).sort.into_iter().collect()
     }

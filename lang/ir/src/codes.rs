@@ -58,6 +58,7 @@ codes! {
     UNKNOWN_UNIT "unknown-unit" "N0" "a unit is not declared";
     UNKNOWN_MEMBER "unknown-member" "N0" "an instance, species or reaction has no such member";
     UNKNOWN_FIELD "unknown-field" "N0" "a field is not one of its owner";
+    DERIVED_MEMBER "derived-member" "N0" "a field gives what follows from other members";
     UNKNOWN_VERB "unknown-verb" "N0" "no skill or command has this name";
     UNKNOWN_PARAMETER "unknown-parameter" "N0" "a workflow has no such parameter";
     DUPLICATE_NAME "duplicate-name" "N0" "a name is declared twice";

@@ -84,6 +84,8 @@ pub struct Holding {
     pub unit: Unit,
     /// kg.
     pub mass: NodeId,
+    /// How warm the whole is at the start, K, and the unit that is written, where the lab says so.
+    pub start: Option<(NodeId, Unit)>,
     /// Where it is written.
     pub span: Span,
 }

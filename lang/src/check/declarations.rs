@@ -3,7 +3,7 @@
 use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::ignored;
-use crate::ast::{AssetLine, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
+use crate::ast::{AssetLine, Field, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
 use crate::budget::Budget;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
@@ -99,18 +99,8 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
                 }
             }
         }
-        ItemKind::Species { fields, .. } => {
-            for f in fields {
-                if let FieldValue::Expr(e) = &f.value
-                    && !matches!(
-                        f.key.text.as_str(),
-                        "by" | "same_as" | "phase" | "hazards" | "reactive_groups" | "color" | "solubility"
-                    )
-                {
-                    lab.expr(e, &mut Scope::module(module));
-                }
-            }
-        }
+        ItemKind::Species { .. } => lab.check_species(id),
+        ItemKind::Material { fields, .. } => material(lab, fields, module),
         ItemKind::Skill { .. } => {
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
@@ -126,6 +116,20 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             }
         }
         _ => {}
+    }
+}
+
+/// The friction of a material is a plain number that is not negative.
+fn material<'a>(lab: &mut Elaborator<'a>, fields: &'a [Field], module: usize) {
+    for f in fields.iter().filter(|f| f.key.text == "friction") {
+        let FieldValue::Expr(e) = &f.value else { continue };
+        let value = lab.typed(e, &Type::ratio(), &mut Scope::module(module), "friction");
+        if let Value::Num(n) = &value
+            && !lab.graph.constant(n.node).is_some_and(|v| v.is_finite() && v >= 0.0)
+        {
+            let headline = "`friction` is a constant that is not negative";
+            lab.report(Diagnostic::error(codes::OUT_OF_RANGE, e.span, headline, "cannot be"));
+        }
     }
 }
 
@@ -213,7 +217,8 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
     for line in lines {
         let literal = match line {
             AssetLine::Field(f) => {
-                lab.check_fields(id, std::slice::from_ref(f));
+                lab.check_fields_of(id, std::slice::from_ref(f), true);
+                lab.check_nested(id, f, module);
                 continue;
             }
             AssetLine::Part { literal, .. } | AssetLine::Grid(Grid { literal, .. }) => literal,
@@ -233,5 +238,6 @@ fn asset<'a>(lab: &mut Elaborator<'a>, id: DeclId, item: &'a Item, module: usize
         if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
             lab.member_value(this, m, name.span);
         }
+        lab.redefinition(this, m, lines);
     }
 }

@@ -3,7 +3,8 @@
 use matterix_ir::stock::Count;
 use matterix_ir::{Diagnostic, codes};
 
-use crate::ast::{NamedExpr, Role};
+use crate::ast::{ExprKind, NamedExpr, Role};
+use crate::elaborate::given::{GIVEN_BY, INSTEAD, ONLY_WITH, word};
 use crate::names::near;
 use crate::stock::{COUNTS_AS, count_of};
 
@@ -11,14 +12,28 @@ use crate::stock::{COUNTS_AS, count_of};
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS]),
-        Role::Extensive => ("an extensive quantity", &["unit", "scale"]),
-        Role::Derived => ("a derived quantity", &["unit", "hidden", COUNTS_AS]),
+        Role::Extensive => ("an extensive quantity", &["unit", "scale", ONLY_WITH]),
+        Role::Derived => ("a derived quantity", &["unit", "hidden", INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
-        Role::Param => ("a parameter", &["above", "at_least"]),
+        Role::Param => ("a parameter", &["above", "at_least", GIVEN_BY]),
         Role::Flow => ("a flow", &[]),
         Role::Part => ("a part", &[]),
     };
-    unknown(what, given, known)
+    let mut found = unknown(what, given, known);
+    found.extend(given.iter().filter_map(misfit));
+    found
+}
+
+/// An option whose value is of the wrong form.
+fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
+    let given = std::slice::from_ref(o);
+    let headline = match o.name.text.as_str() {
+        GIVEN_BY if word(given, GIVEN_BY) != Some("at") => "`given_by` is `at`: what stands after `holding ... at`",
+        ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` names a parameter",
+        INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` is a text",
+        _ => return None,
+    };
+    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else"))
 }
 
 /// Options that bound a value and mean nothing else.

@@ -186,6 +186,12 @@ impl<'a> Elaborator<'a> {
     pub fn volume_of(&mut self, parts: &[(SpeciesId, f64)], at: Span) -> Option<f64> {
         let species = &self.tables.species;
         let wet = parts.iter().any(|(s, _)| species.get(*s).is_water());
+        self.volume_with(parts, wet, at)
+    }
+
+    /// The same where it is known from elsewhere whether there is water.
+    pub fn volume_with(&mut self, parts: &[(SpeciesId, f64)], wet: bool, at: Span) -> Option<f64> {
+        let species = &self.tables.species;
         let mut there: Vec<(SpeciesId, f64)> = Vec::new();
         for (s, amount) in parts {
             match species.get(*s).dissolves.as_slice() {

@@ -2,7 +2,7 @@
 
 use matterix_ir::{Diagnostic, codes};
 
-use crate::ast::Field;
+use crate::ast::{ExprKind, Field, FieldValue};
 use crate::names::near;
 
 /// Reports keys given twice.
@@ -18,6 +18,26 @@ pub fn repeated(fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {
                 )
                 .because(first.key.span, "first given here"),
             );
+        }
+    }
+}
+
+/// Reports fields of another form than they have: those of `nested` hold lines in braces, those of `texts` a text,
+/// all others one value.
+pub fn forms(fields: &[Field], nested: &[&str], texts: &[&str], diagnostics: &mut Vec<Diagnostic>) {
+    for f in fields {
+        let key = f.key.text.as_str();
+        let (fits, form) = match &f.value {
+            FieldValue::Fields(_) => (nested.contains(&key), "one value"),
+            FieldValue::Expr(e) if matches!(&*e.kind, ExprKind::Error) => (true, ""),
+            FieldValue::Expr(_) if nested.contains(&key) => (false, "lines in braces, `{ A: 1, B: 2 }`"),
+            FieldValue::Expr(e) if texts.contains(&key) => (matches!(&*e.kind, ExprKind::Text(_)), "a text in quotes"),
+            FieldValue::Expr(_) => (true, ""),
+            FieldValue::Literal(_) | FieldValue::Species(_) => (false, "one value"),
+        };
+        if !fits {
+            let headline = format!("`{key}` is {form}");
+            diagnostics.push(Diagnostic::error(codes::TYPE_MISMATCH, f.span, headline, "something else"));
         }
     }
 }

@@ -68,6 +68,8 @@ pub struct Instance<'a> {
     pub contents: Vec<(SpeciesId, NodeId)>,
     /// What its contents are called as a reagent.
     pub origin: Option<String>,
+    /// What stands after `at` behind what it holds, with the module of the text.
+    pub start: Option<(&'a Expr, usize)>,
     /// `on table`, `in rack`: preposition and instance.
     pub placed: Vec<(String, InstanceId)>,
     /// Where.
@@ -84,6 +86,12 @@ impl<'a> Instance<'a> {
     /// The strongest field of a name.
     pub fn setting(&self, name: &str) -> Option<Setting<'a>> {
         self.settings.iter().find(|s| s.field.key.text == name).copied()
+    }
+
+    /// The line of its asset's declaration that defines a derived member anew; `own` is the instance's number.
+    pub fn redefined(&self, own: InstanceId, name: &str) -> Option<Setting<'a>> {
+        let is_own = |s: &&Setting<'a>| !s.lab && s.of == Some(own) && s.field.key.text == name;
+        self.settings.iter().find(is_own).copied()
     }
 
     /// What stands in its grid, where it has no parts and one place.

@@ -7,7 +7,9 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::instances::Setting;
 use super::{Elaborator, Pair};
-use crate::ast::{self, AssetLine, AssetLiteral, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path};
+use crate::ast::{
+    self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
+};
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
 
@@ -131,8 +133,13 @@ impl<'a> Elaborator<'a> {
         found
     }
 
-    /// Reports fields that are no member of the kind.
+    /// Reports fields of a thing that are no member of its kind, or that follow from others.
     pub fn check_fields(&mut self, kind: DeclId, fields: &'a [Field]) {
+        self.check_fields_of(kind, fields, false);
+    }
+
+    /// The same; `own` for the lines of the asset's declaration.
+    pub fn check_fields_of(&mut self, kind: DeclId, fields: &'a [Field], own: bool) {
         let Some(info) = self.tables.kinds.get(&kind) else { return };
         let mut known: Vec<String> =
             info.members.iter().filter_map(|m| super::tables::member_name(m.member)).map(|n| n.text.clone()).collect();
@@ -147,6 +154,7 @@ impl<'a> Elaborator<'a> {
         for d in found {
             self.report(d);
         }
+        self.check_settable(kind, fields, own);
     }
 
     fn place(&mut self, id: InstanceId, relations: &'a [(Name, Expr)], module: usize) {
@@ -167,6 +175,12 @@ impl<'a> Elaborator<'a> {
                         self.instances[id.0 as usize].pose.position = position;
                         self.instances[id.0 as usize].at = Some(operand.span);
                     }
+                }
+                ("at", Value::Num(n)) if n.point => {
+                    let what = self.describe(&n);
+                    let headline = format!("`at` expects a position `(x, y, z) mm`, found {what}");
+                    let d = Diagnostic::error(codes::TYPE_MISMATCH, operand.span, headline, format!("this is {what}"));
+                    self.report(d.help("how warm the contents are stands once, after the whole `holding ...`"));
                 }
                 ("at", other) => {
                     self.expected("a position `(x, y, z) mm`", &other, operand.span);
@@ -209,15 +223,14 @@ impl<'a> Elaborator<'a> {
     }
 
     fn hold(&mut self, id: InstanceId, holding: &'a Holding, module: usize) {
-        let e = match holding {
-            Holding::Expr(e) => e,
-            Holding::Places(fills) => return self.fill(id, fills, module),
-        };
-        self.hold_in(id, e, module);
+        match &holding.contents {
+            Contents::Expr(e) => self.hold_in(id, e, holding.at.as_ref(), module),
+            Contents::Places(fills) => self.fill(id, fills, holding.at.as_ref(), module),
+        }
     }
 
-    /// What the places of a grid hold.
-    fn fill(&mut self, id: InstanceId, fills: &'a [ast::Fill], module: usize) {
+    /// What the places of a grid hold; `at` is how warm those are that say nothing else.
+    fn fill(&mut self, id: InstanceId, fills: &'a [ast::Fill], at: Option<&'a Expr>, module: usize) {
         let mut filled: BTreeMap<InstanceId, Span> = BTreeMap::new();
         for fill in fills {
             let span = fill.to.as_ref().map_or(fill.from.span, |to| fill.from.span.to(to.span));
@@ -244,12 +257,12 @@ impl<'a> Elaborator<'a> {
                     );
                     return;
                 }
-                self.hold_in(child, &fill.value, module);
+                self.hold_in(child, &fill.value, fill.at.as_ref().or(at), module);
             }
         }
     }
 
-    fn hold_in(&mut self, id: InstanceId, e: &'a Expr, module: usize) {
+    fn hold_in(&mut self, id: InstanceId, e: &'a Expr, at: Option<&'a Expr>, module: usize) {
         let inst = &self.instances[id.0 as usize];
         let (name, declared) = (inst.name.clone(), inst.span);
         let own = self.per_species(id).map(|_| id);
@@ -276,6 +289,9 @@ impl<'a> Elaborator<'a> {
         self.held[before..].iter_mut().for_each(|held| held.mixture = Some(target));
         self.instances[target.0 as usize].contents = contents;
         self.instances[target.0 as usize].origin = Some(super::contents::origin(e));
+        if let Some(at) = at {
+            self.start_at(target, at, module);
+        }
     }
 
     fn between(&mut self, a: &'a Expr, b: &'a Expr, fields: &'a [Field], module: usize) {
@@ -294,8 +310,16 @@ impl<'a> Elaborator<'a> {
                 ItemKind::Relation { params, definition, .. } => params.len() == 2 && definition.is_none(),
                 _ => false,
             };
-            let known = self.tables.names.lookup(module, &f.key.text);
-            if !known.is_some_and(|id| is_pair(&self.tables.names.decl(id).item.kind)) {
+            let names = self.tables.names;
+            let known = names.lookup(module, &f.key.text).map(|id| names.decl(id));
+            let of_things = known.is_some_and(|decl| match &decl.item.kind {
+                ItemKind::Fn { params, .. } => params.iter().all(|p| match &p.ty {
+                    Some(ty) => matches!(self.resolve_type(ty, decl.module), Type::Instance { .. } | Type::Any),
+                    None => true,
+                }),
+                _ => true,
+            });
+            if !known.is_some_and(|decl| is_pair(&decl.item.kind)) || !of_things {
                 let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
                 d.help.push("pair parameters are functions of two bodies, such as `conductance`, and relations without a definition".into());
                 self.report(d);

@@ -110,7 +110,7 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// A label of a species that no line of the recipe holds; where it is an ion of a salt, the salt is meant.
+    /// A label of a species that no line of the recipe holds; where it is an ion of a dry salt, the salt is meant.
     fn label_of_nothing(
         &mut self,
         (name, label): (&str, &Labelled),
@@ -127,7 +127,7 @@ impl<'a> Elaborator<'a> {
             return d.help(format!("label a species of the recipe, or add `{ion}` to it"));
         };
         let salt_name = self.tables.species.get(salt).name.clone();
-        let d = d.help(format!("a label counts what is weighed in: `{ion}` comes of `{salt_name}` when it dissolves"));
+        let d = d.help(format!("`{salt_name}` gives `{ion}` in water, of which the recipe has none"));
         let Some(strength) = self.concentration_of(parts, salt, kind) else { return d };
         let mended = format!("{} of {salt_name}", rounded(strength, unit));
         d.guess("label the salt", value.span.to(species.span), mended)
@@ -138,20 +138,46 @@ impl<'a> Elaborator<'a> {
         let mut best = None;
         for f in fields {
             match self.substance(&f.key, module)? {
-                Substance::Species(o) if o == s => return Some(f.span),
-                Substance::Solution(id) if self.composition(id).iter().any(|(o, _)| *o == s) => best = Some(f.span),
+                Substance::Species(o) if o == s || self.ions_in(o, s) > 0.0 => return Some(f.span),
+                Substance::Solution(id)
+                    if self.composition(id).iter().any(|(o, _)| *o == s || self.ions_in(*o, s) > 0.0) =>
+                {
+                    best = Some(f.span);
+                }
                 _ => {}
             }
         }
         best
     }
 
-    /// A concentration of a recipe in the kind of a dimension; undissociated, as a label means it.
+    /// How many of an ion one unit of a salt, acid or base becomes in water.
+    fn ions_in(&self, salt: SpeciesId, ion: SpeciesId) -> f64 {
+        self.tables.species.get(salt).dissolves.iter().filter(|(of, _)| *of == ion).map(|(_, n)| n).sum()
+    }
+
+    /// mol of a species per kg of a recipe, and kg of what gives it: of a salt as it is weighed in, of an ion where
+    /// there is water also what the salts give.
+    fn content(&self, parts: &[(SpeciesId, f64)], s: SpeciesId) -> (f64, f64) {
+        let species = &self.tables.species;
+        let wet = parts.iter().any(|(part, _)| species.get(*part).is_water());
+        let mut content = (0.0, 0.0);
+        for (part, amount) in parts {
+            let own = if *part == s { 1.0 } else { 0.0 };
+            let given = own + if wet { self.ions_in(*part, s) } else { 0.0 };
+            if given > 0.0 {
+                content.0 += amount * given;
+                content.1 += amount * species.get(*part).molar_mass;
+            }
+        }
+        content
+    }
+
+    /// A concentration of a recipe in the kind of a dimension; of a salt undissociated, as a label means it.
     fn concentration_of(&mut self, parts: &[(SpeciesId, f64)], s: SpeciesId, kind: &Dimension) -> Option<f64> {
         let units = &self.tables.units;
         let (amount, mass, volume) = (units.named("Amount"), units.named("Mass"), units.named("Volume"));
         let solvent = units.named("SolventMass");
-        let per_kg = parts.iter().find(|p| p.0 == s).map_or(0.0, |p| p.1);
+        let (per_kg, solute) = self.content(parts, s);
         let molar_mass = self.tables.species.get(s).molar_mass;
         let by_mass = self.tables.species.get(s).by_mass;
         if *kind == units.named("MassFraction") || kind.is_one() {
@@ -161,7 +187,7 @@ impl<'a> Elaborator<'a> {
             return Some(per_kg);
         }
         if *kind == amount.over(&solvent) && !by_mass {
-            return Some(per_kg / (1.0 - per_kg * molar_mass));
+            return Some(per_kg / (1.0 - solute));
         }
         if *kind == amount.over(&volume) || *kind == mass.over(&volume) {
             let c = per_kg / self.volume_of(parts, self.tables.species.get(s).span)?;

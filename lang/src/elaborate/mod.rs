@@ -7,6 +7,7 @@ mod coverings;
 mod extents;
 pub mod fields;
 pub mod geometry;
+pub mod given;
 pub mod grids;
 pub mod hazards;
 pub mod include;
@@ -18,6 +19,7 @@ mod labels;
 pub mod laws;
 mod lineage;
 pub mod mixtures;
+mod properties;
 pub mod prune;
 pub mod reach;
 pub mod reactions;
@@ -37,7 +39,7 @@ use matterix_ir::model;
 use matterix_ir::plan::{Comparison, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::ast::{self, Expr, FieldValue};
 use crate::budget::Budget;
@@ -203,6 +205,8 @@ pub struct Elaborator<'a> {
     pub copies: BTreeSet<(u32, u32)>,
     /// Extensive quantities by place.
     pub extensive: BTreeMap<ExtensiveKey, u32>,
+    /// Names of all fields that are given in the lab, once they were asked for.
+    pub given: Option<FxHashSet<&'a str>>,
     /// How devices are spoken to, where that was asked for.
     pub drivers: Vec<matterix_ir::wire::Driver>,
     /// What the lab offers to others.
@@ -362,6 +366,7 @@ impl<'a> Elaborator<'a> {
             known_geometries: FxHashMap::default(),
             by_kind: RwLock::default(),
             open_members: Vec::new(),
+            given: None,
             open_calls: Vec::new(),
             open_consts: Vec::new(),
             meanings: None,

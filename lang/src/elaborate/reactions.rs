@@ -2,7 +2,7 @@
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::fields::unknown_fields;
+use super::fields::{forms, unknown_fields};
 use super::species::{SpeciesTable, field};
 use super::tables::ReactionDef;
 use crate::ast::{ExprKind, Field, FieldValue, ItemKind, Term};
@@ -23,6 +23,7 @@ pub fn collect<'a>(
     for decl in &names.decls {
         let ItemKind::Reaction { name, reactants, reversible, products, fields } = &decl.item.kind else { continue };
         unknown_fields(fields, FIELDS, "a reaction", diagnostics);
+        forms(fields, &["order", "reverse_order"], &["template"], diagnostics);
         let left = species.terms(names, decl.module, reactants, diagnostics);
         let right = species.terms(names, decl.module, products, diagnostics);
         if left.len() != reactants.len() || right.len() != products.len() {

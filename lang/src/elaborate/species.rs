@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::SpeciesId;
+use super::properties::Properties;
 use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind, Name, Term};
 use crate::chem::formula::{Formula, FormulaErrorKind};
 use crate::chem::structure::{Structure, StructureErrorKind};
 use crate::names::{DeclId, Names};
-use crate::units::Units;
 
 /// A declared species.
 #[derive(Clone, Debug)]
@@ -44,7 +44,14 @@ impl SpeciesDef<'_> {
 
     /// The phase it states: `solid`, `liquid`, `gas`.
     pub fn phase(&self) -> Option<&str> {
-        text(self.fields, "phase").map(|t| t.0)
+        match &field(self.fields, "phase")?.value {
+            FieldValue::Expr(e) => match &*e.kind {
+                ExprKind::Text(t) => Some(t),
+                ExprKind::Name(n) => Some(&n.text),
+                _ => None,
+            },
+            _ => None,
+        }
     }
 }
 
@@ -55,35 +62,13 @@ pub struct SpeciesTable<'a> {
     by_decl: BTreeMap<DeclId, SpeciesId>,
 }
 
-/// Fields of a species that have a meaning to the compiler or to the library's laws.
-const FIELDS: &[&str] = &[
-    "smiles",
-    "formula",
-    "same_as",
-    "dissolves",
-    "by",
-    "molar_mass",
-    "density",
-    "molar_volume",
-    "heat_capacity",
-    "specific_heat",
-    "boiling_point",
-    "melting_point",
-    "flash_point",
-    "phase",
-    "hazards",
-    "reactive_groups",
-    "absorbs",
-    "color",
-    "solubility",
-    "autoignition",
-    "vapor_pressure",
-    "pka",
-];
+/// Fields of a species that say what it is; all others are properties.
+const FIELDS: &[&str] = &["smiles", "formula", "same_as", "dissolves", "by", "reactive_groups"];
 
 impl<'a> SpeciesTable<'a> {
     /// Reads every `species` item.
-    pub fn new(names: &'a Names<'a>, units: &Units, diagnostics: &mut Vec<Diagnostic>) -> Self {
+    pub fn new(names: &'a Names<'a>, properties: &Properties<'a>, diagnostics: &mut Vec<Diagnostic>) -> Self {
+        let known: Vec<&str> = FIELDS.iter().chain(properties.keys()).copied().collect();
         let mut table = SpeciesTable::default();
         let mut aliases = Vec::new();
         for (index, decl) in names.decls.iter().enumerate() {
@@ -93,9 +78,17 @@ impl<'a> SpeciesTable<'a> {
                 && let ExprKind::Name(other) = &**kind
             {
                 aliases.push((id, decl.module, other));
+                if let Some(f) = fields.iter().find(|f| f.key.text != "same_as") {
+                    let headline = format!(
+                        "`{}` is another name of `{}` and has no `{}` of its own",
+                        name.text, other.text, f.key.text
+                    );
+                    let d = Diagnostic::error(codes::MISPLACED, f.span, headline, "has no effect");
+                    diagnostics.push(d.help(format!("give it with `{}`, or leave out `same_as`", other.text)));
+                }
                 continue;
             }
-            let def = species(id, decl.module, name, fields, units, diagnostics);
+            let def = species(id, decl.module, name, fields, &known, diagnostics);
             table.by_decl.insert(id, SpeciesId(table.all.len() as u32));
             table.all.push(def);
         }
@@ -185,10 +178,11 @@ fn species<'a>(
     module: usize,
     name: &Name,
     fields: &'a [Field],
-    units: &Units,
+    known: &[&str],
     diagnostics: &mut Vec<Diagnostic>,
 ) -> SpeciesDef<'a> {
-    super::fields::unknown_fields(fields, FIELDS, "a species", diagnostics);
+    unknown_properties(fields, known, diagnostics);
+    check_forms(fields, diagnostics);
     let by_mass = field(fields, "by").is_some();
     let formula = text(fields, "formula").and_then(|(t, span)| read_formula(t, span, diagnostics));
     let structure = text(fields, "smiles").and_then(|(t, span)| match Structure::parse(t) {
@@ -256,7 +250,6 @@ fn species<'a>(
         }),
         None => 1.0,
     };
-    check_molar_mass(name, fields, molar_mass, units, diagnostics);
     SpeciesDef {
         decl,
         name: name.text.clone(),
@@ -320,20 +313,34 @@ fn structure_error(kind: &StructureErrorKind) -> String {
     }
 }
 
-/// A stated molar mass must agree with the formula to one part in a thousand.
-fn check_molar_mass(name: &Name, fields: &[Field], computed: f64, units: &Units, diagnostics: &mut Vec<Diagnostic>) {
-    let Some(f) = field(fields, "molar_mass") else { return };
-    let FieldValue::Expr(e) = &f.value else { return };
-    let ExprKind::Quantity(v, u) = &*e.kind else { return };
-    let Ok(unit) = units.resolve(&u.text) else { return };
-    let stated = unit.unit.to_si(*v);
-    if (stated / computed - 1.0).abs() > 1e-3 {
-        diagnostics.push(Diagnostic::error(
-            codes::FORMULA_INVALID,
-            e.span,
-            format!("the molar mass of `{}` is {}", name.text, unit.unit.show(computed)),
-            "does not agree with the formula",
-        ));
+/// Reports properties that no capability `Species` declares.
+fn unknown_properties(fields: &[Field], known: &[&str], diagnostics: &mut Vec<Diagnostic>) {
+    let before = diagnostics.len();
+    super::fields::unknown_fields(fields, known, "a species", diagnostics);
+    for d in diagnostics.iter_mut().skip(before).filter(|d| d.code == codes::UNKNOWN_FIELD) {
+        d.help
+            .push("a property of your own is declared with its type: `capability Species { param NAME: TYPE }`".into());
+    }
+}
+
+/// What says what a species is has one form each.
+fn check_forms(fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {
+    for f in fields {
+        let kind = match &f.value {
+            FieldValue::Expr(e) => Some(&*e.kind),
+            _ => None,
+        };
+        let (fits, form) = match f.key.text.as_str() {
+            "formula" | "smiles" => (matches!(kind, Some(ExprKind::Text(_) | ExprKind::Error)), "a text in quotes"),
+            "by" => (matches!(kind, Some(ExprKind::Name(n)) if n.text == "mass"), "`mass`"),
+            "same_as" => (matches!(kind, Some(ExprKind::Name(_) | ExprKind::Error)), "the name of a species"),
+            "dissolves" => (matches!(f.value, FieldValue::Species(_)), "a sum of ions, such as `Na+ + Cl-`"),
+            _ => continue,
+        };
+        if !fits {
+            let headline = format!("`{}` is {form}", f.key.text);
+            diagnostics.push(Diagnostic::error(codes::TYPE_MISMATCH, f.span, headline, "something else"));
+        }
     }
 }
 

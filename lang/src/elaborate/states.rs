@@ -32,19 +32,28 @@ impl<'a> Elaborator<'a> {
                 }
                 continue;
             }
+            if !self.is_there(options) {
+                let Type::Quantity { dimension, .. } = ty else { continue };
+                let zero = self.number(0.0, dimension, false);
+                self.keep_value(id, m, &[false, true], &zero);
+                continue;
+            }
             let index = self.allocate(id, full, &ty, options, scale, m.member.span);
             let value = self.state_node(index, &ty);
-            for initial in [false, true] {
-                for live in [false, true] {
-                    if !initial {
-                        let key = MemberKey::of(m, initial, live);
-                        self.instances[id.0 as usize].values.insert(key, value.clone());
-                    }
-                }
-            }
+            self.keep_value(id, m, &[false], &value);
             if *role == Role::Extensive {
                 let key = ExtensiveKey { instance: id, member: name.text.clone(), species: None };
                 self.extensive.insert(key, index);
+            }
+        }
+    }
+
+    /// The value of a member, now and where `initial` says so at the start.
+    fn keep_value(&mut self, id: InstanceId, m: MemberRef<'a>, initial: &[bool], value: &Value) {
+        for initial in initial {
+            for live in [false, true] {
+                let key = MemberKey::of(m, *initial, live);
+                self.instances[id.0 as usize].values.insert(key, value.clone());
             }
         }
     }
@@ -167,6 +176,9 @@ impl<'a> Elaborator<'a> {
             // States of an instance are declared before they are read; here is only what could not be.
             return Value::Error;
         }
+        if let Some(zero) = self.without(id, m, ty) {
+            return zero;
+        }
         if let Some(setting) = self.instances[id.0 as usize].setting(name)
             && let Some(e) = Self::field_expr(setting.value())
         {
@@ -216,7 +228,9 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.all_members(id).iter().copied() {
-                if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind {
+                if let MemberKind::Value { role: Role::Param, name, .. } = &m.member.kind
+                    && !self.is_idle(id, m)
+                {
                     self.member_value(id, m, name.span);
                 }
             }
@@ -225,10 +239,12 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.all_members(id).iter().copied() {
-                let MemberKind::Value { role: Role::State | Role::Extensive, name, per: None, .. } = &m.member.kind
+                let MemberKind::Value { role: Role::State | Role::Extensive, name, per: None, options, .. } =
+                    &m.member.kind
                 else {
                     continue;
                 };
+                self.check_contents_given(id, options);
                 let value = self.member_value(id, m, name.span);
                 let current = self.instances[i as usize].values.get(&MemberKey::of(m, false, false));
                 let index = match current {

@@ -6,8 +6,10 @@ use std::sync::{Arc, OnceLock, RwLock};
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 use rustc_hash::FxHashMap;
 
+use super::properties::{self, Properties};
+use super::reach::Reach;
 use super::species::SpeciesTable;
-use super::units;
+use super::{Elaborator, units};
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
 use crate::budget::Stop;
 use crate::lower::declared_failures;
@@ -99,6 +101,8 @@ pub struct Tables<'a> {
     pub kinds: BTreeMap<DeclId, Kind<'a>>,
     /// Commands by the words of their verbs, in order of capability.
     commands: BTreeMap<String, Vec<MemberRef<'a>>>,
+    /// What may be said of species, with its types.
+    pub properties: Properties<'a>,
     /// Species.
     pub species: SpeciesTable<'a>,
     /// Reactions whose species are all known.
@@ -125,6 +129,7 @@ impl<'a> Tables<'a> {
             failures: OnceLock::new(),
             kinds: BTreeMap::new(),
             commands: BTreeMap::new(),
+            properties: Properties::new(),
             species: SpeciesTable::default(),
             reactions: Vec::new(),
             screen: Screen::default(),
@@ -144,8 +149,14 @@ impl<'a> Tables<'a> {
                 }
             }
         }
-        tables.species = SpeciesTable::new(names, &tables.units, &mut diagnostics);
-        tables.screen = Screen::new(names, &tables.units, &tables.species, &mut diagnostics);
+        tables.properties = properties::declared(&tables.kinds, &mut diagnostics);
+        tables.species = SpeciesTable::new(names, &tables.properties, &mut diagnostics);
+        tables.screen = {
+            let mut lab = Elaborator::new(&tables, Reach::default());
+            let screen = Screen::new(&mut lab);
+            diagnostics.append(&mut lab.diagnostics);
+            screen
+        };
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
         (tables, diagnostics)
     }

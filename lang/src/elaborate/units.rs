@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, UnitText};
+use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, Unary, UnitText};
 use crate::names::{Names, near};
 use crate::units::text::UnitError;
 use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units, called};
@@ -217,6 +217,11 @@ fn unit(units: &mut Units, item: &Item, diagnostics: &mut Vec<Diagnostic>) {
         ));
         return;
     }
+    if !(factor.is_finite() && factor > 0.0) {
+        let headline = format!("the size of the unit `{}` is not a number above zero", name.text);
+        diagnostics.push(Diagnostic::error(codes::OUT_OF_RANGE, name.span, headline, "measures nothing"));
+        return;
+    }
     let offset = origin.as_ref().and_then(|e| constant(units, e, diagnostics)).map(|(_, v)| v);
     let offset = offset.or_else(|| declared.as_ref().is_some_and(|d| d.point).then_some(0.0));
     let (prefixes, span) = (*prefixes, name.span);
@@ -247,6 +252,11 @@ fn constant(units: &Units, e: &Expr, diagnostics: &mut Vec<Diagnostic>) -> Optio
             let (a, b) = (constant(units, a, diagnostics)?, constant(units, b, diagnostics)?);
             Some(if *op == Binary::Mul { (a.0.times(&b.0), a.1 * b.1) } else { (a.0.over(&b.0), a.1 / b.1) })
         }
+        ExprKind::Binary(Binary::Pow, a, b) if exponent(b).is_some() => {
+            let (a, power) = (constant(units, a, diagnostics)?, exponent(b)?);
+            Some((a.0.power(power), matterix_ir::math::pow(a.1, power.num as f64 / power.den as f64)))
+        }
+        ExprKind::Unary(Unary::Neg, a) => constant(units, a, diagnostics).map(|(d, v)| (d, -v)),
         ExprKind::Tuple(items, None) if items.len() == 1 => constant(units, &items[0], diagnostics),
         ExprKind::Error => None,
         _ => {

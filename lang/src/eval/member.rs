@@ -347,10 +347,17 @@ impl<'a> Elaborator<'a> {
         let MemberKind::Value { role, name, ty, per, value, options } = &m.member.kind else { return Value::Error };
         let ty = self.resolve_type(ty, m.module);
         if *role == Role::Param || *role == Role::Derived {
-            let setting = self.instances[id.0 as usize].setting(&name.text);
-            // What an asset's line says of its shape is no value: the `room` of a vessel is what still fits in.
-            let shape = *role == Role::Derived && GEOMETRY.contains(&name.text.as_str());
-            if let Some(setting) = setting.filter(|_| !shape) {
+            let instance = &self.instances[id.0 as usize];
+            let setting = match role {
+                Role::Param => instance.setting(&name.text),
+                // What an asset's line says of its shape is no value: the `room` of a vessel is what still fits in.
+                _ if GEOMETRY.contains(&name.text.as_str()) => None,
+                _ => instance.redefined(id, &name.text),
+            };
+            if let Some(value) = self.started(id, m, &ty) {
+                return value;
+            }
+            if let Some(setting) = setting {
                 let value = self.param(id, &name.text, &ty, setting);
                 if let FieldValue::Expr(at) = setting.value() {
                     self.check_limits(&value, at.span, &name.text, &ty, options, m.module);
@@ -452,7 +459,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Constants become parameters of the model, so that a study can vary them.
-    fn as_param(&mut self, id: InstanceId, name: &str, ty: &Type, value: Value, span: Span) -> Value {
+    pub fn as_param(&mut self, id: InstanceId, name: &str, ty: &Type, value: Value, span: Span) -> Value {
         let full = format!("{}.{name}", self.instances[id.0 as usize].name);
         match value {
             Value::Num(n) => {
@@ -777,13 +784,13 @@ impl<'a> Elaborator<'a> {
             "count" => return Value::Method(Box::new(Value::Species(s)), "count".into()),
             _ => {}
         }
-        let (module, fields, by_mass, molar_mass) = (def.module, def.fields, def.by_mass, def.molar_mass);
+        let (by_mass, molar_mass) = (def.by_mass, def.molar_mass);
         if let Some((_, known)) =
             self.known_properties.get(&s).and_then(|of| of.iter().find(|(n, _)| **n == *name.text))
         {
             return known.clone();
         }
-        if let Some(v) = self.property(module, fields, &name.text) {
+        if let Some(v) = self.property(s, &name.text) {
             return self.known_property(s, &name.text, v);
         }
         let per_amount = |this: &mut Self, specific: Value| match specific {
@@ -798,7 +805,7 @@ impl<'a> Elaborator<'a> {
         };
         // What follows from another stated property by definition of density and specific heat.
         let derived = match name.text.as_str() {
-            "molar_volume" => self.property(module, fields, "density").map(|v| match v {
+            "molar_volume" => self.property(s, "density").map(|v| match v {
                 Value::Num(n) => {
                     let m = self.graph.number(molar_mass);
                     let node = self.graph.binary(BinaryOp::Div, m, n.node);
@@ -807,14 +814,22 @@ impl<'a> Elaborator<'a> {
                 }
                 other => other,
             }),
-            "heat_capacity" => self.property(module, fields, "specific_heat").map(|v| per_amount(self, v)),
+            "heat_capacity" => self.property(s, "specific_heat").map(|v| per_amount(self, v)),
             _ => None,
         };
         if let Some(v) = derived {
             return self.known_property(s, &name.text, v);
         }
+        let Some(ty) = self.property_type(&name.text) else {
+            let known = self.tables.properties.keys().map(ToString::to_string);
+            let known = known.chain(["charge", "splits", "ions", "count"].map(String::from)).collect();
+            return self.no_member(&Value::Species(s), name, known);
+        };
         if self.prototype {
-            return self.number(1.0, Dimension::any(), false);
+            return match ty {
+                Type::Quantity { .. } => self.placeholder(&ty, &name.text),
+                _ => self.number(1.0, Dimension::any(), false),
+            };
         }
         let def = self.tables.species.get(s);
         let by = if by_mass { "`specific_heat`" } else { "`heat_capacity`" };
@@ -843,14 +858,6 @@ impl<'a> Elaborator<'a> {
             self.known_properties.entry(s).or_default().push((name.into(), value.clone()));
         }
         value
-    }
-
-    fn property(&mut self, module: usize, fields: &'a [crate::ast::Field], key: &str) -> Option<Value> {
-        let field = crate::elaborate::species::field(fields, key)?;
-        match &field.value {
-            FieldValue::Expr(e) => Some(self.expr(e, &mut Scope::module(module))),
-            _ => None,
-        }
     }
 
     /// The kinds an instance has, itself included, most derived first.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::Env;
 use matterix_ir::scene::{Instance, InstanceId};
 use matterix_ir::stock::Substance;
+use matterix_ir::{Env, NodeId};
 
 use super::list::{List, Step, table};
 use super::{Prose, words};
@@ -35,11 +35,15 @@ impl Prose<'_, '_> {
 
     /// kg and SI of the written unit, by holding.
     fn held(&self) -> Vec<(f64, f64)> {
+        let stock = &self.program.stock;
+        stock.holdings.iter().map(|h| (self.at_first(h.mass), self.at_first(h.amount))).collect()
+    }
+
+    /// A value that rests on parameters only.
+    fn at_first(&self, node: NodeId) -> f64 {
         let model = &self.program.model;
         let params: Vec<f64> = model.params.iter().map(|p| p.value).collect();
-        let env = Env { time: 0.0, states: &[], params: &params, locals: &[], readings: &[] };
-        let stock = &self.program.stock;
-        stock.holdings.iter().map(|h| (model.graph.eval(h.mass, env), model.graph.eval(h.amount, env))).collect()
+        model.graph.eval(node, Env { time: 0.0, states: &[], params: &params, locals: &[], readings: &[] })
     }
 
     fn instance(&self, id: InstanceId) -> &Instance {
@@ -193,9 +197,11 @@ impl Prose<'_, '_> {
                 })
                 .collect();
             let Some((first, _)) = terms.clone().next() else { continue };
+            let warm = first.start.as_ref().map(|(node, unit)| words::quantity(&unit.show(self.at_first(*node))));
+            let warm = warm.map(|t| format!(" at {t}")).unwrap_or_default();
             let (vessel, what, place) = (
                 self.instance(self.holder(mixture)).name.clone(),
-                words::joined(&texts, "and"),
+                format!("{}{warm}", words::joined(&texts, "and")),
                 self.place(first.span),
             );
             match fills.last_mut() {

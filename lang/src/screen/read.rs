@@ -8,11 +8,11 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::{Consequence, Group, Incompatibility, Least, Party, Screen, in_order};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind, Name};
 use crate::chem::Pattern;
-use crate::elaborate::SpeciesId;
-use crate::elaborate::fields::unknown_fields;
+use crate::elaborate::fields::{forms, unknown_fields};
 use crate::elaborate::species::{SpeciesTable, field};
+use crate::elaborate::{Elaborator, SpeciesId};
+use crate::eval::{Scope, Value};
 use crate::names::{DeclId, Names, near};
-use crate::units::Units;
 
 const GROUP: &[&str] = &["title", "smarts", "unless", "members", "above", "source"];
 const MATERIAL: &[&str] = &["title", "source", "friction"];
@@ -20,22 +20,18 @@ const PAIR: &[&str] = &["consequence", "above", "phase", "source"];
 
 /// What reading needs.
 struct Reader<'r, 'a> {
-    names: &'r Names<'a>,
-    units: &'r Units,
-    species: &'r SpeciesTable<'a>,
+    names: &'a Names<'a>,
+    species: &'a SpeciesTable<'a>,
     found: &'r mut Vec<Diagnostic>,
+    lab: &'r mut Elaborator<'a>,
 }
 
 impl Screen {
     /// Reads every group, material, pair and allowance.
-    pub fn new<'a>(
-        names: &Names<'a>,
-        units: &Units,
-        species: &SpeciesTable<'a>,
-        found: &mut Vec<Diagnostic>,
-    ) -> Screen {
+    pub fn new<'a>(lab: &mut Elaborator<'a>) -> Screen {
         let mut screen = Screen::default();
-        let mut reader = Reader { names, units, species, found };
+        let (names, species, mut found) = (lab.tables.names, &lab.tables.species, Vec::new());
+        let mut reader = Reader { names, species, found: &mut found, lab };
         for index in 0..names.decls.len() as u32 {
             let id = DeclId(index);
             match &names.decl(id).item.kind {
@@ -46,6 +42,7 @@ impl Screen {
                 }
                 ItemKind::Material { name, fields } => {
                     unknown_fields(fields, MATERIAL, "a material", reader.found);
+                    forms(fields, &[], &["title", "source"], reader.found);
                     screen.materials.insert(id, reader.title(fields, name));
                 }
                 _ => {}
@@ -62,7 +59,7 @@ impl Screen {
                     ItemKind::Incompatible { a, b, fields } => {
                         let span = a.span.to(b.span);
                         let parties = reader.parties(a, b, module, &screen.by_decl);
-                        let pair = reader.pair(fields, span);
+                        let pair = reader.pair(fields, span, module);
                         if let (Some((x, y)), Some(pair)) = (parties, pair) {
                             let parties = in_order(x, y);
                             screen.index.entry(parties).or_default().push(screen.pairs.len());
@@ -77,13 +74,15 @@ impl Screen {
             }
         }
         screen.seats = species.iter().map(|_| OnceLock::new()).collect();
+        found.into_iter().for_each(|d| lab.report(d));
         screen
     }
 }
 
-impl Reader<'_, '_> {
-    fn group(&mut self, decl: DeclId, name: &Name, fields: &[Field]) -> Group {
+impl<'a> Reader<'_, 'a> {
+    fn group(&mut self, decl: DeclId, name: &Name, fields: &'a [Field]) -> Group {
         unknown_fields(fields, GROUP, "a reactive group", self.found);
+        forms(fields, &["members"], &[], self.found);
         let module = self.names.decl(decl).module;
         if field(fields, "smarts").is_none() && field(fields, "members").is_none() {
             self.missing(name, "`smarts` or `members`", "nothing belongs to it", "smarts: [\"...\"]");
@@ -96,12 +95,13 @@ impl Reader<'_, '_> {
             exceptions: self.patterns(fields, "unless"),
             read: OnceLock::new(),
             members: self.members(fields, module),
-            least: self.least(fields),
+            least: self.least(fields, module),
         }
     }
 
-    fn pair(&mut self, fields: &[Field], span: Span) -> Option<Incompatibility> {
+    fn pair(&mut self, fields: &'a [Field], span: Span, module: usize) -> Option<Incompatibility> {
         unknown_fields(fields, PAIR, "an incompatibility", self.found);
+        forms(fields, &[], &["source"], self.found);
         let source = self.source(fields, span, "this pair");
         let Some(f) = field(fields, "consequence") else {
             let name = Name { text: "this pair".into(), span };
@@ -111,7 +111,7 @@ impl Reader<'_, '_> {
         let words = self.words(f);
         let mut consequences: Vec<Consequence> = words.into_iter().filter_map(|word| self.consequence(word)).collect();
         consequences.sort_unstable();
-        let least = self.least(fields);
+        let least = self.least(fields, module);
         let phase = field(fields, "phase").and_then(|f| self.words(f).first().map(|n| n.text.clone()));
         let nobody = Party::Group(0);
         (!consequences.is_empty()).then_some(Incompatibility {
@@ -185,7 +185,7 @@ impl Reader<'_, '_> {
         out
     }
 
-    fn members(&mut self, fields: &[Field], module: usize) -> Vec<(SpeciesId, Option<Least>)> {
+    fn members(&mut self, fields: &'a [Field], module: usize) -> Vec<(SpeciesId, Option<Least>)> {
         let mut out = Vec::new();
         let Some(f) = field(fields, "members") else { return out };
         let FieldValue::Fields(lines) = &f.value else {
@@ -199,7 +199,7 @@ impl Reader<'_, '_> {
         for line in lines {
             let least = match &line.value {
                 FieldValue::Expr(e) if matches!(&*e.kind, ExprKind::Name(n) if n.text == "any") => None,
-                FieldValue::Expr(e) => match self.content(e) {
+                FieldValue::Expr(e) => match self.content(e, module) {
                     Some(least) => Some(least),
                     None => continue,
                 },
@@ -213,24 +213,31 @@ impl Reader<'_, '_> {
         out
     }
 
-    fn least(&mut self, fields: &[Field]) -> Option<Least> {
-        match &field(fields, "above")?.value {
-            FieldValue::Expr(e) => self.content(e),
-            _ => None,
+    fn least(&mut self, fields: &'a [Field], module: usize) -> Option<Least> {
+        let f = field(fields, "above")?;
+        match &f.value {
+            FieldValue::Expr(e) => self.content(e, module),
+            _ => {
+                self.misfit(f.span, "`above` is a least content", "above: 0.5 mol/kg");
+                None
+            }
         }
     }
 
     /// `0.5 mol/kg`, `8 %w/w`.
-    fn content(&mut self, e: &Expr) -> Option<Least> {
-        if let ExprKind::Quantity(value, unit) = &*e.kind
-            && let Ok(resolved) = self.units.resolve(&unit.text)
+    fn content(&mut self, e: &'a Expr, module: usize) -> Option<Least> {
+        let value = match self.lab.expr(e, &mut Scope::module(module)) {
+            Value::Error => return None,
+            value => value,
+        };
+        let units = &self.lab.tables.units;
+        if let Value::Num(n) = value
+            && let Some(si) = self.lab.graph.constant(n.node).filter(|v| v.is_finite() && *v >= 0.0)
         {
-            let si = resolved.unit.to_si(*value);
-            let (amount, mass) = (self.units.named("Amount"), self.units.named("Mass"));
-            if resolved.dimension == amount.over(&mass) {
+            if n.dimension == units.named("Amount").over(&units.named("Mass")) {
                 return Some(Least::Amount(si));
             }
-            if resolved.dimension == self.units.named("MassFraction") {
+            if n.dimension == units.named("MassFraction") {
                 return Some(Least::Share(si));
             }
         }

@@ -67,6 +67,7 @@ pub fn stock(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], 
             amount: term.quantity.node,
             unit: lab.unit_of(&term.quantity),
             mass,
+            start: term.mixture.and_then(|id| lab.start_of(id)).map(|n| (n.node, lab.unit_of(&n))),
             span: term.span,
         });
     }

@@ -5,10 +5,9 @@ use std::collections::BTreeSet;
 use matterix_ir::Sources;
 use matterix_ir::stock::{Portion, Recipe};
 
-use crate::ast::{ExprKind, FieldValue, ItemKind};
+use crate::ast::{FieldValue, ItemKind};
 use crate::elaborate::contents::Substance;
 use crate::elaborate::{Elaborator, SpeciesId};
-use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
 /// The recipes, each after those that use it; the species they need are added to `species`.
@@ -40,39 +39,16 @@ fn recipe(
     species: &mut BTreeSet<SpeciesId>,
 ) -> Option<Recipe> {
     let decl = lab.tables.names.decl(id);
-    let ItemKind::Solution { name, fields, labelled } = &decl.item.kind else { return None };
-    let fraction = lab.tables.units.named("MassFraction");
+    let ItemKind::Solution { name, labelled, .. } = &decl.item.kind else { return None };
     let mut lines = Vec::new();
-    let mut rest = None;
-    for field in fields {
-        let FieldValue::Expr(e) = &field.value else { continue };
-        let what = lab.substance(&field.key, decl.module)?;
-        match &what {
-            Substance::Species(s) => drop(species.insert(*s)),
-            Substance::Solution(id) => queue.push(*id),
+    for portion in lab.portions(id)? {
+        let FieldValue::Expr(e) = &portion.field.value else { continue };
+        match lab.substance(&portion.field.key, decl.module)? {
+            Substance::Species(s) => drop(species.insert(s)),
+            Substance::Solution(id) => queue.push(id),
         }
         let text = sources.slice(e.span).to_owned();
-        let mass = if matches!(&*e.kind, ExprKind::Name(n) if n.text == "rest") {
-            rest = Some(lines.len());
-            0.0
-        } else {
-            let Value::Num(n) = lab.expr(e, &mut Scope::module(decl.module)) else { return None };
-            if n.dimension == fraction {
-                lab.graph.constant(n.node)?
-            } else {
-                let mut mass = 0.0;
-                for (s, node) in lab.amounts_of(&what, n, e.span, &field.key) {
-                    mass += lab.graph.constant(node)? * lab.tables.species.get(s).molar_mass;
-                }
-                mass
-            }
-        };
-        lines.push(Portion { substance: field.key.text.clone(), text, share: mass });
-    }
-    let sum: f64 = lines.iter().map(|l| l.share).sum();
-    match rest.and_then(|i| lines.get_mut(i)) {
-        Some(rest) => rest.share = 1.0 - sum,
-        None => lines.iter_mut().for_each(|l| l.share /= sum),
+        lines.push(Portion { substance: portion.field.key.text.clone(), text, share: portion.share });
     }
     let label = labelled.as_ref().map(|l| sources.slice(l.value.span.to(l.species.span)).to_owned());
     Some(Recipe { name: name.text.clone(), parts: lines, label, span: name.span })

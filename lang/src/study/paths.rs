@@ -41,6 +41,7 @@ impl Elaborator<'_> {
             return None;
         };
         let own = text.strip_prefix(lab).and_then(|rest| rest.strip_prefix('.')).unwrap_or(&text).to_string();
+        let own = self.answering(own);
         let value = self.silently(|this| this.member_at(&own, path));
         let found: Vec<Named> = self.open.named(&own).cloned().collect();
         match found.as_slice() {
@@ -54,10 +55,11 @@ impl Elaborator<'_> {
             }
             [one] => Some(one.clone()),
             [] => {
-                let d = match value {
+                let mut d = match value {
                     Some(value) => self.fixed_by(&text, value, path),
                     None => self.unknown_path(&text, &own, path),
                 };
+                d.help.extend(self.instead_at(&own));
                 self.report(d);
                 None
             }
@@ -74,6 +76,20 @@ impl Elaborator<'_> {
         }
     }
 
+    /// A path to a member that the only part of a thing answers for, with that part: `cup.contents.air` of `cup.air`.
+    fn answering(&self, path: String) -> String {
+        let Some((instance, member)) = path.rsplit_once('.') else { return path };
+        let Some(thing) = self.instances.iter().position(|i| i.name == instance) else { return path };
+        if self.has_member(InstanceId(thing as u32), member) {
+            return path;
+        }
+        let mut fitting = self.instances[thing].parts.values().filter(|p| self.has_member(**p, member));
+        match (fitting.next(), fitting.next()) {
+            (Some(part), None) => format!("{}.{member}", self.instances[part.0 as usize].name),
+            _ => path,
+        }
+    }
+
     /// What a member of an instance is worth; it becomes a parameter of the model if it is given as a number.
     fn member_at(&mut self, path: &str, at: &Expr) -> Option<Value> {
         let (instance, member) = path.rsplit_once('.')?;
@@ -81,6 +97,13 @@ impl Elaborator<'_> {
         let found = self.members_of(id, member);
         let values: Vec<Value> = found.iter().map(|m| self.member_value(id, *m, at.span)).collect();
         values.into_iter().next()
+    }
+
+    /// What to give in place of a derived member.
+    fn instead_at(&self, path: &str) -> Option<String> {
+        let (instance, member) = path.rsplit_once('.')?;
+        let thing = self.instances.iter().position(|i| i.name == instance)?;
+        self.instead_of(InstanceId(thing as u32), member)
     }
 
     /// Does something whose findings are another's.

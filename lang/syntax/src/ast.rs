@@ -990,7 +990,7 @@ pub enum LabLineKind {
         /// Its value.
         value: Expr,
     },
-    /// `beaker = Beaker250mL { } on table at (450, -250) mm holding 10 g of water`.
+    /// `beaker = Beaker250mL { } on table at (450, -250) mm holding 10 g of water at 80 degC`.
     Instance {
         /// Its name.
         name: Name,
@@ -1023,9 +1023,18 @@ pub enum LabLineKind {
     },
 }
 
-/// What an instance holds at the start.
+/// What an instance holds at the start, and how warm that is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Holding {
+pub struct Holding {
+    /// What.
+    pub contents: Contents,
+    /// `at 80 degC` after the whole.
+    pub at: Option<Expr>,
+}
+
+/// What stands after `holding`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Contents {
     /// `10 g of water + 12 mmol of EtOH`: an `of` sum, shaped as a binary expression.
     Expr(Expr),
     /// `{ A1: 20 mL of buffer, A2 .. A12: 5 mL of dye }`.
@@ -1041,6 +1050,8 @@ pub struct Fill {
     pub to: Option<Name>,
     /// What each of them holds.
     pub value: Expr,
+    /// `at 4 degC`.
+    pub at: Option<Expr>,
 }
 
 /// A line of a study.

@@ -107,7 +107,8 @@ parts! {
     Until { asks expects timeout }
     Pattern { text span }
     LabLine { kind span }
-    Fill { from to value }
+    Fill { from to value at }
+    Holding { contents at }
     Block { stmts span }
     Handlers { on finally }
     Stmt { kind span }
@@ -306,11 +307,11 @@ impl Moved for LabLineKind {
     }
 }
 
-impl Moved for Holding {
+impl Moved for Contents {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
-            Holding::Expr(a) => each!(put: a),
-            Holding::Places(a) => each!(put: a),
+            Contents::Expr(a) => each!(put: a),
+            Contents::Places(a) => each!(put: a),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Lines of labs, and what of a lab is seen.
 
-use matterix_lang::ast::{Holding, ItemKind, LabLine, LabLineKind, Path};
+use matterix_lang::ast::{Contents, ItemKind, LabLine, LabLineKind, Path};
 
 use super::Walk;
 use crate::index::{DefId, Kind};
@@ -17,18 +17,20 @@ impl Walk<'_> {
                 self.declares(name.span);
                 self.literal(literal);
                 self.exprs(relations.iter().map(|r| &r.1));
-                match holding {
-                    Some(Holding::Expr(e)) => drop(self.expr(e)),
-                    Some(Holding::Places(fills)) => {
+                let Some(holding) = holding else { return };
+                match &holding.contents {
+                    Contents::Expr(e) => drop(self.expr(e)),
+                    Contents::Places(fills) => {
                         for fill in fills {
                             for place in std::iter::once(&fill.from).chain(&fill.to) {
                                 self.language(place.span, "a place of the grid");
                             }
                             self.expr(&fill.value);
+                            self.exprs(&fill.at);
                         }
                     }
-                    None => {}
                 }
+                self.exprs(&holding.at);
             }
             LabLineKind::Include { lab, name, relations, options } => {
                 self.path(lab);

@@ -7,9 +7,9 @@ use super::{
     steps::{block, filled, handlers, labelled},
 };
 use crate::ast::{
-    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Effect, Event, Exchange, Expr, Field, FieldValue,
-    FitLine, Goal, Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner, Member, MemberKind,
-    Name, Pattern, Process, Refusal, Role, StudyLine, Term, Wire, WireKind,
+    AssetLine, AssetLiteral, AssignOp, At, Clause, ClauseKind, Contents, Effect, Event, Exchange, Expr, Field,
+    FieldValue, Fill, FitLine, Goal, Holding, Item, ItemKind, LabLine, LabLineKind, Labelled, Law, LawKind, Manner,
+    Member, MemberKind, Name, Pattern, Process, Refusal, Role, StudyLine, Term, Wire, WireKind,
 };
 
 pub(super) fn docs(docs: &[String]) -> Option<Sexp> {
@@ -337,6 +337,19 @@ fn exchange(said: &Exchange) -> Vec<Sexp> {
     out
 }
 
+fn places(fill: &Fill) -> Sexp {
+    node("places")
+        .with([name(&fill.from)])
+        .with(fill.to.as_ref().map(|to| node("to").with([name(to)])))
+        .with([expr(&fill.value)])
+        .with(warm(fill.at.as_ref()))
+}
+
+/// How warm what is held is.
+fn warm(at: Option<&Expr>) -> Option<Sexp> {
+    at.map(|at| node("at").with([expr(at)]))
+}
+
 fn lab_line(line: &LabLine) -> Sexp {
     match &line.kind {
         LabLineKind::Error => leaf("error"),
@@ -344,14 +357,12 @@ fn lab_line(line: &LabLine) -> Sexp {
         LabLineKind::Instance { name: word, literal: of, relations, holding } => node("instance")
             .with([name(word), literal(of)])
             .with(labelled(relations))
-            .with(holding.as_ref().map(|holding| match holding {
-                Holding::Expr(value) => node("holding").with([expr(value)]),
-                Holding::Places(list) => node("holding").with(list.iter().map(|fill| {
-                    node("places")
-                        .with([name(&fill.from)])
-                        .with(fill.to.as_ref().map(|to| node("to").with([name(to)])))
-                        .with([expr(&fill.value)])
-                })),
+            .with(holding.as_ref().map(|Holding { contents, at }| {
+                match contents {
+                    Contents::Expr(value) => node("holding").with([expr(value)]),
+                    Contents::Places(list) => node("holding").with(list.iter().map(places)),
+                }
+                .with(warm(at.as_ref()))
             })),
         LabLineKind::Include { lab, name: word, relations, options } => {
             node("include").with([path(lab), name(word)]).with(labelled(relations)).with(named(options))

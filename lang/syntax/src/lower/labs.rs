@@ -10,8 +10,8 @@ use super::{
     Lower,
 };
 use crate::ast::{
-    AssetLiteral, Exchange, Expr, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name, Path, Pattern,
-    StudyLine, Text, Until, Wire, WireKind,
+    AssetLiteral, Contents, Exchange, Expr, ExprKind, Fill, FitLine, Holding, ItemKind, LabLine, LabLineKind, Name,
+    Path, Pattern, StudyLine, Text, Until, Wire, WireKind,
 };
 
 impl Lower<'_> {
@@ -62,12 +62,7 @@ impl Lower<'_> {
         let kids = &mut Kids::of(node);
         match rule {
             Rule::setting => LabLineKind::Setting { name: self.name_in(kids), value: self.expr_in(kids) },
-            Rule::instance => LabLineKind::Instance {
-                name: self.name_in(kids),
-                literal: self.literal_in(kids),
-                relations: self.labelled_in(kids),
-                holding: self.holding_in(kids),
-            },
+            Rule::instance => self.instance(kids),
             Rule::include => LabLineKind::Include {
                 lab: self.path_in(kids),
                 name: self.name_in(kids),
@@ -108,11 +103,23 @@ impl Lower<'_> {
         }
     }
 
-    fn holding_in(&mut self, kids: &mut Kids) -> Option<Holding> {
+    fn instance(&mut self, kids: &mut Kids) -> LabLineKind {
+        let (name, literal) = (self.name_in(kids), self.literal_in(kids));
+        let mut relations = self.labelled_in(kids);
+        let contents = self.contents_in(kids);
+        // After what is held the first `at` that is not a place says how warm that is.
+        let mut behind = self.labelled_in(kids);
+        let warm = behind.iter().position(|(label, e)| label.text == "at" && !is_place(e)).map(|i| behind.remove(i).1);
+        relations.append(&mut behind);
+        let holding = contents.map(|contents| Holding { contents, at: warm });
+        LabLineKind::Instance { name, literal, relations, holding }
+    }
+
+    fn contents_in(&mut self, kids: &mut Kids) -> Option<Contents> {
         let mut kids = Kids::of(kids.eat(Rule::holding)?);
         Some(match kids.peek() {
-            Some(Rule::fills) => Holding::Places(self.fills(kids.take())),
-            _ => Holding::Expr(self.expr_in(&mut kids)),
+            Some(Rule::fills) => Contents::Places(self.fills(kids.take())),
+            _ => Contents::Expr(self.expr_in(&mut kids)),
         })
     }
 
@@ -124,7 +131,13 @@ impl Lower<'_> {
                 let kids = &mut Kids::of(node);
                 let from = this.name_in(kids);
                 let to = kids.eat(Rule::place).map(|n| this.name(&n));
-                Fill { from, to, value: this.expr_in(kids) }
+                let value = this.expr_in(kids);
+                let at = kids.eat(Rule::fill_at).map(|node| {
+                    let kids = &mut Kids::of(node);
+                    kids.has(Rule::kw_at);
+                    this.expr_in(kids)
+                });
+                Fill { from, to, value, at }
             },
             |_, _, _| None,
         )
@@ -277,6 +290,11 @@ impl Lower<'_> {
     fn said(&mut self, kids: &mut Kids, span: Span) -> Text {
         self.filled_in(kids).unwrap_or(Text { parts: Vec::new(), span })
     }
+}
+
+/// Whether an expression is written as a place: several coordinates in brackets.
+fn is_place(e: &Expr) -> bool {
+    matches!(&*e.kind, ExprKind::Tuple(items, _) if items.len() > 1)
 }
 
 fn nameless(span: Span) -> Name {
