@@ -236,6 +236,9 @@ impl<'a> Elaborator<'a> {
                     let not = self.graph.unary(UnaryOp::Not, c);
                     for (laws, c) in [(then, c), (otherwise, not)] {
                         let both = guard.map_or(c, |g| self.graph.binary(BinaryOp::And, g, c));
+                        if !self.prototype && self.never(both) {
+                            continue;
+                        }
                         self.each_law(laws, Some(both), scope, line);
                     }
                 }
@@ -313,9 +316,8 @@ impl<'a> Elaborator<'a> {
         let Value::Num(n) = self.coerce(v, &ty, value.span, "rate of change") else { return };
         match self.graph.op(state.node) {
             Op::State(index) => out.push((Target::Derivative(index), n.node)),
-            // A species that can never get into this mixture has no state to change.
-            Op::Const(_) => {}
             _ if self.prototype => {}
+            _ if self.writes(place, n.node, scope) => {}
             _ => self.report(Diagnostic::error(
                 codes::INVALID_LAW,
                 place.span,
@@ -702,8 +704,10 @@ impl<'a> Elaborator<'a> {
                 return None;
             }
         };
+        let v = self.typed(value, &ty, scope, "value");
+        let mut new = self.value_node(&v)?;
         let Op::State(state) = self.graph.op(node) else {
-            if !self.prototype && self.graph.constant(node).is_none() {
+            if !self.prototype && !self.writes(target, new, scope) {
                 self.report(
                     Diagnostic::error(codes::INVALID_LAW, target.span, "only a state can be assigned", "not a state")
                         .help("parameters are fixed, derived quantities follow from states"),
@@ -711,8 +715,6 @@ impl<'a> Elaborator<'a> {
             }
             return None;
         };
-        let v = self.typed(value, &ty, scope, "value");
-        let mut new = self.value_node(&v)?;
         self.note_held(state, new);
         if let Some(g) = guard {
             new = self.graph.select(g, new, node);

@@ -28,6 +28,7 @@ pub mod states;
 pub mod tables;
 pub mod units;
 mod whereabouts;
+mod writes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, RwLock};
@@ -207,6 +208,8 @@ pub struct Elaborator<'a> {
     pub readings: Vec<model::Reading>,
     /// Species that can get into each mixture.
     pub reach: Arc<reach::Reach>,
+    /// Species that laws and effects write into mixtures that have no state for them yet.
+    pub written: BTreeSet<(InstanceId, SpeciesId)>,
     /// Transfers found between mixtures.
     pub moves: BTreeSet<(InstanceId, InstanceId)>,
     /// What has touched what another thing has touched, without a transfer: from, to.
@@ -322,6 +325,7 @@ impl<'a> Elaborator<'a> {
             offers: matterix_ir::offer::Offers::default(),
             readings: Vec::new(),
             reach: Arc::new(reach),
+            written: BTreeSet::new(),
             moves: BTreeSet::new(),
             soiled: BTreeSet::new(),
             streams: BTreeMap::new(),
