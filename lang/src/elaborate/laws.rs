@@ -20,8 +20,43 @@ struct Job<'a> {
     name: String,
 }
 
-/// What is made of an assignment or a call in a law, given the condition around it.
-type Line<'l, 'a> = dyn FnMut(&mut Elaborator<'a>, &'a Law, Option<NodeId>, &mut Scope) + 'l;
+/// What is made of the lines of a law.
+pub(super) trait Lines<'a> {
+    /// An assignment or a call, given the condition around it.
+    fn line(&mut self, lab: &mut Elaborator<'a>, law: &'a Law, guard: Option<NodeId>, scope: &mut Scope);
+
+    /// The value of a `let`, as what follows sees it.
+    fn value(&mut self, _: &mut Elaborator<'a>, value: Value) -> Value {
+        value
+    }
+
+    /// The condition of an `if`, as the lines under it see it.
+    fn open(&mut self, _: &mut Elaborator<'a>, condition: NodeId) -> NodeId {
+        condition
+    }
+
+    /// The lines under the condition that was taken last end.
+    fn close(&mut self) {}
+}
+
+/// The lines of a process: all see the state of one instant.
+struct Rates<'o> {
+    out: &'o mut Vec<(Target, NodeId)>,
+}
+
+impl<'a> Lines<'a> for Rates<'_> {
+    fn line(&mut self, lab: &mut Elaborator<'a>, law: &'a Law, guard: Option<NodeId>, scope: &mut Scope) {
+        let first = self.out.len();
+        match &law.kind {
+            LawKind::Assign { target, op, value } => lab.law_assign(target, *op, value, law.span, scope, self.out),
+            LawKind::Call(call) => lab.law_move(call, guard, scope, self.out),
+            _ => {}
+        }
+        let Some(g) = guard else { return };
+        let zero = lab.graph.number(0.0);
+        self.out[first..].iter_mut().for_each(|(_, node)| *node = lab.graph.select(g, *node, zero));
+    }
+}
 
 /// What a law body contributes to.
 enum Target {
@@ -112,7 +147,7 @@ impl<'a> Elaborator<'a> {
         for set in &sets {
             let mut longer = Vec::new();
             for prefix in &out {
-                let after = self.second(prefix, params.len(), unordered);
+                let after = self.second(prefix, &sets, unordered);
                 longer.extend(
                     set.iter().filter(|v| after(v)).map(|v| [prefix.as_slice(), std::slice::from_ref(v)].concat()),
                 );
@@ -133,18 +168,35 @@ impl<'a> Elaborator<'a> {
 
     /// What may follow the first of a pair: another instance, or what can be in it. Decided before tuples are made, for
     /// there are many more species and reactions than any one mixture meets.
-    fn second(&self, first: &[Value], length: usize, unordered: bool) -> impl Fn(&Value) -> bool {
-        let first = match (first, length) {
+    fn second(&self, first: &[Value], sets: &[Vec<Value>], unordered: bool) -> impl Fn(&Value) -> bool {
+        let first = match (first, sets.len()) {
             ([Value::Instance(a)], 2) => Some(*a),
             _ => None,
         };
         let held = first.and_then(|a| self.reach.set(&self.instances[a.0 as usize].name));
         let has = move |s: &SpeciesId| held.is_some_and(|held| held.contains(s));
+        // Instances stand in a set in their order.
+        let in_set = |set: &[Value], id: InstanceId| {
+            set.binary_search_by_key(&Some(id), |v| if let Value::Instance(i) = v { Some(*i) } else { None }).is_ok()
+        };
+        let swapped = first.filter(|a| unordered && in_set(&sets[1], *a));
         move |v| match (first, v) {
-            (Some(a), Value::Instance(b)) => a != *b && (!unordered || a < *b),
+            (Some(a), Value::Instance(b)) if swapped.is_some() && in_set(&sets[0], *b) => self.goes_first(a, *b),
+            (Some(a), Value::Instance(b)) => a != *b,
             (Some(_), Value::Reaction(r)) => self.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| has(s)),
             (Some(_), Value::Species(s)) => has(s),
             _ => true,
+        }
+    }
+
+    /// Which of two things a law takes first that exists once for both: the one that the lab names first in what it gives
+    /// between them, else the one that is declared first.
+    fn goes_first(&self, a: InstanceId, b: InstanceId) -> bool {
+        let given = |x, y| self.pairs.iter().any(|p| !p.symmetric && (p.a, p.b) == (x, y));
+        match (given(a, b), given(b, a)) {
+            (true, false) => a != b,
+            (false, true) => false,
+            _ => a < b,
         }
     }
 
@@ -215,34 +267,42 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Goes through the lines of a law; each assignment and call comes with what the `if` around it ask for.
-    fn each_law(&mut self, laws: &'a [Law], guard: Option<NodeId>, scope: &mut Scope, line: &mut Line<'_, 'a>) {
+    pub(super) fn each_law(
+        &mut self,
+        laws: &'a [Law],
+        guard: Option<NodeId>,
+        scope: &mut Scope,
+        lines: &mut dyn Lines<'a>,
+    ) {
         let depth = scope.vars.len();
         for law in laws {
             match &law.kind {
                 LawKind::Error => {}
                 LawKind::Let { name, value } => {
                     let v = self.expr(value, scope);
+                    let v = lines.value(self, v);
                     scope.bind(name.text.clone(), v);
                 }
                 LawKind::For { var, set, body } => {
                     for item in self.set(set, scope).unwrap_or_default() {
                         scope.bind(var.text.clone(), item);
-                        self.each_law(body, guard, scope, line);
+                        self.each_law(body, guard, scope, lines);
                         scope.vars.pop();
                     }
                 }
                 LawKind::If { cond, then, otherwise } => {
                     let Some(c) = self.truth(cond, scope) else { continue };
+                    let c = lines.open(self, c);
                     let not = self.graph.unary(UnaryOp::Not, c);
                     for (laws, c) in [(then, c), (otherwise, not)] {
                         let both = guard.map_or(c, |g| self.graph.binary(BinaryOp::And, g, c));
-                        if !self.prototype && self.never(both) {
-                            continue;
+                        if self.prototype || !self.never(both) {
+                            self.each_law(laws, Some(both), scope, lines);
                         }
-                        self.each_law(laws, Some(both), scope, line);
                     }
+                    lines.close();
                 }
-                LawKind::Assign { .. } | LawKind::Call(_) => line(self, law, guard, scope),
+                LawKind::Assign { .. } | LawKind::Call(_) => lines.line(self, law, guard, scope),
             }
         }
         scope.vars.truncate(depth);
@@ -250,17 +310,7 @@ impl<'a> Elaborator<'a> {
 
     /// What the lines of a process contribute.
     fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
-        self.each_law(laws, None, scope, &mut |this, law, guard, scope| {
-            let first = out.len();
-            match &law.kind {
-                LawKind::Assign { target, op, value } => this.law_assign(target, *op, value, law.span, scope, out),
-                LawKind::Call(call) => this.law_move(call, guard, scope, out),
-                _ => {}
-            }
-            let Some(g) = guard else { return };
-            let zero = this.graph.number(0.0);
-            out[first..].iter_mut().for_each(|(_, node)| *node = this.graph.select(g, *node, zero));
-        });
+        self.each_law(laws, None, scope, &mut Rates { out });
     }
 
     fn law_assign(
@@ -627,52 +677,12 @@ impl<'a> Elaborator<'a> {
             if self.never(when) {
                 continue;
             }
-            let mut actions = Vec::new();
-            self.event_body(&e.laws, &mut scope, &mut actions);
+            let actions = self.event_actions(&e.laws, &mut scope, (&name, e.name.span));
             if !actions.is_empty() {
                 events.push(Event { name, when, actions, span: e.name.span });
             }
         }
         events
-    }
-
-    /// What the lines of an event do.
-    fn event_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<Action>) {
-        self.each_law(laws, None, scope, &mut |this, law, guard, scope| match &law.kind {
-            LawKind::Assign { op: AssignOp::Set, target, value } => {
-                out.extend(this.assignment(target, value, guard, scope));
-            }
-            LawKind::Assign { .. } => this.report(
-                Diagnostic::error(
-                    codes::INVALID_LAW,
-                    law.span,
-                    "an event is an instant: it assigns, it does not flow",
-                    "not an assignment",
-                )
-                .help("write `x = x + ...`"),
-            ),
-            LawKind::Call(call) => {
-                for action in this.call_actions(call, law.span, scope) {
-                    out.push(this.guarded_action(action, guard));
-                }
-            }
-            _ => {}
-        });
-    }
-
-    /// An action that does nothing where a condition does not hold.
-    fn guarded_action(&mut self, action: Action, guard: Option<NodeId>) -> Action {
-        let Some(g) = guard else { return action };
-        match action {
-            Action::Move { fraction, from, to, span } => {
-                let zero = self.graph.number(0.0);
-                Action::Move { fraction: self.graph.select(g, fraction, zero), from, to, span }
-            }
-            Action::Assign { state, value, span } => {
-                let old = self.graph.add(Op::State(state));
-                Action::Assign { state, value: self.graph.select(g, value, old), span }
-            }
-        }
     }
 
     /// A transfer; mixtures are numbered in the order of the instances.
@@ -723,7 +733,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Notes what a state that holds an instance may come to hold.
-    fn note_held(&mut self, state: u32, value: NodeId) {
+    pub(super) fn note_held(&mut self, state: u32, value: NodeId) {
         if self.states[state as usize].domain != matterix_ir::model::Domain::Instance {
             return;
         }
@@ -787,7 +797,6 @@ impl<'a> Elaborator<'a> {
     /// Checks an event by itself; its parameters are bound in the scope.
     pub fn check_event(&mut self, e: &'a ast::Event, scope: &mut Scope) {
         self.truth(&e.when, scope);
-        let mut actions = Vec::new();
-        self.event_body(&e.laws, scope, &mut actions);
+        self.event_actions(&e.laws, scope, (&e.name.text, e.name.span));
     }
 }

@@ -12,6 +12,7 @@ pub mod hazards;
 pub mod include;
 mod inertia;
 pub mod instances;
+mod instants;
 mod joints;
 pub mod lab;
 mod labels;
@@ -70,10 +71,12 @@ impl MemberKey {
 /// A pair parameter as a lab gives it: `between a and b { name: value }`.
 #[derive(Debug)]
 pub struct Pair<'a> {
-    /// One.
+    /// The first argument.
     pub a: InstanceId,
-    /// The other.
+    /// The second.
     pub b: InstanceId,
+    /// It is declared symmetric: it holds in either order.
+    pub symmetric: bool,
     /// The function it overrides.
     pub name: String,
     /// Its value.
