@@ -2,6 +2,7 @@
 
 pub mod articulation;
 pub mod balances;
+mod conserve;
 pub mod contents;
 mod coverings;
 mod extents;
