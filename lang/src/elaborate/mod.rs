@@ -30,7 +30,7 @@ pub mod states;
 pub mod tables;
 pub mod units;
 mod whereabouts;
-mod writes;
+pub mod writes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, RwLock};
