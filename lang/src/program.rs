@@ -681,6 +681,7 @@ fn build<'a>(
     let observables = if told { observables(&mut elaborator) } else { Vec::new() };
     let mut starts = checks::starts(&elaborator, lab);
     checks::model(&mut elaborator);
+    elaborator.judge_conservation(&events, &plan);
     let questions = (wanted == Wanted::Contents)
         .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
     let asked = questions.as_ref().map(|q| q.nodes.as_slice());
@@ -709,6 +710,7 @@ fn build<'a>(
             return Some(Built { wiring, points, noted, findings, starts, uses, many, reach, ..Built::default() });
         }
     }
+    let temperatures = elaborator.temperatures(&events, &plan);
     let mixtures = mixtures(&elaborator, &observables);
     let scene = scene(&mut elaborator, lab);
     let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
@@ -729,6 +731,7 @@ fn build<'a>(
         mixtures,
         observables: observables.into_iter().map(|o| o.2).collect(),
         balances,
+        temperatures,
         graph: elaborator.graph,
     };
     let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();

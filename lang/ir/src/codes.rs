@@ -152,6 +152,7 @@ codes! {
     UNSCHEDULABLE "unschedulable" "S1" "no schedule of a workflow can be made or found";
     TAKES_CONTRADICTED "takes-contradicted" "D3" "a command or skill cannot take as long as its bounds say";
     FLOW_UNBALANCED "flow-unbalanced" "E1" "what one body loses the other does not gain";
+    HEAT_LEFT_BEHIND "heat-left-behind" "E1" "a law carries matter from one mixture to another without its heat";
     NOT_LUMPED "not-lumped" "E2" "a body gives off heat faster than it can have one temperature";
     BINDING "binding" "W1" "the bindings of a lab do not say where its devices are";
     UNDRIVEN "undriven" "W1" "nothing carries out a step on real devices";
@@ -162,6 +163,7 @@ codes! {
     DIVERGED "diverged" "W2" "a device tells something else than it was told, or than its twin";
     JOURNAL_MISMATCH "journal-mismatch" "W2" "a deployment cannot go on from its journal";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";
+    NONPHYSICAL_TEMPERATURE "nonphysical-temperature" "X0" "a law brings a mixture to a temperature that cannot be";
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";
     INTEGRATION_FAILED "integration-failed" "X0" "a quantity changes faster than any step can follow";

@@ -179,6 +179,15 @@ pub struct Observable {
     pub unit: Unit,
 }
 
+/// What a process does to a sum that it should not change, where its form does not show that this is nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Doubt {
+    /// Index into [`Model::processes`].
+    pub process: u32,
+    /// The state that integrates it.
+    pub state: u32,
+}
+
 /// A sum over the whole lab that changes only by what crosses its boundary.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Balance {
@@ -192,6 +201,34 @@ pub struct Balance {
     pub unit: Unit,
     /// Magnitude against which the error is judged, SI: the sum of the magnitudes of the terms.
     pub magnitude: NodeId,
+    /// The states that are added up, each with its factor.
+    pub terms: Vec<(u32, f64)>,
+    /// Processes that may make or lose some.
+    pub doubts: Vec<Doubt>,
+}
+
+/// A temperature that a law or effect of the user's own may spoil.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Suspect {
+    /// `cup.contents.temperature`.
+    pub name: String,
+    /// Its value, K.
+    pub value: NodeId,
+    /// The law: `over(still)`.
+    pub law: String,
+    /// Its place in the text.
+    pub span: Span,
+    /// The law carries matter without its heat, and nothing else makes or takes heat there but contact.
+    pub heatless: bool,
+}
+
+/// The temperatures of a lab, where some of them are watched.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Temperatures {
+    /// What is watched.
+    pub suspects: Vec<Suspect>,
+    /// All others, K.
+    pub others: Vec<NodeId>,
 }
 
 /// The flattened model of one lab.
@@ -219,4 +256,6 @@ pub struct Model {
     pub observables: Vec<Observable>,
     /// Sums that must close.
     pub balances: Vec<Balance>,
+    /// Temperatures that must stay physical.
+    pub temperatures: Temperatures,
 }

@@ -64,7 +64,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             lab.truth(when, &mut scope);
         }
         ItemKind::Fn { params, body, external, name, result, options } => {
-            report(lab, ignored::limits("a function", options));
+            report(lab, ignored::function(params.len(), options));
             let mut scope = Scope::module(module);
             bind(lab, params, module, &mut scope);
             if let Some(body) = body {

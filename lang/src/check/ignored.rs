@@ -5,6 +5,7 @@ use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, NamedExpr, Role};
 use crate::elaborate::given::{GIVEN_BY, INSTEAD, ONLY_WITH, word};
+use crate::elaborate::lab::SYMMETRIC;
 use crate::names::near;
 use crate::stock::{COUNTS_AS, count_of};
 
@@ -36,9 +37,17 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
     Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else"))
 }
 
-/// Options that bound a value and mean nothing else.
-pub fn limits(what: &str, given: &[NamedExpr]) -> Vec<Diagnostic> {
-    unknown(what, given, &["above", "at_least"])
+/// Options of a function that mean nothing: it may be bounded, and one of two things symmetric.
+pub fn function(parameters: usize, given: &[NamedExpr]) -> Vec<Diagnostic> {
+    let known: &[&str] = if parameters == 2 { &["above", "at_least", SYMMETRIC] } else { &["above", "at_least"] };
+    let truths = given.iter().filter(|o| o.name.text == SYMMETRIC && parameters == 2);
+    let wrong =
+        truths.filter(|o| !matches!(&*o.value.kind, ExprKind::Name(n) if matches!(n.text.as_str(), "true" | "false")));
+    let wrong = wrong.map(|o| {
+        let headline = format!("`{SYMMETRIC}` is `true` or `false`");
+        Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "neither of them")
+    });
+    unknown("a function", given, known).into_iter().chain(wrong).collect()
 }
 
 fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {

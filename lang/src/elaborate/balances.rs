@@ -1,11 +1,14 @@
 //! Ledgers: what must stay the same over the whole lab, and what crosses its boundary.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Balance, Derivative, Domain, State};
+use matterix_ir::model::{Balance, Derivative, Domain, Doubt, State};
 use matterix_ir::{NodeId, Op, UnaryOp, Unit};
 
-use super::{Contribution, Elaborator};
+use super::{Contribution, Elaborator, SpeciesId};
+
+/// What matters of what a process may make or lose, mol or kg.
+const DOUBT_SCALE: f64 = 1e-6;
 
 impl Elaborator<'_> {
     /// Sums every derivative and adds the balances, with a state for each process that crosses the boundary.
@@ -28,7 +31,7 @@ impl Elaborator<'_> {
         for (member, states) in scalars {
             balances.push(self.scalar_balance(&member, &states, &rates, &mut derivatives));
         }
-        self.matter_balances(&mut balances);
+        self.matter_balances(&mut balances, &mut derivatives);
         (derivatives, balances)
     }
 
@@ -60,6 +63,8 @@ impl Elaborator<'_> {
                 exchanges: Vec::new(),
                 unit: Unit::one(),
                 magnitude: self.graph.number(0.0),
+                terms: Vec::new(),
+                doubts: Vec::new(),
             };
         };
         let mut exchanges = Vec::new();
@@ -89,40 +94,65 @@ impl Elaborator<'_> {
         let total = self.sum_states(states.iter().map(|s| (*s, 1.0)), false);
         let all = states.iter().chain(&exchanges).map(|s| (*s, 1.0)).collect::<Vec<_>>();
         let magnitude = self.sum_states(all.into_iter(), true);
-        Balance { name: member.to_string(), total, exchanges, unit, magnitude }
+        let terms = states.iter().map(|s| (*s, 1.0)).collect();
+        Balance { name: member.to_string(), total, exchanges, unit, magnitude, terms, doubts: Vec::new() }
     }
 
     /// Elements, charge and mass: nothing crosses the boundary.
-    fn matter_balances(&mut self, balances: &mut Vec<Balance>) {
-        let mut elements: BTreeMap<String, Vec<(u32, f64)>> = BTreeMap::new();
-        let mut charge = Vec::new();
-        let mut mass = Vec::new();
-        for (key, index) in &self.extensive {
-            let Some(s) = key.species else { continue };
-            let def = self.tables.species.get(s);
-            mass.push((*index, def.molar_mass));
-            let Some(formula) = &def.formula else { continue };
-            if formula.charge != 0 {
-                charge.push((*index, f64::from(formula.charge)));
-            }
-            for (element, count) in &formula.elements {
-                elements.entry(format!("element {element}")).or_default().push((*index, count.to_f64()));
-            }
+    fn matter_balances(&mut self, balances: &mut Vec<Balance>, derivatives: &mut Vec<Derivative>) {
+        let amounts: Vec<(SpeciesId, u32)> =
+            self.extensive.iter().filter_map(|(key, index)| Some((key.species?, *index))).collect();
+        let of = self.quantities(amounts.iter().map(|a| a.0).collect::<BTreeSet<_>>().into_iter());
+        let doubtful = self.doubtful();
+        let elements = of.keys().filter(|name| name.starts_with("element"));
+        let names: Vec<String> = elements.cloned().chain(["charge".into(), "mass".into()]).collect();
+        for name in names {
+            let Some(factors) = of.get(&name) else { continue };
+            let terms: Vec<(u32, f64)> =
+                amounts.iter().filter_map(|(s, index)| Some((*index, *factors.get(s)?))).collect();
+            let unit = if name == "mass" { Unit::scaled("g", 1e-3) } else { Unit::scaled("mol", 1.0) };
+            let total = self.sum_states(terms.iter().copied(), false);
+            let magnitude = self.sum_states(terms.iter().copied(), true);
+            let doubts = doubtful.iter().filter_map(|(process, changes)| {
+                let changes = changes.iter().filter_map(|(s, node)| Some((*node, *factors.get(s)?)));
+                self.doubt(&name, &unit, *process, changes.collect(), derivatives)
+            });
+            let doubts = doubts.collect();
+            balances.push(Balance { name, total, exchanges: Vec::new(), unit, magnitude, terms, doubts });
         }
-        let mol = Unit::scaled("mol", 1.0);
-        let mut add = |this: &mut Self, name: String, terms: Vec<(u32, f64)>, unit: Unit| {
-            if terms.is_empty() {
-                return;
-            }
-            let total = this.sum_states(terms.iter().copied(), false);
-            let magnitude = this.sum_states(terms.into_iter(), true);
-            balances.push(Balance { name, total, exchanges: Vec::new(), unit, magnitude });
-        };
-        for (name, terms) in elements {
-            add(self, name, terms, mol.clone());
+    }
+
+    /// A state for what a process does to a sum, from its rates with their factors.
+    fn doubt(
+        &mut self,
+        balance: &str,
+        unit: &Unit,
+        process: usize,
+        changes: Vec<(NodeId, f64)>,
+        derivatives: &mut Vec<Derivative>,
+    ) -> Option<Doubt> {
+        let mut sum = self.graph.number(0.0);
+        for (node, factor) in changes {
+            let factor = self.graph.number(factor);
+            let term = self.times(node, factor);
+            sum = self.plus(sum, term);
         }
-        add(self, "charge".into(), charge, mol);
-        add(self, "mass".into(), mass, Unit::scaled("g", 1e-3));
+        if self.graph.constant(sum) == Some(0.0) {
+            return None;
+        }
+        let rate = self.gated(&Contribution { process, node: sum });
+        let state = self.states.len() as u32;
+        let info = &self.processes[process];
+        self.states.push(State {
+            name: format!("{balance} by {}", info.name),
+            domain: Domain::Quantity(unit.clone()),
+            initial: self.graph.number(0.0),
+            scale: DOUBT_SCALE,
+            span: info.span,
+        });
+        self.state_owner.push(matterix_ir::scene::InstanceId(0));
+        derivatives.push(Derivative { state, rate });
+        Some(Doubt { process: process as u32, state })
     }
 
     fn sum_states(&mut self, terms: impl Iterator<Item = (u32, f64)>, magnitude: bool) -> NodeId {

@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::instances::Setting;
 use super::{Elaborator, Pair};
 use crate::ast::{
-    self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
+    self, AssetLine, AssetLiteral, Contents, Expr, ExprKind, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
 };
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
@@ -302,6 +302,7 @@ impl<'a> Elaborator<'a> {
                 None
             }
         };
+        let at = a.span.to(b.span);
         let (Some(a), Some(b)) = (side(a), side(b)) else { return };
         for f in fields {
             let FieldValue::Expr(value) = &f.value else { continue };
@@ -311,22 +312,89 @@ impl<'a> Elaborator<'a> {
                 _ => false,
             };
             let names = self.tables.names;
-            let known = names.lookup(module, &f.key.text).map(|id| names.decl(id));
-            let of_things = known.is_some_and(|decl| match &decl.item.kind {
+            let known = names.lookup(module, &f.key.text).filter(|id| is_pair(&names.decl(*id).item.kind));
+            let of_things = known.is_some_and(|id| match &names.decl(id).item.kind {
                 ItemKind::Fn { params, .. } => params.iter().all(|p| match &p.ty {
-                    Some(ty) => matches!(self.resolve_type(ty, decl.module), Type::Instance { .. } | Type::Any),
+                    Some(ty) => {
+                        matches!(self.resolve_type(ty, names.decl(id).module), Type::Instance { .. } | Type::Any)
+                    }
                     None => true,
                 }),
                 _ => true,
             });
-            if !known.is_some_and(|decl| is_pair(&decl.item.kind)) || !of_things {
+            let Some(id) = known.filter(|_| of_things) else {
                 let mut d = self.tables.names.unknown(module, &f.key, "pair parameter", is_pair);
                 d.help.push("pair parameters are functions of two bodies, such as `conductance`, and relations without a definition".into());
                 self.report(d);
                 continue;
+            };
+            let Some((a, b)) = self.ordered(id, (a, b), &f.key, at) else { continue };
+            let symmetric = self.is_symmetric(id);
+            let same = |p: &&Pair<'_>| {
+                let order = (p.a, p.b) == (a, b) || symmetric && (p.b, p.a) == (a, b);
+                order && p.name == f.key.text && p.within == self.within
+            };
+            if let Some(first) = self.pairs.iter().find(same) {
+                let headline = format!("`{}` is given twice for the same two things", f.key.text);
+                let d = Diagnostic::error(codes::DUPLICATE_NAME, f.key.span, headline, "given again here");
+                let d = d.because(first.value.span, "first given here");
+                self.report(d);
+                continue;
             }
             let within = self.within.clone();
-            self.pairs.push(Pair { a, b, name: f.key.text.clone(), value, module, within, resolved: None });
+            let name = f.key.text.clone();
+            self.pairs.push(Pair { a, b, symmetric, name, value, module, within, resolved: None });
+        }
+    }
+
+    /// Two things in the order in which a function takes them: as written, or the other way round where their kinds fit only
+    /// so. Reports two that fit in neither order.
+    fn ordered(
+        &mut self,
+        function: DeclId,
+        (a, b): (InstanceId, InstanceId),
+        name: &Name,
+        at: Span,
+    ) -> Option<(InstanceId, InstanceId)> {
+        let decl = self.tables.names.decl(function);
+        let (ItemKind::Fn { params, .. } | ItemKind::Relation { params, .. }) = &decl.item.kind else { return None };
+        let types: Vec<Type> = params
+            .iter()
+            .map(|p| p.ty.as_ref().map_or(Type::Any, |ty| self.resolve_parameter_type(ty, decl.module)))
+            .collect();
+        let fits = |id: InstanceId, ty: &Type| match ty {
+            Type::Instance { kinds, .. } => kinds.iter().all(|k| self.instance_is(id, *k)),
+            Type::Any => true,
+            _ => false,
+        };
+        let [first, second] = types.as_slice() else { return None };
+        if fits(a, first) && fits(b, second) {
+            return Some((a, b));
+        }
+        if fits(b, first) && fits(a, second) {
+            return Some((b, a));
+        }
+        let shown = |id: InstanceId| format!("`{}` ({})", self.instances[id.0 as usize].name, self.kind_names(id));
+        let headline = format!("`{}` is not for {} and {}", name.text, shown(a), shown(b));
+        let wanted: Vec<String> = types.iter().map(|ty| self.tables.type_name(ty)).collect();
+        let said = format!("it takes {} and {}", wanted[0], wanted[1]);
+        self.report(
+            Diagnostic::error(codes::TYPE_MISMATCH, name.span, headline, said).because(at, "these two do not fit"),
+        );
+        None
+    }
+
+    /// Whether a function or relation of two things is declared to be the same in either order.
+    fn is_symmetric(&self, id: DeclId) -> bool {
+        match &self.tables.names.decl(id).item.kind {
+            ItemKind::Relation { symmetric, .. } => *symmetric,
+            ItemKind::Fn { options, .. } => options
+                .iter()
+                .any(|o| o.name.text == SYMMETRIC && matches!(&*o.value.kind, ExprKind::Name(n) if n.text == "true")),
+            _ => false,
         }
     }
 }
+
+/// The option of a function of two things that says that their order does not matter.
+pub(crate) const SYMMETRIC: &str = "symmetric";

@@ -21,8 +21,43 @@ struct Job<'a> {
     name: String,
 }
 
-/// What is made of an assignment or a call in a law, given the condition around it.
-type Line<'l, 'a> = dyn FnMut(&mut Elaborator<'a>, &'a Law, Option<NodeId>, &mut Scope) + 'l;
+/// What is made of the lines of a law.
+pub(super) trait Lines<'a> {
+    /// An assignment or a call, given the condition around it.
+    fn line(&mut self, lab: &mut Elaborator<'a>, law: &'a Law, guard: Option<NodeId>, scope: &mut Scope);
+
+    /// The value of a `let`, as what follows sees it.
+    fn value(&mut self, _: &mut Elaborator<'a>, value: Value) -> Value {
+        value
+    }
+
+    /// The condition of an `if`, as the lines under it see it.
+    fn open(&mut self, _: &mut Elaborator<'a>, condition: NodeId) -> NodeId {
+        condition
+    }
+
+    /// The lines under the condition that was taken last end.
+    fn close(&mut self) {}
+}
+
+/// The lines of a process: all see the state of one instant.
+struct Rates<'o> {
+    out: &'o mut Vec<(Target, NodeId)>,
+}
+
+impl<'a> Lines<'a> for Rates<'_> {
+    fn line(&mut self, lab: &mut Elaborator<'a>, law: &'a Law, guard: Option<NodeId>, scope: &mut Scope) {
+        let first = self.out.len();
+        match &law.kind {
+            LawKind::Assign { target, op, value } => lab.law_assign(target, *op, value, law.span, scope, self.out),
+            LawKind::Call(call) => lab.law_move(call, guard, scope, self.out),
+            _ => {}
+        }
+        let Some(g) = guard else { return };
+        let zero = lab.graph.number(0.0);
+        self.out[first..].iter_mut().for_each(|(_, node)| *node = lab.graph.select(g, *node, zero));
+    }
+}
 
 /// What a law body contributes to.
 enum Target {
@@ -117,6 +152,17 @@ impl<'a> Elaborator<'a> {
         Tuples::new(params, module, name, sets, unordered)
     }
 
+    /// Which of two things a law takes first that exists once for both: the one that the lab names first in what it gives
+    /// between them, else the one that is declared first.
+    pub(super) fn goes_first(&self, a: InstanceId, b: InstanceId) -> bool {
+        let given = |x, y| self.pairs.iter().any(|p| !p.symmetric && (p.a, p.b) == (x, y));
+        match (given(a, b), given(b, a)) {
+            (true, false) => a != b,
+            (false, true) => false,
+            _ => a < b,
+        }
+    }
+
     pub(super) fn show(&self, v: &Value) -> String {
         match v {
             Value::Instance(i) => self.instances[i.0 as usize].name.clone(),
@@ -190,31 +236,42 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Goes through the lines of a law; each assignment and call comes with what the `if` around it ask for.
-    fn each_law(&mut self, laws: &'a [Law], guard: Option<NodeId>, scope: &mut Scope, line: &mut Line<'_, 'a>) {
+    pub(super) fn each_law(
+        &mut self,
+        laws: &'a [Law],
+        guard: Option<NodeId>,
+        scope: &mut Scope,
+        lines: &mut dyn Lines<'a>,
+    ) {
         let depth = scope.vars.len();
         for law in laws {
             match &law.kind {
                 LawKind::Error => {}
                 LawKind::Let { name, value } => {
                     let v = self.expr(value, scope);
+                    let v = lines.value(self, v);
                     scope.bind(name.text.clone(), v);
                 }
                 LawKind::For { var, set, body } => {
                     for item in self.set(set, scope).unwrap_or_default() {
                         scope.bind(var.text.clone(), item);
-                        self.each_law(body, guard, scope, line);
+                        self.each_law(body, guard, scope, lines);
                         scope.vars.pop();
                     }
                 }
                 LawKind::If { cond, then, otherwise } => {
                     let Some(c) = self.truth(cond, scope) else { continue };
+                    let c = lines.open(self, c);
                     let not = self.graph.unary(UnaryOp::Not, c);
                     for (laws, c) in [(then, c), (otherwise, not)] {
                         let both = guard.map_or(c, |g| self.graph.binary(BinaryOp::And, g, c));
-                        self.each_law(laws, Some(both), scope, line);
+                        if self.prototype || !self.never(both) {
+                            self.each_law(laws, Some(both), scope, lines);
+                        }
                     }
+                    lines.close();
                 }
-                LawKind::Assign { .. } | LawKind::Call(_) => line(self, law, guard, scope),
+                LawKind::Assign { .. } | LawKind::Call(_) => lines.line(self, law, guard, scope),
             }
         }
         scope.vars.truncate(depth);
@@ -222,17 +279,7 @@ impl<'a> Elaborator<'a> {
 
     /// What the lines of a process contribute.
     fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
-        self.each_law(laws, None, scope, &mut |this, law, guard, scope| {
-            let first = out.len();
-            match &law.kind {
-                LawKind::Assign { target, op, value } => this.law_assign(target, *op, value, law.span, scope, out),
-                LawKind::Call(call) => this.law_move(call, guard, scope, out),
-                _ => {}
-            }
-            let Some(g) = guard else { return };
-            let zero = this.graph.number(0.0);
-            out[first..].iter_mut().for_each(|(_, node)| *node = this.graph.select(g, *node, zero));
-        });
+        self.each_law(laws, None, scope, &mut Rates { out });
     }
 
     fn law_assign(
@@ -288,9 +335,8 @@ impl<'a> Elaborator<'a> {
         let Value::Num(n) = self.coerce(v, &ty, value.span, "rate of change") else { return };
         match self.graph.op(state.node) {
             Op::State(index) => out.push((Target::Derivative(index), n.node)),
-            // A species that can never get into this mixture has no state to change.
-            Op::Const(_) => {}
             _ if self.prototype => {}
+            _ if self.writes(place, n.node, scope) => {}
             _ => self.report(Diagnostic::error(
                 codes::INVALID_LAW,
                 place.span,
@@ -610,48 +656,8 @@ impl<'a> Elaborator<'a> {
         if self.never(when) {
             return None;
         }
-        let mut actions = Vec::new();
-        self.event_body(&e.laws, scope, &mut actions);
+        let actions = self.event_actions(&e.laws, scope, (&name, e.name.span));
         (!actions.is_empty()).then(|| Event { name, when, actions, span: e.name.span })
-    }
-
-    /// What the lines of an event do.
-    fn event_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<Action>) {
-        self.each_law(laws, None, scope, &mut |this, law, guard, scope| match &law.kind {
-            LawKind::Assign { op: AssignOp::Set, target, value } => {
-                out.extend(this.assignment(target, value, guard, scope));
-            }
-            LawKind::Assign { .. } => this.report(
-                Diagnostic::error(
-                    codes::INVALID_LAW,
-                    law.span,
-                    "an event is an instant: it assigns, it does not flow",
-                    "not an assignment",
-                )
-                .help("write `x = x + ...`"),
-            ),
-            LawKind::Call(call) => {
-                for action in this.call_actions(call, law.span, scope) {
-                    out.push(this.guarded_action(action, guard));
-                }
-            }
-            _ => {}
-        });
-    }
-
-    /// An action that does nothing where a condition does not hold.
-    fn guarded_action(&mut self, action: Action, guard: Option<NodeId>) -> Action {
-        let Some(g) = guard else { return action };
-        match action {
-            Action::Move { fraction, from, to, span } => {
-                let zero = self.graph.number(0.0);
-                Action::Move { fraction: self.graph.select(g, fraction, zero), from, to, span }
-            }
-            Action::Assign { state, value, span } => {
-                let old = self.graph.add(Op::State(state));
-                Action::Assign { state, value: self.graph.select(g, value, old), span }
-            }
-        }
     }
 
     /// A transfer; mixtures are numbered in the order of the instances.
@@ -683,8 +689,10 @@ impl<'a> Elaborator<'a> {
                 return None;
             }
         };
+        let v = self.typed(value, &ty, scope, "value");
+        let mut new = self.value_node(&v)?;
         let Op::State(state) = self.graph.op(node) else {
-            if !self.prototype && self.graph.constant(node).is_none() {
+            if !self.prototype && !self.writes(target, new, scope) {
                 self.report(
                     Diagnostic::error(codes::INVALID_LAW, target.span, "only a state can be assigned", "not a state")
                         .help("parameters are fixed, derived quantities follow from states"),
@@ -692,8 +700,6 @@ impl<'a> Elaborator<'a> {
             }
             return None;
         };
-        let v = self.typed(value, &ty, scope, "value");
-        let mut new = self.value_node(&v)?;
         self.note_held(state, new);
         if let Some(g) = guard {
             new = self.graph.select(g, new, node);
@@ -702,7 +708,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Notes what a state that holds an instance may come to hold.
-    fn note_held(&mut self, state: u32, value: NodeId) {
+    pub(super) fn note_held(&mut self, state: u32, value: NodeId) {
         if self.states[state as usize].domain != matterix_ir::model::Domain::Instance {
             return;
         }
@@ -766,7 +772,6 @@ impl<'a> Elaborator<'a> {
     /// Checks an event by itself; its parameters are bound in the scope.
     pub fn check_event(&mut self, e: &'a ast::Event, scope: &mut Scope) {
         self.truth(&e.when, scope);
-        let mut actions = Vec::new();
-        self.event_body(&e.laws, scope, &mut actions);
+        self.event_actions(&e.laws, scope, (&e.name.text, e.name.span));
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod articulation;
 pub mod balances;
+mod conserve;
 pub mod contents;
 mod coverings;
 mod extents;
@@ -13,6 +14,7 @@ pub mod hazards;
 pub mod include;
 mod inertia;
 pub mod instances;
+mod instants;
 mod joints;
 pub mod lab;
 mod labels;
@@ -31,6 +33,7 @@ pub mod tables;
 mod tuples;
 pub mod units;
 mod whereabouts;
+pub mod writes;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, RwLock};
@@ -73,10 +76,12 @@ impl MemberKey {
 /// A pair parameter as a lab gives it: `between a and b { name: value }`.
 #[derive(Debug)]
 pub struct Pair<'a> {
-    /// One.
+    /// The first argument.
     pub a: InstanceId,
-    /// The other.
+    /// The second.
     pub b: InstanceId,
+    /// It is declared symmetric: it holds in either order.
+    pub symmetric: bool,
     /// The function it overrides.
     pub name: String,
     /// Its value.
@@ -215,6 +220,8 @@ pub struct Elaborator<'a> {
     pub readings: Vec<model::Reading>,
     /// Species that can get into each mixture.
     pub reach: Arc<reach::Reach>,
+    /// Species that laws and effects write into mixtures that have no state for them yet.
+    pub written: BTreeSet<(InstanceId, SpeciesId)>,
     /// Transfers found between mixtures.
     pub moves: BTreeSet<(InstanceId, InstanceId)>,
     /// What has touched what another thing has touched, without a transfer: from, to.
@@ -331,6 +338,7 @@ impl<'a> Elaborator<'a> {
             offers: matterix_ir::offer::Offers::default(),
             readings: Vec::new(),
             reach: Arc::new(reach),
+            written: BTreeSet::new(),
             moves: BTreeSet::new(),
             soiled: BTreeSet::new(),
             streams: BTreeMap::new(),

@@ -1,4 +1,5 @@
-//! Which species can get into which mixture: by what it holds, by transfers, by reactions and dissociation.
+//! Which species can get into which mixture: by what it holds, by transfers, by reactions and dissociation, by laws and effects that
+//! write an amount.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,6 +12,8 @@ use super::{Elaborator, SpeciesId, Tables};
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reach {
     sets: BTreeMap<String, BTreeSet<SpeciesId>>,
+    /// What laws and effects write, as far as earlier rounds found it: it only grows, so that the rounds come to an end.
+    written: BTreeMap<String, BTreeSet<SpeciesId>>,
     origins: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -35,14 +38,19 @@ impl Reach {
         self.sets.values().flatten().copied().collect()
     }
 
-    /// Closes the initial contents under transfers, reactions and dissociation.
+    /// Closes the initial contents, and what laws and effects write, under transfers, reactions and dissociation.
     pub fn compute(lab: &Elaborator<'_>) -> Reach {
+        let mut written = lab.reach.written.clone();
+        for (id, s) in &lab.written {
+            written.entry(lab.instances[id.0 as usize].name.clone()).or_default().insert(*s);
+        }
         let mut sets: BTreeMap<InstanceId, BTreeSet<SpeciesId>> = BTreeMap::new();
         for i in 0..lab.instances.len() as u32 {
             let id = InstanceId(i);
             if lab.per_species(id).is_some() {
-                let held = lab.instances[i as usize].contents.iter().map(|c| c.0).collect();
-                sets.insert(id, held);
+                let inst = &lab.instances[i as usize];
+                let held = inst.contents.iter().map(|c| c.0);
+                sets.insert(id, held.chain(written.get(&inst.name).into_iter().flatten().copied()).collect());
             }
         }
         loop {
@@ -62,6 +70,7 @@ impl Reach {
         let origins = if lab.follows_lineage { origins(lab) } else { BTreeMap::new() };
         Reach {
             sets: sets.into_iter().map(|(id, set)| (name(id), set)).collect(),
+            written,
             origins: origins.into_iter().map(|(id, set)| (name(id), set)).collect(),
         }
     }

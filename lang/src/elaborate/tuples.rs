@@ -2,6 +2,8 @@
 
 use std::collections::BTreeSet;
 
+use matterix_ir::scene::InstanceId;
+
 use super::{Elaborator, SpeciesId};
 use crate::ast::{Name, Param};
 use crate::eval::{Scope, Value};
@@ -73,7 +75,8 @@ impl<'a> Tuples<'a> {
         let [first, second] = at else { return true };
         let Value::Instance(a) = self.sets[0][*first] else { return true };
         match self.sets[1][*second] {
-            Value::Instance(b) => a != b && (!self.unordered || a < b),
+            Value::Instance(b) if self.unordered && self.has(1, a) && self.has(0, b) => lab.goes_first(a, b),
+            Value::Instance(b) => a != b,
             Value::Reaction(r) => {
                 let held = self.held(*first, lab);
                 lab.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| held.contains(s))
@@ -81,6 +84,12 @@ impl<'a> Tuples<'a> {
             Value::Species(s) => self.held(*first, lab).contains(&s),
             _ => true,
         }
+    }
+
+    /// Whether a parameter may stand for an instance; those of a set are in their order.
+    fn has(&self, parameter: usize, id: InstanceId) -> bool {
+        let instance = |v: &Value| if let Value::Instance(i) = v { Some(*i) } else { None };
+        self.sets[parameter].binary_search_by_key(&Some(id), instance).is_ok()
     }
 
     fn held(&mut self, first: usize, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {

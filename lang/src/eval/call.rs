@@ -5,7 +5,7 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
 use super::{Num, Scope, Type, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
-use crate::elaborate::Elaborator;
+use crate::elaborate::{Elaborator, Pair};
 use crate::names::{DeclId, near};
 use crate::units::Dimension;
 
@@ -273,8 +273,8 @@ impl<'a> Elaborator<'a> {
         };
         let [a, b] = values else { return None };
         let (a, b) = (instance(a)?, instance(b)?);
-        let found =
-            self.pairs.iter().position(|p| ((p.a == a && p.b == b) || (p.a == b && p.b == a)) && p.name == name)?;
+        let given = |p: &Pair<'_>| p.name == name && ((p.a, p.b) == (a, b) || p.symmetric && (p.b, p.a) == (a, b));
+        let found = self.pairs.iter().position(given)?;
         if let Some(v) = &self.pairs[found].resolved {
             return Some(v.clone());
         }

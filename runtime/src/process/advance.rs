@@ -31,9 +31,11 @@ impl Engine<'_> {
             let held: Vec<usize> =
                 (0..watches.len()).filter(|&i| self.truth(watches[i].node) == watches[i].value).collect();
             if !held.is_empty() {
+                self.check_suspects()?;
                 return Ok(Advance::Watch(held));
             }
             if !(self.time < until && until.is_finite()) {
+                self.check_suspects()?;
                 return Ok(Advance::Reached);
             }
             self.release(observer);

@@ -29,11 +29,13 @@ impl Engine<'_> {
             for action in &model.events[event].actions {
                 self.perform(action, observer)?;
             }
+            self.judge_instant(&format!("`{}`", model.events[event].name), Some(model.events[event].span))?;
         }
         self.report_processes(observer);
         self.mode = None;
         if !self.sampled {
             self.show(observer);
+            self.check_temperatures()?;
             self.check_balances(cause)?;
         }
         Ok(())
@@ -82,6 +84,7 @@ impl Engine<'_> {
         match *action {
             Action::Assign { state, value, span } => {
                 let value = self.eval(value);
+                self.suspicion.count(self.model, state, value - self.states[state as usize]);
                 self.write(state, value);
                 self.check_states(Some(&[state])).map_err(|f| f.at(span))
             }

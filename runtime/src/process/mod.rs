@@ -8,6 +8,7 @@
 //! - `analysis`, `mode`: which part of the graph that is.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`: steps, and the solution between them.
+//! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
 //! - `advance`, `instant`: the loop over segments, and what happens between two.
 
 mod advance;
@@ -17,6 +18,7 @@ mod instant;
 mod integrator;
 mod memo;
 mod mode;
+mod suspicion;
 mod switch;
 mod tangent;
 mod tape;
@@ -27,7 +29,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use matterix_ir::graph::Env;
-use matterix_ir::model::{Action, Model};
+use matterix_ir::model::{Action, Balance, Doubt, Model};
 use matterix_ir::{NodeId, codes};
 
 use crate::fault::Fault;
@@ -37,6 +39,7 @@ use crate::ledger::Balances;
 use integrator::Integrator;
 use memo::Memo;
 use mode::{Law, Mode};
+use suspicion::Suspicion;
 
 /// How accurately to integrate, and when to give up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,6 +118,7 @@ pub struct Engine<'m> {
     /// Whether the present state has been shown to the observer.
     sampled: bool,
     balances: Balances,
+    suspicion: Suspicion,
     memo: RefCell<Memo>,
 }
 
@@ -139,6 +143,7 @@ impl<'m> Engine<'m> {
             crossings: VecDeque::new(),
             sampled: false,
             balances: Balances::default(),
+            suspicion: Suspicion::new(model),
             memo: RefCell::new(Memo::new(&model.graph)),
         };
         engine.states = model.states.iter().map(|s| engine.eval(s.initial)).collect();
@@ -226,6 +231,12 @@ impl<'m> Engine<'m> {
         for action in actions {
             self.perform(action, observer)?;
         }
+        self.judge_instant(
+            "this step",
+            actions.first().map(|a| match a {
+                Action::Assign { span, .. } | Action::Move { span, .. } => *span,
+            }),
+        )?;
         let last = actions.last().map(|a| match a {
             Action::Assign { span, .. } | Action::Move { span, .. } => *span,
         });
@@ -235,6 +246,7 @@ impl<'m> Engine<'m> {
     /// Takes the last sample and checks that the balances close.
     pub fn finish(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         self.show(observer);
+        self.check_temperatures()?;
         self.check_balances(None)
     }
 
@@ -284,24 +296,35 @@ impl<'m> Engine<'m> {
         Err(Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span))
     }
 
-    fn check_balances(&self, span: Option<matterix_ir::Span>) -> Result<(), Fault> {
+    /// Fails where a sum does not close: at the law that breaks it, else at `cause`.
+    fn check_balances(&self, cause: Option<matterix_ir::Span>) -> Result<(), Fault> {
         for (report, balance) in self.balances().iter().zip(&self.model.balances) {
             if !report.closes() {
-                let (unit, accounted) = (&balance.unit, report.initial + report.exchanged);
-                let message = format!(
-                    "the balance of {} does not close: there is {}, and {} is accounted for",
-                    report.name,
-                    unit.show(report.now),
-                    unit.show(accounted),
-                );
-                let help = format!("the difference is {}", unit.show(report.error));
-                let fault = Fault::new(codes::BALANCE_BREACH, self.time, message).help(help);
-                return Err(match span {
-                    Some(span) => fault.at(span),
-                    None => fault,
-                });
+                return Err(self.breach(report, balance, cause));
             }
         }
         Ok(())
+    }
+
+    fn breach(&self, report: &BalanceReport, balance: &Balance, cause: Option<matterix_ir::Span>) -> Fault {
+        let (unit, accounted) = (&balance.unit, report.initial + report.exchanged);
+        let did = |d: &&Doubt| self.states[d.state as usize].abs();
+        let culprit = balance.doubts.iter().max_by(|a, b| did(a).total_cmp(&did(b))).filter(|d| did(d) > 0.0);
+        let process = culprit.and_then(|d| Some((self.model.processes.get(d.process as usize)?, did(&d))));
+        let sums = format!("there is {}, and {} is accounted for", unit.show(report.now), unit.show(accounted));
+        let (message, span) = match process {
+            Some((process, by)) => {
+                let verb = if report.error > 0.0 { "made" } else { "lost" };
+                let text = format!("`{}` has {verb} {} of {}: {sums}", process.name, unit.show(by), report.name);
+                (text, Some(process.span))
+            }
+            None => (format!("the balance of {} does not close: {sums}", report.name), cause),
+        };
+        let help = format!("the difference is {}", unit.show(report.error));
+        let fault = Fault::new(codes::BALANCE_BREACH, self.time, message).help(help);
+        match span {
+            Some(span) => fault.at(span),
+            None => fault,
+        }
     }
 }

@@ -115,7 +115,15 @@ impl Build {
     /// A balance of `total`, judged against itself.
     pub fn balance(&mut self, name: &str, total: NodeId, exchanges: Vec<u32>) {
         let magnitude = self.model.graph.unary(matterix_ir::UnaryOp::Abs, total);
-        self.model.balances.push(Balance { name: name.into(), total, exchanges, unit: Unit::one(), magnitude });
+        self.model.balances.push(Balance {
+            name: name.into(),
+            total,
+            exchanges,
+            unit: Unit::one(),
+            magnitude,
+            terms: Vec::new(),
+            doubts: Vec::new(),
+        });
     }
 }
 

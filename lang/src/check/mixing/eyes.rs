@@ -30,6 +30,8 @@ pub struct Eyes<'l, 'a> {
     pub lineage: BTreeMap<u32, InstanceId>,
     /// The states that are amounts.
     pub counted: BTreeSet<u32>,
+    /// What each of them is an amount of.
+    pub amount_of: BTreeMap<u32, (InstanceId, SpeciesId)>,
 }
 
 impl<'l, 'a> Eyes<'l, 'a> {
@@ -47,6 +49,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
             formulas: RefCell::default(),
             moving: (0..lab.states.len() as u32).map(|state| lab.rates.contains_key(&state)).collect(),
             counted: amounts.values().flatten().map(|a| a.1).collect(),
+            amount_of: amounts.iter().flat_map(|(m, of)| of.iter().map(|(s, state)| (*state, (*m, *s)))).collect(),
             lineage: lab.lineage.iter().flat_map(|(m, of)| of.values().map(|state| (*state, *m))).collect(),
             amounts,
             extensive: lab.extensive_by_mixture(),

@@ -4,6 +4,7 @@
 //! would. Residues count: what was emptied is still wet.
 
 mod eyes;
+mod feeds;
 mod hazards;
 mod reactions;
 mod report;
@@ -11,7 +12,7 @@ mod world;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Event};
 use matterix_ir::plan::{Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, FileId, Severity, Span};
@@ -44,7 +45,7 @@ pub fn contents(lab: &mut Elaborator<'_>) {
         ends: Vec::new(),
     };
     if let Some(ready) = ready(lab) {
-        let found = mixing(lab, &plan, ready);
+        let found = mixing(lab, &plan, &[], ready);
         found.into_iter().for_each(|d| lab.report(d));
     }
 }
@@ -62,12 +63,13 @@ pub fn ready(lab: &mut Elaborator<'_>) -> Option<Ready> {
 }
 
 /// Judges what a plan brings together.
-pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, ready: Ready) -> Vec<Diagnostic> {
+pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready) -> Vec<Diagnostic> {
     let eyes = Eyes::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
     let mut walk = Walk {
         by_event: moves_of_events(&eyes, plan),
+        feeds: feeds::feeds(&eyes, events),
         eyes: &eyes,
         materials: ready.materials,
         hazards: ready.hazards,
@@ -83,6 +85,7 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, ready: Ready) -> Vec<Diagnostic
     };
     let mut world = World::initial(&eyes, plan.locals.len());
     walk.begin(&mut world);
+    walk.fed(&mut world);
     walk.endangered(&world);
     walk.endanger(&mut world);
     walk.step(plan.root, world);
@@ -147,6 +150,8 @@ struct Walk<'w, 'a> {
     /// Transfers that events make: those that neither operations nor processes do.
     by_event: BTreeSet<(InstanceId, InstanceId)>,
     library: BTreeSet<FileId>,
+    /// Amounts that laws write.
+    feeds: Vec<feeds::Feed>,
     /// Places in the user's text around the current step, innermost last.
     places: Vec<Span>,
     /// Pairs found, with the place and the mixture.
@@ -208,6 +213,7 @@ impl Walk<'_, '_> {
                     self.action(action, &mut world);
                 }
                 self.streams(&mut world);
+                self.fed(&mut world);
                 self.endanger(&mut world);
                 world
             }
@@ -321,7 +327,11 @@ impl Walk<'_, '_> {
             }
             Action::Assign { .. } => None,
         };
+        let effected = self.effected(action, world);
         world.act(self.eyes, action, self.place());
+        if let Some((mixture, species)) = effected {
+            self.bring(mixture, species, self.place(), world);
+        }
         if let Some((to, before)) = before {
             self.arrived(&before, world, to);
         }

@@ -162,6 +162,8 @@ fn model() -> Model {
             exchanges: vec![7],
             unit: Unit::scaled("kJ", 1000.0),
             magnitude: scale,
+            terms: vec![],
+            doubts: vec![],
         },
         Balance {
             name: "element C".into(),
@@ -169,6 +171,8 @@ fn model() -> Model {
             exchanges: vec![],
             unit: Unit::scaled("mmol", 1e-3),
             magnitude: carbon,
+            terms: vec![],
+            doubts: vec![],
         },
     ];
     model

@@ -1,0 +1,118 @@
+//! What laws, events and effects bring into mixtures by writing amounts.
+
+use std::rc::Rc;
+
+use matterix_ir::model::{Action, Event};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{NodeId, Span};
+
+use super::Walk;
+use super::eyes::Eyes;
+use super::world::{Came, Entry, World};
+use crate::elaborate::SpeciesId;
+use crate::elaborate::writes::vanishes;
+
+/// An amount that a law writes.
+pub(super) struct Feed {
+    mixture: InstanceId,
+    species: SpeciesId,
+    /// While it is written, or when.
+    condition: Option<NodeId>,
+    /// What is written: a rate, or what comes to be there.
+    value: NodeId,
+    /// The place of the law.
+    span: Span,
+}
+
+/// The amounts that processes and events write. What reactions make, and the ions that a species becomes, is known otherwise.
+pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
+    let lab = eyes.lab;
+    let species = &lab.tables.species;
+    let is_ion = |m: InstanceId, s: SpeciesId| {
+        let held = lab.reach.set(&lab.instances[m.0 as usize].name);
+        held.into_iter().flatten().any(|have| species.get(*have).dissolves.iter().any(|d| d.0 == s))
+    };
+    let mut out = Vec::new();
+    let streams = |process: usize| lab.streams.keys().any(|(p, ..)| *p == process);
+    for (state, (mixture, species)) in &eyes.amount_of {
+        for c in lab.rates.get(state).into_iter().flatten() {
+            let process = &lab.processes[c.process];
+            if process.reaction.is_none() && !streams(c.process) {
+                let (condition, value, span) = (process.guard, c.node, process.span);
+                out.push(Feed { mixture: *mixture, species: *species, condition, value, span });
+            }
+        }
+    }
+    for event in events {
+        for action in &event.actions {
+            let Action::Assign { state, value, .. } = action else { continue };
+            let Some((mixture, species)) = eyes.amount_of.get(state) else { continue };
+            if !is_ion(*mixture, *species) {
+                let (condition, span) = (Some(event.when), event.span);
+                out.push(Feed { mixture: *mixture, species: *species, condition, value: *value, span });
+            }
+        }
+    }
+    out
+}
+
+impl Walk<'_, '_> {
+    /// What laws may have written by now, with what is there, and what streams carry on of it.
+    pub(super) fn fed(&mut self, world: &mut World) {
+        for _ in 0..self.feeds.len() {
+            let due = |f: &&Feed| self.brings(f.mixture, f.species, f.condition, f.value, world);
+            let due: Vec<(InstanceId, SpeciesId, Span)> =
+                self.feeds.iter().filter(due).map(|f| (f.mixture, f.species, f.span)).collect();
+            if due.is_empty() {
+                return;
+            }
+            for (mixture, species, span) in due {
+                self.bring(mixture, species, span, world);
+            }
+            self.streams(world);
+        }
+    }
+
+    /// The species that an effect brings into a mixture that has none of it.
+    pub(super) fn effected(&self, action: &Action, world: &World) -> Option<(InstanceId, SpeciesId)> {
+        let Action::Assign { state, value, .. } = action else { return None };
+        let (mixture, species) = *self.eyes.amount_of.get(state)?;
+        self.brings(mixture, species, None, *value, world).then_some((mixture, species))
+    }
+
+    /// Whether something that is not there may be written now.
+    fn brings(
+        &self,
+        mixture: InstanceId,
+        species: SpeciesId,
+        condition: Option<NodeId>,
+        value: NodeId,
+        world: &World,
+    ) -> bool {
+        let there = |m: InstanceId, s: SpeciesId| world.held(m).get(&s).is_some_and(|e| !e.residue);
+        let splits =
+            |have: &SpeciesId| self.eyes.lab.tables.species.get(*have).dissolves.iter().any(|d| d.0 == species);
+        if there(mixture, species) || world.held(mixture).keys().any(splits) {
+            return false;
+        }
+        let absent = |state: u32| self.eyes.amount_of.get(&state).is_some_and(|(m, s)| !there(*m, *s));
+        condition.is_none_or(|c| self.eyes.truth(c, world) != Some(false))
+            && !vanishes(&self.eyes.lab.graph, value, &|c| self.eyes.lab.never(c), &absent)
+    }
+
+    /// Puts a species into a mixture and judges what it meets there.
+    pub(super) fn bring(&mut self, mixture: InstanceId, species: SpeciesId, span: Span, world: &mut World) {
+        let came = vec![Came { span, into: mixture }];
+        let entry = Entry { content: None, certain: false, residue: false, came };
+        Rc::make_mut(&mut world.mixtures[mixture.0 as usize]).insert(species, entry);
+        let others: Vec<SpeciesId> = world.present(mixture).map(|p| p.0.0).filter(|o| *o != species).collect();
+        self.meet(world, mixture, species, &others, None);
+        self.touch(world, mixture, species, None);
+        let place = self.place();
+        for s in world.react(self.eyes.lab, mixture, place) {
+            let all: Vec<SpeciesId> = world.present(mixture).map(|p| p.0.0).filter(|o| *o != s).collect();
+            self.meet(world, mixture, s, &all, None);
+        }
+        self.settle();
+    }
+}

@@ -1,0 +1,124 @@
+//! What laws and effects may do that no lab does: make or lose matter, bring a mixture to a temperature that cannot be.
+//!
+//! Where the compiler has shown that nothing of the kind can happen there is nothing to look at.
+
+use matterix_ir::model::Model;
+use matterix_ir::{Span, codes};
+
+use super::Engine;
+use crate::fault::Fault;
+use crate::ledger::CLOSURE;
+
+/// A mixture may be so much warmer or colder than everything else was before its law is blamed, K.
+const MARGIN: f64 = 1.0;
+
+/// What is counted between two looks.
+#[derive(Debug, Default)]
+pub(super) struct Suspicion {
+    /// The sums that each state is in, by balance, with its factor there; found when first needed.
+    factors: Vec<Vec<(u32, f64)>>,
+    /// What the assignments of the present instant add to each balance, and the sum of their magnitudes.
+    added: Vec<(f64, f64)>,
+    /// Whether processes or temperatures are to be looked at while time passes.
+    watchful: bool,
+    /// The least and greatest of all temperatures that are not suspected, K.
+    span: Option<(f64, f64)>,
+}
+
+impl Suspicion {
+    pub(super) fn new(model: &Model) -> Self {
+        let doubts = model.balances.iter().any(|b| !b.doubts.is_empty());
+        Suspicion { watchful: doubts || !model.temperatures.suspects.is_empty(), ..Suspicion::default() }
+    }
+
+    /// Counts the assignment of a state that changes it by so much.
+    pub(super) fn count(&mut self, model: &Model, state: u32, by: f64) {
+        if self.factors.is_empty() {
+            self.factors = vec![Vec::new(); model.states.len()];
+            for (balance, of) in model.balances.iter().enumerate() {
+                for (state, factor) in &of.terms {
+                    self.factors[*state as usize].push((balance as u32, *factor));
+                }
+            }
+        }
+        let factors = &self.factors[state as usize];
+        if factors.is_empty() {
+            return;
+        }
+        self.added.resize(model.balances.len(), (0.0, 0.0));
+        for (balance, factor) in factors {
+            let sum = &mut self.added[*balance as usize];
+            *sum = (sum.0 + factor * by, sum.1 + (factor * by).abs());
+        }
+    }
+}
+
+impl Engine<'_> {
+    /// Fails where what was assigned since the last look makes or loses something; `who` did it.
+    pub(super) fn judge_instant(&mut self, who: &str, span: Option<Span>) -> Result<(), Fault> {
+        let added = std::mem::take(&mut self.suspicion.added);
+        for (balance, (sum, size)) in self.model.balances.iter().zip(added) {
+            if sum.abs() <= CLOSURE * size || sum.abs() <= CLOSURE * self.eval(balance.magnitude).abs() {
+                continue;
+            }
+            let verb = if sum > 0.0 { "makes" } else { "loses" };
+            let message = format!("{who} {verb} {} of {}", balance.unit.show(sum.abs()), balance.name);
+            let fault = Fault::new(codes::BALANCE_BREACH, self.time, message)
+                .help("let one mixture gain what another loses: `move(...)` does");
+            return Err(match span {
+                Some(span) => fault.at(span),
+                None => fault,
+            });
+        }
+        Ok(())
+    }
+
+    /// Looks at what processes may break while time passes.
+    pub(super) fn check_suspects(&mut self) -> Result<(), Fault> {
+        if !self.suspicion.watchful {
+            return Ok(());
+        }
+        self.check_temperatures()?;
+        self.check_balances(None)
+    }
+
+    /// Fails where a suspected temperature cannot be.
+    pub(super) fn check_temperatures(&mut self) -> Result<(), Fault> {
+        let temperatures = &self.model.temperatures;
+        if temperatures.suspects.is_empty() {
+            return Ok(());
+        }
+        let (mut low, mut high) = self.suspicion.span.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+        let others = temperatures.others.iter().map(|n| self.eval(*n));
+        let first = self.suspicion.span.is_none();
+        let own = temperatures.suspects.iter().filter(|_| first).map(|s| self.eval(s.value));
+        for t in others.chain(own).filter(|t| t.is_finite()) {
+            (low, high) = (low.min(t), high.max(t));
+        }
+        self.suspicion.span = Some((low, high));
+        for suspect in &temperatures.suspects {
+            let t = self.eval(suspect.value);
+            let beyond = suspect.heatless && (t < low - MARGIN || t > high + MARGIN);
+            if t >= 0.0 && !beyond {
+                continue;
+            }
+            let unit = matterix_ir::Unit { symbol: "degC".into(), factor: 1.0, offset: 273.15 };
+            let shown = |t: f64| unit.show(t);
+            let message = match t < 0.0 || t.is_nan() {
+                true => format!("`{}` brings `{}` to {}, which cannot be", suspect.law, suspect.name, shown(t)),
+                false => format!(
+                    "`{}` brings `{}` to {}: all else in the lab was within {} and {}",
+                    suspect.law,
+                    suspect.name,
+                    shown(t),
+                    shown(low),
+                    shown(high)
+                ),
+            };
+            return Err(Fault::new(codes::NONPHYSICAL_TEMPERATURE, self.time, message)
+                .at(suspect.span)
+                .help("let amounts take their heat along: `move(...)` does"));
+        }
+        Ok(())
+    }
+}
