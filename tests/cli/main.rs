@@ -45,6 +45,7 @@ mod strict;
 mod studies;
 mod time;
 mod together;
+mod twin;
 mod types;
 mod usage;
 mod verify;
