@@ -46,6 +46,7 @@ mod strict;
 mod studies;
 mod time;
 mod together;
+mod twin;
 mod types;
 mod usage;
 mod verify;

@@ -32,6 +32,7 @@ const OF_REACTION: &[(&str, &str)] = &[
     ("products", "the species that are made"),
     ("orders", "the species that the rate depends on"),
     ("unordered", "the reactants on which the rate does not depend"),
+    ("limiting", "the reactants that a law of this order uses up in finite time: those without an order of 1 or more"),
     ("valid", "temperatures between which the rate law holds"),
     ("enthalpy", "energy per mole of reaction"),
     ("rate", "the rate constant at a temperature: `r.rate(T)`"),
@@ -111,7 +112,7 @@ impl Index {
             }
             Sort::Reaction => {
                 let found = known(OF_REACTION, name)?;
-                let species = ["species", "reactants", "products", "orders", "unordered"].contains(&name);
+                let species = ["species", "reactants", "products", "orders", "unordered", "limiting"].contains(&name);
                 let sort = if species { Sort::List(Box::new(Sort::Species)) } else { Sort::Any };
                 Some(Member { sort, ..found })
             }

@@ -91,6 +91,16 @@ pub enum Action {
     },
 }
 
+impl Action {
+    /// The node that it takes its value from.
+    pub fn source(&self) -> NodeId {
+        match self {
+            Action::Assign { value, .. } => *value,
+            Action::Move { fraction, .. } => *fraction,
+        }
+    }
+}
+
 /// Actions that happen, in order, each time `when` becomes true; true at the start counts as becoming true.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {

@@ -35,6 +35,12 @@ impl<'a> Elaborator<'a> {
                 let without = reactants.into_iter().filter(|(s, _)| !orders.iter().any(|(o, n)| o == s && *n > 0.0));
                 Value::List(without.map(|(s, _)| Value::Species(s)).collect())
             }
+            "limiting" => {
+                let orders = self.orders(r);
+                let reactants = self.tables.reactions[r.0 as usize].reactants.clone();
+                let slows = |s: &SpeciesId| orders.iter().any(|(o, n)| o == s && *n >= 1.0);
+                list(&mut reactants.into_iter().map(|t| t.0).filter(|s| !slows(s)))
+            }
             "valid" => self.window(r),
             "enthalpy" => self.reaction_enthalpy(r),
             "rate" | "order" | "coefficient" | "basis" | "requires" => {
@@ -47,6 +53,7 @@ impl<'a> Elaborator<'a> {
                     "products",
                     "orders",
                     "unordered",
+                    "limiting",
                     "valid",
                     "enthalpy",
                     "rate",

@@ -586,26 +586,16 @@ impl<'a> Planner<'a, '_> {
         let decl = self.lab.tables.names.decl(id);
         let ItemKind::Skill { sig, clauses, body, handlers, .. } = &decl.item.kind else { return None };
         let mut bound = self.bind_arguments(sig, clauses, decl.module, call, object, false, scope)?;
-        let mut kept = Vec::new();
-        if body.is_some() {
-            // An argument is what it is when the skill is called, whatever the skill changes.
-            for (name, value) in &mut bound.values {
-                if self.is_kept(value) {
-                    continue;
-                }
-                let (now, steps) = self.keep(name, std::mem::replace(value, Value::Error), span);
-                *value = now;
-                kept.extend(steps);
-            }
-        }
+        // An argument is what it is when the skill is called, whatever the skill changes.
+        let kept = self.keep_arguments(&mut bound, span, |this, value| body.is_some() || this.asks_a_device(value));
         let mut inner = Scope::module(decl.module);
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
         }
         let label = self.call_label(sig, &bound, None).unwrap_or_else(|| self.text(span));
         let Some(body) = body else {
-            let step = self.primitive(sig, clauses, &bound, &label, span, &mut inner);
-            return step.map(|s| (s, None));
+            let step = self.primitive(sig, clauses, &bound, &label, span, &mut inner)?;
+            return Some((self.after(kept, label, span, step), None));
         };
         if let Some((verb, at)) = self.lab.ring(&self.open, id) {
             self.lab.report(
@@ -627,13 +617,36 @@ impl<'a> Planner<'a, '_> {
         let result = self.skill_body(sig, clauses, body, handlers, &label, span, &mut inner);
         self.lab.calls.pop();
         self.open.pop();
-        match (result, kept.is_empty()) {
-            (Some((step, value)), false) => {
-                kept.push(step);
-                Some((self.add(label, span, Step::Sequence(kept)), value))
+        let (step, value) = result?;
+        Some((self.after(kept, label, span, step), value))
+    }
+
+    /// Takes those arguments that `when` names as they are when the call begins.
+    pub(super) fn keep_arguments(
+        &mut self,
+        bound: &mut Bound,
+        span: Span,
+        when: impl Fn(&Self, &Value) -> bool,
+    ) -> Vec<StepId> {
+        let mut kept = Vec::new();
+        for (name, value) in &mut bound.values {
+            if self.is_kept(value) || !when(self, value) {
+                continue;
             }
-            (result, _) => result,
+            let (now, steps) = self.keep(name, std::mem::replace(value, Value::Error), span);
+            *value = now;
+            kept.extend(steps);
         }
+        kept
+    }
+
+    /// A step after those that keep its arguments.
+    pub(super) fn after(&mut self, mut kept: Vec<StepId>, label: String, span: Span, step: StepId) -> StepId {
+        if kept.is_empty() {
+            return step;
+        }
+        kept.push(step);
+        self.add(label, span, Step::Sequence(kept))
     }
 
     /// What stands for the steps of a skill that is called again while another one is checked by itself: the failures that it declares, and

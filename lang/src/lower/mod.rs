@@ -2,6 +2,7 @@
 
 mod call;
 mod clauses;
+mod columns;
 mod holds;
 mod limits;
 mod motion;
@@ -56,6 +57,8 @@ pub struct Planner<'a, 'e> {
     pub failures: Arc<BTreeSet<String>>,
     /// Jobs started so far.
     pub jobs: BTreeSet<String>,
+    /// Names of what is recorded so far.
+    columns: BTreeSet<String>,
     /// Positions of the names that stand for a turn's thing in the workflow, as [`Scope::reads`] has them.
     turns: u64,
     /// Positions of the workflow's parameters.
@@ -117,6 +120,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             handlers: 0,
             failures,
             jobs: BTreeSet::new(),
+            columns: BTreeSet::new(),
             turns: 0,
             parameters: 0,
             said: Vec::new(),

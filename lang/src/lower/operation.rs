@@ -29,7 +29,9 @@ impl<'a> Planner<'a, '_> {
         let MemberKind::Command { sig, clauses } = &m.member.kind else { return None };
         let device = self.device(sig, &object, call, scope)?;
         let object_is_device = sig.params.is_empty() && object.is_some();
-        let bound = self.bind_arguments(sig, clauses, m.module, call, object, true, scope)?;
+        let mut bound = self.bind_arguments(sig, clauses, m.module, call, object, true, scope)?;
+        // What a device shows is asked for when the command is given.
+        let kept = self.keep_arguments(&mut bound, span, Self::asks_a_device);
         let mut inner = Scope::of_member(device, m);
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
@@ -42,10 +44,10 @@ impl<'a> Planner<'a, '_> {
             operation.claims.insert(0, device);
         }
         operation.at_start = std::mem::take(&mut operation.at_end);
-        let step = self.during(sig, label, span, operation, invariants, &bound);
+        let step = self.during(sig, label.clone(), span, operation, invariants, &bound);
         self.say(device, sig, &bound, step);
         self.note_call(sig, &bound, Some((device, object_is_device)), step);
-        Some(step)
+        Some(self.after(kept, label, span, step))
     }
 
     /// An operation with what must hold while it lasts.

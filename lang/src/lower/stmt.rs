@@ -395,12 +395,8 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn keep(&mut self, name: &str, v: Value, span: Span) -> (Value, Vec<StepId>) {
         match v {
             Value::Num(n) => {
-                if !self.depends_on_run(n.node) {
-                    return (Value::Num(n), Vec::new());
-                }
-                let unit = self.lab.unit_of(&n);
-                let (node, step) = self.keep_node(name, n.node, unit, span);
-                (Value::Num(Num { node, literal: false, ..n }), vec![step])
+                let (kept, steps) = self.keep_number(name, n, span);
+                (Value::Num(kept), steps)
             }
             Value::Bool(n) if self.depends_on_run(n) => {
                 let (node, step) = self.keep_node(name, n, Unit::one(), span);
@@ -427,8 +423,23 @@ impl<'a> Planner<'a, '_> {
                     .collect();
                 (Value::Tuple(kept), steps)
             }
+            Value::Range(low, high) => {
+                let (low, mut steps) = self.keep_number(&format!("{name}.min"), *low, span);
+                let (high, more) = self.keep_number(&format!("{name}.max"), *high, span);
+                steps.extend(more);
+                (Value::Range(Box::new(low), Box::new(high)), steps)
+            }
             other => (other, Vec::new()),
         }
+    }
+
+    fn keep_number(&mut self, name: &str, n: Num, span: Span) -> (Num, Vec<StepId>) {
+        if !self.depends_on_run(n.node) {
+            return (n, Vec::new());
+        }
+        let unit = self.lab.unit_of(&n);
+        let (node, step) = self.keep_node(name, n.node, unit, span);
+        (Num { node, literal: false, ..n }, vec![step])
     }
 
     fn keep_node(&mut self, name: &str, value: NodeId, unit: Unit, span: Span) -> (NodeId, StepId) {
@@ -445,6 +456,18 @@ impl<'a> Planner<'a, '_> {
             return false;
         };
         matches!(self.lab.graph.op(*node), Op::Local(_))
+    }
+
+    /// Whether a value asks a device what it shows.
+    pub(super) fn asks_a_device(&self, value: &Value) -> bool {
+        let asks = |node: NodeId| self.lab.graph.leaves(node).meets(Leaves::READING);
+        match value {
+            Value::Num(n) => asks(n.node),
+            Value::Bool(n) | Value::InstanceNode(n) | Value::Enum(n, _) => asks(*n),
+            Value::Range(low, high) => asks(low.node) || asks(high.node),
+            Value::Tuple(items) => items.iter().any(|item| self.asks_a_device(item)),
+            _ => false,
+        }
     }
 
     fn depends_on_run(&self, node: NodeId) -> bool {
@@ -509,7 +532,7 @@ impl<'a> Planner<'a, '_> {
                 return None;
             }
         };
-        let name = self.text(value.span);
+        let name = self.column(value.span, scope);
         let label = self.text(span);
         Some(self.add(label, span, Step::Record { name, value: nodes, unit, every }))
     }

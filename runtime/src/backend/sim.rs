@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::NodeId;
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
+use matterix_ir::{Leaves, NodeId};
 
 use super::{Backend, Follow, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::Listener;
@@ -39,6 +39,8 @@ pub struct Sim<'m> {
     sampled: BTreeMap<NodeId, Vec<u32>>,
     /// When each reading was last told, s.
     told: BTreeMap<u32, f64>,
+    /// When each reading was last given from outside, s.
+    given: BTreeMap<u32, f64>,
 }
 
 /// Longest time between two recorded moments of a motion, s.
@@ -79,9 +81,10 @@ enum Ends {
 impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
     pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
-        let (running, sampled, told) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+        let (running, sampled) = (BTreeMap::new(), BTreeMap::new());
+        let (told, given) = (BTreeMap::new(), BTreeMap::new());
         let (moves, swung) = (Moves::default(), None);
-        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, swung, sampled, told }
+        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, swung, sampled, told, given }
     }
 
     /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
@@ -127,7 +130,7 @@ impl<'m> Sim<'m> {
         let led = self.stage.as_ref().and_then(|stage| stage.led_by(&motion));
         let values: Vec<f64> = match led {
             Some(led) => vec![self.after(operation, led)],
-            None => motion.values().into_iter().map(|node| self.engine.eval(node)).collect(),
+            None => motion.values().into_iter().map(|node| self.measure(node, out)).collect(),
         };
         let Some(stage) = self.stage.as_mut() else { return Ok(None) };
         stage.come_to(self.engine.time());
@@ -203,6 +206,9 @@ impl<'m> Sim<'m> {
         let readings = self.sampled.entry(node).or_insert_with(|| watch::readings(&model.graph, node));
         for &index in readings.iter() {
             let Some(reading) = model.readings.get(index as usize) else { continue };
+            if self.given.get(&index) == Some(&now) {
+                continue;
+            }
             let exact = self.engine.eval(reading.value);
             let shown = noise::measure(reading, index as usize, self.seed, now, exact);
             if self.told.insert(index, now) != Some(now) {
@@ -213,6 +219,26 @@ impl<'m> Sim<'m> {
             }
         }
         self.engine.eval(node)
+    }
+
+    /// A reading as a device has just reported it: within this instant it stands in place of what the model supposes.
+    pub fn give(&mut self, reading: u32, value: f64) {
+        let now = self.engine.time();
+        if let Some(slot) = self.engine.readings_mut().get_mut(reading as usize) {
+            *slot = value;
+            self.given.insert(reading, now);
+        }
+    }
+
+    /// Takes a sample of every reading that actions depend on, then performs them.
+    fn act(&mut self, actions: &[Action], out: &mut dyn Listener) -> Result<(), Fault> {
+        let graph = &self.prepared.model.graph;
+        for node in actions.iter().map(Action::source).filter(|n| graph.leaves(*n).meets(Leaves::READING)) {
+            self.measure(node, out);
+        }
+        self.engine.apply(actions, out)?;
+        self.follow_supports(actions);
+        Ok(())
     }
 
     fn end_of(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ends, Fault> {
@@ -310,8 +336,7 @@ impl Backend for Sim<'_> {
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         let ends = self.attempt(operation, self.engine.time(), out)?;
-        self.engine.apply(&operation.at_start, out)?;
-        self.follow_supports(&operation.at_start);
+        self.act(&operation.at_start, out)?;
         let lasts = match &ends {
             Ends::At(end) => end - self.engine.time(),
             _ => 0.0,
@@ -345,8 +370,7 @@ impl Backend for Sim<'_> {
             if let Ends::Failed(name, text) = running.ends {
                 return Ok(Status::Failed { name, text });
             }
-            self.engine.apply(&running.at_end, out)?;
-            self.follow_supports(&running.at_end);
+            self.act(&running.at_end, out)?;
             if let Some(text) = self.follow_joints(0.0, out) {
                 return Ok(Status::Failed { name: "collision".to_string(), text });
             }

@@ -111,8 +111,11 @@ impl<'p> Executor<'p, '_> {
                 if every <= 0.0 {
                     return Err(self.unusable("the interval of `record` is 0 s".to_owned()));
                 }
-                self.recordings.insert(id, Recording { name, value, unit, since: self.now, every, turn: 0 });
-                self.sample()?;
+                // A turn of a loop that comes to it again finds it sampling.
+                if self.recordings.get(&id).is_none_or(|r| r.every != every) {
+                    self.recordings.insert(id, Recording { name, value, unit, since: self.now, every, turn: 0 });
+                    self.sample()?;
+                }
             }
             Step::Note(text) => {
                 let text = self.words(text)?;
@@ -239,7 +242,7 @@ impl<'p> Executor<'p, '_> {
     pub(super) fn sample(&mut self) -> Result<(), Fault> {
         let now = self.now;
         let due: BTreeMap<StepId, Recording<'p>> =
-            self.recordings.iter().filter(|(_, r)| r.due() <= now).map(|(&s, r)| (s, r.clone())).collect();
+            self.recordings.iter().filter(|(_, r)| r.is_due(now)).map(|(&s, r)| (s, r.clone())).collect();
         for (step, recording) in due {
             let mut values = Vec::with_capacity(recording.value.len());
             for &node in recording.value {

@@ -169,9 +169,16 @@ struct Recording<'p> {
     turn: u64,
 }
 
+/// A sample that is due within this part of its interval counts as due: what is left is rounding.
+const ROUNDING: f64 = 1e-9;
+
 impl Recording<'_> {
     fn due(&self) -> f64 {
         self.since + self.turn as f64 * self.every
+    }
+
+    fn is_due(&self, now: f64) -> bool {
+        self.due() <= now + (ROUNDING * self.every).max(4.0 * f64::EPSILON * now)
     }
 }
 

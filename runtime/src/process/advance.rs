@@ -2,6 +2,7 @@
 
 use matterix_ir::{NodeId, codes};
 
+use super::clock::Clock;
 use super::dense::Dense;
 use super::integrator::{Integrator, Next};
 use super::mode::watched;
@@ -111,7 +112,7 @@ impl Engine<'_> {
         let looks = guide.switches.iter().any(|s| s.follows_time);
         while self.time < guide.target {
             let end = if looks { guide.target.min(self.time + LOOK) } else { guide.target };
-            if let Some(crossing) = guide.crossing(self.time, &[end], &mut [], &mut |_, _| {}) {
+            if let Some(crossing) = guide.crossing(Clock::LAB, self.time, &[end], &mut [], &mut |_, _| {}) {
                 self.arrive(crossing.time);
                 return Stretch::Crossed(crossing);
             }
@@ -129,8 +130,8 @@ impl Engine<'_> {
     ) -> Result<Stretch, Fault> {
         let moving = integrator.moving.clone();
         let mut end = Ok(Stretch::On);
-        if self.time < integrator.dense.end {
-            end = self.stretch(&integrator.dense, &moving, guide, observer);
+        if integrator.dense.reached < integrator.dense.end {
+            end = self.stretch(&mut integrator.dense, &moving, guide, observer);
         }
         if let Ok(Stretch::On) = end {
             let driven = integrator.drive(&mut |dense| {
@@ -151,29 +152,33 @@ impl Engine<'_> {
     /// Goes through what `dense` knows beyond the present time.
     fn stretch(
         &mut self,
-        dense: &Dense,
+        dense: &mut Dense,
         moving: &[u32],
         guide: &mut Guide<'_>,
         observer: &mut dyn Observer,
     ) -> Result<Stretch, Fault> {
-        let end = dense.end.min(guide.target);
-        let mut times: Vec<f64> = dense.times().filter(|&t| t > self.time && t < end).collect();
+        let (clock, from) = (dense.clock, dense.reached);
+        let target = clock.local(guide.target).max(from);
+        let end = dense.end.min(target);
+        let mut times: Vec<f64> = dense.times().filter(|&t| t > from && t < end).collect();
         times.push(end);
         let mut values = vec![0.0; moving.len()];
-        let crossing = guide.crossing(self.time, &times, &mut values, &mut |time, out| dense.at(time, out));
-        let time = crossing.map_or(end, |c| c.time);
-        dense.at(time, &mut values);
+        let crossing = guide.crossing(clock, from, &times, &mut values, &mut |time, out| dense.at(time, out));
+        let reached = crossing.map_or(end, |c| c.time);
+        dense.at(reached, &mut values);
+        dense.reached = reached;
         for (&state, &value) in moving.iter().zip(&values) {
             self.states[state as usize] = value;
         }
-        self.arrive(time);
+        let on_target = crossing.is_none() && reached == target;
+        self.arrive(if on_target { guide.target } else { clock.lab(reached).clamp(self.time, guide.target) });
         self.check_states(Some(moving))?;
-        if time == dense.end {
+        if reached == dense.end {
             self.show(observer);
         }
         Ok(match crossing {
             Some(crossing) => Stretch::Crossed(crossing),
-            None if time == guide.target => Stretch::Target,
+            None if on_target => Stretch::Target,
             None => Stretch::On,
         })
     }
@@ -250,9 +255,10 @@ struct Guide<'s> {
 }
 
 impl Guide<'_> {
-    /// The earliest change between `from` and the last of `times`, s.
+    /// The earliest change between `from` and the last of `times`, s on `clock`.
     fn crossing(
         &mut self,
+        clock: Clock,
         from: f64,
         times: &[f64],
         moving: &mut [f64],
@@ -260,7 +266,7 @@ impl Guide<'_> {
     ) -> Option<Crossing> {
         let mut first: Option<Crossing> = None;
         for switches in &mut self.switches {
-            let found = switches.first_crossing(from, times.iter().copied(), moving, path);
+            let found = switches.first_crossing(clock, from, times.iter().copied(), moving, path);
             first = match (first, found) {
                 (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),
                 (a, b) => a.or(b),

@@ -8,7 +8,13 @@ use std::collections::BTreeMap;
 use matterix_ir::graph::{Env, eval_op};
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
-use super::tape::{Step, Tape};
+use super::tape::{Step, Tape, Term};
+
+/// Largest whole number that a term of a sum is a multiple by: its product is exact in two doubles.
+const LARGEST_FACTOR: f64 = 1e6;
+
+/// A sum is taken apart no further: one written in terms of itself doubles with every line.
+const MOST_TERMS: usize = 1000;
 
 /// What one operation is for the length of a segment.
 #[derive(Clone, Copy, Debug, Default)]
@@ -165,6 +171,66 @@ impl<'g> Analysis<'g> {
             }
             _ => None,
         }
+    }
+
+    /// The terms of a sum, with whole numbers as factors.
+    fn terms(&self, node: NodeId, factor: f64, out: &mut Vec<(f64, NodeId)>) {
+        let node = NodeId(self.fact(node).same);
+        let whole = |n: NodeId| {
+            let Fact { varies, now, .. } = self.fact(n);
+            (!varies && now.fract() == 0.0 && (now * factor).abs() <= LARGEST_FACTOR).then_some(now * factor)
+        };
+        match self.graph.op(node) {
+            _ if !self.fact(node).varies || out.len() >= MOST_TERMS => out.push((factor, node)),
+            Op::Binary(BinaryOp::Add, a, b) => {
+                self.terms(a, factor, out);
+                self.terms(b, factor, out);
+            }
+            Op::Binary(BinaryOp::Sub, a, b) => {
+                self.terms(a, factor, out);
+                self.terms(b, -factor, out);
+            }
+            Op::Unary(UnaryOp::Neg, a) => self.terms(a, -factor, out),
+            Op::Binary(BinaryOp::Mul, a, b) => match (whole(a), whole(b)) {
+                (Some(factor), _) => self.terms(b, factor, out),
+                (_, Some(factor)) => self.terms(a, factor, out),
+                _ => out.push((factor, node)),
+            },
+            _ => out.push((factor, node)),
+        }
+    }
+
+    /// The tape that computes rates of change: as [`Analysis::tape`], but sums of many terms are as good as exact, so that
+    /// what one state loses others gain to the last digit.
+    pub(super) fn rates(&self, outputs: &[NodeId], moving: &[u32]) -> Tape {
+        let sums = outputs.iter().map(|&output| {
+            let mut terms = Vec::new();
+            self.terms(output, 1.0, &mut terms);
+            let plain = terms.len() < 2 || (terms.len() == 2 && terms.iter().all(|t| t.0.abs() == 1.0));
+            if plain { Vec::new() } else { terms }
+        });
+        let sums: Vec<_> = sums.collect();
+        let summed = outputs.iter().zip(&sums).flat_map(|(&output, terms)| match terms.as_slice() {
+            [] => vec![output],
+            terms => terms.iter().map(|t| t.1).collect(),
+        });
+        let roots: Vec<NodeId> = summed.collect();
+        let mut tape = self.tape(&roots, moving);
+        let registers = std::mem::take(&mut tape.outputs);
+        let mut next = registers.into_iter();
+        for terms in sums {
+            let output = if terms.is_empty() {
+                next.next()
+            } else {
+                let first = tape.terms.len() as u32;
+                let terms = terms.iter().zip(&mut next);
+                tape.terms.extend(terms.map(|(&(factor, _), register)| Term { factor, register }));
+                tape.steps.push(Step::Sum(first, tape.terms.len() as u32 - first));
+                Some((tape.first_result() + tape.steps.len() - 1) as u32)
+            };
+            tape.outputs.extend(output);
+        }
+        tape
     }
 
     /// The tape that computes `outputs`; `moving` lists the moving states in the order of its inputs.

@@ -1,5 +1,7 @@
 //! The solution between two times, as a polynomial.
 
+use super::clock::Clock;
+
 /// Degree of the polynomial: that of the integrator's highest order.
 const DEGREE: usize = 5;
 
@@ -10,18 +12,33 @@ const POINTS: [f64; DEGREE + 1] =
 /// Barycentric weights of [`POINTS`].
 const WEIGHTS: [f64; DEGREE + 1] = [0.5, -1.0, 1.0, -1.0, 1.0, -0.5];
 
-/// The moving states from `start` to `end`.
+/// The moving states from `start` to `end`, s on `clock`.
 #[derive(Clone, Debug)]
 pub(super) struct Dense {
-    pub(super) start: f64,
+    pub(super) clock: Clock,
+    start: f64,
     pub(super) end: f64,
+    /// How far it has been gone through.
+    pub(super) reached: f64,
     values: [Vec<f64>; DEGREE + 1],
 }
 
 impl Dense {
-    /// An empty interval at `time`.
+    /// An empty interval at the lab time `time`, s.
     pub(super) fn still(time: f64, states: &[f64]) -> Self {
-        Dense { start: time, end: time, values: std::array::from_fn(|_| states.to_vec()) }
+        let values = std::array::from_fn(|_| states.to_vec());
+        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, reached: 0.0, values }
+    }
+
+    /// Counts time from the end on, where nothing is left to go through.
+    pub(super) fn restart(&mut self) {
+        self.clock.restart(self.end);
+        self.values.swap(0, DEGREE);
+        for k in 1..=DEGREE {
+            let (first, rest) = self.values.split_at_mut(k);
+            rest[0].copy_from_slice(&first[0]);
+        }
+        (self.start, self.end, self.reached) = (0.0, 0.0, 0.0);
     }
 
     /// Moves on to the interval from the old end to `end`, filling in the states there by `sample`. The old end stays a
@@ -32,7 +49,7 @@ impl Dense {
         mut sample: impl FnMut(f64, &mut [f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         self.values.swap(0, DEGREE);
-        (self.start, self.end) = (self.end, end);
+        (self.start, self.reached, self.end) = (self.end, self.end, end);
         for k in 1..=DEGREE {
             sample(self.time(k), &mut self.values[k])?;
         }
@@ -48,7 +65,7 @@ impl Dense {
         (1..DEGREE).map(|k| self.time(k))
     }
 
-    /// The moving states at `time`, s, within the interval.
+    /// The moving states at the local `time`, s, within the interval.
     pub(super) fn at(&self, time: f64, out: &mut [f64]) {
         if let Some(k) = (0..=DEGREE).rev().find(|&k| self.time(k) == time) {
             out.copy_from_slice(&self.values[k]);

@@ -7,12 +7,13 @@
 //! - `tape`, `tangent`: the law of a segment as a short program, and its derivative.
 //! - `analysis`, `mode`: which part of the graph that is.
 //! - `switch`: the comparisons, and where they change.
-//! - `integrator`, `dense`: steps, and the solution between them.
+//! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
 //! - `advance`, `instant`: the loop over segments, and what happens between two.
 
 mod advance;
 mod analysis;
+mod clock;
 mod dense;
 mod instant;
 mod integrator;

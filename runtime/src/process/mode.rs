@@ -63,7 +63,7 @@ impl Law {
         laws.retain(|(state, _)| marked[*state as usize]);
         laws.sort_unstable();
         let (moving, rates): (Vec<u32>, Vec<NodeId>) = laws.into_iter().unzip();
-        let rates = analysis.tape(&rates, &moving);
+        let rates = analysis.rates(&rates, &moving);
         let switches = Switches::new(analysis, model.graph.ops(), self.roots.iter().copied(), &moving, time);
         Mode { moving, rates, switches }
     }

@@ -4,10 +4,14 @@ use matterix_ir::graph::binary;
 use matterix_ir::{BinaryOp, NodeId, Op};
 
 use super::analysis::Analysis;
+use super::clock::Clock;
 use super::tape::Tape;
 
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
+
+/// Times below this one are located as closely as this one, s.
+const LEAST: f64 = 1e-30;
 
 /// A comparison and the truth it has within the segment.
 #[derive(Clone, Debug)]
@@ -38,6 +42,8 @@ pub(super) struct Switches {
     tape: Tape,
     list: Vec<Switch>,
     registers: Vec<f64>,
+    /// Which time the path counts.
+    clock: Clock,
     /// The first instant at which a comparison of time itself changes, s; infinite if none does.
     pub(super) stop: f64,
     /// Whether a watched comparison depends on time in a way that cannot be solved for it.
@@ -47,7 +53,7 @@ pub(super) struct Switches {
 /// A comparison that has just changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossing {
-    /// When, s: the first instant at which it has its new truth.
+    /// When, s on the clock that was given: the first instant at which it has its new truth.
     pub(super) time: f64,
     pub(super) node: NodeId,
     /// Whether it is an equality, true at this instant only.
@@ -91,7 +97,7 @@ impl Switches {
     }
 
     fn run(&mut self, time: f64, moving: &[f64]) {
-        self.tape.run(time, moving, &mut self.registers);
+        self.tape.run(self.clock.lab(time), moving, &mut self.registers);
     }
 
     /// Left and right of switch `i` after [`Switches::run`].
@@ -100,10 +106,11 @@ impl Switches {
         (at(2 * i), at(2 * i + 1))
     }
 
-    /// The earliest change of any comparison between `from` and the last of `times` (ascending, s), located to a few
-    /// units of rounding of the time. `path` gives the moving states.
+    /// The earliest change of any comparison between `from` and the last of `times` (ascending, s on `clock`), located to a
+    /// few units of rounding of that time. `path` gives the moving states.
     pub(super) fn first_crossing(
         &mut self,
+        clock: Clock,
         from: f64,
         times: impl Iterator<Item = f64>,
         moving: &mut [f64],
@@ -112,6 +119,7 @@ impl Switches {
         if self.list.is_empty() {
             return None;
         }
+        self.clock = clock;
         let mut low = from;
         for high in times {
             path(high, moving);
@@ -173,8 +181,8 @@ impl Switches {
 }
 
 /// The unit of rounding at a time, s.
-pub(super) fn rounding(time: f64) -> f64 {
-    f64::EPSILON * time.abs().max(1e-6)
+fn rounding(time: f64) -> f64 {
+    f64::EPSILON * time.abs().max(LEAST)
 }
 
 /// When a comparison of two clocks changes: not a pair of clocks, never, or at that instant exactly.

@@ -25,6 +25,9 @@ pub(super) fn push(tape: &Tape, registers: &[f64], direction: &[f64], tangents: 
                 }
             }
             Step::Select(c, a, b) => tangents[if registers[c as usize] != 0.0 { a } else { b } as usize],
+            Step::Sum(first, count) => {
+                tape.summed(first, count).map(|t| t.factor * tangents[t.register as usize]).sum()
+            }
         };
     }
 }

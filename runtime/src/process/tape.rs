@@ -9,6 +9,15 @@ pub(super) enum Step {
     Unary(UnaryOp, u32),
     Binary(BinaryOp, u32, u32),
     Select(u32, u32, u32),
+    /// So many of the tape's terms from this one on, added up as if exactly.
+    Sum(u32, u32),
+}
+
+/// A register times a whole number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Term {
+    pub(super) factor: f64,
+    pub(super) register: u32,
 }
 
 /// Operations over a register file laid out as constants, time, moving states, results.
@@ -18,6 +27,8 @@ pub(super) struct Tape {
     /// How many moving states it reads.
     pub(super) inputs: usize,
     pub(super) steps: Vec<Step>,
+    /// What sums are of.
+    pub(super) terms: Vec<Term>,
     /// Registers of the results that are asked for.
     pub(super) outputs: Vec<u32>,
 }
@@ -29,6 +40,7 @@ impl PartialEq for Tape {
         self.inputs == other.inputs
             && self.outputs == other.outputs
             && self.steps == other.steps
+            && self.terms == other.terms
             && bits(self) == bits(other)
     }
 }
@@ -61,8 +73,16 @@ impl Tape {
                 Step::Unary(op, a) => unary(op, registers[a as usize]),
                 Step::Binary(op, a, b) => binary(op, registers[a as usize], registers[b as usize]),
                 Step::Select(c, a, b) => registers[if registers[c as usize] != 0.0 { a } else { b } as usize],
+                Step::Sum(first, count) => {
+                    exact_sum(self.summed(first, count).map(|t| (t.factor, registers[t.register as usize])))
+                }
             };
         }
+    }
+
+    /// The terms of a sum.
+    pub(super) fn summed(&self, first: u32, count: u32) -> impl Iterator<Item = Term> {
+        self.terms[first as usize..(first + count) as usize].iter().copied()
     }
 
     /// Copies the results after [`Tape::run`].
@@ -70,5 +90,46 @@ impl Tape {
         for (out, &register) in out.iter_mut().zip(&self.outputs) {
             *out = registers[register as usize];
         }
+    }
+}
+
+/// The sum of products with whole numbers, rounded once: near an equilibrium fast terms cancel, and what rounding left of them
+/// would make or destroy matter (Ogita, Rump and Oishi 2005: dot product in twice the precision).
+fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut sum, mut error) = (0.0, 0.0);
+    for (factor, value) in terms {
+        let (product, lost) = two_product(factor, value);
+        let total = sum + product;
+        let part = total - sum;
+        error += (sum - (total - part)) + (product - part) + lost;
+        sum = total;
+    }
+    let all = sum + error;
+    if all.is_finite() { all } else { sum }
+}
+
+/// The rounded product with a small whole number, and what rounding took from it (Dekker 1971).
+fn two_product(factor: f64, value: f64) -> (f64, f64) {
+    let product = factor * value;
+    if factor.abs() == 1.0 {
+        return (product, 0.0);
+    }
+    const SPLIT: f64 = 134_217_729.0;
+    let high = SPLIT * value;
+    let high = high - (high - value);
+    (product, (factor * high - product) + factor * (value - high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::exact_sum;
+
+    #[test]
+    fn what_cancels_leaves_nothing() {
+        let (q, r) = (7893.123456789, 7893.123456788);
+        assert_eq!(exact_sum([(1.0, 1e-12), (3.0, q), (-3.0, q)].into_iter()), 1e-12);
+        let net = exact_sum([(3.0, q), (1.0, 1e-4), (-3.0, r), (-1.0, 1e-4)].into_iter());
+        assert_eq!(net, exact_sum([(3.0, q), (-3.0, r)].into_iter()));
+        assert_eq!(exact_sum([(1.0, f64::INFINITY), (1.0, 1.0)].into_iter()), f64::INFINITY);
     }
 }

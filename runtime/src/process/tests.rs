@@ -133,14 +133,18 @@ proptest! {
     fn dense_output_is_a_polynomial(coefficients in prop::array::uniform6(-1.0..1.0f64), place in 0.0..=1.0f64) {
         let f = |t: f64| coefficients.iter().rev().fold(0.0, |sum, c| sum * (t - 10.0) + c);
         let mut dense = Dense::still(9.5, &[f(9.5)]);
-        let done: Result<(), ()> = dense.extend(11.0, |time, out| {
-            out[0] = f(time);
+        let done: Result<(), ()> = dense.extend(1.5, |time, out| {
+            out[0] = f(9.5 + time);
             Ok(())
         });
         prop_assert_eq!(done, Ok(()));
-        let (time, mut out) = (9.5 + 1.5 * place, [0.0]);
+        let (time, mut out) = (1.5 * place, [0.0]);
         dense.at(time, &mut out);
-        prop_assert!((out[0] - f(time)).abs() < 1e-12);
+        prop_assert!((out[0] - f(9.5 + time)).abs() < 1e-12);
+        dense.restart();
+        dense.at(0.0, &mut out);
+        prop_assert_eq!(dense.clock.lab(0.0), 11.0);
+        prop_assert!((out[0] - f(11.0)).abs() < 1e-12);
     }
 }
 

@@ -3,6 +3,7 @@
 mod analytic;
 mod analytic_sn1;
 mod engine_events;
+mod engine_fast;
 mod engine_faults;
 mod engine_model;
 mod engine_segments;

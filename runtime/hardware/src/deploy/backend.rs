@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::Operation;
-use matterix_ir::{NodeId, Op, Span, codes};
+use matterix_ir::{Leaves, NodeId, Op, Span, codes};
 use matterix_runtime::backend::{Backend, Follow, Status, Ticket};
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
@@ -87,6 +87,12 @@ impl Backend for Hardware<'_, '_> {
                 let message = format!("nobody did `{label}`");
                 return Err(self.fault(codes::RUN_FAILED, program.plan.get(step).span, message));
             }
+        }
+        let graph = &self.program.model.graph;
+        let heard = |n: &NodeId| graph.leaves(*n).meets(Leaves::READING);
+        let nodes: Vec<NodeId> = operation.at_start.iter().map(Action::source).filter(heard).collect();
+        for node in nodes {
+            self.eval(node, out)?;
         }
         // What is said goes by what was before: which tip is next, how much is in a syringe.
         let texts = exchange.map(|e| self.texts(&e.sends)).unwrap_or_default();

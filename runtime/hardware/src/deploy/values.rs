@@ -36,9 +36,7 @@ impl Hardware<'_, '_> {
         };
         if let (Op::Reading(r), Some(slot)) = (self.program.model.graph.op(node), told.and_then(|t| t.reading)) {
             out.reading(now, slot as usize, value);
-            if let Some(slot) = self.twin.engine().readings_mut().get_mut(r as usize) {
-                *slot = value;
-            }
+            self.twin.give(r, value);
         }
         self.fresh.insert(node, (now, value));
         Ok(value)

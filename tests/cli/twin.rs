@@ -1,0 +1,122 @@
+//! What the twin says is what a law says: fast laws, laws that run out, values that steps are given, strokes of what reacts.
+
+use std::collections::BTreeMap;
+
+use crate::harness::{folder, matterixc, root};
+
+/// Runs a workflow of a case; its status and what it wrote.
+fn run(case: &str, workflow: &str) -> (i32, String) {
+    let file = root().join("tests/cases").join(case);
+    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow]);
+    (ran.code, format!("{}{}", ran.out, ran.err))
+}
+
+/// Every one of these passes, with nothing found in it.
+fn pass(case: &str, workflows: &[&str]) {
+    for workflow in workflows {
+        let (code, text) = run(case, workflow);
+        assert_eq!(code, 0, "{case} {workflow}: {text}");
+        for word in ["error[", "warning["] {
+            assert!(!text.contains(word), "{case} {workflow}: {text}");
+        }
+    }
+}
+
+#[test]
+fn fast_chemistry_comes_to_its_end() {
+    pass("fast.mtx", &["fades", "dissociates"]);
+    pass("neutralisation.mtx", &["neutralises", "keeps_the_excess"]);
+}
+
+#[test]
+fn what_runs_out_runs_out_at_its_time() {
+    let all = [
+        "zero_order",
+        "used_up_as_it_comes",
+        "shares",
+        "half_order",
+        "negative_order",
+        "with_a_catalyst",
+        "there_and_back",
+    ];
+    pass("runs_out.mtx", &all);
+}
+
+#[test]
+fn a_reading_is_that_of_the_moment_when_the_step_is_called() {
+    let all = [
+        "of_a_command",
+        "in_a_loop",
+        "in_an_effect",
+        "of_an_option_and_a_duration",
+        "as_it_was_when_called",
+        "in_a_skill_and_a_job",
+    ];
+    pass("arguments.mtx", &all);
+}
+
+/// By name, the times at which a value was recorded.
+fn recorded(workflow: &str) -> BTreeMap<String, Vec<f64>> {
+    let dir = folder(&format!("columns_{workflow}"));
+    let file = root().join("tests/cases/columns.mtx");
+    let out = dir.to_str().expect("text");
+    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow, "--out", out]);
+    assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
+    let text = std::fs::read_to_string(dir.join("records.csv")).expect("records");
+    let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for line in text.lines().skip(1) {
+        let (time, rest) = line.split_once(',').expect("a time");
+        let name = rest.split(',').next().expect("a name");
+        columns.entry(name.to_owned()).or_default().push(time.parse().expect("a number"));
+    }
+    columns
+}
+
+#[test]
+fn every_column_has_a_name_of_its_own() {
+    let columns = recorded("columns");
+    let names: Vec<&str> = columns.keys().map(String::as_str).collect();
+    let wanted = [
+        "1 * clock.x",
+        "2 * clock.x",
+        "a.contents.amount[EtOH]",
+        "a.contents.amount[water]",
+        "a.contents.temperature",
+        "a.contents.volume",
+        "b.contents.temperature",
+        "b.contents.volume",
+        "clock.x",
+        "clock.x (2)",
+        "clock.x / 2",
+    ];
+    assert_eq!(names, wanted);
+    let seconds: Vec<f64> = (0..=4).map(f64::from).collect();
+    for (name, times) in &columns {
+        let expected = if name == "clock.x (2)" { vec![0.0, 2.0, 4.0] } else { seconds.clone() };
+        assert_eq!(*times, expected, "{name}");
+    }
+}
+
+#[test]
+fn every_sample_that_is_due_is_taken() {
+    let times = &recorded("samples")["clock.x"];
+    assert_eq!(times.len(), 51);
+    assert!((times[50] - 3.5).abs() < 1e-12);
+    let late = &recorded("samples_late")["clock.x"];
+    assert_eq!(late.len(), 36);
+}
+
+#[test]
+fn a_stroke_gives_off_what_it_took() {
+    let all = [
+        "gives_off_what_is_there",
+        "mixes_full_tips",
+        "gives_off_in_parts",
+        "brings_over_in_strokes",
+        "pushes_what_was_drawn",
+    ];
+    pass("strokes.mtx", &all);
+    let (code, text) = run("strokes.mtx", "asks_for_more_than_was_taken");
+    assert_eq!(code, 1);
+    assert!(text.contains("volume_underflow") || text.contains("volume-underflow"), "{text}");
+}
