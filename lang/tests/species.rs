@@ -36,7 +36,7 @@ fn a_property_is_typed_where_it_is_written() {
         ("molar_mass: 2 * 29 g/mol", &["formula-invalid: the molar mass of `x` is 0.062068 kg/mol"]),
         ("density: 0 g/mL", &["out-of-range: `x.density` cannot be 0 g/mL"]),
         ("density: 1 g/mL, heat_capacity: -1 J/(mol*K)", &["out-of-range: the heat capacity of `x` is not above zero"]),
-        ("phase: \"liquit\"", &["type-mismatch: `x.phase` expects one of `solid`, `liquid` or `gas`, found a text"]),
+        ("phase: \"liquit\"", &["type-mismatch: `x.phase` expects one of `solid`, `liquid`, `gas`, found a text"]),
         ("by: volume", &["type-mismatch: `by` is `mass`"]),
         ("fade: 3 s", &["unknown-field: a species has no field `fade`"]),
         (

@@ -13,7 +13,7 @@ fn contents_begin_and_mix_as_the_lab_says() {
 #[test]
 fn a_study_varies_how_warm_contents_begin() {
     let ended = matterixc(&["study", CASE]);
-    assert!(ended.out.contains("vary hot.initial_temperature in 60 degC .. 90 degC by grid(4)"), "{}", ended.out);
+    assert!(ended.out.contains("vary hot.contents.initial_temperature in 60 degC .. 90 degC by grid(4)"), "{}", ended.out);
     assert!(!ended.out.contains("error"), "{}", ended.out);
 }
 
@@ -44,7 +44,7 @@ fn the_format_of_a_beginning_stays() {
 fn what_follows_from_the_rest_does_not_vary() {
     let dir = folder("derived_path");
     let text = std::fs::read_to_string(crate::harness::root().join(CASE)).expect("the case is there");
-    write(&dir, "a.mtx", &text.replace("vary hot.initial_temperature", "vary hot.contents.temperature"));
+    write(&dir, "a.mtx", &text.replace("vary hot.contents.initial_temperature", "vary hot.contents.temperature"));
     let ended = matterixc_in(&dir, &["check", "a.mtx"]);
     assert_eq!(ended.code, 1);
     let said = ended.out.replace('\n', " ");
