@@ -2,6 +2,7 @@
 
 mod along;
 mod beforehand;
+mod beginnings;
 mod bill;
 mod book;
 mod budget;

@@ -74,11 +74,12 @@ fn reason(m: &MemberRef<'_>) -> Option<&'static str> {
 impl<'a> Elaborator<'a> {
     /// Reports fields for members of a kind that cannot be given. In the asset's own declaration a derived member may
     /// be defined anew (`redefinition` looks at that).
-    pub fn check_settable(&mut self, kind: DeclId, fields: &'a [Field], own: bool) {
+    pub fn check_settable(&mut self, kinds: &[DeclId], fields: &'a [Field], own: bool) {
         let tables: &'a Tables<'a> = self.tables;
+        let Some(&kind) = kinds.first() else { return };
         for f in fields {
             let key = f.key.text.as_str();
-            let found = tables.members(kind, key);
+            let found: Vec<&MemberRef<'a>> = kinds.iter().flat_map(|k| tables.members(*k, key)).collect();
             // A capability may also mean its own member of that name: one that can be given is enough.
             let Some(m) = found.first().filter(|_| found.iter().all(|m| reason(m).is_some())) else { continue };
             let derived = matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });

@@ -173,8 +173,9 @@ impl<'a> Elaborator<'a> {
                     FieldValue::Literal(AssetLiteral { fields, .. }) => fields,
                     _ => &[],
                 };
-                if let [kind] = kinds.as_slice() {
-                    self.check_fields(*kind, fields);
+                match kinds.as_slice() {
+                    [kind] => self.check_fields(*kind, fields),
+                    several => self.check_settable(several, fields, false),
                 }
                 nested.extend(fields.iter().map(|field| Setting { field, ..s }));
             }

@@ -154,7 +154,7 @@ impl<'a> Elaborator<'a> {
         for d in found {
             self.report(d);
         }
-        self.check_settable(kind, fields, own);
+        self.check_settable(&[kind], fields, own);
     }
 
     fn place(&mut self, id: InstanceId, relations: &'a [(Name, Expr)], module: usize) {
