@@ -148,7 +148,7 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    fn show(&self, v: &Value) -> String {
+    pub(super) fn show(&self, v: &Value) -> String {
         match v {
             Value::Instance(i) => self.instances[i.0 as usize].name.clone(),
             Value::Species(s) => self.tables.species.get(*s).name.clone(),

@@ -126,6 +126,13 @@ impl<'a> Elaborator<'a> {
         v
     }
 
+    /// Whether a function of instances was called with these in the lab.
+    pub fn was_called(&self, id: DeclId, values: &[Value]) -> bool {
+        let Some((id, instances, count, initial, _)) = self.remembered_call(id, values) else { return true };
+        let known = |live| self.known_calls.contains_key(&(id, instances.clone(), count, initial, live));
+        known(false) || known(true)
+    }
+
     /// What a call is remembered by: a function of instances and lists of them alone always gives the same node.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
         if self.prototype || values.is_empty() || self.rate_prefix.is_some() {

@@ -3,7 +3,7 @@
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
 use rustc_hash::FxHashMap;
 
-use super::{Num, Scope, Value};
+use super::{Num, ReactionId, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
 use crate::elaborate::units::unit_error;
 use crate::elaborate::{Asked, Elaborator};
@@ -513,13 +513,13 @@ impl<'a> Elaborator<'a> {
                 inside.for_each(|c| c.each.push((var.span, instance)));
             }
             // The innermost of several, as all is bound there.
-            if self.noting
+            let decides = (self.noting && fold.text == "all") || (self.noting_any && fold.text == "any");
+            if decides
                 && self.noted.len() == noted
-                && fold.text == "all"
                 && self.open_calls.is_empty()
                 && self.open_members.is_empty()
                 && let Value::Bool(node) = value
-                && self.graph.constant(node).is_none_or(|v| v == 0.0)
+                && self.graph.constant(node).is_none_or(|v| (v != 0.0) == self.noting_any)
             {
                 self.noted.push((node, scope.vars.clone()));
             }
@@ -584,6 +584,12 @@ impl<'a> Elaborator<'a> {
 
     /// The members of a finite set: a list, or all instances of a type.
     pub fn set(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<Value>> {
+        if let ExprKind::Name(n) = &*e.kind
+            && n.text == "Reaction"
+            && !self.resolves(n, scope)
+        {
+            return Some((0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect());
+        }
         let value = self.expr(e, scope);
         match self.listed(value) {
             Value::List(items) => Some(items),

@@ -189,6 +189,31 @@ impl<'a> Planner<'a, '_> {
         Some(Condition { refusal, ..condition })
     }
 
+    /// A condition to beware of, and what is said where it holds, of each that `any` asks about.
+    pub fn beware(
+        &mut self,
+        when: &'a Expr,
+        because: Option<&'a ast::Text>,
+        scope: &mut Scope,
+    ) -> Option<(NodeId, Vec<Said>)> {
+        self.lab.noting_any = because.is_some();
+        let node = self.lab.truth(when, scope);
+        self.lab.noting_any = false;
+        let mut bound = std::mem::take(&mut self.lab.noted);
+        let node = node?;
+        // Of what cannot come about nothing needs to be said.
+        let Some(words) = because.filter(|_| self.lab.graph.constant(node) != Some(0.0)) else {
+            return Some((node, Vec::new()));
+        };
+        if bound.is_empty() {
+            bound.push((node, scope.vars.clone()));
+        }
+        let terms = std::mem::take(&mut self.lab.terms);
+        let said = self.said_of_each(words, bound, scope);
+        self.lab.terms = terms;
+        Some((node, said))
+    }
+
     /// In what is compared, the names of parameters make room for those of the instances that were given.
     fn name_arguments(&self, condition: &mut Condition, scope: &Scope) {
         let each = condition.each.iter_mut().flat_map(|asked| &mut asked.compared);
@@ -215,6 +240,16 @@ impl<'a> Planner<'a, '_> {
             let text = if holds { None } else { self.filled(words, scope) };
             return text.map(|text| Said { node: condition.node, text }).into_iter().collect();
         }
+        self.said_of_each(words, bound, scope)
+    }
+
+    /// Words for each that is asked about, with what is bound there.
+    fn said_of_each(
+        &mut self,
+        words: &'a ast::Text,
+        bound: Vec<(NodeId, Vec<(String, Value)>)>,
+        scope: &mut Scope,
+    ) -> Vec<Said> {
         let mut out = Vec::new();
         for (node, vars) in bound {
             let outside = std::mem::replace(&mut scope.vars, vars);
