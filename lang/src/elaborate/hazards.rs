@@ -38,6 +38,8 @@ pub struct Hazard {
     pub grave: bool,
     /// At what it is looked at.
     pub watched: Watched,
+    /// The dimension of the value it watches: contents that are given in it are measured out by such a value.
+    pub measure: Option<Dimension>,
     /// The first thing it is about.
     pub about: Option<InstanceId>,
     /// When it is there.
@@ -125,15 +127,17 @@ impl<'a> Elaborator<'a> {
     fn of_instances(&mut self, declared: Declared<'a>, out: &mut Vec<Hazard>) {
         let Declared { params, module, name, .. } = declared;
         for (mut scope, shown) in self.tuples(params, module, Some(declared.when), name) {
-            let watched = match declared.of {
-                None => Watched::Steps,
+            let (watched, measure) = match declared.of {
+                None => (Watched::Steps, None),
                 Some(of) if !self.is_asked_for(of, &scope) => continue,
                 Some(of) => match self.expr(of, &mut scope) {
-                    Value::Num(Num { node, .. }) | Value::Bool(node) => Watched::Value(node),
+                    Value::Num(Num { node, dimension, .. }) => (Watched::Value(node), Some(dimension)),
+                    Value::Bool(node) => (Watched::Value(node), None),
                     _ => continue,
                 },
             };
-            out.extend(self.hazard(declared, watched, shown, &mut scope));
+            let hazard = self.hazard(declared, watched, shown, &mut scope);
+            out.extend(hazard.map(|h| Hazard { measure, ..h }));
         }
     }
 
@@ -192,7 +196,7 @@ impl<'a> Elaborator<'a> {
         });
         let (grave, span, help) = (declared.grave, declared.name.span, declared.help.cloned());
         let name = declared.name.text.clone();
-        Some(Hazard { name, shown, grave, watched, about, when: node, states, terms, said, help, span })
+        Some(Hazard { name, shown, grave, watched, measure: None, about, when: node, states, terms, said, help, span })
     }
 
     /// Checks the declaration of a hazard on stand-ins for its instances, which `scope` has bound.

@@ -79,6 +79,11 @@ const FIELDS: &[&str] = &[
     "autoignition",
     "vapor_pressure",
     "pka",
+    "pkah",
+    "heat_of_solution",
+    "hydration",
+    "crowding",
+    "heat_of_vaporization",
 ];
 
 impl<'a> SpeciesTable<'a> {

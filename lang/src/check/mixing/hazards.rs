@@ -66,6 +66,26 @@ impl Walk<'_, '_> {
         thing.map_or(self.place(), |id| lab.instances[id.0 as usize].span)
     }
 
+    /// Judges the hazards of what the lab itself measures out: contents given in the dimension of a watched value.
+    pub(super) fn measured_out(&mut self, world: &World) {
+        let lab = self.eyes.lab;
+        for held in &lab.held {
+            let Some(m) = held.mixture else { continue };
+            let dimension = &held.quantity.dimension;
+            let is_of =
+                |h: &Hazard| h.about == Some(m) || (h.about.is_some() && h.about == lab.instances[m.0 as usize].owner);
+            let watches = |h: &Hazard| h.measure.as_ref().is_some_and(|d| d == dimension) && is_of(h);
+            let found: Vec<usize> = (0..self.hazards.all.len()).filter(|i| watches(&self.hazards.all[*i])).collect();
+            for i in found {
+                let hazard = &self.hazards.all[i];
+                if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
+                    let d = self.hazard(hazard, world, held.span, "measured out here");
+                    self.tell(i, d);
+                }
+            }
+        }
+    }
+
     /// Judges the hazards that depend on states that a step changed.
     pub(super) fn endanger(&mut self, world: &mut World) {
         let changed = world.take_changed();

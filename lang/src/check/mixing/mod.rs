@@ -88,6 +88,7 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, ready: Ready) -> Vec<Diagnostic
     let mut world = World::initial(&eyes, plan.locals.len());
     walk.begin(&mut world);
     walk.endangered(&world);
+    walk.measured_out(&world);
     walk.endanger(&mut world);
     walk.step(plan.root, world);
     walk.found
