@@ -56,6 +56,9 @@ pub struct Hazard {
     pub span: Span,
 }
 
+/// What is bound wherever a condition asks for any of several, with what it asks there.
+type Bound = Vec<(NodeId, Vec<(String, Value)>)>;
+
 /// A declaration as it is read.
 #[derive(Clone, Copy)]
 struct Declared<'a> {
@@ -159,6 +162,9 @@ impl<'a> Elaborator<'a> {
             scope.bind(share.to_string(), value);
             scope.bind(from.to_string(), Value::Instance(a));
             scope.bind(to.to_string(), Value::Instance(b));
+            let Some(hazard) = self.hazard(declared, Watched::Transfer(a, b, None), String::new(), &mut scope) else {
+                continue;
+            };
             let then = match declared.of.filter(|_| declared.after.is_some()) {
                 None => None,
                 Some(of) => match self.expr(of, &mut scope) {
@@ -168,7 +174,7 @@ impl<'a> Elaborator<'a> {
             };
             let shown = |id: InstanceId| self.show(&Value::Instance(id));
             let shown = format!("{}({}, {})", declared.name.text, shown(a), shown(b));
-            out.extend(self.hazard(declared, Watched::Transfer(a, b, then), shown, &mut scope));
+            out.push(Hazard { shown, watched: Watched::Transfer(a, b, then), ..hazard });
         }
     }
 
@@ -179,12 +185,14 @@ impl<'a> Elaborator<'a> {
 
     fn hazard(&mut self, declared: Declared<'a>, watched: Watched, shown: String, scope: &mut Scope) -> Option<Hazard> {
         self.terms.clear();
-        let sources = Sources::default();
-        let (node, said) = Planner::new(self, &sources).beware(declared.when, declared.because, scope)?;
+        let (node, bound) = self.beware(declared.when, scope)?;
         let terms = std::mem::take(&mut self.terms);
         if self.never(node) {
             return None;
         }
+        let sources = Sources::default();
+        let said = declared.because.map(|words| Planner::new(self, &sources).beware(node, words, bound, scope));
+        let said = said.unwrap_or_default();
         let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
             Op::State(s) => Some(s),
             _ => None,
@@ -197,6 +205,15 @@ impl<'a> Elaborator<'a> {
         let (grave, span, help) = (declared.grave, declared.name.span, declared.help.cloned());
         let name = declared.name.text.clone();
         Some(Hazard { name, shown, grave, watched, measure: None, about, when: node, states, terms, said, help, span })
+    }
+
+    /// A condition to beware of, with what is bound wherever `any` asks it of something in turn.
+    fn beware(&mut self, when: &'a Expr, scope: &mut Scope) -> Option<(NodeId, Bound)> {
+        self.noting_any = true;
+        let node = self.truth(when, scope);
+        self.noting_any = false;
+        let bound = std::mem::take(&mut self.noted);
+        Some((node?, bound))
     }
 
     /// Checks the declaration of a hazard on stand-ins for its instances, which `scope` has bound.
@@ -229,7 +246,10 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        Planner::new(self, sources).beware(when, because.as_ref(), scope);
+        let held = self.beware(when, scope);
+        if let (Some((node, bound)), Some(words)) = (held, because) {
+            Planner::new(self, sources).beware(node, words, bound, scope);
+        }
     }
 
     /// Checks that what a file accepts is a hazard or a caution.

@@ -53,6 +53,8 @@ impl SpeciesDef<'_> {
 pub struct SpeciesTable<'a> {
     all: Vec<SpeciesDef<'a>>,
     by_decl: BTreeMap<DeclId, SpeciesId>,
+    /// Those that split in water, in order.
+    salts: Vec<SpeciesId>,
 }
 
 /// Fields of a species that have a meaning to the compiler or to the library's laws.
@@ -84,6 +86,8 @@ const FIELDS: &[&str] = &[
     "hydration",
     "crowding",
     "heat_of_vaporization",
+    "heat_of_neutralisation",
+    "acid_gas",
 ];
 
 impl<'a> SpeciesTable<'a> {
@@ -119,6 +123,9 @@ impl<'a> SpeciesTable<'a> {
             let module = table.all[index].module;
             let ions = table.terms(names, module, terms, diagnostics);
             check_dissociation(&table, index, &ions, f.span, diagnostics);
+            if !ions.is_empty() {
+                table.salts.push(SpeciesId(index as u32));
+            }
             table.all[index].dissolves = ions;
         }
         table
@@ -158,6 +165,11 @@ impl<'a> SpeciesTable<'a> {
     /// One species.
     pub fn get(&self, id: SpeciesId) -> &SpeciesDef<'a> {
         &self.all[id.0 as usize]
+    }
+
+    /// Those that split in water.
+    pub fn salts(&self) -> impl Iterator<Item = SpeciesId> + '_ {
+        self.salts.iter().copied()
     }
 
     /// All species.

@@ -412,6 +412,15 @@ impl<'a> Elaborator<'a> {
 
     fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
         match op {
+            Binary::And if self.noting_any => {
+                let x = self.truth(a, scope);
+                // There are many mixtures, and what is never so of one need not be written out.
+                if x.is_some_and(|x| self.graph.constant(x) == Some(0.0)) && !self.prototype {
+                    return x.map_or(Value::Error, Value::Bool);
+                }
+                let (Some(x), Some(y)) = (x, self.truth(b, scope)) else { return Value::Error };
+                Value::Bool(self.graph.binary(BinaryOp::And, x, y))
+            }
             Binary::And | Binary::Or => {
                 let (x, y) = (self.truth(a, scope), self.truth(b, scope));
                 let (Some(x), Some(y)) = (x, y) else { return Value::Error };

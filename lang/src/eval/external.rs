@@ -1,5 +1,7 @@
 //! The functions the library declares with `extern fn`, bound by name in one table.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::scene::InstanceId;
 use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
@@ -161,10 +163,16 @@ impl Elaborator<'_> {
             }
             (Bound::Salts, [Value::List(set)]) => {
                 let species = &self.tables.species;
-                let there = |ion: &SpeciesId| set.contains(&Value::Species(*ion)) || species.get(*ion).is_water();
-                let made = |of: &[(SpeciesId, f64)]| !of.is_empty() && of.iter().all(|(ion, _)| there(ion));
-                let salts = species.iter().filter(|(_, def)| made(&def.dissolves));
-                Value::List(salts.map(|(s, _)| Value::Species(s)).collect())
+                let set: BTreeSet<SpeciesId> = set
+                    .iter()
+                    .filter_map(|v| match v {
+                        Value::Species(s) => Some(*s),
+                        _ => None,
+                    })
+                    .collect();
+                let there = |ion: &SpeciesId| set.contains(ion) || species.get(*ion).is_water();
+                let made = |s: &SpeciesId| species.get(*s).dissolves.iter().all(|(ion, _)| there(ion));
+                Value::List(species.salts().filter(made).map(Value::Species).collect())
             }
             (Bound::Parts, [Value::Instance(i), Value::Kind(kind)]) => {
                 let mut found = Vec::new();

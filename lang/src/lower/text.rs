@@ -189,29 +189,18 @@ impl<'a> Planner<'a, '_> {
         Some(Condition { refusal, ..condition })
     }
 
-    /// A condition to beware of, and what is said where it holds, of each that `any` asks about.
+    /// What is said where a condition holds to beware of: of each that `any` asks about, with what is bound there.
     pub fn beware(
         &mut self,
-        when: &'a Expr,
-        because: Option<&'a ast::Text>,
+        node: NodeId,
+        words: &'a ast::Text,
+        mut bound: Vec<(NodeId, Vec<(String, Value)>)>,
         scope: &mut Scope,
-    ) -> Option<(NodeId, Vec<Said>)> {
-        self.lab.noting_any = because.is_some();
-        let node = self.lab.truth(when, scope);
-        self.lab.noting_any = false;
-        let mut bound = std::mem::take(&mut self.lab.noted);
-        let node = node?;
-        // Of what cannot come about nothing needs to be said.
-        let Some(words) = because.filter(|_| self.lab.graph.constant(node) != Some(0.0)) else {
-            return Some((node, Vec::new()));
-        };
+    ) -> Vec<Said> {
         if bound.is_empty() {
             bound.push((node, scope.vars.clone()));
         }
-        let terms = std::mem::take(&mut self.lab.terms);
-        let said = self.said_of_each(words, bound, scope);
-        self.lab.terms = terms;
-        Some((node, said))
+        self.said_of_each(words, bound, scope)
     }
 
     /// In what is compared, the names of parameters make room for those of the instances that were given.
