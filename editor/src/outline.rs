@@ -73,7 +73,11 @@ fn symbol(name: &Name, detail: &'static str, kind: SymbolKind, span: Span, child
 
 fn item(item: &Item) -> Option<Symbol> {
     let (detail, kind) = match &item.kind {
-        ItemKind::Error | ItemKind::Use { .. } | ItemKind::Incompatible { .. } | ItemKind::Allow { .. } => return None,
+        ItemKind::Error
+        | ItemKind::Use { .. }
+        | ItemKind::Incompatible { .. }
+        | ItemKind::Allow { .. }
+        | ItemKind::Accept { .. } => return None,
         ItemKind::Dimension { name, .. } => {
             return Some(symbol(name, "dimension", SymbolKind::Unit, item.span, Vec::new()));
         }

@@ -298,10 +298,13 @@ module.exports = grammar({
     reactive_group: ($) => seq('reactive_group', field('name', $.identifier), $.fields),
     material: ($) => seq('material', field('name', $.identifier), $.fields),
     incompatible: ($) => seq('incompatible', $.species, 'with', nl($), $.species, $.fields),
-    allow: ($) => seq('allow', 'incompatible', $.species, 'with', nl($), $.species, $.string),
+    allow: ($) => seq('allow', choice(seq('incompatible', $.species, 'with', nl($), $.species), field('name', $.identifier)), $.string),
     hazard: ($) => seq(
-      choice('hazard', 'caution'), field('name', $.identifier), $.parameters, optional($._nl_more), 'when', field('condition', $.expression),
+      choice('hazard', 'caution'), field('name', $.identifier), $.parameters,
+      optional(seq(optional($._nl_more), 'of', nl($), field('value', $._operand), optional(seq(optional($._nl_more), 'after', nl($), $._operand)))),
+      optional($._nl_more), 'when', field('condition', $.expression),
       optional(seq(optional($._nl_more), $.string)),
+      optional(seq(optional($._nl_more), 'because', nl($), $.string)),
     ),
     extends: ($) => seq(':', nl($), commas($, field('type', $._name))),
     capability: ($) => seq(

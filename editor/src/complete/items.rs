@@ -16,6 +16,7 @@ const ITEMS: &[(&str, &str)] = &[
     ("reactive_group", "reactive_group ${1:name} { title: \"$2\", members: { ${3:species}: any }, source: \"$4\" }"),
     ("material", "material ${1:name} { source: \"$0\" }"),
     ("incompatible", "incompatible ${1:a} with ${2:b} { consequence: [${3:heat}], source: \"$4\" }"),
+    ("allow", "allow ${1:caution} \"${2:why}\""),
     ("allow incompatible", "allow incompatible ${1:a} with ${2:b} \"${3:why}\""),
     ("capability", "capability ${1:Name}: ${2:Body} {\n    $0\n}"),
     ("asset", "asset ${1:Name}: ${2:Body} { mass: ${3:1 kg}$0 }"),

@@ -268,7 +268,11 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Study { .. } => Kind::Study,
         ItemKind::Fit { .. } => Kind::Fit,
         ItemKind::Test { .. } => Kind::Test,
-        ItemKind::Error | ItemKind::Use { .. } | ItemKind::Incompatible { .. } | ItemKind::Allow { .. } => return None,
+        ItemKind::Error
+        | ItemKind::Use { .. }
+        | ItemKind::Incompatible { .. }
+        | ItemKind::Allow { .. }
+        | ItemKind::Accept { .. } => return None,
     })
 }
 

@@ -100,6 +100,15 @@ codes! {
     ABOVE_BOILING_POINT "above-boiling-point" "H2" "a set point above the boiling point of what is heated";
     CLOSED_VESSEL_HEATED "closed-vessel-heated" "H2" "a closed vessel is heated";
     ABOVE_FLASH_POINT "above-flash-point" "H2" "a set point that brings a liquid to its flash point";
+    WEAK_ACID_LEFT_OUT "weak-acid-left-out" "H3" "the pH of a weak acid is used, of which the model knows nothing";
+    WEAK_BASE_LEFT_OUT "weak-base-left-out" "H3" "the pH of a weak base is used, of which the model knows nothing";
+    PH_OF_STRONG_SOLUTION "ph-of-strong-solution" "H3" "a pH is used where activities are far from concentrations";
+    UNDISSOLVED "undissolved" "H3" "a mixture holds more of a salt than dissolves";
+    GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
+    VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume";
+    HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used behind a step whose heat the model leaves out";
+    HOT_MIXING "hot-mixing" "H3" "a step dissolves, dilutes or neutralises so much that it gets hot";
+    WELLS_STAY_COLD "wells-stay-cold" "H3" "a heater warms labware whose wells take no heat in the model";
     NEED_UNMET "need-unmet" "P1" "a step cannot begin because what it needs does not hold";
     VOLUME_OVERFLOW "volume-overflow" "V1" "a vessel gets more than it holds";
     VOLUME_UNDERFLOW "volume-underflow" "V2" "more is taken from a vessel than there is";

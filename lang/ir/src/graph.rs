@@ -132,7 +132,8 @@ impl Env<'_> {
             Op::Time => self.time,
             Op::State(i) => self.states[i as usize],
             Op::Param(i) => self.params[i as usize],
-            Op::Local(i) => self.locals[i as usize],
+            // What a plan does not keep is no number.
+            Op::Local(i) => self.locals.get(i as usize).copied().unwrap_or(f64::NAN),
             Op::Reading(i) => self.readings[i as usize],
             Op::Unary(..) | Op::Binary(..) | Op::Select(..) => f64::NAN,
         }

@@ -58,11 +58,12 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             bind(lab, &e.params, module, &mut scope);
             lab.check_event(e, &mut scope);
         }
-        ItemKind::Hazard { params, when, .. } => {
+        ItemKind::Hazard { params, .. } => {
             let mut scope = Scope::module(module);
             bind(lab, params, module, &mut scope);
-            lab.truth(when, &mut scope);
+            lab.check_hazard(&item.kind, sources, &mut scope);
         }
+        ItemKind::Accept { name, .. } => lab.check_accepted(name, module),
         ItemKind::Fn { params, body, external, name, result, options } => {
             report(lab, ignored::function(params.len(), options));
             let mut scope = Scope::module(module);

@@ -1,13 +1,31 @@
 //! Hazards on the instances of a lab: conditions that must not come about.
 
-use matterix_ir::plan::Term;
-use matterix_ir::scene::InstanceId;
-use matterix_ir::{NodeId, Op, Span};
+use std::collections::BTreeSet;
 
-use super::Elaborator;
-use crate::ast::ItemKind;
-use crate::eval::{Scope, Value};
-use crate::names::DeclId;
+use matterix_ir::plan::{Said, Term};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, NodeId, Op, Sources, Span, codes};
+
+use super::{Elaborator, Tables};
+use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
+use crate::eval::{Num, Scope, Type, Value};
+use crate::lower::Planner;
+use crate::names::{DeclId, near};
+use crate::units::Dimension;
+
+/// The kept value that stands for the share of its source which a transfer takes, in what is said of transfers.
+pub const SHARE: u32 = u32::MAX;
+
+/// At what a hazard is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watched {
+    /// After each step that changes what it depends on.
+    Steps,
+    /// Where this value is used.
+    Value(NodeId),
+    /// Before matter goes from one mixture into another, [`SHARE`] of it; told where a value is used after that, if there is one.
+    Transfer(InstanceId, InstanceId, Option<NodeId>),
+}
 
 /// A hazard over instances of the lab.
 #[derive(Clone, Debug)]
@@ -18,6 +36,10 @@ pub struct Hazard {
     pub shown: String,
     /// An error, not a warning.
     pub grave: bool,
+    /// At what it is looked at.
+    pub watched: Watched,
+    /// The dimension of the value it watches: contents that are given in it are measured out by such a value.
+    pub measure: Option<Dimension>,
     /// The first thing it is about.
     pub about: Option<InstanceId>,
     /// When it is there.
@@ -26,25 +48,80 @@ pub struct Hazard {
     pub states: Vec<u32>,
     /// The members it names.
     pub terms: Vec<Term>,
+    /// What is so, for each that it asks about: the first whose node holds counts.
+    pub said: Vec<Said>,
     /// How to mend it.
     pub help: Option<String>,
     /// Its declaration.
     pub span: Span,
 }
 
+/// What is bound wherever a condition asks for any of several, with what it asks there.
+type Bound = Vec<(NodeId, Vec<(String, Value)>)>;
+
+/// A declaration as it is read.
+#[derive(Clone, Copy)]
+struct Declared<'a> {
+    module: usize,
+    grave: bool,
+    name: &'a Name,
+    params: &'a [Param],
+    of: Option<&'a Expr>,
+    after: Option<&'a Expr>,
+    when: &'a Expr,
+    help: Option<&'a String>,
+    because: Option<&'a Text>,
+}
+
+/// `move(share, from: a, to: b)` after `of`: the names it gives to the share and the two mixtures.
+fn transfer(of: &Expr) -> Option<(&Expr, &Expr, &Expr)> {
+    let ExprKind::Call(callee, args) = &*of.kind else { return None };
+    let named = |key: &str| args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == key)).map(|a| &a.value);
+    let is_move = matches!(&*callee.kind, ExprKind::Name(n) if n.text == "move");
+    let share = args.iter().find(|a| a.name.is_none()).map(|a| &a.value);
+    Some((share?, named("from")?, named("to")?)).filter(|_| is_move && args.len() == 3)
+}
+
+/// The name that an expression consists of.
+fn bare(e: &Expr) -> Option<&str> {
+    match &*e.kind {
+        ExprKind::Name(n) => Some(&n.text),
+        _ => None,
+    }
+}
+
+/// The hazards and cautions that a package accepts, by name.
+fn accepted(tables: &Tables<'_>) -> BTreeSet<DeclId> {
+    let names = tables.names;
+    let items = names.modules.iter().enumerate().flat_map(|(i, m)| m.tree.items.iter().map(move |item| (i, item)));
+    let named = items.filter_map(|(module, item)| match &item.kind {
+        ItemKind::Accept { name, .. } => names.lookup(module, &name.text),
+        _ => None,
+    });
+    named.collect()
+}
+
 impl<'a> Elaborator<'a> {
-    /// Every hazard on every fitting combination of instances, but for those that cannot come about.
+    /// Every hazard on every fitting combination of instances, but for those that cannot come about or are accepted.
     pub fn hazards(&mut self) -> Vec<Hazard> {
         let mut out = Vec::new();
         let names = self.tables.names;
+        let accepted = accepted(self.tables);
         for index in 0..names.decls.len() as u32 {
-            let decl = names.decl(DeclId(index));
-            let ItemKind::Hazard { name, params, when, .. } = &decl.item.kind else { continue };
-            let mut tuples = self.tuples(params, decl.module, Some(when), name);
-            while let Some((scope, shown)) = tuples.next(self) {
-                let hazard = if self.enter(name.span) { self.hazard(&decl.item.kind, scope, shown) } else { None };
-                self.leave();
-                out.extend(hazard);
+            let id = DeclId(index);
+            let decl = names.decl(id);
+            let ItemKind::Hazard { grave, name, params, of, after, when, help, because } = &decl.item.kind else {
+                continue;
+            };
+            if accepted.contains(&id) {
+                continue;
+            }
+            let (of, after, help, because) = (of.as_ref(), after.as_ref(), help.as_ref(), because.as_ref());
+            let declared =
+                Declared { module: decl.module, grave: *grave, name, params, of, after, when, help, because };
+            match after.or(of).and_then(transfer) {
+                Some((share, from, to)) => self.of_transfers(declared, share, (from, to), &mut out),
+                None => self.of_instances(declared, &mut out),
             }
         }
         if self.budget.is_over() {
@@ -53,33 +130,145 @@ impl<'a> Elaborator<'a> {
         out
     }
 
-    /// One hazard on a combination; none where it cannot come about.
-    fn hazard(&mut self, kind: &'a ItemKind, mut scope: Scope, shown: String) -> Option<Hazard> {
-        let ItemKind::Hazard { grave, name, when, help, .. } = kind else { return None };
+    fn of_instances(&mut self, declared: Declared<'a>, out: &mut Vec<Hazard>) {
+        let Declared { params, module, name, .. } = declared;
+        let mut tuples = self.tuples(params, module, Some(declared.when), name);
+        while let Some((mut scope, shown)) = tuples.next(self) {
+            let (watched, measure) = match declared.of {
+                None => (Watched::Steps, None),
+                Some(of) if !self.is_asked_for(of, &scope) => continue,
+                Some(of) => match self.expr(of, &mut scope) {
+                    Value::Num(Num { node, dimension, .. }) => (Watched::Value(node), Some(dimension)),
+                    Value::Bool(node) => (Watched::Value(node), None),
+                    _ => continue,
+                },
+            };
+            let hazard =
+                if self.enter(name.span) { self.hazard(declared, watched, shown, &mut scope) } else { None };
+            self.leave();
+            out.extend(hazard.map(|h| Hazard { measure, ..h }));
+        }
+    }
+
+    /// Whether a value may be used: of a function of the parameters alone, whether anything of the lab calls it so.
+    fn is_asked_for(&self, of: &Expr, scope: &Scope) -> bool {
+        let ExprKind::Call(callee, args) = &*of.kind else { return true };
+        let given = |arg: &Arg| scope.var(bare(&arg.value)?).cloned();
+        let values: Option<Vec<Value>> = args.iter().map(given).collect();
+        let function = bare(callee).and_then(|name| self.tables.names.lookup(scope.module, name));
+        let (Some(values), Some(function)) = (values, function) else { return true };
+        self.was_called(function, &values)
+    }
+
+    fn of_transfers(&mut self, declared: Declared<'a>, share: &Expr, ends: (&Expr, &Expr), out: &mut Vec<Hazard>) {
+        let (Some(share), Some(from), Some(to)) = (bare(share), bare(ends.0), bare(ends.1)) else { return };
+        for (a, b) in self.moves.clone() {
+            let mut scope = Scope::module(declared.module);
+            let value = self.share_moved();
+            scope.bind(share.to_string(), value);
+            scope.bind(from.to_string(), Value::Instance(a));
+            scope.bind(to.to_string(), Value::Instance(b));
+            let Some(hazard) = self.hazard(declared, Watched::Transfer(a, b, None), String::new(), &mut scope) else {
+                continue;
+            };
+            let then = match declared.of.filter(|_| declared.after.is_some()) {
+                None => None,
+                Some(of) => match self.expr(of, &mut scope) {
+                    Value::Num(Num { node, .. }) | Value::Bool(node) => Some(node),
+                    _ => continue,
+                },
+            };
+            let shown = |id: InstanceId| self.show(&Value::Instance(id));
+            let shown = format!("{}({}, {})", declared.name.text, shown(a), shown(b));
+            out.push(Hazard { shown, watched: Watched::Transfer(a, b, then), ..hazard });
+        }
+    }
+
+    fn share_moved(&mut self) -> Value {
+        let node = self.graph.add(Op::Local(SHARE));
+        self.num(node, Dimension::one())
+    }
+
+    fn hazard(&mut self, declared: Declared<'a>, watched: Watched, shown: String, scope: &mut Scope) -> Option<Hazard> {
         self.terms.clear();
-        let node = self.truth(when, &mut scope)?;
+        let (node, bound) = self.beware(declared.when, scope)?;
         let terms = std::mem::take(&mut self.terms);
         if self.never(node) {
             return None;
         }
+        let sources = Sources::default();
+        let said = declared.because.map(|words| Planner::new(self, &sources).beware(node, words, bound, scope));
+        let said = said.unwrap_or_default();
         let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
             Op::State(s) => Some(s),
             _ => None,
         });
+        let states: Vec<u32> = states.collect();
         let about = scope.vars.iter().find_map(|(_, v)| match v {
             Value::Instance(id) => Some(*id),
             _ => None,
         });
-        Some(Hazard {
-            name: name.text.clone(),
-            shown,
-            grave: *grave,
-            about,
-            when: node,
-            states: states.collect(),
-            terms,
-            help: help.clone(),
-            span: name.span,
-        })
+        let (grave, span, help) = (declared.grave, declared.name.span, declared.help.cloned());
+        let name = declared.name.text.clone();
+        Some(Hazard { name, shown, grave, watched, measure: None, about, when: node, states, terms, said, help, span })
+    }
+
+    /// A condition to beware of, with what is bound wherever `any` asks it of something in turn.
+    fn beware(&mut self, when: &'a Expr, scope: &mut Scope) -> Option<(NodeId, Bound)> {
+        self.noting_any = true;
+        let node = self.truth(when, scope);
+        self.noting_any = false;
+        let bound = std::mem::take(&mut self.noted);
+        Some((node?, bound))
+    }
+
+    /// Checks the declaration of a hazard on stand-ins for its instances, which `scope` has bound.
+    pub fn check_hazard(&mut self, kind: &'a ItemKind, sources: &Sources, scope: &mut Scope) {
+        let ItemKind::Hazard { params, of, after, when, because, .. } = kind else { return };
+        let parameter = |e: &Expr| bare(e).is_some_and(|name| params.iter().any(|p| p.name.text == name));
+        let moved = after.as_ref().or(of.as_ref()).and_then(transfer);
+        let named = moved.and_then(|(share, a, b)| bare(share).filter(|_| parameter(a) && parameter(b)));
+        match (named, moved, after) {
+            (Some(name), ..) => {
+                let share = self.placeholder(&Type::ratio(), name);
+                scope.bind(name.to_string(), share);
+            }
+            (None, Some((at, ..)), _) | (None, None, Some(at)) => self.report(
+                Diagnostic::error(
+                    codes::TYPE_MISMATCH,
+                    at.span,
+                    "a transfer is named by its share and two parameters",
+                    "not a transfer between two parameters",
+                )
+                .help("write `move(share, from: a, to: b)`"),
+            ),
+            (None, None, None) => {}
+        }
+        if let Some(of) = of.as_ref().filter(|_| after.is_some() || moved.is_none()) {
+            match self.expr(of, scope) {
+                Value::Num(_) | Value::Bool(_) | Value::Error => {}
+                other => {
+                    self.expected("a quantity or a truth value", &other, of.span);
+                }
+            }
+        }
+        let held = self.beware(when, scope);
+        if let (Some((node, bound)), Some(words)) = (held, because) {
+            Planner::new(self, sources).beware(node, words, bound, scope);
+        }
+    }
+
+    /// Checks that what a file accepts is a hazard or a caution.
+    pub fn check_accepted(&mut self, name: &Name, module: usize) {
+        let names = self.tables.names;
+        let is_hazard = |kind: &ItemKind| matches!(kind, ItemKind::Hazard { .. });
+        if names.lookup(module, &name.text).is_some_and(|id| is_hazard(&names.decl(id).item.kind)) {
+            return;
+        }
+        let known = names.visible(module).filter(|(_, id)| is_hazard(&names.decl(*id).item.kind)).map(|(n, _)| n);
+        let near = near::nearest(&name.text, known);
+        let headline = format!("there is no hazard or caution `{}`", name.text);
+        let d = Diagnostic::error(codes::UNKNOWN_NAME, name.span, headline, "nothing to allow");
+        self.report(near::proposed(d, &near, name.span));
     }
 }

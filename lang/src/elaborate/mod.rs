@@ -256,6 +256,8 @@ pub struct Elaborator<'a> {
     pub asked_of: Vec<Asked>,
     /// What is bound wherever a condition is asked of something in turn is noted: it is named in words.
     pub noting: bool,
+    /// The same wherever a hazard asks whether there is any of several.
+    pub noting_any: bool,
     /// What was noted: what is asked there, and what is bound.
     pub noted: Vec<(NodeId, Vec<(String, Value)>)>,
     /// The species that the expression evaluated last asks for, and that can never get into the mixture asked.
@@ -356,6 +358,7 @@ impl<'a> Elaborator<'a> {
             looked_into: BTreeSet::new(),
             asked_of: Vec::new(),
             noting: false,
+            noting_any: false,
             noted: Vec::new(),
             absent: Vec::new(),
             absent_in: BTreeMap::new(),

@@ -60,6 +60,8 @@ impl SpeciesDef<'_> {
 pub struct SpeciesTable<'a> {
     all: Vec<SpeciesDef<'a>>,
     by_decl: BTreeMap<DeclId, SpeciesId>,
+    /// Those that split in water, in order.
+    salts: Vec<SpeciesId>,
 }
 
 /// Fields of a species that say what it is; all others are properties.
@@ -107,6 +109,9 @@ impl<'a> SpeciesTable<'a> {
             let module = table.all[index].module;
             let ions = table.terms(names, module, terms, diagnostics);
             check_dissociation(&table, index, &ions, f.span, diagnostics);
+            if !ions.is_empty() {
+                table.salts.push(SpeciesId(index as u32));
+            }
             table.all[index].dissolves = ions;
         }
         table
@@ -146,6 +151,11 @@ impl<'a> SpeciesTable<'a> {
     /// One species.
     pub fn get(&self, id: SpeciesId) -> &SpeciesDef<'a> {
         &self.all[id.0 as usize]
+    }
+
+    /// Those that split in water.
+    pub fn salts(&self) -> impl Iterator<Item = SpeciesId> + '_ {
+        self.salts.iter().copied()
     }
 
     /// All species.

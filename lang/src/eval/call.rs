@@ -139,6 +139,13 @@ impl<'a> Elaborator<'a> {
         v
     }
 
+    /// Whether a function of instances was called with these in the lab.
+    pub fn was_called(&self, id: DeclId, values: &[Value]) -> bool {
+        let Some((id, arguments, count, initial, _)) = self.remembered_call(id, values) else { return true };
+        let known = |live| self.known_calls.contains_key(&(id, arguments.clone(), count, initial, live));
+        known(false) || known(true)
+    }
+
     /// What a call is remembered by: a function of instances and lists of them alone always gives the same node, and so does one of
     /// numbers that the run does not change.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {

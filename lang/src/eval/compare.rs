@@ -34,6 +34,10 @@ impl<'a> Elaborator<'a> {
             let node = self.graph.number(f64::from(u8::from(x == y)));
             return self.equality(op, node, at_a);
         }
+        if let (Value::Species(x), Value::Species(y)) = (&a, &b) {
+            let node = self.graph.number(f64::from(u8::from(x == y)));
+            return self.equality(op, node, at_a);
+        }
         if let (Value::Enum(..), Value::Enum(..)) = (&a, &b) {
             return match self.same_word(&a, &b, at_a, at_b) {
                 Some(node) => self.equality(op, node, at_a),

@@ -3,7 +3,7 @@
 use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
 use rustc_hash::FxHashMap;
 
-use super::{Num, Scope, Value};
+use super::{Num, ReactionId, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
 use crate::elaborate::units::unit_error;
 use crate::elaborate::{Asked, Elaborator};
@@ -415,6 +415,15 @@ impl<'a> Elaborator<'a> {
 
     fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
         match op {
+            Binary::And if self.noting_any => {
+                let x = self.truth(a, scope);
+                // There are many mixtures, and what is never so of one need not be written out.
+                if x.is_some_and(|x| self.graph.constant(x) == Some(0.0)) && !self.prototype {
+                    return x.map_or(Value::Error, Value::Bool);
+                }
+                let (Some(x), Some(y)) = (x, self.truth(b, scope)) else { return Value::Error };
+                Value::Bool(self.graph.binary(BinaryOp::And, x, y))
+            }
             Binary::And | Binary::Or => {
                 let (x, y) = (self.truth(a, scope), self.truth(b, scope));
                 let (Some(x), Some(y)) = (x, y) else { return Value::Error };
@@ -516,13 +525,13 @@ impl<'a> Elaborator<'a> {
                 inside.for_each(|c| c.each.push((var.span, instance)));
             }
             // The innermost of several, as all is bound there.
-            if self.noting
+            let decides = (self.noting && fold.text == "all") || (self.noting_any && fold.text == "any");
+            if decides
                 && self.noted.len() == noted
-                && fold.text == "all"
                 && self.open_calls.is_empty()
                 && self.open_members.is_empty()
                 && let Value::Bool(node) = value
-                && self.graph.constant(node).is_none_or(|v| v == 0.0)
+                && self.graph.constant(node).is_none_or(|v| (v != 0.0) == self.noting_any)
             {
                 self.noted.push((node, scope.vars.clone()));
             }
@@ -587,6 +596,12 @@ impl<'a> Elaborator<'a> {
 
     /// The members of a finite set: a list, or all instances of a type.
     pub fn set(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Vec<Value>> {
+        if let ExprKind::Name(n) = &*e.kind
+            && n.text == "Reaction"
+            && !self.resolves(n, scope)
+        {
+            return Some((0..self.tables.reactions.len() as u32).map(|r| Value::Reaction(ReactionId(r))).collect());
+        }
         let value = self.expr(e, scope);
         match self.listed(value) {
             Value::List(items) => Some(items),

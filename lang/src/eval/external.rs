@@ -1,10 +1,12 @@
 //! The functions the library declares with `extern fn`, bound by name in one table.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::scene::InstanceId;
 use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
-use super::{Num, Scope, Type, Value};
+use super::{Num, Scope, SpeciesId, Type, Value};
 use crate::ast::ItemKind;
 use crate::elaborate::Elaborator;
 use crate::names::DeclId;
@@ -29,6 +31,8 @@ enum Bound {
     Choose,
     /// The species of a set that state a property.
     Having,
+    /// The species that split into some of a set, and water, alone.
+    Salts,
     /// The parts of an instance, and theirs, that are of a kind.
     Parts,
     /// An instance and what it is a part of, as far as they are of a kind.
@@ -92,6 +96,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("parts", Bound::Parts),
     ("position", Bound::Position),
     ("placed", Bound::Placed),
+    ("salts", Bound::Salts),
     ("soils", Bound::Soils),
     ("stated", Bound::Stated),
     ("max_over_time", Bound::OverTime(Keep::Largest)),
@@ -155,6 +160,19 @@ impl Elaborator<'_> {
                     _ => false,
                 };
                 Value::List(set.iter().filter(|v| states(v)).cloned().collect())
+            }
+            (Bound::Salts, [Value::List(set)]) => {
+                let species = &self.tables.species;
+                let set: BTreeSet<SpeciesId> = set
+                    .iter()
+                    .filter_map(|v| match v {
+                        Value::Species(s) => Some(*s),
+                        _ => None,
+                    })
+                    .collect();
+                let there = |ion: &SpeciesId| set.contains(ion) || species.get(*ion).is_water();
+                let made = |s: &SpeciesId| species.get(*s).dissolves.iter().all(|(ion, _)| there(ion));
+                Value::List(species.salts().filter(made).map(Value::Species).collect())
             }
             (Bound::Parts, [Value::Instance(i), Value::Kind(kind)]) => {
                 let mut found = Vec::new();

@@ -189,6 +189,20 @@ impl<'a> Planner<'a, '_> {
         Some(Condition { refusal, ..condition })
     }
 
+    /// What is said where a condition holds to beware of: of each that `any` asks about, with what is bound there.
+    pub fn beware(
+        &mut self,
+        node: NodeId,
+        words: &'a ast::Text,
+        mut bound: Vec<(NodeId, Vec<(String, Value)>)>,
+        scope: &mut Scope,
+    ) -> Vec<Said> {
+        if bound.is_empty() {
+            bound.push((node, scope.vars.clone()));
+        }
+        self.said_of_each(words, bound, scope)
+    }
+
     /// In what is compared, the names of parameters make room for those of the instances that were given.
     fn name_arguments(&self, condition: &mut Condition, scope: &Scope) {
         let each = condition.each.iter_mut().flat_map(|asked| &mut asked.compared);
@@ -215,6 +229,16 @@ impl<'a> Planner<'a, '_> {
             let text = if holds { None } else { self.filled(words, scope) };
             return text.map(|text| Said { node: condition.node, text }).into_iter().collect();
         }
+        self.said_of_each(words, bound, scope)
+    }
+
+    /// Words for each that is asked about, with what is bound there.
+    fn said_of_each(
+        &mut self,
+        words: &'a ast::Text,
+        bound: Vec<(NodeId, Vec<(String, Value)>)>,
+        scope: &mut Scope,
+    ) -> Vec<Said> {
         let mut out = Vec::new();
         for (node, vars) in bound {
             let outside = std::mem::replace(&mut scope.vars, vars);

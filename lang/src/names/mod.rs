@@ -214,7 +214,8 @@ pub fn item_name(item: &Item) -> Option<(String, Span)> {
         | ItemKind::Dimension { .. }
         | ItemKind::Unit { .. }
         | ItemKind::Incompatible { .. }
-        | ItemKind::Allow { .. } => None,
+        | ItemKind::Allow { .. }
+        | ItemKind::Accept { .. } => None,
     }
 }
 

@@ -219,6 +219,14 @@ pub fn pairs(module: &Module) -> String {
                 reason.clone(),
                 cell(&item.docs),
             ]),
+            ItemKind::Accept { name, reason } => rows.push(vec![
+                code(&name.text),
+                String::new(),
+                "allowed".to_string(),
+                String::new(),
+                reason.clone(),
+                cell(&item.docs),
+            ]),
             _ => {}
         }
     }

@@ -149,6 +149,13 @@ pub enum ItemKind {
         /// Why it is meant.
         reason: String,
     },
+    /// `allow undissolved "why"`: a hazard or caution that this package accepts.
+    Accept {
+        /// Its name.
+        name: Name,
+        /// Why it is meant.
+        reason: String,
+    },
     /// `hazard closed_vessel_heated(h: Heater & Body, v: Capped) when ... "open it first"`.
     Hazard {
         /// `hazard`, not `caution`: it is an error.
@@ -157,10 +164,16 @@ pub enum ItemKind {
         name: Name,
         /// Over what.
         params: Vec<Param>,
+        /// `of acidity(m)`: the value, or the transfer, at whose use it is looked at.
+        of: Option<Expr>,
+        /// `after move(share, from: a, to: b)`: the transfer behind which the value's use counts.
+        after: Option<Expr>,
         /// When it is there.
         when: Expr,
         /// How to mend it.
         help: Option<String>,
+        /// What is so, in words with values; it may name what `any` goes through.
+        because: Option<Text>,
     },
     /// `capability Heater: Thermal { ... }`.
     Capability {

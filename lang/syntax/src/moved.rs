@@ -143,7 +143,10 @@ impl Moved for ItemKind {
             ItemKind::Material { name, fields } => each!(put: name fields),
             ItemKind::Incompatible { a, b, fields } => each!(put: a b fields),
             ItemKind::Allow { a, b, reason } => each!(put: a b reason),
-            ItemKind::Hazard { grave, name, params, when, help } => each!(put: grave name params when help),
+            ItemKind::Accept { name, reason } => each!(put: name reason),
+            ItemKind::Hazard { grave, name, params, of, after, when, help, because } => {
+                each!(put: grave name params of after when help because)
+            }
             ItemKind::Capability { name, extends, source, members } => each!(put: name extends source members),
             ItemKind::Asset { name, extends, source, lines } => each!(put: name extends source lines),
             ItemKind::Process(a) => each!(put: a),

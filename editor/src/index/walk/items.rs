@@ -79,9 +79,12 @@ impl Walk<'_> {
                 self.global(a);
                 self.global(b);
             }
-            ItemKind::Hazard { params, when, .. } => {
+            ItemKind::Accept { name, .. } => self.global(name),
+            ItemKind::Hazard { params, of, after, when, because, .. } => {
                 self.params(params);
+                self.exprs(of.iter().chain(after));
                 self.expr(when);
+                because.iter().for_each(|words| self.said_of(when, words));
             }
             ItemKind::Capability { extends, members, .. } => {
                 extends.iter().for_each(|p| self.path(p));

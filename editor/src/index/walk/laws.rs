@@ -1,6 +1,6 @@
 //! Laws, effects and clauses.
 
-use matterix_lang::ast::{Clause, ClauseKind, Effect, Expr, Goal, Law, LawKind, Manner, Name, Refusal, Sig};
+use matterix_lang::ast::{Clause, ClauseKind, Effect, Expr, Goal, Law, LawKind, Manner, Name, Refusal, Sig, Text};
 
 use super::{Found, Walk};
 use crate::index::Kind;
@@ -171,9 +171,14 @@ impl Walk<'_> {
         if let Some(refusal) = refusal {
             self.failure(&refusal.failure);
         }
-        self.inside(because.span, |this| {
+        self.said_of(cond, because);
+    }
+
+    /// What is said of a condition, which may name what it goes through.
+    pub(super) fn said_of(&mut self, cond: &Expr, words: &Text) {
+        self.inside(words.span, |this| {
             this.enter_folds(cond);
-            this.text(because);
+            this.text(words);
         });
     }
 

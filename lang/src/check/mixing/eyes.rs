@@ -9,6 +9,7 @@ use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::world::World;
+use crate::elaborate::hazards::SHARE;
 use crate::elaborate::mixtures::{Passage, Passages};
 use crate::elaborate::{Elaborator, ExtensiveKey, SpeciesId};
 
@@ -117,6 +118,7 @@ impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
             Op::Const(v) => return Some((v, true)),
             Op::State(i) => self.world.states[i as usize],
             Op::Param(i) => self.params[i as usize],
+            Op::Local(SHARE) => self.world.share,
             Op::Local(i) => self.world.locals.get(i as usize).copied().unwrap_or(f64::NAN),
             _ => f64::NAN,
         };

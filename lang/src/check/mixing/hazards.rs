@@ -1,49 +1,87 @@
 //! H2: hazards that a step brings about, such as a set point above the boiling point of what stands on the plate.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::convert::Infallible;
 
 use matterix_ir::model::Domain;
+use matterix_ir::plan::{Said, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
 use super::Walk;
+use super::uses::Stream;
 use super::world::World;
-use crate::elaborate::hazards::Hazard;
+use crate::elaborate::hazards::{Hazard, Watched};
 
 /// The hazards of a lab, by the states they depend on.
 pub(super) struct Hazards {
-    all: Vec<Hazard>,
+    pub all: Vec<Hazard>,
     by_state: BTreeMap<u32, Vec<usize>>,
     /// What is reported already, until it is over.
     present: BTreeSet<usize>,
+    /// Those of values that are recorded or kept from a step on.
+    standing: BTreeMap<usize, Span>,
+    /// Those of transfers that have come about, with what is said of them where a value is used.
+    since: BTreeMap<usize, (Span, String)>,
+    /// Places, and the hazards of values and transfers told there: one mistake is one message.
+    told: BTreeSet<(Span, Span)>,
 }
 
 impl Hazards {
     pub(super) fn new(all: Vec<Hazard>) -> Self {
         let mut by_state: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (i, hazard) in all.iter().enumerate() {
-            for s in &hazard.states {
+            for s in hazard.states.iter().filter(|_| !matches!(hazard.watched, Watched::Transfer(..))) {
                 by_state.entry(*s).or_default().push(i);
             }
         }
-        Hazards { all, by_state, present: BTreeSet::new() }
+        let (present, standing, since, told) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
+        Hazards { all, by_state, present, standing, since, told }
     }
 }
 
 impl Walk<'_, '_> {
     /// Judges the hazards that are there whatever is done: of things as they are, said once for each declaration.
     pub(super) fn endangered(&mut self, world: &World) {
-        for hazard in self.hazards.all.iter().filter(|h| h.states.is_empty()) {
-            let mut thing = hazard.about;
-            while let Some(owner) = thing.and_then(|id| self.eyes.lab.instances[id.0 as usize].owner) {
-                thing = Some(owner);
-            }
-            let place = thing.map_or(self.place(), |id| self.eyes.lab.instances[id.0 as usize].span);
+        let as_it_is = |h: &&Hazard| h.states.is_empty() && h.watched == Watched::Steps;
+        for hazard in self.hazards.all.iter().filter(as_it_is) {
+            let place = self.declared_at(hazard);
             if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
                 continue;
             }
             let d = self.hazard(hazard, world, place, "declared here");
             if !self.found.iter().any(|f| f.span() == d.span() && f.code == d.code) {
                 self.found.push(d);
+            }
+        }
+    }
+
+    /// Where the whole thing stands in the lab that a hazard is about.
+    fn declared_at(&self, hazard: &Hazard) -> Span {
+        let lab = self.eyes.lab;
+        let mut thing = hazard.about;
+        while let Some(owner) = thing.and_then(|id| lab.instances[id.0 as usize].owner) {
+            thing = Some(owner);
+        }
+        thing.map_or(self.place(), |id| lab.instances[id.0 as usize].span)
+    }
+
+    /// Judges the hazards of what the lab itself measures out: contents given in the dimension of a watched value.
+    pub(super) fn measured_out(&mut self, world: &World) {
+        let lab = self.eyes.lab;
+        for held in &lab.held {
+            let Some(m) = held.mixture else { continue };
+            let dimension = &held.quantity.dimension;
+            let is_of =
+                |h: &Hazard| h.about == Some(m) || (h.about.is_some() && h.about == lab.instances[m.0 as usize].owner);
+            let watches = |h: &Hazard| h.measure.as_ref().is_some_and(|d| d == dimension) && is_of(h);
+            let found: Vec<usize> = (0..self.hazards.all.len()).filter(|i| watches(&self.hazards.all[*i])).collect();
+            for i in found {
+                let hazard = &self.hazards.all[i];
+                if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
+                    let d = self.hazard(hazard, world, held.span, "measured out here");
+                    self.tell(i, d);
+                }
             }
         }
     }
@@ -55,19 +93,118 @@ impl Walk<'_, '_> {
             changed.iter().filter_map(|s| self.hazards.by_state.get(s)).flatten().copied().collect();
         for i in touched {
             let hazard = &self.hazards.all[i];
+            let since = match hazard.watched {
+                Watched::Steps => None,
+                _ if self.hazards.standing.contains_key(&i) => self.hazards.standing.get(&i).copied(),
+                _ => continue,
+            };
             if self.eyes.nominal_truth(hazard.when, world) != Some(true) {
                 self.hazards.present.remove(&i);
                 continue;
             }
-            if self.hazards.present.contains(&i) {
+            if !self.hazards.present.insert(i) {
                 continue;
             }
-            let d = self.hazard(hazard, world, self.place(), "brings it about");
-            self.hazards.present.insert(i);
-            if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
-                self.found.push(d);
+            let hazard = &self.hazards.all[i];
+            // What is so from the start stands where the lab puts it.
+            let (place, said) = match self.places.len() {
+                1 => (self.declared_at(hazard), "so from the start"),
+                _ => (self.place(), "brings it about"),
+            };
+            let mut d = self.hazard(hazard, world, place, said);
+            if let Some(since) = since.filter(|since| *since != place) {
+                d = d.because(since, "used from here on");
+            }
+            self.tell(i, d);
+        }
+    }
+
+    /// Judges the hazards of what a step uses.
+    pub(super) fn used(&mut self, id: StepId, world: &World) {
+        let Some(found) = self.uses.by_step.get(&id).cloned() else { return };
+        let lasts = matches!(self.plan.get(id).step, Step::Record { .. } | Step::Keep { .. });
+        for i in found.iter().copied() {
+            if lasts {
+                let place = self.place();
+                self.hazards.standing.entry(i).or_insert(place);
+            }
+            self.used_here(i, world);
+        }
+    }
+
+    /// Judges the hazards of a flow that goes on from now on.
+    pub(super) fn flows(&mut self, stream: Stream, world: &World) {
+        let found = self.uses.by_stream.get(&stream).cloned();
+        found.iter().flat_map(|found| found.iter()).for_each(|i| self.used_here(*i, world));
+    }
+
+    /// Judges the hazards of a transfer that is about to take a share.
+    pub(super) fn transfers(&mut self, from: InstanceId, to: InstanceId, share: f64, world: &mut World) {
+        let Some(found) = self.uses.by_transfer.get(&(from, to)).cloned() else { return };
+        world.share = share;
+        for i in found {
+            let hazard = &self.hazards.all[i];
+            match hazard.watched {
+                Watched::Transfer(.., Some(_)) if self.eyes.nominal_truth(hazard.when, world) == Some(true) => {
+                    let words = self.worded(hazard, world).unwrap_or_default();
+                    let place = self.place();
+                    self.hazards.since.insert(i, (place, words));
+                }
+                Watched::Transfer(.., Some(_)) => {}
+                _ => self.used_here(i, world),
             }
         }
+        world.share = f64::NAN;
+    }
+
+    /// Tells a hazard of a transfer where the value is used that it is about.
+    fn used_after(&mut self, i: usize, world: &World) {
+        let Some((place, words)) = self.hazards.since.remove(&i) else { return };
+        let mut d = self.hazard(&self.hazards.all[i], world, self.place(), "used here");
+        if !words.is_empty() {
+            d.headline = words;
+        }
+        d = d.because(place, "comes together here");
+        self.tell(i, d);
+    }
+
+    fn used_here(&mut self, i: usize, world: &World) {
+        let hazard = &self.hazards.all[i];
+        if self.hazards.since.contains_key(&i) {
+            return self.used_after(i, world);
+        }
+        if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
+            let said =
+                if matches!(hazard.watched, Watched::Transfer(..)) { "comes together here" } else { "used here" };
+            let d = self.hazard(hazard, world, self.place(), said);
+            self.hazards.present.insert(i);
+            self.tell(i, d);
+        }
+    }
+
+    /// Takes in a finding, unless the same was said at the same place.
+    fn tell(&mut self, i: usize, d: Diagnostic) {
+        let hazard = &self.hazards.all[i];
+        let once = hazard.watched != Watched::Steps || !hazard.said.is_empty();
+        if once && !self.hazards.told.insert((d.span(), hazard.span)) {
+            return;
+        }
+        if !self.found.iter().any(|f| f.span() == d.span() && f.headline == d.headline) {
+            self.found.push(d);
+        }
+    }
+
+    /// What is so, in the words of a hazard: of the first that it asks about and that is so.
+    fn worded(&self, hazard: &Hazard, world: &World) -> Option<String> {
+        let is_so = |said: &&Said| self.eyes.nominal_truth(said.node, world) == Some(true);
+        let Said { text, .. } = hazard.said.iter().find(is_so)?;
+        let lab = self.eyes.lab;
+        let value = |node| {
+            let value = self.eyes.value(node, world);
+            Ok::<_, Infallible>(Some(value).filter(|v| v.is_finite()))
+        };
+        let instance = |at: f64| lab.instances.get(at as usize).map_or("nothing", |i| i.name.as_str()).to_string();
+        text.show(value, instance).ok()
     }
 
     fn hazard(&self, hazard: &Hazard, world: &World, place: Span, said: &str) -> Diagnostic {
@@ -75,7 +212,9 @@ impl Walk<'_, '_> {
         let code = codes::find(&hazard.name.replace('_', "-")).unwrap_or(codes::HAZARD);
         let about = hazard.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
         let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
-        let headline = format!("{words}: {}", things.join(" and "));
+        let worded = self.worded(hazard, world);
+        let in_words = worded.is_some();
+        let headline = worded.unwrap_or_else(|| format!("{words}: {}", things.join(" and ")));
         let mut d = Diagnostic::error(code, place, headline, said);
         if !hazard.grave {
             d.severity = Severity::Warning;
@@ -90,7 +229,7 @@ impl Walk<'_, '_> {
                 d = d.because(span, format!("`{name}` is set here"));
             }
         }
-        for term in &hazard.terms {
+        for term in hazard.terms.iter().filter(|_| !in_words) {
             let value = self.eyes.value(term.node, world);
             if let Domain::Quantity(unit) = &term.domain
                 && value.is_finite()
@@ -100,6 +239,9 @@ impl Walk<'_, '_> {
         }
         if let Some(help) = &hazard.help {
             d = d.help(help.clone());
+        }
+        if !hazard.grave && in_words {
+            d = d.help(format!("if this is meant, say so: `allow {} \"why\"`", hazard.name));
         }
         d
     }

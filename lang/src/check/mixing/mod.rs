@@ -8,6 +8,7 @@ mod feeds;
 mod hazards;
 mod reactions;
 mod report;
+mod uses;
 mod world;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,6 +25,7 @@ use crate::names::DeclId;
 use crate::screen::Consequence;
 use eyes::Eyes;
 use hazards::Hazards;
+use uses::Uses;
 use world::{Before, World};
 
 /// Steps after which loops are followed no further than once, so that nested loops stay cheap.
@@ -67,7 +69,9 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready)
     let eyes = Eyes::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
+    let uses = Uses::new(lab, plan, &ready.hazards.all, &library);
     let mut walk = Walk {
+        uses,
         by_event: moves_of_events(&eyes, plan),
         feeds: feeds::feeds(&eyes, events),
         eyes: &eyes,
@@ -87,6 +91,7 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready)
     walk.begin(&mut world);
     walk.fed(&mut world);
     walk.endangered(&world);
+    walk.measured_out(&world);
     walk.endanger(&mut world);
     walk.step(plan.root, world);
     walk.found
@@ -146,6 +151,7 @@ struct Walk<'w, 'a> {
     /// What the wall around each mixture is made of, where that is said.
     materials: BTreeMap<InstanceId, DeclId>,
     hazards: Hazards,
+    uses: Uses,
     plan: &'w Plan,
     /// Transfers that events make: those that neither operations nor processes do.
     by_event: BTreeSet<(InstanceId, InstanceId)>,
@@ -194,7 +200,11 @@ impl Walk<'_, '_> {
         if own {
             self.places.push(step.span);
         }
+        self.used(id, &world);
         let world = self.inside(&step.step, world);
+        if matches!(step.step, Step::RepeatWhile { .. }) {
+            self.used(id, &world);
+        }
         if own {
             self.places.pop();
         }
@@ -282,6 +292,7 @@ impl Walk<'_, '_> {
             Step::Skill { body, .. }
             | Step::Named { body, .. }
             | Step::Keep { body, .. }
+            | Step::During { body, .. }
             | Step::Within { body, .. }
             | Step::Claim { body, .. }
             | Step::Start { body, .. } => self.step(*body, world),
@@ -321,9 +332,14 @@ impl Walk<'_, '_> {
 
     fn action(&mut self, action: &Action, world: &mut World) {
         let before = match action {
-            Action::Move { from, to, .. } => {
+            Action::Move { fraction, from, to, .. } => {
                 let mixtures = &self.eyes.lab.mixtures;
-                mixtures.get(*from as usize).zip(mixtures.get(*to as usize)).map(|(a, b)| (*b, world.before(*a, *b)))
+                let ends = mixtures.get(*from as usize).zip(mixtures.get(*to as usize)).map(|(a, b)| (*a, *b));
+                if let Some((a, b)) = ends.filter(|(a, b)| a != b) {
+                    let share = self.eyes.value(*fraction, world);
+                    self.transfers(a, b, share, world);
+                }
+                ends.map(|(a, b)| (b, world.before(a, b)))
             }
             Action::Assign { .. } => None,
         };
@@ -345,6 +361,7 @@ impl Walk<'_, '_> {
             let guard = lab.processes.get(*process).and_then(|p| p.guard);
             if guard.is_none_or(|g| self.eyes.truth(g, world) != Some(false)) {
                 active.insert((*from, *to));
+                self.flows((*process, *from, *to), world);
             }
         }
         // One stream may feed the next.

@@ -60,6 +60,8 @@ pub struct World {
     pub states: Pages<f64>,
     /// By the index of kept values; not a number where it is not known.
     pub locals: Vec<f64>,
+    /// The share of its source that the transfer takes which is looked at; not a number beside transfers.
+    pub share: f64,
     /// The step that last assigned a state, by its index.
     set: Pages<Option<Span>>,
     /// States changed since they were last asked for.
@@ -74,6 +76,7 @@ impl World {
             mixtures: vec![Contents::default(); lab.instances.len()].into_iter().collect(),
             states: lab.states.iter().map(|_| f64::NAN).collect(),
             locals: vec![f64::NAN; locals],
+            share: f64::NAN,
             set: lab.states.iter().map(|_| None).collect(),
             changed: (0..lab.states.len() as u32).collect(),
         };

@@ -57,11 +57,17 @@ fn item_kind(kind: &ItemKind) -> Sexp {
             node("incompatible").with([name(a), name(b)]).with(fields(list))
         }
         ItemKind::Allow { a, b, reason } => node("allow").with([name(a), name(b), quoted(reason)]),
-        ItemKind::Hazard { grave, name: word, params, when, help } => node(if *grave { "hazard" } else { "caution" })
-            .with([name(word)])
-            .with(params.iter().map(param))
-            .with([node("when").with([expr(when)])])
-            .with(help.iter().map(|h| quoted(h))),
+        ItemKind::Accept { name: word, reason } => node("accept").with([name(word), quoted(reason)]),
+        ItemKind::Hazard { grave, name: word, params, of, after, when, help, because } => {
+            node(if *grave { "hazard" } else { "caution" })
+                .with([name(word)])
+                .with(params.iter().map(param))
+                .with(of.as_ref().map(|e| node("of").with([expr(e)])))
+                .with(after.as_ref().map(|e| node("after").with([expr(e)])))
+                .with([node("when").with([expr(when)])])
+                .with(help.iter().map(|h| quoted(h)))
+                .with(because.as_ref().map(|words| node("because").with([super::steps::filled(words)])))
+        }
         ItemKind::Capability { name: word, extends, source, members } => node("capability")
             .with([name(word)])
             .with(extends.iter().map(path))

@@ -45,15 +45,23 @@ impl Lower<'_> {
                 ItemKind::Incompatible { a: self.name_in(kids), b: self.name_in(kids), fields: self.fields_in(kids) }
             }
             Rule::allow => {
-                let (a, b) = (self.name_in(kids), self.name_in(kids));
-                ItemKind::Allow { a, b, reason: self.text_in(kids) }
+                let name = self.name_in(kids);
+                match kids.peek() {
+                    Some(Rule::species) => {
+                        ItemKind::Allow { a: name, b: self.name_in(kids), reason: self.text_in(kids) }
+                    }
+                    _ => ItemKind::Accept { name, reason: self.text_in(kids) },
+                }
             }
             Rule::hazard => ItemKind::Hazard {
                 grave: kids.has(Rule::kw_hazard),
                 name: self.name_in(kids),
                 params: self.params_in(kids),
+                of: kids.has(Rule::kw_of).then(|| kids.eat(Rule::operand).map(|o| self.expr(o))).flatten(),
+                after: kids.eat(Rule::operand).map(|o| self.expr(o)),
                 when: self.expr_in(kids),
                 help: kids.eat(Rule::string).map(|t| self.text(&t)),
+                because: kids.has(Rule::kw_because).then(|| self.filled_in(kids)).flatten(),
             },
             Rule::capability => self.capability(kids),
             Rule::asset => self.asset(kids),

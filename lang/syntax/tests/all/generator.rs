@@ -202,6 +202,10 @@ fn item() -> Text {
         (name(), quoted()).prop_map(|(n, t)| format!("material {n} {{ title: {t} }}")),
         (name(), cond(), quoted()).prop_map(|(n, c, t)| format!("hazard {n}(a: T)\n when {c}\n {t}")),
         (name(), cond()).prop_map(|(n, c)| format!("caution {n}(a: T) when {c}")),
+        (name(), operand(), cond(), quoted()).prop_map(|(n, o, c, t)| {
+            format!("caution {n}(a: T)\n of {o}\n after {o}\n when {c}\n {t}\n because {t}")
+        }),
+        (name(), quoted()).prop_map(|(n, t)| format!("allow {n} {t}")),
         (species(), quantity()).prop_map(|(s, q)| format!("solution S {{ {s}: {q}; water: rest }} labelled {q} of {s} +- 1 %")),
         (species(), cond()).prop_map(|(s, c)| format!("reaction r: {s} + 2 {s} <-> {s} {{\n rate: {c},\n order: {{}}\n}}")),
         members,

@@ -1,0 +1,140 @@
+//! Where the plan uses values that hazards watch: in conditions, kept values, records and texts of its own, in what its
+//! operations do, and in the flows of processes. What steps of the library ask for themselves is no use.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Condition, Plan, PlanStep, Step, StepId};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{FileId, NodeId, Op, Text, TextPart};
+use rustc_hash::FxHashMap;
+
+use crate::elaborate::Elaborator;
+use crate::elaborate::hazards::{Hazard, Watched};
+
+/// A flow of a process: its index, and the two mixtures.
+pub(super) type Stream = (usize, InstanceId, InstanceId);
+
+/// The hazards, by index, that are looked at where something is used.
+#[derive(Default)]
+pub(super) struct Uses {
+    pub by_step: BTreeMap<StepId, Rc<[usize]>>,
+    pub by_transfer: BTreeMap<(InstanceId, InstanceId), Vec<usize>>,
+    pub by_stream: BTreeMap<Stream, Rc<[usize]>>,
+}
+
+impl Uses {
+    /// What a plan uses of what hazards watch.
+    pub fn new(lab: &Elaborator<'_>, plan: &Plan, hazards: &[Hazard], library: &BTreeSet<FileId>) -> Uses {
+        let mut uses = Uses::default();
+        let mut finder = Finder { lab, watched: FxHashMap::default(), known: FxHashMap::default() };
+        for (i, hazard) in hazards.iter().enumerate() {
+            match hazard.watched {
+                Watched::Steps => {}
+                Watched::Value(node) => finder.watched.entry(node).or_default().push(i),
+                Watched::Transfer(from, to, then) => {
+                    uses.by_transfer.entry((from, to)).or_default().push(i);
+                    then.into_iter().for_each(|node| finder.watched.entry(node).or_default().push(i));
+                }
+            }
+        }
+        if finder.watched.is_empty() {
+            return uses;
+        }
+        for (i, step) in plan.steps.iter().enumerate() {
+            let found = finder.all(used_by(step, library));
+            if !found.is_empty() {
+                uses.by_step.insert(StepId(i as u32), found);
+            }
+        }
+        for (stream, flows) in &lab.streams {
+            let found = finder.all(vec![*flows]);
+            if !found.is_empty() {
+                uses.by_stream.insert(*stream, found);
+            }
+        }
+        uses
+    }
+}
+
+/// Finds watched values below others.
+struct Finder<'l, 'a> {
+    lab: &'l Elaborator<'a>,
+    watched: FxHashMap<NodeId, Vec<usize>>,
+    known: FxHashMap<NodeId, Rc<[usize]>>,
+}
+
+impl Finder<'_, '_> {
+    fn all(&mut self, nodes: Vec<NodeId>) -> Rc<[usize]> {
+        if let [one] = nodes.as_slice() {
+            return self.below(*one);
+        }
+        let found: BTreeSet<usize> = nodes.into_iter().flat_map(|n| self.below(n).to_vec()).collect();
+        found.into_iter().collect()
+    }
+
+    /// The hazards that watch something a value rests on, the true values behind readings included.
+    fn below(&mut self, node: NodeId) -> Rc<[usize]> {
+        if let Some(known) = self.known.get(&node) {
+            return known.clone();
+        }
+        let mut found = BTreeSet::new();
+        let mut readings = Vec::new();
+        for n in self.lab.graph.schedule([node]) {
+            found.extend(self.watched.get(&n).into_iter().flatten().copied());
+            if let Op::Reading(r) = self.lab.graph.op(n) {
+                readings.push(self.lab.readings[r as usize].value);
+            }
+        }
+        for value in readings {
+            found.extend(self.below(value).iter());
+        }
+        let found: Rc<[usize]> = found.into_iter().collect();
+        self.known.insert(node, found.clone());
+        found
+    }
+}
+
+/// The values a step uses.
+fn used_by(step: &PlanStep, library: &BTreeSet<FileId>) -> Vec<NodeId> {
+    let own = |condition: &Condition| !library.contains(&condition.span.file);
+    let stands_here = !library.contains(&step.span.file);
+    let mut out = Vec::new();
+    match &step.step {
+        Step::Operation(o) => {
+            out.extend(o.needs.iter().filter(|c| own(c)).map(|c| c.node));
+            out.extend(o.until.iter().filter(|c| own(c)).map(|c| c.node));
+            out.extend(o.at_start.iter().chain(&o.at_end).map(|action| match action {
+                Action::Assign { value, .. } => *value,
+                Action::Move { fraction, .. } => *fraction,
+            }));
+        }
+        Step::Skill { needs, invariants, promises, .. } => {
+            let asked = needs.iter().map(|c| &**c).chain(invariants).chain(promises);
+            out.extend(asked.filter(|c| own(c)).map(|c| c.node));
+        }
+        Step::During { invariants, .. } => out.extend(invariants.iter().filter(|c| own(c)).map(|c| c.node)),
+        Step::WaitUntil { condition, .. }
+        | Step::Hold { condition, .. }
+        | Step::Keep { condition, .. }
+        | Step::If { condition, .. }
+        | Step::RepeatWhile { condition, .. } => out.extend(Some(condition.node).filter(|_| own(condition))),
+        Step::Expect(conditions) => out.extend(conditions.iter().filter(|c| own(c)).map(|c| c.node)),
+        Step::Let { value, .. } if stands_here => out.push(*value),
+        Step::Wait { duration } if stands_here => out.push(*duration),
+        Step::Repeat { times, .. } if stands_here => out.push(*times),
+        Step::Record { value, .. } => out.extend(value),
+        Step::Note(text) | Step::Ask(text) if stands_here => shown(text, &mut out),
+        _ => {}
+    }
+    out
+}
+
+fn shown(text: &Text, out: &mut Vec<NodeId>) {
+    out.extend(text.parts.iter().filter_map(|part| match part {
+        TextPart::Quantity { value, .. } => Some(*value),
+        TextPart::Bool(node) => Some(*node),
+        _ => None,
+    }));
+}
