@@ -1,5 +1,6 @@
 //! S1, D3, R1, R2: what no order and no patience mends. All of it is about the run in which nothing fails.
 
+mod components;
 mod deadlock;
 mod show;
 mod takes;
@@ -9,16 +10,19 @@ mod windows;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
-use matterix_ir::Diagnostic;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, Step, StepId};
+use matterix_ir::{Diagnostic, Span, codes};
 use matterix_timing::walk::Durations;
 use matterix_timing::{Known, Point, ROUNDING, Scope, Timing};
 
 use crate::elaborate::Elaborator;
 
-/// Networks are searched from at most so many points: plans with more branches than that are left to the run.
-const MOST_SEARCHES: usize = 4000;
+/// Least times that are kept at most (eight bytes each); when they are full, what is asked for again is searched again.
+const MOST_KEPT: usize = 8_000_000;
+
+/// Differences that all searches look at, at most; a plan that needs more is told that its times were not all compared.
+const MOST_WORK: usize = 2_000_000_000;
 
 /// Reports contradictions in the times of a plan and in the use of instances.
 pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
@@ -37,7 +41,17 @@ pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], event
     };
     found.extend(twice::findings(&times, &name));
     found.extend(deadlock::findings(&times, &name));
+    if times.work.get() > MOST_WORK {
+        let text = "its steps are compared with each other up to a limit";
+        found.push(spent(plan.get(plan.root).span, "not all times of this workflow are compared", text));
+    }
     found
+}
+
+/// The finding that a limit of an analysis was reached.
+fn spent(place: Span, headline: &str, text: &str) -> Diagnostic {
+    Diagnostic::warning(codes::NOT_ANALYSED, place, headline, text)
+        .help("divide the workflow into several, or say `claim` around what must not overlap")
 }
 
 /// Least times from a point to all others, s, with what holds in some scopes.
@@ -48,12 +62,13 @@ struct Times<'p> {
     plan: &'p Plan,
     timing: Timing,
     searched: RefCell<Searched>,
-    searches: Cell<usize>,
+    /// Differences looked at so far.
+    work: Cell<usize>,
 }
 
 impl<'p> Times<'p> {
     fn new(plan: &'p Plan, timing: Timing) -> Self {
-        Times { plan, timing, searched: RefCell::default(), searches: Cell::new(0) }
+        Times { plan, timing, searched: RefCell::default(), work: Cell::new(0) }
     }
 
     /// The least time between two points, s; none where it is not known.
@@ -64,11 +79,15 @@ impl<'p> Times<'p> {
         let key = (from, scopes.to_vec());
         let mut searched = self.searched.borrow_mut();
         if !searched.contains_key(&key) {
-            if self.searches.get() >= MOST_SEARCHES {
+            if self.work.get() > MOST_WORK {
                 return None;
             }
-            self.searches.set(self.searches.get() + 1);
-            searched.insert(key.clone(), self.timing.network.least_from(from, scopes).unwrap_or_default());
+            let network = &self.timing.network;
+            self.work.set(self.work.get() + network.edges.len());
+            if (searched.len() + 1) * network.points as usize > MOST_KEPT {
+                searched.clear();
+            }
+            searched.insert(key.clone(), network.least_from(from, scopes).unwrap_or_default());
         }
         let least = searched.get(&key)?.get(to.0 as usize).copied()?;
         least.is_finite().then_some(least)
@@ -82,8 +101,12 @@ impl<'p> Times<'p> {
         }
     }
 
-    /// Whether one step is over before the other begins in every run.
+    /// Whether one step is over before the other begins in every run. Where the search was cut short they count as apart: that is
+    /// told of by itself.
     fn apart(&self, a: StepId, b: StepId) -> bool {
+        if self.work.get() > MOST_WORK {
+            return true;
+        }
         let (a, b) = (self.all_turns(a, b), self.all_turns(b, a));
         let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
         let scopes = [a.scope, b.scope];
