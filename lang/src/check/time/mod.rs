@@ -58,7 +58,7 @@ fn spent(place: Span, headline: &str, text: &str) -> Diagnostic {
 type Searched = BTreeMap<(Point, Vec<Scope>), Vec<f64>>;
 
 /// The plan with its times, and answers about pairs of steps.
-struct Times<'p> {
+pub struct Times<'p> {
     plan: &'p Plan,
     timing: Timing,
     searched: RefCell<Searched>,
@@ -67,6 +67,15 @@ struct Times<'p> {
 }
 
 impl<'p> Times<'p> {
+    /// Walks through a plan; what its times contradict is left out.
+    pub fn of(lab: &Elaborator<'_>, plan: &'p Plan, derivatives: &[Derivative], events: &[Event]) -> Self {
+        let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
+        let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
+        let timing = Timing::of(plan, &known, Durations::Bounds);
+        let (_, network) = windows::findings(plan, &timing);
+        Times::new(plan, Timing { network, ..timing })
+    }
+
     fn new(plan: &'p Plan, timing: Timing) -> Self {
         Times { plan, timing, searched: RefCell::default(), work: Cell::new(0) }
     }
@@ -94,27 +103,27 @@ impl<'p> Times<'p> {
     }
 
     /// Whether the plan lets two steps run at the same time, as far as its shape tells.
-    fn beside(&self, a: StepId, b: StepId) -> bool {
+    pub fn beside(&self, a: StepId, b: StepId) -> bool {
         match (self.timing.visit(a), self.timing.visit(b)) {
             (Some(a), Some(b)) => self.timing.beside(a, b),
             _ => false,
         }
     }
 
-    /// Whether one step is over before the other begins in every run. Where the search was cut short they count as apart: that is
-    /// told of by itself.
+    /// Whether one step is over before the other begins in every run, whichever comes first. Where the search was cut short they
+    /// count as apart: that is told of by itself.
     fn apart(&self, a: StepId, b: StepId) -> bool {
-        if self.work.get() > MOST_WORK {
-            return true;
-        }
-        let (a, b) = (self.all_turns(a, b), self.all_turns(b, a));
-        let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
-        let scopes = [a.scope, b.scope];
+        self.work.get() > MOST_WORK || self.before(a, b) || self.before(b, a)
+    }
+
+    /// Whether a step is over before another one begins in every run.
+    pub fn before(&self, first: StepId, second: StepId) -> bool {
+        let (first, second) = (self.all_turns(first, second), self.all_turns(second, first));
+        let (Some(a), Some(b)) = (self.timing.visit(first), self.timing.visit(second)) else { return false };
         // Two actions without duration meet where nothing keeps them apart; others may follow each other closely.
         let at_once = a.lasts.max <= 0.0 && b.lasts.max <= 0.0;
         let gap = if at_once { ROUNDING } else { -ROUNDING };
-        let after = |first: Point, second: Point| self.least(first, second, &scopes).is_some_and(|t| t > gap);
-        after(a.end, b.start) || after(b.end, a.start)
+        self.least(a.end, b.start, &[a.scope, b.scope]).is_some_and(|t| t > gap)
     }
 
     /// Whether the steps run at the same time in every run.
