@@ -1,8 +1,9 @@
 //! Hazards on the instances of a lab: conditions that must not come about.
 
+use matterix_ir::model::Danger;
 use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{NodeId, Op, Span};
+use matterix_ir::{Code, NodeId, Op, Severity, Span, codes};
 
 use super::Elaborator;
 use crate::ast::ItemKind;
@@ -32,7 +33,40 @@ pub struct Hazard {
     pub span: Span,
 }
 
+impl Hazard {
+    /// The kind of finding.
+    pub fn code(&self) -> Code {
+        codes::find(&self.name.replace('_', "-")).unwrap_or(codes::HAZARD)
+    }
+
+    /// What is dangerous about which things.
+    pub fn headline(&self) -> String {
+        let about = self.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
+        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
+        format!("{}: {}", self.name.replace('_', " "), things.join(" and "))
+    }
+
+    /// An error, or a warning.
+    pub fn severity(&self) -> Severity {
+        if self.grave { Severity::Error } else { Severity::Warning }
+    }
+}
+
 impl Elaborator<'_> {
+    /// What a run watches for. What depends on no state is there from the start or never, which is told before the run.
+    pub fn dangers(&mut self) -> Vec<Danger> {
+        let all = self.hazards().into_iter().filter(|h| !h.states.is_empty());
+        let danger = |h: Hazard| Danger {
+            code: h.code(),
+            severity: h.severity(),
+            when: h.when,
+            headline: h.headline(),
+            help: h.help.iter().cloned().collect(),
+            span: h.span,
+        };
+        all.map(danger).collect()
+    }
+
     /// Every hazard on every fitting combination of instances, but for those that cannot come about.
     pub fn hazards(&mut self) -> Vec<Hazard> {
         let mut out = Vec::new();

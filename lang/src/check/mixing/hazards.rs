@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Domain;
-use matterix_ir::{Diagnostic, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Span};
 
 use super::Walk;
 use super::world::World;
@@ -71,15 +71,8 @@ impl Walk<'_, '_> {
     }
 
     fn hazard(&self, hazard: &Hazard, world: &World, place: Span, said: &str) -> Diagnostic {
-        let words = hazard.name.replace('_', " ");
-        let code = codes::find(&hazard.name.replace('_', "-")).unwrap_or(codes::HAZARD);
-        let about = hazard.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
-        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
-        let headline = format!("{words}: {}", things.join(" and "));
-        let mut d = Diagnostic::error(code, place, headline, said);
-        if !hazard.grave {
-            d.severity = Severity::Warning;
-        }
+        let mut d = Diagnostic::error(hazard.code(), place, hazard.headline(), said);
+        d.severity = hazard.severity();
         let mut places = vec![place];
         for s in &hazard.states {
             if let Some(span) = world.set_at(*s)

@@ -468,14 +468,26 @@ impl Walk<'_, '_> {
     pub(super) fn take_orders(&mut self) {
         let Some(Found { met, done, always }) = self.orders.take() else { return };
         let is_always = |pair: &Pair| always.as_ref().is_some_and(|all| all.contains(pair));
-        // What the text's own order has found, and another order does not.
+        // What the text's own order has found, and another order does not, or none that can happen.
+        let mut never = BTreeSet::new();
         for (pair, place, index) in std::mem::take(&mut self.told) {
-            let here = met.get(&(pair, place));
-            let sometimes = here.is_some_and(|m| m.certain < done.get(&place).copied().unwrap_or_default());
-            if sometimes && always.is_some() && !is_always(&pair) && !self.in_loop(place) {
-                in_some_order(&mut self.found[index]);
+            let times = done.get(&place).copied().unwrap_or_default();
+            match met.get(&(pair, place)) {
+                None if times > 0 && always.is_some() => {
+                    self.pairs.remove(&pair);
+                    never.insert(index);
+                }
+                Some(met) if met.certain < times && always.is_some() && !is_always(&pair) && !self.in_loop(place) => {
+                    in_some_order(&mut self.found[index]);
+                }
+                _ => {}
             }
         }
+        let mut index = 0;
+        self.found.retain(|_| {
+            index += 1;
+            !never.contains(&(index - 1))
+        });
         let mut said: BTreeMap<Pair, (Severity, Span, Diagnostic)> = BTreeMap::new();
         for ((pair, place), found) in met {
             let Met { mut diagnostic, certain, grave } = found;
