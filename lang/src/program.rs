@@ -716,6 +716,14 @@ fn build<'a>(
     let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
     let stock =
         if told { crate::stock::stock(&mut elaborator, sources, &mixtures, workflow) } else { Stock::default() };
+    let (incompatible, dangers) = match told {
+        true => {
+            let held = elaborator.instances.iter().flat_map(|i| &i.contents);
+            let brought = held.map(|(s, _)| *s).collect();
+            (crate::screen::watched(tables, &mixtures, &brought), elaborator.dangers())
+        }
+        false => (Vec::new(), Vec::new()),
+    };
     let model = Model {
         params: elaborator.params,
         states: elaborator.states,
@@ -732,6 +740,8 @@ fn build<'a>(
         observables: observables.into_iter().map(|o| o.2).collect(),
         balances,
         temperatures,
+        incompatible,
+        dangers,
         graph: elaborator.graph,
     };
     let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();

@@ -14,4 +14,5 @@ pub mod process;
 pub mod record;
 pub mod run;
 pub mod schedule;
+mod screen;
 pub mod study;

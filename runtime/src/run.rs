@@ -5,12 +5,15 @@ use matterix_ir::{Program, codes};
 use serde::Serialize;
 
 use crate::backend::{Dry, Moves, Prepared, Sim};
+use crate::exec::Tee;
 use crate::exec::{
     self, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
 };
 use crate::fault::Fault;
 use crate::motion::Stage;
 use crate::process::{BalanceReport, Engine, Options};
+pub use crate::screen::Finding;
+use crate::screen::Screen;
 
 /// How closely the world is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -51,6 +54,8 @@ pub struct Outcome {
     pub suppressed: Vec<FailureTrace>,
     /// What the run has left on or in hand, with the steps that used it last.
     pub unfinished: Vec<FailureTrace>,
+    /// Species that have met and should not, and hazards that came about, in order.
+    pub findings: Vec<Finding>,
     /// In the order of their judgement.
     pub expectations: Vec<ExpectationResult>,
     /// Conditions that were taken to hold.
@@ -87,6 +92,25 @@ pub fn run(program: &Program, options: &RunOptions<'_>, out: &mut dyn Listener) 
 /// Runs a program that was made ready before, for one run of many: `params` are all of its parameters by index, SI. The
 /// fidelity is `process`, or `motion` where the options say so.
 pub fn run_ready(
+    program: &Program,
+    prepared: &Prepared,
+    params: Vec<f64>,
+    options: &RunOptions<'_>,
+    out: &mut dyn Listener,
+) -> Outcome {
+    let mut screen = Screen::new(program);
+    if screen.is_idle() {
+        return run_watched(program, prepared, params, options, out);
+    }
+    let mut outcome = run_watched(program, prepared, params, options, &mut Tee(&mut screen, out));
+    if screen.is_grave() && outcome.status == RunStatus::Passed {
+        outcome.status = RunStatus::ExpectationFailed;
+    }
+    outcome.findings = screen.found;
+    outcome
+}
+
+fn run_watched(
     program: &Program,
     prepared: &Prepared,
     params: Vec<f64>,
@@ -167,6 +191,7 @@ fn outcome(execution: Execution, params: Vec<f64>, states: Vec<Option<f64>>) -> 
         failure,
         suppressed,
         unfinished,
+        findings: Vec::new(),
         expectations,
         assumptions,
         steps,

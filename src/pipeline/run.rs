@@ -223,6 +223,7 @@ fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
         fidelity: fidelity.to_string(),
         status,
         failure,
+        findings: outcome.findings.clone(),
         ..RunInfo::default()
     }
 }
@@ -232,6 +233,7 @@ pub(super) fn findings(outcome: &Outcome, sources: &Sources) -> Vec<Diagnostic> 
     let missed = outcome.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
     let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
     found.extend(outcome.failure.iter().chain(&outcome.unfinished).map(exec::diagnostic));
+    found.extend(outcome.findings.iter().map(|f| f.diagnostic.clone()));
     let others = outcome.suppressed.iter().map(exec::diagnostic);
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found.into_iter().map(|d| led_by_the_user(d, sources)).collect()

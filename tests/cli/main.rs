@@ -32,6 +32,7 @@ mod motion;
 mod mutants;
 mod new;
 mod offers;
+mod orders;
 mod overlap;
 mod pages;
 mod physique;

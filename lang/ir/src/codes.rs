@@ -188,6 +188,7 @@ codes! {
     PROMISE_BROKEN "promise-broken" "X0" "a skill ended without what it promises";
     NOT_EXPRESSIBLE "not-expressible" "W0" "a workflow does what the kind of file it is written as cannot say";
     WRONG_MESSAGE "wrong-message" "W0" "a driver says something that its wire does not know";
+    NOT_ANALYSED "not-analysed" "L1" "a limit of an analysis is reached, and what lies beyond it is not looked at";
     UNUSABLE_NUMBER "unusable-number" "X0" "a duration, an interval or a count is not one";
 }
 

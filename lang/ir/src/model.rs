@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::scene::InstanceId;
-use crate::{Graph, NodeId, Span, Unit};
+use crate::{Code, Graph, NodeId, Severity, Span, Unit};
 
 /// What the numbers of a discrete or continuous state mean.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -241,6 +241,40 @@ pub struct Temperatures {
     pub others: Vec<NodeId>,
 }
 
+/// Two species that should not be in one mixture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Incompatible {
+    /// Index into [`Model::species`].
+    pub species: (u32, u32),
+    /// The ions of each by their index and number, where it dissolves: where all of them are, it counts as there.
+    pub ions: (Vec<(u32, f64)>, Vec<(u32, f64)>),
+    /// Content of each from which on it counts, mol per kg of mixture (kg per kg where it is counted by mass).
+    pub least: (f64, f64),
+    /// How bad it is.
+    pub severity: Severity,
+    /// What happens: `toxic gas`.
+    pub words: String,
+    /// Why, and where that is published.
+    pub help: Vec<String>,
+}
+
+/// A hazard or caution of a library or file, on its instances.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Danger {
+    /// The kind of finding.
+    pub code: Code,
+    /// How bad it is.
+    pub severity: Severity,
+    /// It is there while this is not 0.
+    pub when: NodeId,
+    /// `above boiling point: `plate` and `beaker``.
+    pub headline: String,
+    /// How to mend it.
+    pub help: Vec<String>,
+    /// Its declaration.
+    pub span: Span,
+}
+
 /// The flattened model of one lab.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -268,4 +302,10 @@ pub struct Model {
     pub balances: Vec<Balance>,
     /// Temperatures that must stay physical.
     pub temperatures: Temperatures,
+    /// What should not meet, of what may be in one mixture of the lab.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub incompatible: Vec<Incompatible>,
+    /// What should not come about.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dangers: Vec<Danger>,
 }

@@ -77,7 +77,7 @@ pub fn plan(
     let is_whole = lab.diagnostics.iter().all(whole);
     let ready = mixing::ready(lab);
     let about = &*lab;
-    let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, events, ready));
+    let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
     let takes = || time::plan(about, plan, derivatives, events);
     let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use matterix_ir::model::Danger;
+
 use matterix_ir::plan::{Said, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, NodeId, Op, Sources, Span, codes};
+use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Sources, Span, codes};
 
 use super::{Elaborator, Tables};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
@@ -56,6 +58,25 @@ pub struct Hazard {
     pub span: Span,
 }
 
+impl Hazard {
+    /// The kind of finding.
+    pub fn code(&self) -> Code {
+        codes::find(&self.name.replace('_', "-")).unwrap_or(codes::HAZARD)
+    }
+
+    /// What is dangerous about which things.
+    pub fn headline(&self) -> String {
+        let about = self.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
+        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
+        format!("{}: {}", self.name.replace('_', " "), things.join(" and "))
+    }
+
+    /// An error, or a warning.
+    pub fn severity(&self) -> Severity {
+        if self.grave { Severity::Error } else { Severity::Warning }
+    }
+}
+
 /// What is bound wherever a condition asks for any of several, with what it asks there.
 type Bound = Vec<(NodeId, Vec<(String, Value)>)>;
 
@@ -102,6 +123,20 @@ fn accepted(tables: &Tables<'_>) -> BTreeSet<DeclId> {
 }
 
 impl<'a> Elaborator<'a> {
+    /// What a run watches for. What depends on no state is there from the start or never, which is told before the run.
+    pub fn dangers(&mut self) -> Vec<Danger> {
+        let all = self.hazards().into_iter().filter(|h| h.watched == Watched::Steps && !h.states.is_empty());
+        let danger = |h: Hazard| Danger {
+            code: h.code(),
+            severity: h.severity(),
+            when: h.when,
+            headline: h.headline(),
+            help: h.help.iter().cloned().collect(),
+            span: h.span,
+        };
+        all.map(danger).collect()
+    }
+
     /// Every hazard on every fitting combination of instances, but for those that cannot come about or are accepted.
     pub fn hazards(&mut self) -> Vec<Hazard> {
         let mut out = Vec::new();

@@ -7,6 +7,7 @@
 mod consequence;
 mod member;
 mod read;
+mod watch;
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -20,6 +21,7 @@ use crate::names::DeclId;
 
 pub use consequence::Consequence;
 pub use member::Seat;
+pub use watch::watched;
 
 /// One side of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -7,6 +7,7 @@ use matterix_ir::{Program, Sources, Span};
 use serde::Serialize;
 
 use super::recording::Recording;
+use crate::run::Finding;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -51,6 +52,8 @@ pub struct RunInfo {
     pub status: Status,
     /// Why it failed, if it did.
     pub failure: Option<Failure>,
+    /// What met that should not, and hazards that came about.
+    pub findings: Vec<Finding>,
     /// The integrator's counters by name, if there was one.
     pub integrator: BTreeMap<String, u64>,
 }

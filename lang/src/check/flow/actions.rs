@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption};
-use matterix_ir::{BinaryOp, NodeId};
+use matterix_ir::{BinaryOp, NodeId, Severity};
 
 use super::Flow;
 use super::facts::Facts;
@@ -96,6 +96,7 @@ impl Flow<'_, '_> {
 
     /// Notes that a state has changed.
     fn touch(&self, state: u32, facts: &mut Facts) {
+        facts.reopen(|s| s == state);
         if let Some(rates) = self.rates_of.get(&state) {
             facts.unsettled.extend(rates);
         }
@@ -267,6 +268,20 @@ impl Flow<'_, '_> {
             }
             due = next;
         }
+        let headline = format!("events set each other off more than {MOST_EVENTS} times");
+        self.not_analysed(Severity::Advice, headline, "what they change is not known from here on");
+        let mixtures = &self.mixtures;
+        let states = |action: &Action| -> Vec<u32> {
+            match action {
+                Action::Assign { state, .. } => vec![*state],
+                Action::Move { from, to, .. } => {
+                    [from, to].into_iter().flat_map(|m| &mixtures[*m as usize]).map(|(_, state)| *state).collect()
+                }
+            }
+        };
+        let changed: BTreeSet<u32> =
+            due.iter().flat_map(|i| &self.events[*i as usize].actions).flat_map(states).collect();
+        self.forget(&changed.into_iter().collect::<Vec<_>>(), facts);
     }
 
     /// The events that look at any of these states.

@@ -5,9 +5,9 @@ use std::rc::Rc;
 
 use matterix_ir::graph::unary;
 use matterix_ir::values::Rules;
-use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
+use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 
-use super::facts::Facts;
+use super::facts::{Decided, Facts};
 use super::value::{Known, Why};
 use super::{Flow, Raised};
 
@@ -291,6 +291,47 @@ impl Flow<'_, '_> {
         Known::Range(low - slack, high + slack, Why::Unknown)
     }
 
+    /// How a condition comes out: by what is known, or as it came out before on this way.
+    pub fn truth(&mut self, node: NodeId, facts: &Facts) -> Option<bool> {
+        let known = self.eval(node, facts).truth();
+        if known.is_some() || facts.decided.is_empty() {
+            return known;
+        }
+        let (opposite, turned) = self.turned(node);
+        facts.decided.iter().find_map(|before| {
+            let op = self.lab.graph.op(before.node);
+            let against =
+                Some(before.node) == turned || op == Op::Unary(UnaryOp::Not, node) || opposite.is_some_and(|o| op == o);
+            if before.node == node { Some(before.holds) } else { against.then_some(!before.holds) }
+        })
+    }
+
+    /// What is true where a condition is false, as an operation or a node of its own.
+    fn turned(&self, node: NodeId) -> (Option<Op>, Option<NodeId>) {
+        match self.lab.graph.op(node) {
+            Op::Unary(UnaryOp::Not, a) => (None, Some(a)),
+            Op::Binary(BinaryOp::Lt, a, b) => (Some(Op::Binary(BinaryOp::Le, b, a)), None),
+            Op::Binary(BinaryOp::Le, a, b) => (Some(Op::Binary(BinaryOp::Lt, b, a)), None),
+            _ => (None, None),
+        }
+    }
+
+    /// Takes a branch: its condition is decided on this way until something it depends on changes.
+    pub fn decide(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+        if self.truth(node, facts).is_none() && !self.is_shared(node) {
+            let graph = &self.lab.graph;
+            let order = graph.schedule([node]);
+            // A reading is another one the next time, and time goes on.
+            if !order.iter().any(|n| matches!(graph.op(*n), Op::Reading(_) | Op::Time)) {
+                let of = |kind: fn(Op) -> Option<u32>| order.iter().filter_map(|n| kind(graph.op(*n))).collect();
+                let states = of(|op| if let Op::State(s) = op { Some(s) } else { None });
+                let locals = of(|op| if let Op::Local(l) = op { Some(l) } else { None });
+                facts.decided.push(Decided { node, holds, states, locals });
+            }
+        }
+        self.assume(node, holds, facts);
+    }
+
     /// Takes a condition for true or false, as far as that says something of single states.
     pub fn assume(&self, node: NodeId, holds: bool, facts: &mut Facts) {
         let graph = &self.lab.graph;
@@ -303,6 +344,11 @@ impl Flow<'_, '_> {
             Op::Binary(BinaryOp::Or, a, b) if !holds => {
                 self.assume(a, false, facts);
                 self.assume(b, false, facts);
+            }
+            Op::Local(i) => {
+                if let Some(slot) = facts.locals.get_mut(i as usize).filter(|known| known.bounds() == (0.0, 1.0)) {
+                    *slot = Known::Point(f64::from(u8::from(holds)));
+                }
             }
             Op::State(s) if self.is_truth(s) => facts.states[s as usize] = Known::Point(f64::from(u8::from(holds))),
             Op::Binary(op @ (BinaryOp::Eq | BinaryOp::Lt | BinaryOp::Le), a, b) => {
@@ -324,6 +370,12 @@ impl Flow<'_, '_> {
 
     fn is_truth(&self, state: u32) -> bool {
         self.lab.states[state as usize].domain == matterix_ir::model::Domain::Bool
+    }
+
+    /// Notes a failure that the text writes at a place of the user's.
+    pub fn raise_written(&mut self, name: &str, span: Span, mut facts: Facts) {
+        facts.written = Some(span).filter(|span| !self.in_library(*span));
+        self.raise(name, facts);
     }
 
     /// Notes a failure for the handlers around.

@@ -51,6 +51,7 @@ impl Flow<'_, '_> {
             return;
         }
         facts.time = Known::binary(BinaryOp::Add, &facts.time, duration);
+        facts.reopen(|s| self.lab.rates.contains_key(&s));
         let mut timed = self.timed.clone();
         for _ in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();

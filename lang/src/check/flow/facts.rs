@@ -23,6 +23,19 @@ pub struct Event {
 /// The way to a point of the plan, the latest change first.
 pub type History = Option<Rc<Event>>;
 
+/// A condition that only a run can tell, as it came out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decided {
+    /// The condition.
+    pub node: NodeId,
+    /// Whether it held.
+    pub holds: bool,
+    /// The states it depends on, by index.
+    pub states: Rc<[u32]>,
+    /// The kept values it depends on, by index.
+    pub locals: Rc<[u32]>,
+}
+
 /// What is known at one point of the plan.
 #[derive(Clone, Debug)]
 pub struct Facts {
@@ -44,6 +57,10 @@ pub struct Facts {
     pub fired: Vec<Option<bool>>,
     /// Presumed conditions that have held at some moment, or may have.
     pub held: BTreeSet<NodeId>,
+    /// Conditions that only a run can tell, as they came out on this way.
+    pub decided: Vec<Decided>,
+    /// Where the text writes the failure that was raised on this way.
+    pub written: Option<Span>,
 }
 
 impl Facts {
@@ -73,6 +90,17 @@ impl Facts {
         }
         let earlier = self.history.take();
         self.history = Some(Rc::new(Event { span, before, earlier }));
+    }
+
+    /// Conditions that depend on these states are open again.
+    pub fn reopen(&mut self, changed: impl Fn(u32) -> bool) {
+        self.decided.retain(|d| !d.states.iter().any(|s| changed(*s)));
+    }
+
+    /// Keeps a value; conditions that depend on the one before are open again.
+    pub fn keep(&mut self, local: u32, value: Known) {
+        self.locals[local as usize] = value;
+        self.decided.retain(|d| !d.locals.contains(&local));
     }
 
     /// Forgets states that only a run can tell.
@@ -109,6 +137,8 @@ impl Facts {
         out.moving.extend(a.moving.iter().chain(&b.moving));
         out.barrier = None;
         out.held.extend(a.held.iter().chain(&b.held));
+        out.decided = a.decided.into_iter().filter(|d| b.decided.contains(d)).collect();
+        out.written = a.written.or(b.written);
         out
     }
 }

@@ -8,9 +8,9 @@ use matterix_ir::{BinaryOp, codes};
 
 use super::Flow;
 use super::facts::Facts;
-use super::parted;
 use super::report::Finding;
 use super::value::Known;
+use super::{left, parted};
 
 /// A job that was started and not waited for yet.
 #[derive(Clone, Debug)]
@@ -30,11 +30,13 @@ pub(super) type Jobs = BTreeMap<String, Job>;
 /// Follows a plan way by way, and in both orders where it starts jobs; `begin` gives one that was not followed yet.
 pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
     let mut flow = parted::follow(&begin);
+    left::on_some_way(&mut flow, &begin);
     if flow.plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. })) {
         let mut late = begin();
         late.notes = None;
         late.late = true;
         late.follow();
+        left::on_some_way(&mut late, &begin);
         let first = std::mem::take(&mut flow.findings);
         flow.findings = in_both(first, &late.findings);
         // What was not looked at for a mistake that is none after all.

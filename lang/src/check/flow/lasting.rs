@@ -2,7 +2,7 @@
 
 use matterix_ir::plan::LONGEST_RUN;
 use matterix_ir::quantity::{show_duration, show_number};
-use matterix_ir::{Code, NodeId, codes};
+use matterix_ir::{Code, NodeId, Severity, codes};
 
 use super::Flow;
 use super::facts::Facts;
@@ -50,6 +50,14 @@ impl Flow<'_, '_> {
     /// Reports what is wrong with the statement that is followed now; a warning where it may not be reached.
     fn found_here(&mut self, code: Code, headline: String, said: String, mend: &str) {
         let d = self.at_site(code, headline, said, self.doubt > 0).help(mend);
+        let about = d.span();
+        self.found(d, about);
+    }
+
+    /// Says once that a limit of this check is reached at the statement that is followed now, and what is not known behind it.
+    pub(super) fn not_analysed(&mut self, severity: Severity, headline: String, said: &str) {
+        let mut d = self.at_site(codes::NOT_ANALYSED, headline, said.to_owned(), false);
+        d.severity = severity;
         let about = d.span();
         self.found(d, about);
     }

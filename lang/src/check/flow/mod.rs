@@ -15,6 +15,7 @@ mod facts;
 mod history;
 mod jobs;
 mod lasting;
+mod left;
 mod otherwise;
 mod parted;
 mod points;
@@ -122,6 +123,8 @@ struct Flow<'l, 'a> {
     turning: usize,
     /// Ways that have met.
     ways: parted::Ways,
+    /// Meetings of ways that differ in what should hold at the end.
+    forks: left::Forks,
     /// Whether the plan was followed to its end, and that looked at.
     ended: bool,
     steps: usize,
@@ -220,6 +223,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             late: false,
             turning: 0,
             ways: parted::Ways::default(),
+            forks: left::Forks::default(),
             ended: false,
             steps: 0,
             notes: None,
@@ -258,12 +262,15 @@ impl<'l, 'a> Flow<'l, 'a> {
         let begun = facts.clone();
         self.note_start(&begun);
         // What a mistake cut short is not finished for another reason.
+        self.guards.push(Vec::new());
         let ended = self.walk(self.plan.root, facts).and_then(|facts| self.await_all(facts));
-        if let Some(ended) = ended
-            && !self.findings.iter().any(report::Finding::is_error)
-        {
-            self.ends(&begun, &ended);
-            self.ended = true;
+        let raised = self.guards.pop().unwrap_or_default();
+        if !self.findings.iter().any(report::Finding::is_error) {
+            self.ended = ended.is_some();
+            if let Some(ended) = ended {
+                self.ends(&begun, &ended);
+            }
+            self.ends_failed(&begun, &raised);
         }
         self.dead_branches();
     }
@@ -280,6 +287,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             barrier: None,
             fired: vec![Some(false); self.events.len()],
             held: BTreeSet::new(),
+            decided: Vec::new(),
+            written: None,
         };
         let states = &self.lab.states;
         facts.states = (0..states.len()).map(|i| self.eval(states[i].initial, &facts)).collect();

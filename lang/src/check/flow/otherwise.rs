@@ -4,14 +4,17 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Plan, Step};
-use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op};
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, codes};
 
 use super::value::Known;
 use super::{Flow, forbidden_on_any_way};
 use crate::elaborate::Elaborator;
 
-/// So many other values are tried.
-const MOST_VALUES: usize = 8;
+/// So many steps are followed for other values; at least [`FEWEST_VALUES`] are tried.
+const MOST_STEPS: usize = 400_000;
+
+/// So many other values are tried however long the plan is.
+const FEWEST_VALUES: usize = 8;
 
 /// Values of parameters, by index, that take the other side of a branch.
 pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
@@ -36,7 +39,14 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
             out.extend(other.map(|v| (param, v)).filter(|new| !out.contains(new)));
         }
     }
-    out.truncate(MOST_VALUES);
+    let most = (MOST_STEPS / flow.steps.max(1)).max(FEWEST_VALUES);
+    if out.len() > most {
+        let headline = format!("{most} of {} other values of the parameters are tried", out.len());
+        let text = "what is used after its disposal is not looked for with the others".to_owned();
+        let span = flow.plan.get(flow.plan.root).span;
+        flow.found(Diagnostic::warning(codes::NOT_ANALYSED, span, headline, text), span);
+    }
+    out.truncate(most);
     out
 }
 

@@ -41,6 +41,11 @@ pub(super) struct Ways {
 }
 
 impl Ways {
+    /// The same for a plan that is followed again: what was cleared stays so.
+    pub(super) fn again(self) -> Ways {
+        Ways { cleared: self.cleared, ..Ways::default() }
+    }
+
     /// How many meetings there were by now.
     pub(super) fn meetings(&self) -> usize {
         self.met.len()
@@ -104,8 +109,11 @@ impl Flow<'_, '_> {
     /// What is known after one of several ways from `base`.
     pub(super) fn meet(&mut self, id: StepId, base: &Facts, ways: impl IntoIterator<Item = Facts>) -> Option<Facts> {
         let mut ways: Vec<Facts> = ways.into_iter().collect();
-        // In a loop a meeting is many: the ways of one turn are not those of the next.
         let differ = ways.windows(2).any(|two| two[0].states != two[1].states);
+        if differ && let Some(way) = self.fork(id, &ways) {
+            return Some(ways.swap_remove(way));
+        }
+        // In a loop a meeting is many: the ways of one turn are not those of the next.
         if differ && self.turning == 0 {
             let number = self.ways.met.len();
             self.ways.met.push(ways.len());

@@ -224,5 +224,7 @@ fn bare(facts: &Facts) -> Facts {
         barrier: None,
         fired: Vec::new(),
         held: BTreeSet::new(),
+        decided: Vec::new(),
+        written: None,
     }
 }

@@ -215,24 +215,18 @@ impl Flow<'_, '_> {
         self.found(d, condition.span);
     }
 
-    /// Looks at what should hold at the end and held at the start.
-    pub fn ends(&mut self, begun: &Facts, ended: &Facts) {
-        let plan = self.plan;
-        for Limit { instance, condition: end } in &plan.ends {
-            let kept = self.eval(end.node, begun).truth() == Some(true);
-            if !kept || self.eval(end.node, ended).truth() != Some(false) {
-                continue;
-            }
-            let changed: Vec<(Span, String)> = end.terms.iter().flat_map(|t| self.history(t, ended)).collect();
-            let Some((span, said)) = changed.into_iter().next() else { continue };
-            let name = self.lab.spoken_name(*instance);
-            let how = end.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
-            let headline = format!("`{}` ends, and `{name}` is {how}", plan.workflow);
-            let mut d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
-            d = d.because(end.span, format!("looked for here: `{}`", end.text));
-            d.help.extend(end.advice());
-            self.found(d, end.span);
-        }
+    /// Something that is not in order at an end of the workflow, with the step that left it so.
+    pub(super) fn unfinished(&mut self, end: &Limit, ended: &Facts, ends: &str) -> Option<Diagnostic> {
+        let condition = &end.condition;
+        let changed: Vec<(Span, String)> = condition.terms.iter().flat_map(|t| self.history(t, ended)).collect();
+        let (span, said) = changed.into_iter().next()?;
+        let name = self.lab.spoken_name(end.instance);
+        let how = condition.refusal.as_ref().map_or("unfinished".to_string(), |r| r.failure.replace('_', " "));
+        let headline = format!("`{}` {ends}, and `{name}` is {how}", self.plan.workflow);
+        let d = Diagnostic::warning(codes::UNFINISHED, span, headline, said);
+        let mut d = d.because(condition.span, format!("looked for here: `{}`", condition.text));
+        d.help.extend(condition.advice());
+        Some(d)
     }
 
     /// A wait for something that cannot come: at all, or in the time given.

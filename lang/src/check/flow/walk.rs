@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Caught, Condition, Step, StepId};
-use matterix_ir::{BinaryOp, NodeId, Op};
+use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::facts::Facts;
 use super::jobs::in_both;
@@ -26,6 +26,9 @@ impl Flow<'_, '_> {
     pub fn walk(&mut self, id: StepId, facts: Facts) -> Option<Facts> {
         self.steps += 1;
         if self.steps > MOST_STEPS {
+            let headline =
+                format!("`{}` is followed up to here: it has more than {MOST_STEPS} steps", self.plan.workflow);
+            self.not_analysed(Severity::Warning, headline, "nothing is known from here on");
             return None;
         }
         let node = self.plan.get(id);
@@ -84,13 +87,14 @@ impl Flow<'_, '_> {
                 after
             }
             Step::Named { start, end, body, .. } => {
-                facts.locals[*start as usize] = facts.time.clone();
+                facts.keep(*start, facts.time.clone());
                 let mut after = self.walk(*body, facts)?;
-                after.locals[*end as usize] = after.time.clone();
+                after.keep(*end, after.time.clone());
                 Some(after)
             }
             Step::Let { local, value } => {
-                facts.locals[*local as usize] = self.eval(*value, &facts);
+                let value = self.eval(*value, &facts);
+                facts.keep(*local, value);
                 Some(facts)
             }
             Step::Wait { duration } => {
@@ -98,9 +102,9 @@ impl Flow<'_, '_> {
                 self.pass(&time, &mut facts);
                 Some(facts)
             }
-            Step::WaitUntil { condition, timeout } => self.wait_until(condition, *timeout, facts),
+            Step::WaitUntil { condition, timeout } => self.wait_until(id, condition, *timeout, facts),
             Step::Hold { condition, duration, timeout } => {
-                let mut facts = self.wait_until(condition, *timeout, facts)?;
+                let mut facts = self.wait_until(id, condition, *timeout, facts)?;
                 let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
                 self.assume(condition.node, true, &mut facts);
@@ -150,7 +154,7 @@ impl Flow<'_, '_> {
             Step::Start { job, body } => self.start_job(job, *body, facts),
             Step::Await { job } => self.await_job(job, facts),
             Step::Fail { name, .. } => {
-                self.raise(name, facts);
+                self.raise_written(name, node.span, facts);
                 None
             }
             Step::Expect(conditions) => {
@@ -166,7 +170,13 @@ impl Flow<'_, '_> {
         }
     }
 
-    fn wait_until(&mut self, condition: &Condition, timeout: Option<NodeId>, mut facts: Facts) -> Option<Facts> {
+    fn wait_until(
+        &mut self,
+        id: StepId,
+        condition: &Condition,
+        timeout: Option<NodeId>,
+        mut facts: Facts,
+    ) -> Option<Facts> {
         let value = self.eval(condition.node, &facts);
         if value.truth() == Some(true) {
             return Some(facts);
@@ -184,7 +194,7 @@ impl Flow<'_, '_> {
         let before = facts.clone();
         self.pass(&Known::Range(0.0, longest, Why::Unknown), &mut facts);
         if timeout.is_some() {
-            self.raise("timeout", facts.clone());
+            self.raise_written("timeout", self.plan.get(id).span, facts.clone());
         }
         if value.truth() == Some(false) && !parts.timed && !shared {
             let never = self.eval(condition.node, &facts).truth() == Some(false);
@@ -223,18 +233,18 @@ impl Flow<'_, '_> {
         otherwise: Option<StepId>,
         facts: Facts,
     ) -> Option<Facts> {
-        let value = self.eval(condition.node, &facts);
+        let truth = self.truth(condition.node, &facts);
         self.note_branch(condition, otherwise.is_some());
         let mut branch = |holds: bool, facts: &Facts| {
             let mut facts = facts.clone();
-            self.assume(condition.node, holds, &mut facts);
+            self.decide(condition.node, holds, &mut facts);
             match (holds, otherwise) {
                 (true, _) => self.walk(then, facts),
                 (false, Some(step)) => self.walk(step, facts),
                 (false, None) => Some(facts),
             }
         };
-        match value.truth() {
+        match truth {
             Some(holds) => branch(holds, &facts),
             None => {
                 let (yes, no) = (branch(true, &facts), branch(false, &facts));
@@ -269,6 +279,7 @@ impl Flow<'_, '_> {
             }
         }
         self.more_turns(body, false, &facts);
+        self.turns_not_followed();
         self.widen(body, &mut facts);
         Some(later(facts, &begun))
     }
@@ -323,9 +334,16 @@ impl Flow<'_, '_> {
             }
         }
         self.more_turns(body, false, &facts);
+        self.turns_not_followed();
         self.widen(body, &mut facts);
         ends.push(facts);
         self.meet(id, &start, ends)
+    }
+
+    /// Says that more turns of a loop are not followed one by one.
+    fn turns_not_followed(&mut self) {
+        let headline = format!("the turns of this loop are followed one by one up to {MOST_TURNS} of them");
+        self.not_analysed(Severity::Advice, headline, "what further turns change is not known behind it");
     }
 
     /// A turn of a loop.
@@ -433,8 +451,8 @@ impl Flow<'_, '_> {
                 Caught::Any => true,
             });
             raised = rest;
-            let entry = taken.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths));
-            if let Some(entry) = entry {
+            if let Some(mut entry) = self.entry(id, &facts, taken) {
+                entry.written = None;
                 self.cleaning += 1;
                 let end = self.walk(*handler, entry);
                 self.cleaning -= 1;
@@ -443,7 +461,7 @@ impl Flow<'_, '_> {
         }
         raised.extend(self.guards.pop().unwrap_or_default());
         if let Some(finally) = finally {
-            (after, raised) = self.leaving(finally, &facts, after, raised);
+            (after, raised) = self.leaving(id, finally, &facts, after, raised);
         }
         self.after_report(&facts, reported, handlers, finally);
         if let Some(outer) = self.guards.last_mut() {
@@ -452,10 +470,21 @@ impl Flow<'_, '_> {
         after
     }
 
+    /// What is known where failures lead to one place.
+    fn entry(&mut self, id: StepId, base: &Facts, raised: Vec<Raised>) -> Option<Facts> {
+        let mut ways: Vec<Facts> = raised.into_iter().map(|(_, facts)| facts).collect();
+        if let Some(way) = self.fork(id, &ways) {
+            return Some(ways.swap_remove(way));
+        }
+        let site = self.site();
+        ways.into_iter().reduce(|a, b| base.join(a, &b, site, Why::Paths))
+    }
+
     /// What is known behind a `finally`: on the way that goes on, and where failures go on outwards. What goes wrong in it is
     /// said once.
     fn leaving(
         &mut self,
+        id: StepId,
         finally: StepId,
         base: &Facts,
         after: Option<Facts>,
@@ -473,7 +502,7 @@ impl Flow<'_, '_> {
         let mut left = Vec::new();
         for name in names {
             let alike: Vec<Raised> = raised.iter().filter(|(other, _)| other == name).cloned().collect();
-            let Some(entry) = self.joined(base, &alike) else { continue };
+            let Some(entry) = self.entry(id, base, alike) else { continue };
             let end = match std::mem::replace(&mut said, true) {
                 false => self.walk(finally, entry),
                 true => {

@@ -6,7 +6,7 @@ use std::convert::Infallible;
 use matterix_ir::model::Domain;
 use matterix_ir::plan::{Said, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Span};
 
 use super::Walk;
 use super::uses::Stream;
@@ -208,17 +208,11 @@ impl Walk<'_, '_> {
     }
 
     fn hazard(&self, hazard: &Hazard, world: &World, place: Span, said: &str) -> Diagnostic {
-        let words = hazard.name.replace('_', " ");
-        let code = codes::find(&hazard.name.replace('_', "-")).unwrap_or(codes::HAZARD);
-        let about = hazard.shown.split_once('(').map_or("", |s| s.1.trim_end_matches(')'));
-        let things: Vec<String> = about.split(", ").map(|t| format!("`{t}`")).collect();
-        let worded = self.worded(hazard, world);
-        let in_words = worded.is_some();
-        let headline = worded.unwrap_or_else(|| format!("{words}: {}", things.join(" and ")));
-        let mut d = Diagnostic::error(code, place, headline, said);
-        if !hazard.grave {
-            d.severity = Severity::Warning;
-        }
+        let words = self.worded(hazard, world);
+        let in_words = words.is_some();
+        let headline = words.unwrap_or_else(|| hazard.headline());
+        let mut d = Diagnostic::error(hazard.code(), place, headline, said);
+        d.severity = hazard.severity();
         let mut places = vec![place];
         for s in &hazard.states {
             if let Some(span) = world.set_at(*s)

@@ -1,11 +1,14 @@
 //! H1 and M1: which species meet on the way of the plan, and what the vessels are made of.
 //!
-//! The plan is followed in its order. Branches join; loops are followed twice, which brings together whatever more turns
-//! would. Residues count: what was emptied is still wet.
+//! The plan is followed in the order of the text. Branches join; loops are followed turn by turn and then until further turns bring
+//! nothing new. Where steps that run beside each other bring something into one vessel and take it out again, the plan is followed
+//! in every order besides (`orders.rs`). Residues count: what was emptied is still wet.
 
 mod eyes;
 mod feeds;
 mod hazards;
+mod lines;
+mod orders;
 mod reactions;
 mod report;
 mod uses;
@@ -13,11 +16,12 @@ mod world;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Action, Event};
-use matterix_ir::plan::{Plan, PlanStep, Step, StepId};
+use matterix_ir::model::{Action, Derivative, Event};
+use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, FileId, Severity, Span};
 
+use super::time::Times;
 use crate::ast::{MemberKind, Role};
 use crate::elaborate::{Elaborator, SpeciesId};
 use crate::eval::{Type, Value};
@@ -28,7 +32,7 @@ use hazards::Hazards;
 use uses::Uses;
 use world::{Before, World};
 
-/// Steps after which loops are followed no further than once, so that nested loops stay cheap.
+/// Steps after which turns of loops are no longer followed one by one, so that nested loops stay cheap.
 const PATIENCE: usize = 20_000;
 
 /// Turns of a loop that are followed one by one.
@@ -47,9 +51,31 @@ pub fn contents(lab: &mut Elaborator<'_>) {
         ends: Vec::new(),
     };
     if let Some(ready) = ready(lab) {
-        let found = mixing(lab, &plan, &[], ready);
+        let found = mixing(lab, &plan, &[], &[], ready);
         found.into_iter().for_each(|d| lab.report(d));
     }
+}
+
+/// Two species that come together, by the mixture.
+type Pair = (InstanceId, SpeciesId, SpeciesId);
+
+/// Two species that come together in one of the orders in which steps can run.
+struct Coming {
+    pair: Pair,
+    place: Span,
+    diagnostic: Diagnostic,
+    /// On every way to this step.
+    certain: bool,
+    /// How bad it is where it happens in every order.
+    grave: Severity,
+}
+
+/// What one event brings together: what it is ranked by, the finding, and what and where it is.
+struct Pending {
+    consequences: Vec<Consequence>,
+    diagnostic: Diagnostic,
+    pair: Pair,
+    place: Span,
 }
 
 /// What is looked up in a lab before a plan is followed.
@@ -65,7 +91,13 @@ pub fn ready(lab: &mut Elaborator<'_>) -> Option<Ready> {
 }
 
 /// Judges what a plan brings together.
-pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready) -> Vec<Diagnostic> {
+pub fn mixing(
+    lab: &Elaborator<'_>,
+    plan: &Plan,
+    derivatives: &[Derivative],
+    events: &[Event],
+    ready: Ready,
+) -> Vec<Diagnostic> {
     let eyes = Eyes::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
@@ -84,6 +116,11 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready)
         walls: BTreeSet::new(),
         at_walls: BTreeSet::new(),
         pending: Vec::new(),
+        certain: Vec::new(),
+        pairs: BTreeMap::new(),
+        told: Vec::new(),
+        orders: None,
+        raised: Vec::new(),
         found: Vec::new(),
         steps: 0,
     };
@@ -93,7 +130,9 @@ pub fn mixing(lab: &Elaborator<'_>, plan: &Plan, events: &[Event], ready: Ready)
     walk.endangered(&world);
     walk.measured_out(&world);
     walk.endanger(&mut world);
+    let begun = world.clone();
     walk.step(plan.root, world);
+    orders::orders(&mut walk, &begun, || Times::of(lab, plan, derivatives, events));
     walk.found
 }
 
@@ -146,6 +185,34 @@ fn material_of(lab: &mut Elaborator<'_>, id: InstanceId) -> Option<DeclId> {
     None
 }
 
+/// What the vessels may hold where failures are raised: of a wait that is timed out, and of any step.
+#[derive(Clone, Default)]
+struct Raised {
+    timeout: Option<World>,
+    any: Option<World>,
+}
+
+impl Raised {
+    /// What the vessels may hold where a handler begins.
+    fn entry(&self, caught: &Caught, before: &World, after: &World) -> World {
+        let around = || before.clone().join(after.clone());
+        match (caught, &self.timeout, &self.any) {
+            (Caught::Named(name), Some(world), _) if name == "timeout" => world.clone(),
+            (Caught::Any, Some(timeout), Some(any)) => around().join(timeout.clone()).join(any.clone()),
+            (_, _, Some(any)) => around().join(any.clone()),
+            (Caught::Any, Some(timeout), None) => around().join(timeout.clone()),
+            _ => around(),
+        }
+    }
+
+    fn note(place: &mut Option<World>, world: &World) {
+        *place = Some(match place.take() {
+            Some(known) => known.join(world.clone()),
+            None => world.clone(),
+        });
+    }
+}
+
 struct Walk<'w, 'a> {
     eyes: &'w Eyes<'w, 'a>,
     /// What the wall around each mixture is made of, where that is said.
@@ -165,8 +232,18 @@ struct Walk<'w, 'a> {
     /// Walls looked at, by what touches them.
     walls: BTreeSet<(InstanceId, SpeciesId)>,
     at_walls: BTreeSet<(Span, DeclId, SpeciesId)>,
-    /// Findings of the current event, with what they are ranked by.
-    pending: Vec<(Severity, Vec<Consequence>, Diagnostic)>,
+    /// Findings of the current event.
+    pending: Vec<Pending>,
+    /// What the current event brings together for certain.
+    certain: Vec<Pair>,
+    /// What is told, and how bad it is.
+    pairs: BTreeMap<Pair, Severity>,
+    /// Where it is told, with its place among the findings.
+    told: Vec<(Pair, Span, usize)>,
+    /// What comes together in other orders, while these are followed.
+    orders: Option<orders::Found>,
+    /// What the vessels may hold where failures are raised in the bodies with handlers around, innermost last.
+    raised: Vec<Raised>,
     found: Vec<Diagnostic>,
     steps: usize,
 }
@@ -181,6 +258,7 @@ impl Walk<'_, '_> {
                 self.touch(world, m, *s, None);
             }
             self.settle();
+            self.note_certain(world);
             world.react(self.eyes.lab, m, self.eyes.lab.instances[m.0 as usize].span);
         }
     }
@@ -219,19 +297,40 @@ impl Walk<'_, '_> {
                 if o.needs.iter().any(|need| self.eyes.truth(need.node, &world) == Some(false)) {
                     return world;
                 }
-                for action in o.at_start.iter().chain(&o.at_end) {
+                for action in &o.at_start {
+                    self.action(action, &mut world);
+                }
+                // What begins may be over when the operation is.
+                if !o.at_start.is_empty() && !o.at_end.is_empty() {
+                    self.streams(&mut world);
+                }
+                for action in &o.at_end {
                     self.action(action, &mut world);
                 }
                 self.streams(&mut world);
                 self.fed(&mut world);
                 self.endanger(&mut world);
+                if let Some(raised) = self.raised.last_mut() {
+                    Raised::note(&mut raised.any, &world);
+                }
+                world
+            }
+            Step::WaitUntil { timeout: Some(_), .. } | Step::Hold { timeout: Some(_), .. } => {
+                if let Some(raised) = self.raised.last_mut() {
+                    Raised::note(&mut raised.timeout, &world);
+                }
                 world
             }
             Step::Guarded { body, handlers, finally } => {
                 let before = world.clone();
+                let handled = !handlers.is_empty();
+                self.raised.extend(handled.then(Raised::default));
                 let mut after = self.step(*body, world);
-                for (_, handler) in handlers {
-                    let handled = self.step(*handler, before.clone().join(after.clone()));
+                let raised = handled.then(|| self.raised.pop()).flatten().unwrap_or_default();
+                self.pass_on(&raised);
+                for (caught, handler) in handlers {
+                    let entry = raised.entry(caught, &before, &after);
+                    let handled = self.step(*handler, entry);
                     if !self.leaves(*handler) {
                         after = after.join(handled);
                     }
@@ -276,13 +375,12 @@ impl Walk<'_, '_> {
                 self.turns(times, *body, world)
             }
             Step::RepeatWhile { body, .. } => {
-                let once = self.step(*body, world.clone());
-                let some = world.join(once.clone());
                 if self.steps > PATIENCE {
-                    return some;
+                    return self.more_turns(*body, world);
                 }
-                let twice = self.step(*body, once);
-                some.join(twice)
+                let once = self.step(*body, world.clone());
+                let twice = self.step(*body, once.clone());
+                self.more_turns(*body, world.join(once).join(twice))
             }
             Step::Let { local, value } => {
                 let value = self.eyes.value(*value, &world);
@@ -300,25 +398,30 @@ impl Walk<'_, '_> {
         }
     }
 
-    /// So many turns, or an unknown number of at least one. After those that are followed one by one, more of them leave
-    /// what the last of two leave.
+    /// So many turns, or an unknown number of them.
     fn turns(&mut self, times: f64, body: StepId, mut world: World) -> World {
         let followed = if times.is_nan() { 1.0 } else { times.min(TURNS) };
         let mut done = 0.0;
         while done < followed {
-            let before = world.clone();
+            if self.steps > PATIENCE {
+                return self.more_turns(body, world);
+            }
             world = self.step(body, world);
             done += 1.0;
-            // What another turn would change is not known.
-            if self.steps > PATIENCE && done != times {
-                return before.join(world);
+        }
+        if done >= times { world } else { self.more_turns(body, world) }
+    }
+
+    /// Any number of turns: until one more brings nothing that was not there, and changes nothing that is known.
+    fn more_turns(&mut self, body: StepId, mut world: World) -> World {
+        loop {
+            let after = self.step(body, world.clone());
+            let joined = world.clone().join(after);
+            if joined.is_like(&world) {
+                return joined;
             }
+            world = joined;
         }
-        if done >= times {
-            return world;
-        }
-        let more = self.step(body, world.clone());
-        world.join(more)
     }
 
     /// Whether nothing after a step is reached from it: it fails, or begins the body around it again.
@@ -382,6 +485,19 @@ impl Walk<'_, '_> {
         }
     }
 
+    /// What one body does not handle may be handled around it.
+    fn pass_on(&mut self, raised: &Raised) {
+        if let Some(outer) = self.raised.last_mut() {
+            raised.timeout.iter().for_each(|world| Raised::note(&mut outer.timeout, world));
+            raised.any.iter().for_each(|world| Raised::note(&mut outer.any, world));
+        }
+    }
+
+    /// Notes in a world what has met in it for certain.
+    fn note_certain(&mut self, world: &mut World) {
+        world.met.extend(self.certain.drain(..));
+    }
+
     /// Judges what a transfer brought.
     fn arrived(&mut self, before: &Before, world: &mut World, to: InstanceId) {
         let brought: Vec<SpeciesId> = before.source.iter().filter(|(_, e)| !e.residue).map(|p| *p.0).collect();
@@ -400,5 +516,6 @@ impl Walk<'_, '_> {
             self.meet(world, to, s, &all, None);
         }
         self.settle();
+        self.note_certain(world);
     }
 }

@@ -3,8 +3,8 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
-use super::Walk;
 use super::world::{Before, Entry, World};
+use super::{Coming, Pending, Walk};
 use crate::elaborate::SpeciesId;
 use crate::screen::{Intended, Match, Party, Presence, intended};
 
@@ -58,25 +58,37 @@ impl Walk<'_, '_> {
                 Some(_) => self.place(),
                 None => entry.came.last().map_or(self.place(), |c| c.span),
             };
-            if !self.seen.insert((place, s.min(*o), s.max(*o))) {
+            let pair = (m, s.min(*o), s.max(*o));
+            let certain = arriving.certain && met.certain && !met.residue;
+            self.certain.extend(certain.then_some(pair));
+            if self.orders.is_none() && !self.seen.insert((place, s.min(*o), s.max(*o))) {
                 continue;
             }
-            let meeting = Meeting {
-                m,
-                a: (s, entry),
-                b: (*o, met),
-                certain: arriving.certain && met.certain && !met.residue,
-                place,
-            };
-            let d = self.incompatible(world, &meeting, &found);
-            self.pending.push((d.severity, found.pair.consequences.clone(), d));
+            let meeting = Meeting { m, a: (s, entry), b: (*o, met), certain, place };
+            let diagnostic = self.incompatible(world, &meeting, &found);
+            let grave = found.pair.severity();
+            match &mut self.orders {
+                Some(orders) => orders.add(Coming { pair, place, diagnostic, certain, grave }),
+                None => {
+                    let consequences = found.pair.consequences.clone();
+                    self.pending.push(Pending { consequences, diagnostic, pair, place });
+                }
+            }
         }
     }
 
     /// Reports the gravest of what one event brings together: the others are mended with it.
     pub(super) fn settle(&mut self) {
         let pending = std::mem::take(&mut self.pending);
-        self.found.extend(pending.into_iter().min_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1))).map(|p| p.2));
+        for p in &pending {
+            let told = self.pairs.entry(p.pair).or_insert(p.diagnostic.severity);
+            *told = (*told).min(p.diagnostic.severity);
+        }
+        let rank = |p: &Pending| (p.diagnostic.severity, p.consequences.clone());
+        if let Some(gravest) = pending.into_iter().min_by_key(rank) {
+            self.told.push((gravest.pair, gravest.place, self.found.len()));
+            self.found.push(gravest.diagnostic);
+        }
     }
 
     fn incompatible(&self, world: &World, meeting: &Meeting<'_>, found: &Match<'_>) -> Diagnostic {
@@ -147,7 +159,12 @@ impl Walk<'_, '_> {
         };
         let d =
             d.help(format!("{belongs} ({})", found.pair.source)).help("use a vessel of another material").help(SCREEN);
-        self.found.push(d);
+        match &mut self.orders {
+            Some(orders) => {
+                orders.add(Coming { pair: (m, s, s), place, grave: d.severity, diagnostic: d, certain: false });
+            }
+            None => self.found.push(d),
+        }
     }
 
     fn history(&self, mut d: Diagnostic, name: &str, entry: &Entry, place: Span) -> Diagnostic {

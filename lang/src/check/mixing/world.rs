@@ -66,6 +66,8 @@ pub struct World {
     set: Pages<Option<Span>>,
     /// States changed since they were last asked for.
     changed: BTreeSet<u32>,
+    /// Pairs that have met on every way to this point, by the mixture.
+    pub met: BTreeSet<(InstanceId, SpeciesId, SpeciesId)>,
 }
 
 impl World {
@@ -79,6 +81,7 @@ impl World {
             share: f64::NAN,
             set: lab.states.iter().map(|_| None).collect(),
             changed: (0..lab.states.len() as u32).collect(),
+            met: BTreeSet::new(),
         };
         // Initial values depend on parameters only.
         for (i, state) in lab.states.iter().enumerate() {
@@ -262,6 +265,7 @@ impl World {
             }
         }
         self.changed.extend(other.changed);
+        self.met.retain(|pair| other.met.contains(pair));
         self.set.merge(&other.set, |set, o| *set = o.or(*set));
         self.mixtures.merge(&other.mixtures, |mine, entries| {
             if Rc::ptr_eq(mine, entries) {
@@ -284,6 +288,24 @@ impl World {
             }
         });
         self
+    }
+}
+
+impl World {
+    /// Whether another one holds the same species everywhere, knows the same values, and has met the same pairs.
+    pub fn is_like(&self, other: &World) -> bool {
+        let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
+        let held = |(a, b): (&Contents, &Contents)| {
+            Rc::ptr_eq(a, b)
+                || (a.len() == b.len()
+                    && a.iter()
+                        .zip(b.iter())
+                        .all(|((s, x), (t, y))| s == t && x.residue == y.residue && x.certain == y.certain))
+        };
+        self.met == other.met
+            && self.states.iter().zip(other.states.iter()).all(|(a, b)| same(*a, *b))
+            && self.locals.iter().zip(&other.locals).all(|(a, b)| same(*a, *b))
+            && self.mixtures.iter().zip(other.mixtures.iter()).all(held)
     }
 }
 

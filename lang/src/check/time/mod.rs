@@ -1,5 +1,6 @@
 //! S1, D3, R1, R2: what no order and no patience mends. All of it is about the run in which nothing fails.
 
+mod components;
 mod deadlock;
 mod show;
 mod takes;
@@ -9,16 +10,19 @@ mod windows;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 
-use matterix_ir::Diagnostic;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, Step, StepId};
+use matterix_ir::{Diagnostic, Span, codes};
 use matterix_timing::walk::Durations;
 use matterix_timing::{Known, Point, ROUNDING, Scope, Timing};
 
 use crate::elaborate::Elaborator;
 
-/// Networks are searched from at most so many points: plans with more branches than that are left to the run.
-const MOST_SEARCHES: usize = 4000;
+/// Least times that are kept at most (eight bytes each); when they are full, what is asked for again is searched again.
+const MOST_KEPT: usize = 8_000_000;
+
+/// Differences that all searches look at, at most; a plan that needs more is told that its times were not all compared.
+const MOST_WORK: usize = 2_000_000_000;
 
 /// Reports contradictions in the times of a plan and in the use of instances.
 pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
@@ -37,23 +41,43 @@ pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], event
     };
     found.extend(twice::findings(&times, &name));
     found.extend(deadlock::findings(&times, &name));
+    if times.work.get() > MOST_WORK {
+        let text = "its steps are compared with each other up to a limit";
+        found.push(spent(plan.get(plan.root).span, "not all times of this workflow are compared", text));
+    }
     found
+}
+
+/// The finding that a limit of an analysis was reached.
+fn spent(place: Span, headline: &str, text: &str) -> Diagnostic {
+    Diagnostic::warning(codes::NOT_ANALYSED, place, headline, text)
+        .help("divide the workflow into several, or say `claim` around what must not overlap")
 }
 
 /// Least times from a point to all others, s, with what holds in some scopes.
 type Searched = BTreeMap<(Point, Vec<Scope>), Vec<f64>>;
 
 /// The plan with its times, and answers about pairs of steps.
-struct Times<'p> {
+pub struct Times<'p> {
     plan: &'p Plan,
     timing: Timing,
     searched: RefCell<Searched>,
-    searches: Cell<usize>,
+    /// Differences looked at so far.
+    work: Cell<usize>,
 }
 
 impl<'p> Times<'p> {
+    /// Walks through a plan; what its times contradict is left out.
+    pub fn of(lab: &Elaborator<'_>, plan: &'p Plan, derivatives: &[Derivative], events: &[Event]) -> Self {
+        let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
+        let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
+        let timing = Timing::of(plan, &known, Durations::Bounds);
+        let (_, network) = windows::findings(plan, &timing);
+        Times::new(plan, Timing { network, ..timing })
+    }
+
     fn new(plan: &'p Plan, timing: Timing) -> Self {
-        Times { plan, timing, searched: RefCell::default(), searches: Cell::new(0) }
+        Times { plan, timing, searched: RefCell::default(), work: Cell::new(0) }
     }
 
     /// The least time between two points, s; none where it is not known.
@@ -64,34 +88,42 @@ impl<'p> Times<'p> {
         let key = (from, scopes.to_vec());
         let mut searched = self.searched.borrow_mut();
         if !searched.contains_key(&key) {
-            if self.searches.get() >= MOST_SEARCHES {
+            if self.work.get() > MOST_WORK {
                 return None;
             }
-            self.searches.set(self.searches.get() + 1);
-            searched.insert(key.clone(), self.timing.network.least_from(from, scopes).unwrap_or_default());
+            let network = &self.timing.network;
+            self.work.set(self.work.get() + network.edges.len());
+            if (searched.len() + 1) * network.points as usize > MOST_KEPT {
+                searched.clear();
+            }
+            searched.insert(key.clone(), network.least_from(from, scopes).unwrap_or_default());
         }
         let least = searched.get(&key)?.get(to.0 as usize).copied()?;
         least.is_finite().then_some(least)
     }
 
     /// Whether the plan lets two steps run at the same time, as far as its shape tells.
-    fn beside(&self, a: StepId, b: StepId) -> bool {
+    pub fn beside(&self, a: StepId, b: StepId) -> bool {
         match (self.timing.visit(a), self.timing.visit(b)) {
             (Some(a), Some(b)) => self.timing.beside(a, b),
             _ => false,
         }
     }
 
-    /// Whether one step is over before the other begins in every run.
+    /// Whether one step is over before the other begins in every run, whichever comes first. Where the search was cut short they
+    /// count as apart: that is told of by itself.
     fn apart(&self, a: StepId, b: StepId) -> bool {
-        let (a, b) = (self.all_turns(a, b), self.all_turns(b, a));
-        let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
-        let scopes = [a.scope, b.scope];
+        self.work.get() > MOST_WORK || self.before(a, b) || self.before(b, a)
+    }
+
+    /// Whether a step is over before another one begins in every run.
+    pub fn before(&self, first: StepId, second: StepId) -> bool {
+        let (first, second) = (self.all_turns(first, second), self.all_turns(second, first));
+        let (Some(a), Some(b)) = (self.timing.visit(first), self.timing.visit(second)) else { return false };
         // Two actions without duration meet where nothing keeps them apart; others may follow each other closely.
         let at_once = a.lasts.max <= 0.0 && b.lasts.max <= 0.0;
         let gap = if at_once { ROUNDING } else { -ROUNDING };
-        let after = |first: Point, second: Point| self.least(first, second, &scopes).is_some_and(|t| t > gap);
-        after(a.end, b.start) || after(b.end, a.start)
+        self.least(a.end, b.start, &[a.scope, b.scope]).is_some_and(|t| t > gap)
     }
 
     /// Whether the steps run at the same time in every run.

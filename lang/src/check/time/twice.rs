@@ -1,6 +1,6 @@
 //! R1: one instance used by two steps at the same time.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Plan, Step, StepId};
@@ -8,39 +8,101 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, codes};
 use matterix_timing::usage::{self, Use};
 
-use super::{Times, expected, show};
+use super::{Times, expected, show, spent};
 
-/// Pairs of uses at most.
-const MOST: usize = 200_000;
+/// Pairs of uses that are compared at most; a plan that needs more is told that it was not searched to the end.
+const MOST: usize = 2_000_000;
 
-/// Uses that overlap, or may, where nothing makes them take turns.
+/// Uses that overlap, or may, where nothing makes them take turns. Between two lines of steps one clash over an instance is said,
+/// a certain one before one that may be.
 pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
     let uses = usage::uses(times.plan, &times.timing);
     let mut clashes: Vec<(&Use, &Use, bool)> = Vec::new();
-    let mut pairs = 0;
+    let mut unfinished: Option<&Use> = None;
+    let mut left = MOST;
     for of_one in uses.chunk_by(|a, b| a.instance == b.instance) {
-        let threads: Vec<u32> = of_one.iter().map(|u| thread(times, u.step)).collect();
-        // In one line of steps nothing meets: most instances are used in one only.
-        if threads.windows(2).all(|two| two[0] == two[1]) {
-            continue;
+        let mut lines: BTreeMap<u32, Vec<&Use>> = BTreeMap::new();
+        for used in of_one {
+            lines.entry(thread(times, used.step)).or_default().push(used);
         }
-        for (i, first) in of_one.iter().enumerate() {
-            for (j, second) in of_one.iter().enumerate().skip(i + 1) {
-                if threads[i] == threads[j] {
-                    continue;
-                }
-                pairs += 1;
-                if pairs <= MOST {
-                    clashes.extend(clash(times, first, second).map(|sure| (first, second, sure)));
+        let lines: Vec<Vec<&Use>> = lines.into_values().collect();
+        for (i, one) in lines.iter().enumerate() {
+            for other in &lines[i + 1..] {
+                match between(times, one, other, &mut left) {
+                    Ok(clash) => clashes.extend(clash),
+                    Err(at) => unfinished = unfinished.or(Some(at)),
                 }
             }
         }
     }
-    // Between two lines of steps one clash over an instance is said, a certain one before one that may be.
     clashes.sort_by_key(|c| !c.2);
     let mut said: BTreeSet<(InstanceId, StepId, StepId)> = BTreeSet::new();
     clashes.retain(|(a, b, _)| said.insert((a.instance, line(times, a.step), line(times, b.step))));
-    clashes.into_iter().map(|(a, b, sure)| finding(times, a, b, sure, &name(a.instance))).collect()
+    let mut found: Vec<Diagnostic> =
+        clashes.into_iter().map(|(a, b, sure)| finding(times, a, b, sure, &name(a.instance))).collect();
+    found.extend(unfinished.map(|at| {
+        let own = times.plan.get(show::own(times.plan, &times.timing, at.step));
+        let headline = format!("not all uses of `{}` are compared with each other", name(at.instance));
+        spent(own.span, &headline, "the search for what is used twice at the same time ends here")
+    }));
+    found
+}
+
+/// The clash of two lines of steps over one instance, if there is one; a use of it where the search was cut short.
+fn between<'u>(
+    times: &Times<'_>,
+    one: &[&'u Use],
+    other: &[&'u Use],
+    left: &mut usize,
+) -> Result<Option<(&'u Use, &'u Use, bool)>, &'u Use> {
+    let mut maybe = None;
+    let (of_one, of_other) = (classes(times, one, other), classes(times, other, one));
+    for (mine, a) in &of_one {
+        for (others, b) in &of_other {
+            // What both claim makes them take turns.
+            if !mine.is_disjoint(others) {
+                continue;
+            }
+            for first in a {
+                for second in b {
+                    if *left == 0 {
+                        return maybe.map_or(Err(*first), |found| Ok(Some(found)));
+                    }
+                    *left -= 1;
+                    match clash(times, first, second) {
+                        Some(true) => return Ok(Some((*first, *second, true))),
+                        Some(false) if maybe.is_none() => maybe = Some((*first, *second, false)),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+    Ok(maybe)
+}
+
+/// The uses of one line of steps by what is claimed around them for certain, and not around those of the other line.
+fn classes<'u>(times: &Times<'_>, one: &[&'u Use], other: &[&Use]) -> BTreeMap<BTreeSet<InstanceId>, Vec<&'u Use>> {
+    let beyond: BTreeSet<StepId> = other.first().into_iter().flat_map(|u| outside(times, u)).collect();
+    let other_line = other.first().map(|u| thread(times, u.step));
+    let mut out: BTreeMap<BTreeSet<InstanceId>, Vec<&Use>> = BTreeMap::new();
+    for used in one {
+        let around = times.timing.around(used.step);
+        // One line may have begun inside of a claim of the other, which is around some of the other's steps only.
+        let own = around.filter(|s| !beyond.contains(s) && Some(thread(times, *s)) != other_line);
+        let claims = own.filter_map(|s| match &times.plan.get(s).step {
+            Step::Claim { claims, .. } => Some(claims.as_slice()),
+            _ => None,
+        });
+        out.entry(claims.flatten().copied().collect()).or_default().push(used);
+    }
+    out
+}
+
+/// The steps around the line of steps in which a use stands.
+fn outside(times: &Times<'_>, used: &Use) -> impl Iterator<Item = StepId> {
+    let line = thread(times, used.step);
+    times.timing.around(used.step).filter(move |s| thread(times, *s) != line)
 }
 
 fn thread(times: &Times<'_>, step: StepId) -> u32 {

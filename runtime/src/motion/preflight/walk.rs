@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Caught, Condition, Operation, Step, StepId};
 use matterix_ir::scene::{InstanceId, Stand};
-use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span};
+use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span, codes};
 
 use super::beside::{Job, Moved};
 use super::course::{Cause, Course, Refusal};
@@ -95,8 +95,26 @@ struct Walk<'p, 's> {
 type Courses<'p> = Vec<Course<'p>>;
 
 impl<'p> Walk<'p, '_> {
+    /// Says once that what a plan may be looked at is used up before this step.
+    fn ends_here(&mut self, id: StepId) {
+        if self.found.iter().any(|f| f.finding.code == codes::NOT_ANALYSED) {
+            return;
+        }
+        let span = self.program.plan.get(id).span;
+        let site = if self.is_own(span) { span } else { self.sites.last().copied().unwrap_or(span) };
+        let headline = "the motions of this workflow are looked at up to here: there are too many of them";
+        let label = "from here on it is not known what is out of reach or in the way";
+        let finding = Diagnostic::warning(codes::NOT_ANALYSED, site, headline, label)
+            .help("divide the workflow into several, each of which is looked at whole");
+        self.found.push(Found { site, call: None, finding });
+    }
+
     fn step(&mut self, id: StepId, courses: Courses<'p>) -> Courses<'p> {
-        if courses.is_empty() || self.looker.is_done() {
+        if courses.is_empty() {
+            return courses;
+        }
+        if self.looker.is_done() {
+            self.ends_here(id);
             return courses;
         }
         let at = self.program.plan.get(id);

@@ -25,6 +25,7 @@ pub(super) fn report(run: &Run<'_>) -> Report {
         status: info.status,
         end: run.recording.end,
         failure: failure(run),
+        findings: findings(run),
         expectations: expectations(run),
         containers: program.model.mixtures.iter().map(|m| container(run, m)).collect(),
         steps: steps(run),
@@ -49,6 +50,17 @@ fn failure(run: &Run<'_>) -> Option<FailureReport> {
         place: failure.span.map(|s| run.place(s)).unwrap_or_default(),
         trace: nodes.map(|n| TraceReport { label: n.label.clone(), place: run.place(n.span) }).collect(),
     })
+}
+
+fn findings(run: &Run<'_>) -> Vec<FindingReport> {
+    let row = |f: &crate::run::Finding| FindingReport {
+        time: f.time,
+        code: f.diagnostic.code.name.to_owned(),
+        severity: f.diagnostic.severity,
+        text: f.diagnostic.headline.clone(),
+        place: run.place(f.diagnostic.span()),
+    };
+    run.info.findings.iter().map(row).collect()
 }
 
 fn expectations(run: &Run<'_>) -> Vec<ExpectationReport> {

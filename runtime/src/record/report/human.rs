@@ -1,5 +1,6 @@
 //! The report as it is read in a terminal.
 
+use matterix_ir::Severity;
 use matterix_ir::quantity::show_number;
 
 use super::text::{Align, Table, amount, digits, mass, quantity, seconds};
@@ -17,6 +18,7 @@ pub fn human(report: &Report) -> String {
     let sections = [
         head(report),
         failure(report),
+        findings(report),
         expectations(report),
         containers(report),
         readings(report),
@@ -37,6 +39,9 @@ fn section(title: &str, table: &Table) -> Option<String> {
 fn head(report: &Report) -> Option<String> {
     let status = match report.status {
         Status::Passed => "passed",
+        Status::Missed if report.findings.iter().any(|f| f.severity == Severity::Error) => {
+            "something met or came about that must not"
+        }
         Status::Missed if report.expectations.iter().all(|e| e.passed) => "something was left on or in hand",
         Status::Missed => "an expectation was not met",
         Status::Failed => "failed",
@@ -57,6 +62,15 @@ fn failure(report: &Report) -> Option<String> {
         table.row([format!("in {}", node.label), place(&node.place)]);
     }
     section(&format!("Failure at {} s", seconds(failure.time)), &table)
+}
+
+fn findings(report: &Report) -> Option<String> {
+    let mut table = Table::new(&[Right, Left, Left, Left]);
+    for finding in &report.findings {
+        let severity = if finding.severity == Severity::Error { "ERROR" } else { "warning" };
+        table.row([&format!("{} s", seconds(finding.time)), severity, &finding.text, &place(&finding.place)]);
+    }
+    section("Findings", &table)
 }
 
 fn expectations(report: &Report) -> Option<String> {

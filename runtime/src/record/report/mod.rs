@@ -7,6 +7,7 @@ pub(crate) mod text;
 
 use std::collections::BTreeMap;
 
+use matterix_ir::Severity;
 use serde::Serialize;
 
 use super::recording::{Level, StepState};
@@ -44,6 +45,8 @@ pub struct Report {
     pub end: f64,
     /// Why it failed, if it did.
     pub failure: Option<FailureReport>,
+    /// What met that should not, and hazards that came about, in order.
+    pub findings: Vec<FindingReport>,
     /// In the order in which they were judged.
     pub expectations: Vec<ExpectationReport>,
     /// Every mixture at the end.
@@ -89,6 +92,22 @@ pub struct FailureReport {
     pub place: Place,
     /// The nodes it passed through, from the leaf up, without those that only order others.
     pub trace: Vec<TraceReport>,
+}
+
+/// A finding of the run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FindingReport {
+    /// s.
+    pub time: f64,
+    /// Its code.
+    pub code: String,
+    /// `error`, `warning`.
+    pub severity: Severity,
+    /// In words.
+    pub text: String,
+    /// The statement during which it was made.
+    #[serde(flatten)]
+    pub place: Place,
 }
 
 /// A node a failure passed through.

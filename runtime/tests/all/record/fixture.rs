@@ -7,8 +7,9 @@ use matterix_ir::model::{
 };
 use matterix_ir::plan::{Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::{Frame, Instance, InstanceId, Pose, Scene, Shape};
-use matterix_ir::{BinaryOp, FileId, Op, Program, Sources, Span, Unit};
+use matterix_ir::{BinaryOp, Diagnostic, FileId, Op, Program, Sources, Span, Unit, codes};
 use matterix_runtime::record::{Expectation, Failure, Level, Measured, Recording, Run, RunInfo, Status, StepState};
+use matterix_runtime::run::Finding;
 
 pub(super) const TEXT: &str = "mtx 1\nlab bench {\n}\nworkflow synthesize in bench {\n    wait 2 s\n    heat hotplate to 76.33 degC\n    place beaker on hotplate by panda\n    expect beaker.contents[EtI] in 0.90 mol/kg .. 0.92 mol/kg\n}\n";
 
@@ -301,6 +302,10 @@ pub(super) fn lab() -> Lab {
             span: Some(line(7)),
             trace: vec![StepId(4), StepId(0)],
         }),
+        findings: vec![Finding {
+            time: 6.0,
+            diagnostic: Diagnostic::warning(codes::INCOMPATIBLE_MIX, line(7), "`EtI` and `EtOH` have met", "here"),
+        }],
         integrator: BTreeMap::from([("steps".into(), 128), ("rejected".into(), 3)]),
     };
     Lab { recording: recording(&program), program, sources, info }
