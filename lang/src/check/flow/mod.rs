@@ -8,16 +8,19 @@
 
 mod actions;
 mod beside;
+mod bonds;
 mod demands;
 mod eval;
 mod evolve;
 mod facts;
+mod fluxes;
 mod history;
 mod jobs;
 mod lasting;
 mod otherwise;
 mod parted;
 mod points;
+mod polytope;
 mod report;
 mod reported;
 mod value;
@@ -75,6 +78,10 @@ struct Flow<'l, 'a> {
     formulas: Formulas,
     /// Room for exact values.
     numbers: Vec<f64>,
+    /// What goes on by the laws, where that was asked for.
+    stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
+    /// Nodes as sums of states, as far as they were asked for.
+    forms: FxHashMap<NodeId, Option<Rc<bonds::Form>>>,
     /// Operations of a node that depend on a state.
     parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
     /// Values of the operations that were evaluated.
@@ -196,6 +203,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             orders: vec![None; lab.graph.ops().len()],
             formulas: Formulas::default(),
             numbers: Vec::new(),
+            stoichiometry: None,
+            forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
             rates_of: BTreeMap::new(),
@@ -278,6 +287,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             unsettled: (0..self.derivatives.len() as u32).collect(),
             moving: BTreeSet::new(),
             barrier: None,
+            bonds: None,
             fired: vec![Some(false); self.events.len()],
             held: BTreeSet::new(),
         };

@@ -222,6 +222,7 @@ fn bare(facts: &Facts) -> Facts {
         unsettled: BTreeSet::new(),
         moving: BTreeSet::new(),
         barrier: None,
+        bonds: facts.bonds.clone(),
         fired: Vec::new(),
         held: BTreeSet::new(),
     }
