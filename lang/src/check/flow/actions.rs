@@ -322,6 +322,7 @@ impl Flow<'_, '_> {
                 let node = until.node;
                 let value = self.eval(node, &facts);
                 if value.truth() != Some(true) {
+                    self.stopped_meanwhile(until, f64::INFINITY, &facts);
                     self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
                     self.assume(node, true, &mut facts);
                 }

@@ -1,6 +1,6 @@
 //! What is known at one point of the plan, and how it came to be.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::pages::Pages;
@@ -47,6 +47,8 @@ pub struct Facts {
     pub fired: Vec<Option<bool>>,
     /// Presumed conditions that have held at some moment, or may have.
     pub held: BTreeSet<NodeId>,
+    /// Jobs that have begun by now, and whether they have on every way.
+    pub begun: BTreeMap<String, bool>,
 }
 
 impl Facts {
@@ -120,6 +122,11 @@ impl Facts {
         }
     }
 
+    /// Whether a job has begun on every way.
+    fn has_begun(&self, job: &str) -> bool {
+        self.begun.get(job) == Some(&true)
+    }
+
     /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
     pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
         let mut out = self.clone();
@@ -152,6 +159,12 @@ impl Facts {
             _ => Bonds::join(&a, b, &out, why),
         };
         out.held.extend(a.held.iter().chain(&b.held));
+        out.begun = a
+            .begun
+            .keys()
+            .chain(b.begun.keys())
+            .map(|job| (job.clone(), a.has_begun(job) && b.has_begun(job)))
+            .collect();
         out
     }
 }

@@ -106,7 +106,7 @@ impl Flow<'_, '_> {
     }
 
     /// A rate as a sum of fluxes; none where it has too many.
-    fn terms(&self, rate: NodeId) -> Option<BTreeMap<Flux, f64>> {
+    pub(super) fn terms(&self, rate: NodeId) -> Option<BTreeMap<Flux, f64>> {
         let mut out: BTreeMap<Flux, f64> = BTreeMap::new();
         let mut todo = vec![(rate, 1.0, Vec::new())];
         while let Some((node, c, conditions)) = todo.pop() {
@@ -141,6 +141,11 @@ impl Flow<'_, '_> {
         }
         out.retain(|_, c| *c != 0.0);
         Some(out)
+    }
+
+    /// Whether a flux may go on.
+    pub(super) fn may_go(&mut self, flux: &Flux, facts: &Facts) -> bool {
+        flux.conditions.iter().all(|(condition, holds)| self.eval(*condition, facts).truth() != Some(!holds))
     }
 
     /// Bounds of a flux.

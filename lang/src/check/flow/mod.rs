@@ -15,6 +15,7 @@ mod evolve;
 mod facts;
 mod fluxes;
 mod history;
+mod interference;
 mod jobs;
 mod lasting;
 mod otherwise;
@@ -23,6 +24,7 @@ mod points;
 mod polytope;
 mod report;
 mod reported;
+mod totals;
 mod value;
 mod walk;
 mod words;
@@ -80,6 +82,8 @@ struct Flow<'l, 'a> {
     numbers: Vec<f64>,
     /// What goes on by the laws, where that was asked for.
     stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
+    /// Derivatives as sums of what goes on, as far as they were asked for.
+    terms_known: FxHashMap<u32, totals::Terms>,
     /// Nodes as sums of states, as far as they were asked for.
     forms: FxHashMap<NodeId, Option<Rc<bonds::Form>>>,
     /// Operations of a node that depend on a state.
@@ -119,6 +123,8 @@ struct Flow<'l, 'a> {
     cleaning: usize,
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
+    /// What goes on beside the branches and jobs that are followed, innermost last.
+    rivals: Vec<Vec<interference::Rival>>,
     /// Conditions that `keep` asks for all the time.
     kept: Vec<&'l Condition>,
     /// Jobs that go on.
@@ -204,6 +210,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             formulas: Formulas::default(),
             numbers: Vec::new(),
             stoichiometry: None,
+            terms_known: FxHashMap::default(),
             forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
@@ -224,6 +231,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             doubt: 0,
             cleaning: 0,
             shared: Vec::new(),
+            rivals: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,
@@ -290,6 +298,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             bonds: None,
             fired: vec![Some(false); self.events.len()],
             held: BTreeSet::new(),
+            begun: BTreeMap::new(),
         };
         let states = &self.lab.states;
         facts.states = (0..states.len()).map(|i| self.eval(states[i].initial, &facts)).collect();

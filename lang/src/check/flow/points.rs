@@ -225,5 +225,6 @@ fn bare(facts: &Facts) -> Facts {
         bonds: facts.bonds.clone(),
         fired: Vec::new(),
         held: BTreeSet::new(),
+        begun: BTreeMap::new(),
     }
 }
