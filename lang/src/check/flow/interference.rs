@@ -86,18 +86,24 @@ impl<'p> Flow<'p, '_> {
         let mut at = now;
         let mut open = true;
         for effect in effects {
-            self.pass(&Known::Point(effect.at.0 - at), &mut facts);
+            self.pass_by_totals(&Known::Point(effect.at.0 - at), &mut facts);
             open &= self.eval(condition.node, &facts).truth() == Some(false);
             at = effect.at.0;
             facts.time = Known::Point(at);
             self.perform(effect.actions, &mut facts);
         }
-        self.pass(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
+        self.pass_by_totals(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
         let never = open && self.eval(condition.node, &facts).truth() == Some(false);
         self.quiet -= 1;
         self.guards = guards;
         self.reported = reported;
         never
+    }
+
+    fn pass_by_totals(&mut self, duration: &Known, facts: &mut Facts) {
+        let before = facts.clone();
+        self.pass(duration, facts);
+        self.by_totals(duration.bounds().1, &before, facts);
     }
 
     fn keeps_from(&mut self, condition: &Condition, span: Span, after: f64) {
