@@ -104,49 +104,52 @@ fn known_of(thing: &Value) -> Vec<(String, Value)> {
 #[test]
 fn runs_stay_within_what_is_known() {
     for name in RUNS {
-        let file = format!("examples/{name}.mtx");
-        let dir = folder(&format!("contents_{name}"));
-        let out = dir.to_str().expect("text");
-        let ended = matterixc(&["run", &file, "--out", out, "--format", "json"]);
-        let report: Value = serde_json::from_str(&ended.out).expect("a report");
-        let (columns, rows) = rows(&dir.join("states.csv"));
-        let mut compared = 0;
-        let all = statements(&file, &[]);
-        for s in all.iter().filter(|s| s["after"].is_object() && s["block"] == false) {
-            let line = &s["span"]["start"]["line"];
-            let steps = report["steps"].as_array().expect("steps").iter();
-            let mut ends: Vec<f64> = steps
-                .filter(|t| t["file"].as_str() == Some(file.as_str()) && t["line"] == *line && t["state"] == "done")
-                .filter(|t| t["label"].as_str().is_some_and(|l| !l.starts_with('{') && l != "sequence"))
-                .filter_map(|t| t["end"].as_f64())
-                .collect();
-            // Statements that share a line are not told apart by it.
-            if all.iter().filter(|o| o["span"]["start"]["line"] == *line).count() > 1 {
-                continue;
-            }
-            ends.dedup();
-            let things = s["after"]["things"].as_array().expect("things");
-            let facts: Vec<(String, Value)> = things.iter().flat_map(known_of).collect();
-            for end in ends {
-                assert!(holds(&s["after"]["elapsed"], end), "{file}:{line}: {end} s, {}", s["after"]["elapsed"]);
-                // What happens at the same instant stands in rows of the same time; a row need not fall on it.
-                let from = rows.partition_point(|r| r[0] < end - SAME_TIME);
-                let to = rows.partition_point(|r| r[0] <= end + SAME_TIME);
-                let around =
-                    from.saturating_sub(usize::from(from == to))..(to + usize::from(from == to)).min(rows.len());
-                let now = &rows[around];
-                for (column, value) in &facts {
-                    let Some((i, unit)) = columns.get(column) else { continue };
-                    let Some(factor) = factor(unit, value["unit"].as_str().expect("a unit")) else { continue };
-                    let within = now.iter().any(|r| holds(value, r[*i] * factor));
-                    let found: Vec<f64> = now.iter().map(|r| r[*i] * factor).collect();
-                    assert!(within, "{file}:{line} at {end} s: {column} is {found:?}, not {value}");
-                    compared += 1;
-                }
+        let compared = stays_within(&format!("examples/{name}.mtx"), &folder(&format!("contents_{name}")));
+        assert!(compared > 5, "{name}: only {compared} values were compared");
+    }
+}
+
+/// Runs a file and compares what is recorded after each statement with what `check` knows there; how many values were.
+pub fn stays_within(file: &str, dir: &std::path::Path) -> usize {
+    let out = dir.to_str().expect("text");
+    let ended = matterixc(&["run", file, "--out", out, "--format", "json"]);
+    let report: Value = serde_json::from_str(&ended.out).expect("a report");
+    let (columns, rows) = rows(&dir.join("states.csv"));
+    let mut compared = 0;
+    let all = statements(file, &[]);
+    for s in all.iter().filter(|s| s["after"].is_object() && s["block"] == false) {
+        let line = &s["span"]["start"]["line"];
+        let steps = report["steps"].as_array().expect("steps").iter();
+        let mut ends: Vec<f64> = steps
+            .filter(|t| t["file"].as_str() == Some(file) && t["line"] == *line && t["state"] == "done")
+            .filter(|t| t["label"].as_str().is_some_and(|l| !l.starts_with('{') && l != "sequence"))
+            .filter_map(|t| t["end"].as_f64())
+            .collect();
+        // Statements that share a line are not told apart by it.
+        if all.iter().filter(|o| o["span"]["start"]["line"] == *line).count() > 1 {
+            continue;
+        }
+        ends.dedup();
+        let things = s["after"]["things"].as_array().expect("things");
+        let facts: Vec<(String, Value)> = things.iter().flat_map(known_of).collect();
+        for end in ends {
+            assert!(holds(&s["after"]["elapsed"], end), "{file}:{line}: {end} s, {}", s["after"]["elapsed"]);
+            // What happens at the same instant stands in rows of the same time; a row need not fall on it.
+            let from = rows.partition_point(|r| r[0] < end - SAME_TIME);
+            let to = rows.partition_point(|r| r[0] <= end + SAME_TIME);
+            let around = from.saturating_sub(usize::from(from == to))..(to + usize::from(from == to)).min(rows.len());
+            let now = &rows[around];
+            for (column, value) in &facts {
+                let Some((i, unit)) = columns.get(column) else { continue };
+                let Some(factor) = factor(unit, value["unit"].as_str().expect("a unit")) else { continue };
+                let within = now.iter().any(|r| holds(value, r[*i] * factor));
+                let found: Vec<f64> = now.iter().map(|r| r[*i] * factor).collect();
+                assert!(within, "{file}:{line} at {end} s: {column} is {found:?}, not {value}");
+                compared += 1;
             }
         }
-        assert!(compared > 5, "{file}: only {compared} values were compared");
     }
+    compared
 }
 
 #[test]

@@ -38,6 +38,7 @@ mod pages;
 mod physique;
 mod pipeline_tests;
 mod plan;
+mod reacting;
 mod reference;
 mod science;
 mod screening;

@@ -1,6 +1,7 @@
 //! What operations need and do.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use matterix_ir::model::Action;
@@ -8,6 +9,7 @@ use matterix_ir::plan::{Condition, Operation, Presumption};
 use matterix_ir::{BinaryOp, NodeId, Severity};
 
 use super::Flow;
+use super::bonds::{Bonds, Form};
 use super::facts::Facts;
 use super::value::{Known, Why};
 
@@ -109,6 +111,8 @@ impl Flow<'_, '_> {
         for s in &changed {
             self.touch(*s, facts);
         }
+        let written: Vec<u32> = changes.iter().map(|(state, _)| *state).collect();
+        facts.rebind(|bonds, _| bonds.release(&written));
         facts.write(self.site(), changes);
         self.note_held(&changed, facts);
         changed
@@ -155,8 +159,15 @@ impl Flow<'_, '_> {
     fn act(&mut self, action: &Action, facts: &mut Facts) -> Vec<u32> {
         match action {
             Action::Assign { state, value, .. } => {
-                let value = self.eval(*value, facts);
-                self.write(vec![(*state, value)], facts)
+                let known = self.eval(*value, facts);
+                let bonds =
+                    facts.bonds.as_deref().cloned().zip(self.form_in(*value, facts)).map(|(mut bonds, form)| {
+                        bonds.assigned(*state, &form, facts);
+                        bonds
+                    });
+                let changed = self.write(vec![(*state, known)], facts);
+                self.bind(bonds, facts);
+                changed
             }
             Action::Move { fraction, from, to, .. } => {
                 let share = self.eval(*fraction, facts);
@@ -231,7 +242,28 @@ impl Flow<'_, '_> {
             let more = Known::binary(BinaryOp::Add, &facts.states[target as usize], &moved);
             changes.extend([(*source, rest), (target, more)]);
         }
-        self.write(changes, facts)
+        let bonds = facts.bonds.as_deref().cloned().map(|mut bonds| {
+            let ways = self.passages.between(from, to, &self.mixtures);
+            bonds.transferred(&fraction, &ways, facts);
+            bonds
+        });
+        let changed = self.write(changes, facts);
+        self.bind(bonds, facts);
+        changed
+    }
+
+    /// A node as a sum of states, where some states hang together.
+    fn form_in(&mut self, node: NodeId, facts: &Facts) -> Option<Rc<Form>> {
+        facts.bonds.as_ref()?;
+        self.form(node)
+    }
+
+    /// States hang together so from now on.
+    fn bind(&self, bonds: Option<Bonds>, facts: &mut Facts) {
+        if let Some(mut bonds) = bonds {
+            bonds.stamp(facts);
+            facts.bonds = Some(Rc::new(bonds)).filter(|bonds| !bonds.is_empty());
+        }
     }
 
     /// Fires those of the events that became true, and what they set off, until none does.
@@ -305,6 +337,7 @@ impl Flow<'_, '_> {
                 let node = until.node;
                 let value = self.eval(node, &facts);
                 if value.truth() != Some(true) {
+                    self.stopped_meanwhile(until, f64::INFINITY, &facts);
                     self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
                     self.assume(node, true, &mut facts);
                 }

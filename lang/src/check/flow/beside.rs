@@ -121,7 +121,7 @@ impl Flow<'_, '_> {
     }
 
     /// States, and all that laws and events change by them.
-    fn behind(&self, states: &BTreeSet<u32>) -> BTreeSet<u32> {
+    pub(super) fn behind(&self, states: &BTreeSet<u32>) -> BTreeSet<u32> {
         let mut out = states.clone();
         let mut todo: Vec<u32> = states.iter().copied().collect();
         while let Some(state) = todo.pop() {

@@ -224,7 +224,11 @@ impl Flow<'_, '_> {
     pub fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
         let order = self.order(node);
         self.work_out(&order, facts);
-        self.values.of(node).clone()
+        let known = self.values.of(node).clone();
+        if facts.bonds.is_some() && matches!(self.lab.graph.op(node), Op::Binary(BinaryOp::Add | BinaryOp::Sub, ..)) {
+            return self.together(node, known, facts);
+        }
+        known
     }
 
     /// The value of a node that was enclosed just before, now that of what is known one state alone has changed.
@@ -271,6 +275,12 @@ impl Flow<'_, '_> {
                 }
                 Op::Unary(op, a) => self.values.result(*n, [a], |[a]| Known::unary(op, a)),
                 Op::Binary(BinaryOp::Eq, a, b) if a == b => self.values.leaf(*n, &Known::Point(1.0)),
+                // What is known of a sum hangs on more than what is known of its parts.
+                Op::Binary(op @ (BinaryOp::Add | BinaryOp::Sub), a, b) if self.is_outer_sum(*n) => {
+                    let apart = Known::binary(op, self.values.of(a), self.values.of(b));
+                    let known = self.together(*n, apart, facts);
+                    self.values.leaf(*n, &known);
+                }
                 Op::Binary(op, a, b) => self.values.result(*n, [a, b], |[a, b]| Known::binary(op, a, b)),
                 Op::Select(c, a, b) => self.values.result(*n, [c, a, b], |[c, a, b]| Known::select(c, a, b)),
             }
@@ -358,11 +368,14 @@ impl Flow<'_, '_> {
                     Op::State(s) => facts.states[s as usize].exact(),
                     _ => None,
                 };
-                match (graph.op(a), graph.op(b), number(a), number(b)) {
-                    (Op::State(s), _, None, Some(v)) => cut(&mut facts.states[s as usize], op, v, holds, true),
-                    (_, Op::State(s), Some(v), None) => cut(&mut facts.states[s as usize], op, v, holds, false),
-                    _ => {}
-                }
+                let (s, v, left) = match (graph.op(a), graph.op(b), number(a), number(b)) {
+                    (Op::State(s), _, None, Some(v)) => (s, v, true),
+                    (_, Op::State(s), Some(v), None) => (s, v, false),
+                    _ => return,
+                };
+                let mut known = facts.states[s as usize].clone();
+                cut(&mut known, op, v, holds, left);
+                facts.narrow(s, known);
             }
             _ => {}
         }

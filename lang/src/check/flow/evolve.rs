@@ -10,7 +10,10 @@ use std::rc::Rc;
 use matterix_ir::{BinaryOp, Op};
 
 use super::Flow;
+use super::bonds::Bonds;
 use super::facts::Facts;
+use super::fluxes::Row;
+use super::polytope::scaled;
 use super::value::{Known, Why};
 
 /// A rate below this share of a state's scale per second moves nothing that matters within the longest run.
@@ -40,8 +43,49 @@ const MOST_MOVING: usize = 48;
 /// Rounds of events and laws that change each other, before what they change counts as unknown.
 const ROUNDS: usize = 8;
 
-/// Bounds that hold for all time to come, by state.
-pub type Barrier = Rc<BTreeMap<u32, (f64, f64)>>;
+/// Bounds that hold for all time to come, while nothing else changes.
+#[derive(Debug, Default)]
+pub struct Barrier {
+    /// By state.
+    states: BTreeMap<u32, (f64, f64)>,
+    /// How far what goes on can go, and what states that it changes are without it.
+    bonds: Option<Rc<Bonds>>,
+}
+
+/// A pair of faces of the box, by derivative.
+#[derive(Clone, Copy)]
+enum Wall {
+    /// Of the state.
+    Whole(u32),
+    /// Of the state without what the fluxes that change matter bring: a heat content without the heat of reactions.
+    Apart(u32),
+}
+
+/// What a derivative is of.
+enum Kind {
+    /// An amount: what it is at first and what goes on.
+    Matter(Rc<Row>),
+    /// Something that fluxes of matter change besides others.
+    Mixed(Rc<Row>),
+    /// Something else.
+    Plain,
+}
+
+/// A box that is being made.
+struct Making {
+    /// What is known within it.
+    within: Facts,
+    /// Faces of states that fluxes of matter change besides others.
+    whole: BTreeMap<u32, (f64, f64)>,
+    /// Fluxes that go on.
+    active: BTreeSet<usize>,
+    /// Whether extents go down and up.
+    ways: BTreeMap<usize, (bool, bool)>,
+    /// Derivatives that are not zero.
+    moving: BTreeSet<u32>,
+    /// How many of them have faces.
+    faces: usize,
+}
 
 impl Flow<'_, '_> {
     /// Time passes; what moves is known within bounds from then on.
@@ -73,7 +117,7 @@ impl Flow<'_, '_> {
 
     /// Lets the laws act for at most `longest` s; the states that are no longer what they were.
     fn flow_on(&mut self, longest: f64, facts: &mut Facts) -> Vec<u32> {
-        if !facts.unsettled.is_empty() {
+        if !facts.unsettled.is_empty() || facts.bonds.as_ref().is_some_and(|bonds| !bonds.all_hold(facts)) {
             facts.barrier = None;
         }
         let barrier = match facts.barrier.clone() {
@@ -85,22 +129,30 @@ impl Flow<'_, '_> {
             }
         };
         facts.unsettled.clear();
-        if barrier.is_empty() {
+        if barrier.states.is_empty() {
             return Vec::new();
         }
         let mut within = facts.clone();
-        for (state, (low, high)) in barrier.iter() {
+        for (state, (low, high)) in &barrier.states {
             within.states[*state as usize] = Known::Range(*low, *high, Why::Unknown);
         }
-        let mut moved = Vec::new();
+        within.bonds.clone_from(&barrier.bonds);
+        let (bonds, amounts) = self.go_on(longest, &barrier, &within, facts);
+        let mut moved: Vec<(u32, Known)> = Vec::new();
         for i in facts.moving.clone() {
             let derivative = &self.derivatives[i as usize];
             let state = derivative.state;
-            let Some(&(low, high)) = barrier.get(&state) else { continue };
-            let (slowest, fastest) = self.eval(derivative.rate, &within).bounds();
-            let (from, to) = facts.states[state as usize].bounds();
-            let low = low.max(from + (slowest * longest).min(0.0)).min(from);
-            let high = high.min(to + (fastest * longest).max(0.0)).max(to);
+            let Some(&(low, high)) = barrier.states.get(&state) else { continue };
+            let (low, high) = match amounts.get(&state) {
+                Some(bounds) => *bounds,
+                None => {
+                    let (slowest, fastest) = self.eval(derivative.rate, &within).bounds();
+                    let (from, to) = facts.states[state as usize].bounds();
+                    let low = low.max(from + (slowest * longest).min(0.0)).min(from);
+                    let high = high.min(to + (fastest * longest).max(0.0)).max(to);
+                    bonds.as_ref().map_or((low, high), |bonds| bonds.cut(state, (low, high)))
+                }
+            };
             let now =
                 if low.is_nan() || high.is_nan() { Known::nothing() } else { Known::Range(low, high, Why::Unknown) };
             if facts.states[state as usize] != now {
@@ -111,46 +163,93 @@ impl Flow<'_, '_> {
         for (state, now) in moved {
             facts.states[state as usize] = now;
         }
+        facts.bonds = bonds.map(|mut bonds| {
+            bonds.stamp(facts);
+            Rc::new(bonds)
+        });
         states
     }
 
+    /// How far what changes matter goes on for at most `longest` s, with what states are without it, and the bounds of amounts.
+    fn go_on(
+        &mut self,
+        longest: f64,
+        barrier: &Barrier,
+        within: &Facts,
+        facts: &Facts,
+    ) -> (Option<Bonds>, BTreeMap<u32, (f64, f64)>) {
+        let Some(all) = &barrier.bonds else { return (None, BTreeMap::new()) };
+        let stoichiometry = self.stoichiometry();
+        let rows = facts.moving.iter().filter_map(|i| stoichiometry.rows.get(*i as usize)?.as_ref().map(|r| (*i, r)));
+        let rows: Vec<(u32, &Rc<Row>)> = rows.collect();
+        let fluxes: BTreeSet<usize> = rows.iter().flat_map(|(_, row)| &row.fluxes).map(|(flux, _)| *flux).collect();
+        let mut bonds = facts.bonds.as_deref().cloned().unwrap_or_default();
+        let mut more: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for flux in fluxes {
+            let (direction, by) = &stoichiometry.directions[flux];
+            if all.range_in(direction).is_none() {
+                continue;
+            }
+            let (low, high) = self.flux(&stoichiometry.fluxes[flux], within);
+            let (low, high) = scaled(longest, scaled(*by, (low, high)));
+            direction.iter().for_each(|(state, _)| bonds.cover(*state, facts));
+            let extent = bonds.extent_of(direction);
+            let (a, b) = more.entry(extent).or_default();
+            (*a, *b) = (*a + low.min(0.0), *b + high.max(0.0));
+        }
+        for (extent, (low, high)) in more {
+            let extent = &mut bonds.extents[extent];
+            let furthest = all.range_in(&extent.direction).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+            let (from, to) = extent.range;
+            extent.range = ((from + low).max(furthest.0).min(from), (to + high).min(furthest.1).max(to));
+        }
+        for (i, row) in rows {
+            let state = self.derivatives[i as usize].state;
+            let Some(&(low, high)) = all.states.get(&state).map(|bond| bond.base.bounds()).as_ref() else { continue };
+            if self.is_amount(state) {
+                continue;
+            }
+            let (slowest, fastest) = self.rest(row, within);
+            if let Some(bond) = bonds.states.get_mut(&state) {
+                let (from, to) = bond.base.bounds();
+                let low = low.max(from + scaled(longest, (slowest.min(0.0), 0.0)).0).min(from);
+                let high = high.min(to + scaled(longest, (0.0, fastest.max(0.0))).1).max(to);
+                bond.base = Known::Range(low, high, Why::Unknown);
+            }
+        }
+        let amounts = bonds.tighten(|state| self.is_amount(state));
+        (Some(bonds), amounts.into_iter().collect())
+    }
+
+    /// What a derivative is of.
+    fn kind(&mut self, derivative: u32) -> Kind {
+        let stoichiometry = self.stoichiometry();
+        match stoichiometry.rows.get(derivative as usize).cloned().flatten() {
+            Some(row) if self.is_amount(self.derivatives[derivative as usize].state) => Kind::Matter(row),
+            Some(row) => Kind::Mixed(row),
+            None => Kind::Plain,
+        }
+    }
+
     /// Bounds that what moves never leaves.
-    fn barrier(&mut self, facts: &mut Facts) -> BTreeMap<u32, (f64, f64)> {
+    fn barrier(&mut self, facts: &mut Facts) -> Barrier {
         let mut due: BTreeSet<u32> = std::mem::take(&mut facts.unsettled);
         due.extend(&facts.moving);
-        let mut moving: BTreeSet<u32> = BTreeSet::new();
-        let mut within = facts.clone();
-        for round in 0..=SWEEPS {
+        facts.rebind(Bonds::settle);
+        let mut box_ = Making {
+            within: facts.clone(),
+            whole: BTreeMap::new(),
+            active: BTreeSet::new(),
+            ways: BTreeMap::new(),
+            moving: BTreeSet::new(),
+            faces: 0,
+        };
+        for round in 0..=2 * SWEEPS {
             let mut crossed = BTreeSet::new();
             for i in std::mem::take(&mut due) {
-                let state = self.derivatives[i as usize].state;
-                let (a, b) = self.rate(i, &within);
-                if !moving.contains(&i) {
-                    let still = self.still(state);
-                    if a.abs() <= still && b.abs() <= still {
-                        continue;
-                    }
-                    moving.insert(i);
-                }
-                let (down, up) = self.crossings(i, &mut within);
-                let far = round >= SWEEPS || moving.len() > MOST_MOVING;
-                let (start_low, start_high) = facts.states[state as usize].bounds();
-                let (mut low, mut high) = within.states[state as usize].bounds();
-                if up {
-                    let open = far || self.is_amount(state);
-                    high = if open { f64::INFINITY } else { self.face(i, high, start_high, 1.0, &mut within) };
-                }
-                if down {
-                    low = match self.is_amount(state) {
-                        true => 0.0,
-                        false if far => f64::NEG_INFINITY,
-                        false => self.face(i, low, start_low, -1.0, &mut within),
-                    };
-                }
-                if up || down {
-                    within.states[state as usize] = Known::Range(low, high, Why::Unknown);
-                    crossed.insert(i);
-                    crossed.extend(self.rates_of.get(&state).into_iter().flatten());
+                match self.kind(i) {
+                    Kind::Matter(row) => self.react(i, &row, facts, &mut box_, &mut crossed),
+                    kind => self.push_out(i, &kind, round >= SWEEPS, facts, &mut box_, &mut crossed),
                 }
             }
             if crossed.is_empty() {
@@ -158,25 +257,178 @@ impl Flow<'_, '_> {
             }
             due = crossed;
         }
-        if moving.len() <= MOST_MOVING {
-            self.narrow(&moving, facts, &mut within);
+        if box_.faces <= MOST_MOVING {
+            self.narrow(facts, &mut box_);
         }
-        facts.moving = moving;
+        facts.moving = box_.moving;
         let bounds = |i: &u32| {
             let state = self.derivatives[*i as usize].state;
-            (state, within.states[state as usize].bounds())
+            (state, box_.within.states[state as usize].bounds())
         };
-        facts.moving.iter().map(bounds).collect()
+        Barrier { states: facts.moving.iter().map(bounds).collect(), bonds: box_.within.bonds }
+    }
+
+    /// Lets the fluxes that change an amount go as far as they can.
+    fn react(&mut self, derivative: u32, row: &Row, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
+        let stoichiometry = self.stoichiometry();
+        let still = self.still(self.derivatives[derivative as usize].state);
+        let mut grown = BTreeSet::new();
+        for (flux, c) in &row.fluxes {
+            let (low, high) = self.flux(&stoichiometry.fluxes[*flux], &making.within);
+            if !making.active.contains(flux) && (low * c).abs() <= still && (high * c).abs() <= still {
+                continue;
+            }
+            making.active.insert(*flux);
+            let (direction, by) = &stoichiometry.directions[*flux];
+            let (low, high) = scaled(*by, (low, high));
+            let mut bonds = making.within.bonds.as_deref().cloned().unwrap_or_default();
+            direction.iter().for_each(|(state, _)| bonds.cover(*state, facts));
+            let extent = bonds.extent_of(direction);
+            let (down, up) = making.ways.entry(extent).or_default();
+            let new = (low < 0.0 && !*down, high > 0.0 && !*up);
+            (*down, *up) = (*down || new.0, *up || new.1);
+            let range = &mut bonds.extents[extent].range;
+            *range = (if new.0 { f64::NEG_INFINITY } else { range.0 }, if new.1 { f64::INFINITY } else { range.1 });
+            if new.0 || new.1 {
+                grown.extend(direction.iter().map(|(state, _)| *state));
+                making.within.bonds = Some(Rc::new(bonds));
+            }
+        }
+        if row.fluxes.iter().any(|(flux, _)| making.active.contains(flux)) {
+            making.moving.insert(derivative);
+        }
+        if grown.is_empty() {
+            return;
+        }
+        let Some(mut bonds) = making.within.bonds.as_deref().cloned() else { return };
+        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state)) {
+            making.within.states[state as usize] = Known::Range(low, high, Why::Unknown);
+        }
+        bonds.stamp(&making.within);
+        making.within.bonds = Some(Rc::new(bonds));
+        for state in grown {
+            let of = stoichiometry.of_state.get(&state).copied();
+            if let Some(i) = of.filter(|_| !self.is_amount(state)) {
+                self.put(i, facts, making);
+            }
+            crossed.extend(of);
+            crossed.extend(self.rates_of.get(&state).into_iter().flatten());
+        }
+    }
+
+    /// What is known of a state that fluxes of matter change besides others: by itself, and without what they bring.
+    fn put(&mut self, derivative: u32, facts: &Facts, making: &mut Making) {
+        let state = self.derivatives[derivative as usize].state;
+        let whole = *making.whole.entry(derivative).or_insert_with(|| facts.states[state as usize].bounds());
+        let bounds = making.within.bonds.as_ref().map_or(whole, |bonds| bonds.cut(state, whole));
+        making.within.set(state, Known::Range(bounds.0, bounds.1, Why::Unknown));
+    }
+
+    /// Moves the faces of a state out that are crossed.
+    fn push_out(
+        &mut self,
+        derivative: u32,
+        kind: &Kind,
+        late: bool,
+        facts: &Facts,
+        making: &mut Making,
+        crossed: &mut BTreeSet<u32>,
+    ) {
+        let state = self.derivatives[derivative as usize].state;
+        let (a, b) = self.rate(derivative, &making.within);
+        if !making.moving.contains(&derivative) {
+            let still = self.still(state);
+            if a.abs() <= still && b.abs() <= still {
+                return;
+            }
+            making.moving.insert(derivative);
+            making.faces += 1;
+        }
+        let far = late || making.faces > MOST_MOVING;
+        let apart = matches!(kind, Kind::Mixed(_)) && making.within.hangs(state);
+        if apart {
+            // A flux of matter may have been found since.
+            self.put(derivative, facts, making);
+        }
+        let walls = [apart.then_some(Wall::Apart(derivative)), Some(Wall::Whole(derivative))];
+        for wall in walls.into_iter().flatten() {
+            let (down, up) = self.crossings(wall, making);
+            let (start_low, start_high) = self.begins(wall, facts);
+            let (mut low, mut high) = self.faces(wall, making);
+            if up {
+                let open = far || self.is_amount(state);
+                high = if open { f64::INFINITY } else { self.face(wall, high, start_high, 1.0, making) };
+            }
+            if down {
+                low = match self.is_amount(state) {
+                    true => 0.0,
+                    false if far => f64::NEG_INFINITY,
+                    false => self.face(wall, low, start_low, -1.0, making),
+                };
+            }
+            if up || down {
+                self.set_faces(wall, (low, high), facts, making);
+                crossed.insert(derivative);
+                crossed.extend(self.rates_of.get(&state).into_iter().flatten());
+            }
+        }
+    }
+
+    /// The faces of a wall.
+    fn faces(&self, wall: Wall, making: &Making) -> (f64, f64) {
+        let state = |i: u32| self.derivatives[i as usize].state;
+        match wall {
+            Wall::Whole(i) => {
+                making.whole.get(&i).copied().unwrap_or_else(|| making.within.states[state(i) as usize].bounds())
+            }
+            Wall::Apart(i) => self.apart(state(i), &making.within),
+        }
+    }
+
+    /// What is known of a state without what fluxes of matter bring.
+    fn apart(&self, state: u32, facts: &Facts) -> (f64, f64) {
+        let bond = facts.bonds.as_ref().and_then(|bonds| bonds.states.get(&state));
+        bond.map_or_else(|| facts.states[state as usize].bounds(), |bond| bond.base.bounds())
+    }
+
+    /// Where the faces of a wall stand at first.
+    fn begins(&self, wall: Wall, facts: &Facts) -> (f64, f64) {
+        match wall {
+            Wall::Whole(i) => facts.states[self.derivatives[i as usize].state as usize].bounds(),
+            Wall::Apart(i) => self.apart(self.derivatives[i as usize].state, facts),
+        }
+    }
+
+    fn set_faces(&mut self, wall: Wall, faces: (f64, f64), facts: &Facts, making: &mut Making) {
+        let (Wall::Whole(i) | Wall::Apart(i)) = wall;
+        let state = self.derivatives[i as usize].state;
+        let known = Known::Range(faces.0, faces.1, Why::Unknown);
+        match wall {
+            Wall::Apart(_) => {
+                making.within.rebind(|bonds, _| {
+                    if let Some(bond) = bonds.states.get_mut(&state) {
+                        bond.base = known;
+                    }
+                });
+                self.put(i, facts, making);
+            }
+            Wall::Whole(_) if making.whole.contains_key(&i) => {
+                making.whole.insert(i, faces);
+                self.put(i, facts, making);
+            }
+            Wall::Whole(_) => making.within.set(state, known),
+        }
     }
 
     /// Where a face that is crossed has to be moved so that it no longer is, and a little further, so that faces that
     /// push each other come to rest. `side` is 1 for an upper face, -1 for a lower one. The rate was evaluated just before.
-    fn face(&mut self, derivative: u32, from: f64, start: f64, side: f64, within: &mut Facts) -> f64 {
-        let state = self.derivatives[derivative as usize].state;
+    fn face(&mut self, wall: Wall, from: f64, start: f64, side: f64, making: &mut Making) -> f64 {
+        let (Wall::Whole(i) | Wall::Apart(i)) = wall;
+        let state = self.derivatives[i as usize].state;
         let mut step = self.lab.states[state as usize].scale.max((from - start).abs());
         let (mut near, mut far) = (from, from + side * step);
         let mut doublings = 0;
-        while self.outwards(derivative, far, side, within) {
+        while self.outwards(wall, far, side, making) {
             doublings += 1;
             if doublings > DOUBLINGS {
                 return side * f64::INFINITY;
@@ -187,26 +439,36 @@ impl Flow<'_, '_> {
         }
         for _ in 0..HALVINGS / 2 {
             let middle = 0.5 * (near + far);
-            if self.outwards(derivative, middle, side, within) { near = middle } else { far = middle }
+            if self.outwards(wall, middle, side, making) { near = middle } else { far = middle }
         }
         far + OVERSHOOT * (far - start)
     }
 
-    fn outwards(&mut self, derivative: u32, at: f64, side: f64, within: &mut Facts) -> bool {
-        let (slow, fast) = self.rate_at(derivative, at, within);
+    fn outwards(&mut self, wall: Wall, at: f64, side: f64, making: &mut Making) -> bool {
+        let (slow, fast) = self.rate_at(wall, at, making);
         if side > 0.0 { fast > 0.0 } else { slow < 0.0 }
     }
 
     /// Brings faces back in as far as nothing crosses them.
-    fn narrow(&mut self, moving: &BTreeSet<u32>, facts: &Facts, within: &mut Facts) {
+    fn narrow(&mut self, facts: &Facts, making: &mut Making) {
+        let mut walls = Vec::new();
+        for i in making.moving.clone() {
+            match self.kind(i) {
+                Kind::Matter(_) => {}
+                Kind::Mixed(_) if making.within.hangs(self.derivatives[i as usize].state) => {
+                    walls.extend([Wall::Apart(i), Wall::Whole(i)]);
+                }
+                _ => walls.push(Wall::Whole(i)),
+            }
+        }
         for _ in 0..NARROWINGS {
             let mut rests = true;
-            for i in moving {
-                let state = self.derivatives[*i as usize].state;
-                let (inner_low, inner_high) = facts.states[state as usize].bounds();
-                self.rate(*i, within);
+            for wall in &walls {
+                let (inner_low, inner_high) = self.begins(*wall, facts);
+                let (Wall::Whole(i) | Wall::Apart(i)) = *wall;
+                self.rate(i, &making.within);
                 for upper in [true, false] {
-                    let (low, high) = within.states[state as usize].bounds();
+                    let (low, high) = self.faces(*wall, making);
                     let (mut near, mut far) = if upper { (inner_high, high) } else { (inner_low, low) };
                     if !far.is_finite() || near == far {
                         continue;
@@ -214,12 +476,12 @@ impl Flow<'_, '_> {
                     for _ in 0..HALVINGS {
                         let middle = 0.5 * (near + far);
                         let side = if upper { 1.0 } else { -1.0 };
-                        if self.outwards(*i, middle, side, within) { near = middle } else { far = middle }
+                        if self.outwards(*wall, middle, side, making) { near = middle } else { far = middle }
                     }
                     let (inner, before) = if upper { (inner_high, high) } else { (inner_low, low) };
                     rests &= (before - far).abs() <= AT_REST * (before - inner).abs();
                     let face = if upper { (low, far) } else { (far, high) };
-                    within.states[state as usize] = Known::Range(face.0, face.1, Why::Unknown);
+                    self.set_faces(*wall, face, facts, making);
                 }
             }
             if rests {
@@ -228,13 +490,13 @@ impl Flow<'_, '_> {
         }
     }
 
-    /// Whether the lower and the upper face of a state's bounds are crossed outwards; its rate was evaluated just before.
-    fn crossings(&mut self, derivative: u32, within: &mut Facts) -> (bool, bool) {
-        let state = self.derivatives[derivative as usize].state;
-        let (low, high) = within.states[state as usize].bounds();
-        let still = self.still(state);
-        let down = low.is_finite() && self.rate_at(derivative, low, within).0 < -still;
-        let up = high.is_finite() && self.rate_at(derivative, high, within).1 > still;
+    /// Whether the lower and the upper face of a wall are crossed outwards; the rate was evaluated just before.
+    fn crossings(&mut self, wall: Wall, making: &mut Making) -> (bool, bool) {
+        let (Wall::Whole(i) | Wall::Apart(i)) = wall;
+        let (low, high) = self.faces(wall, making);
+        let still = self.still(self.derivatives[i as usize].state);
+        let down = low.is_finite() && self.rate_at(wall, low, making).0 < -still;
+        let up = high.is_finite() && self.rate_at(wall, high, making).1 > still;
         (down, up)
     }
 
@@ -243,13 +505,39 @@ impl Flow<'_, '_> {
         self.enclose(self.derivatives[derivative as usize].rate, within).bounds()
     }
 
-    /// Bounds of a derivative with its own state at a value, where it was evaluated before with nothing else otherwise.
-    fn rate_at(&mut self, derivative: u32, at: f64, within: &mut Facts) -> (f64, f64) {
-        let derivative = &self.derivatives[derivative as usize];
-        let place = derivative.state as usize;
-        let before = std::mem::replace(&mut within.states[place], Known::Point(at));
-        let bounds = self.enclose_again(derivative.rate, derivative.state, within).bounds();
-        within.states[place] = before;
+    /// Bounds of how fast what a wall is of changes where it has a value; the rate was evaluated before with nothing else
+    /// otherwise. Nothing moves where both kinds of walls leave no room.
+    fn rate_at(&mut self, wall: Wall, at: f64, making: &mut Making) -> (f64, f64) {
+        let (Wall::Whole(i) | Wall::Apart(i)) = wall;
+        let derivative = &self.derivatives[i as usize];
+        let state = derivative.state;
+        let hangs = making.whole.contains_key(&i);
+        let added = making.within.bonds.as_ref().filter(|_| hangs).map(|bonds| bonds.added(state));
+        let there = match (wall, added) {
+            (Wall::Whole(_), None) => Known::Point(at),
+            (Wall::Whole(_), Some(added)) => {
+                let (low, high) = self.apart(state, &making.within);
+                if at < low + added.0 || at > high + added.1 {
+                    return (0.0, 0.0);
+                }
+                Known::Point(at)
+            }
+            (Wall::Apart(_), added) => {
+                let (added, whole) = (added.unwrap_or_default(), making.whole.get(&i).copied());
+                let (low, high) = whole.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+                let (low, high) = (low.max(at + added.0), high.min(at + added.1));
+                if low > high {
+                    return (0.0, 0.0);
+                }
+                Known::Range(low, high, Why::Unknown)
+            }
+        };
+        let before = std::mem::replace(&mut making.within.states[state as usize], there);
+        let bounds = match (wall, self.kind(i)) {
+            (Wall::Apart(_), Kind::Mixed(row)) => self.rest(&row, &making.within),
+            _ => self.enclose_again(derivative.rate, state, &making.within).bounds(),
+        };
+        making.within.states[state as usize] = before;
         bounds
     }
 

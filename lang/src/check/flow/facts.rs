@@ -1,11 +1,12 @@
 //! What is known at one point of the plan, and how it came to be.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::pages::Pages;
 use matterix_ir::{NodeId, Span};
 
+use super::bonds::Bonds;
 use super::evolve::Barrier;
 use super::value::{Known, Why};
 
@@ -52,7 +53,9 @@ pub struct Facts {
     /// Derivatives that are not known to be zero, by index.
     pub moving: BTreeSet<u32>,
     /// Bounds of what moves for all time to come, while nothing else changes.
-    pub barrier: Option<Barrier>,
+    pub barrier: Option<Rc<Barrier>>,
+    /// How states hang together that laws change.
+    pub bonds: Option<Rc<Bonds>>,
     /// By event index: whether its condition held when it was last looked at.
     pub fired: Vec<Option<bool>>,
     /// Presumed conditions that have held at some moment, or may have.
@@ -61,6 +64,8 @@ pub struct Facts {
     pub decided: Vec<Decided>,
     /// Where the text writes the failure that was raised on this way.
     pub written: Option<Span>,
+    /// Jobs that have begun by now, and whether they have on every way.
+    pub begun: BTreeMap<String, bool>,
 }
 
 impl Facts {
@@ -103,11 +108,51 @@ impl Facts {
         self.decided.retain(|d| !d.locals.contains(&local));
     }
 
+    /// Changes how states hang together; nothing is done where none do.
+    pub fn rebind(&mut self, how: impl FnOnce(&mut Bonds, &Facts)) {
+        let Some(mut bonds) = self.bonds.take() else { return };
+        how(Rc::make_mut(&mut bonds), self);
+        self.bonds = Some(bonds).filter(|bonds| !bonds.is_empty());
+    }
+
+    /// Whether a state hangs together with others.
+    pub fn hangs(&self, state: u32) -> bool {
+        self.bonds.as_ref().is_some_and(|bonds| bonds.states.contains_key(&state))
+    }
+
+    /// Sets what is known of a state where how it hangs together with others stays.
+    pub fn set(&mut self, state: u32, known: Known) {
+        if self.hangs(state) {
+            let now = known.clone();
+            self.rebind(|bonds, _| {
+                if let Some(bond) = bonds.states.get_mut(&state) {
+                    bond.known = now;
+                }
+            });
+        }
+        self.states[state as usize] = known;
+    }
+
+    /// More is known of a state, which has not changed.
+    pub fn narrow(&mut self, state: u32, known: Known) {
+        let before = std::mem::replace(&mut self.states[state as usize], known.clone());
+        let hangs = |bonds: &Rc<Bonds>| bonds.states.get(&state).is_some_and(|bond| bond.known.is(&before));
+        if self.bonds.as_ref().is_some_and(hangs) {
+            self.set(state, known);
+        }
+    }
+
     /// Forgets states that only a run can tell.
     pub fn forget(&mut self, states: &[u32]) {
+        self.rebind(|bonds, _| bonds.release(states));
         for state in states {
             self.states[*state as usize] = Known::nothing();
         }
+    }
+
+    /// Whether a job has begun on every way.
+    fn has_begun(&self, job: &str) -> bool {
+        self.begun.get(job) == Some(&true)
     }
 
     /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
@@ -136,9 +181,20 @@ impl Facts {
         out.unsettled.extend(a.unsettled.iter().chain(&b.unsettled));
         out.moving.extend(a.moving.iter().chain(&b.moving));
         out.barrier = None;
+        out.bonds = match (&a.bonds, &b.bonds) {
+            (None, None) => None,
+            (Some(one), Some(other)) if Rc::ptr_eq(one, other) && one.all_hold(&out) => Some(one.clone()),
+            _ => Bonds::join(&a, b, &out, why),
+        };
         out.held.extend(a.held.iter().chain(&b.held));
-        out.decided = a.decided.into_iter().filter(|d| b.decided.contains(d)).collect();
         out.written = a.written.or(b.written);
+        out.begun = a
+            .begun
+            .keys()
+            .chain(b.begun.keys())
+            .map(|job| (job.clone(), a.has_begun(job) && b.has_begun(job)))
+            .collect();
+        out.decided = a.decided.into_iter().filter(|d| b.decided.contains(d)).collect();
         out
     }
 }

@@ -8,6 +8,7 @@ use matterix_ir::{BinaryOp, codes};
 
 use super::Flow;
 use super::facts::Facts;
+use super::interference::Rival;
 use super::report::Finding;
 use super::value::Known;
 use super::{left, parted};
@@ -22,6 +23,18 @@ pub(super) struct Job {
     end: Option<Known>,
     /// The states that it changes.
     writes: BTreeSet<u32>,
+}
+
+impl Job {
+    /// Its steps.
+    pub(super) fn body(&self) -> StepId {
+        self.body
+    }
+
+    /// When it began, s.
+    pub(super) fn start(&self) -> &Known {
+        &self.start
+    }
 }
 
 /// Jobs that go on, by name.
@@ -60,12 +73,30 @@ impl Flow<'_, '_> {
                 Some(std::mem::replace(&mut facts.time, start.clone()))
             }
         };
+        facts.begun.insert(name.to_owned(), true);
         self.jobs.insert(name.to_owned(), Job { body, start, end, writes });
         Some(facts)
     }
 
     /// Waits for a job.
-    pub(super) fn await_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
+    pub(super) fn await_job(&mut self, name: &str, facts: Facts) -> Option<Facts> {
+        match facts.begun.get(name) {
+            Some(true) => {}
+            begun => {
+                let some = begun.is_some();
+                if !self.is_taken("job") {
+                    self.never_began(name, some);
+                }
+                self.raise("job", facts.clone());
+                if !some {
+                    return None;
+                }
+            }
+        }
+        self.end_of_job(name, facts)
+    }
+
+    fn end_of_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
         self.end_job(name);
         let Some(Job { body, start, end, .. }) = self.jobs.remove(name) else { return Some(facts) };
         let now = facts.time.clone();
@@ -84,7 +115,7 @@ impl Flow<'_, '_> {
     /// The jobs that nothing waits for: a run ends when they have.
     pub(super) fn await_all(&mut self, mut facts: Facts) -> Option<Facts> {
         while let Some(name) = self.jobs.keys().next().cloned() {
-            facts = self.await_job(&name, facts)?;
+            facts = self.end_of_job(&name, facts)?;
         }
         Some(facts)
     }
@@ -93,7 +124,10 @@ impl Flow<'_, '_> {
         let others = self.beside(body);
         self.begin_job(&others);
         self.shared.push(others);
+        let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
+        self.rivals.push(vec![rival]);
         let after = self.walk(body, facts);
+        self.rivals.pop();
         self.shared.pop();
         after
     }

@@ -8,19 +8,24 @@
 
 mod actions;
 mod beside;
+mod bonds;
 mod demands;
 mod eval;
 mod evolve;
 mod facts;
+mod fluxes;
 mod history;
+mod interference;
 mod jobs;
 mod lasting;
 mod left;
 mod otherwise;
 mod parted;
 mod points;
+mod polytope;
 mod report;
 mod reported;
+mod totals;
 mod value;
 mod walk;
 mod words;
@@ -76,6 +81,12 @@ struct Flow<'l, 'a> {
     formulas: Formulas,
     /// Room for exact values.
     numbers: Vec<f64>,
+    /// What goes on by the laws, where that was asked for.
+    stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
+    /// Derivatives as sums of what goes on, as far as they were asked for.
+    terms_known: FxHashMap<u32, totals::Terms>,
+    /// Nodes as sums of states, as far as they were asked for.
+    forms: FxHashMap<NodeId, Option<Rc<bonds::Form>>>,
     /// Operations of a node that depend on a state.
     parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
     /// Values of the operations that were evaluated.
@@ -113,6 +124,8 @@ struct Flow<'l, 'a> {
     cleaning: usize,
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
+    /// What goes on beside the branches and jobs that are followed, innermost last.
+    rivals: Vec<Vec<interference::Rival>>,
     /// Conditions that `keep` asks for all the time.
     kept: Vec<&'l Condition>,
     /// Jobs that go on.
@@ -199,6 +212,9 @@ impl<'l, 'a> Flow<'l, 'a> {
             orders: vec![None; lab.graph.ops().len()],
             formulas: Formulas::default(),
             numbers: Vec::new(),
+            stoichiometry: None,
+            terms_known: FxHashMap::default(),
+            forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
             rates_of: BTreeMap::new(),
@@ -218,6 +234,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             doubt: 0,
             cleaning: 0,
             shared: Vec::new(),
+            rivals: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,
@@ -285,10 +302,12 @@ impl<'l, 'a> Flow<'l, 'a> {
             unsettled: (0..self.derivatives.len() as u32).collect(),
             moving: BTreeSet::new(),
             barrier: None,
+            bonds: None,
             fired: vec![Some(false); self.events.len()],
             held: BTreeSet::new(),
             decided: Vec::new(),
             written: None,
+            begun: BTreeMap::new(),
         };
         let states = &self.lab.states;
         facts.states = (0..states.len()).map(|i| self.eval(states[i].initial, &facts)).collect();

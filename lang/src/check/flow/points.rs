@@ -222,9 +222,11 @@ fn bare(facts: &Facts) -> Facts {
         unsettled: BTreeSet::new(),
         moving: BTreeSet::new(),
         barrier: None,
+        bonds: facts.bonds.clone(),
         fired: Vec::new(),
         held: BTreeSet::new(),
         decided: Vec::new(),
         written: None,
+        begun: BTreeMap::new(),
     }
 }

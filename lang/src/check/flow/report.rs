@@ -256,6 +256,21 @@ impl Flow<'_, '_> {
         self.found(d, condition.span);
     }
 
+    /// A job that is waited for and has not begun, on every way or on some.
+    pub(super) fn never_began(&mut self, job: &str, some: bool) {
+        let open = some.then(|| self.ways.meetings());
+        if some && self.is_cleared(self.site()) {
+            return;
+        }
+        let some = some || self.doubt > 0;
+        let ways = if some { ", on some ways through the plan" } else { "" };
+        let headline = format!("no job `{job}` has begun here{ways}");
+        let d = self.at_site(codes::JOB_NOT_BEGUN, headline, "nothing to wait for: fails with `job`".to_string(), some);
+        let about = d.span();
+        let d = d.help(format!("start `{job}` on every way that leads here, or wait for it where it was started"));
+        self.found_on(d, about, open);
+    }
+
     /// Which species a condition wants more of than none, where nothing brings or makes any.
     fn not_made(&mut self, condition: &Condition, facts: &Facts) -> Option<String> {
         let (mixture, s) = *self.lab.absent_in.get(&condition.span)?.first()?;

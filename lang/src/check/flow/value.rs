@@ -158,6 +158,15 @@ impl Known {
         }
     }
 
+    /// What is known where another range holds as well. Two that only rounding parts are the first.
+    pub fn within(self, other: &Known) -> Known {
+        let (Known::Range(a, b, why), Known::Range(c, d, _)) = (&self, other) else {
+            return if self.why().is_none() || matches!(other, Known::Range(..)) { self } else { other.clone() };
+        };
+        let (low, high) = (a.max(*c), b.min(*d));
+        if low <= high { Known::Range(low, high, *why) } else { self }
+    }
+
     /// An operation on one number.
     pub fn unary(op: UnaryOp, a: &Known) -> Known {
         let Some(why) = a.why() else { return Known::point(unary(op, a.bounds().0)) };

@@ -7,6 +7,7 @@ use matterix_ir::plan::{Caught, Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::facts::Facts;
+use super::interference::Rival;
 use super::jobs::in_both;
 use super::parted::MOST_WAYS;
 use super::points::at_least;
@@ -191,8 +192,14 @@ impl Flow<'_, '_> {
             self.pass(&Known::Point(wait), &mut facts);
             return Some(facts);
         }
+        if !(timeout.is_some() && self.is_taken("timeout")) {
+            self.stopped_meanwhile(condition, longest, &facts);
+        }
         let before = facts.clone();
         self.pass(&Known::Range(0.0, longest, Why::Unknown), &mut facts);
+        if value.truth() == Some(false) && self.eval(condition.node, &facts).truth().is_none() {
+            self.by_totals(longest, &before, &mut facts);
+        }
         if timeout.is_some() {
             self.raise_written("timeout", self.plan.get(id).span, facts.clone());
         }
@@ -412,7 +419,10 @@ impl Flow<'_, '_> {
             self.begin_branch(&others);
             self.shared.push(others);
             facts.time = start.clone();
+            let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
+            self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
             let after = self.walk(branches[*i], facts);
+            self.rivals.pop();
             self.shared.pop();
             self.end_branch();
             facts = after?;

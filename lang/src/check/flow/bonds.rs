@@ -1,0 +1,367 @@
+//! What hangs together where laws move matter: each amount is what it was, its base, and a coefficient for each extent to which
+//! something has gone on. Sums of amounts are then known as closely as what has gone on changes them: a mass not at all.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use matterix_ir::BinaryOp;
+
+use super::facts::Facts;
+use super::polytope::{self, Face, range_of, scaled};
+use super::value::{Known, Why};
+
+/// A sum of coefficients below this share of its terms is zero: what goes on does not change it.
+const CANCELS: f64 = 1e-12;
+
+/// Coefficients of two directions that differ by less than this share are the same.
+const SAME: f64 = 1e-9;
+
+/// More extents than these are not told apart: what they move is known in boxes alone.
+const MOST_EXTENTS: usize = 256;
+
+/// The coefficients of an extent by state, the first of them 1.
+pub type Direction = Rc<[(u32, f64)]>;
+
+/// Something that goes on, and how far it has gone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Extent {
+    /// What it changes.
+    pub direction: Direction,
+    /// How far it has gone, ends included; nothing is always among it.
+    pub range: (f64, f64),
+}
+
+/// A state that hangs together with others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bond {
+    /// What it is without what the extents say.
+    pub base: Known,
+    /// What is known of it by itself; where it is known otherwise now, something else has changed it.
+    pub known: Known,
+}
+
+/// What hangs together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bonds {
+    /// By state index.
+    pub states: BTreeMap<u32, Bond>,
+    /// What has gone on.
+    pub extents: Vec<Extent>,
+}
+
+/// A sum of states with coefficients, and a number.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Form {
+    /// The number.
+    pub constant: f64,
+    /// Coefficients by state, in the order of the states.
+    pub terms: Vec<(u32, f64)>,
+}
+
+/// A direction with its first coefficient 1, and the number it was divided by; none where nothing is left of it.
+pub fn direction(terms: impl IntoIterator<Item = (u32, f64)>) -> Option<(Direction, f64)> {
+    let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
+    terms.into_iter().for_each(|(state, c)| *sums.entry(state).or_default() += c);
+    sums.retain(|_, c| *c != 0.0);
+    let first = *sums.values().next()?;
+    Some((sums.into_iter().map(|(state, c)| (state, c / first)).collect(), first))
+}
+
+fn alike(a: &Direction, b: &Direction) -> bool {
+    let same = |((s, c), (t, d)): (&(u32, f64), &(u32, f64))| s == t && (c - d).abs() <= SAME * c.abs();
+    Rc::ptr_eq(a, b) || (a.len() == b.len() && a.iter().zip(b.iter()).all(same))
+}
+
+impl Bonds {
+    /// Whether nothing hangs together.
+    pub fn is_empty(&self) -> bool {
+        self.extents.is_empty()
+    }
+
+    /// Whether what is said of a state still holds.
+    fn holds(&self, state: u32, facts: &Facts) -> bool {
+        self.states.get(&state).is_some_and(|bond| bond.known.is(&facts.states[state as usize]))
+    }
+
+    /// Whether what is said of all states still holds.
+    pub fn all_hold(&self, facts: &Facts) -> bool {
+        self.states.keys().all(|state| self.holds(*state, facts))
+    }
+
+    /// Forgets what something else has changed.
+    pub fn settle(&mut self, facts: &Facts) {
+        let gone: Vec<u32> = self.states.keys().copied().filter(|s| !self.holds(*s, facts)).collect();
+        self.release(&gone);
+    }
+
+    /// Forgets how states hang together with others.
+    pub fn release(&mut self, states: &[u32]) {
+        if !states.iter().any(|s| self.states.contains_key(s)) {
+            return;
+        }
+        states.iter().for_each(|s| drop(self.states.remove(s)));
+        let extents = std::mem::take(&mut self.extents);
+        for Extent { direction, range } in extents {
+            match direction.iter().any(|(s, _)| states.contains(s)) {
+                true => self.add(direction.iter().copied().filter(|(s, _)| !states.contains(s)), range),
+                false => self.extents.push(Extent { direction, range }),
+            }
+        }
+        self.forget_still();
+    }
+
+    /// States that nothing has changed are what they are by themselves.
+    fn forget_still(&mut self) {
+        let extents = &self.extents;
+        self.states.retain(|state, _| extents.iter().any(|e| e.direction.iter().any(|(s, _)| s == state)));
+    }
+
+    /// Takes a state as it is for what nothing has changed yet.
+    pub fn cover(&mut self, state: u32, facts: &Facts) {
+        let known = &facts.states[state as usize];
+        self.states.entry(state).or_insert_with(|| Bond { base: known.clone(), known: known.clone() });
+    }
+
+    /// The place of what goes on in a direction.
+    pub fn extent_of(&mut self, direction: &Direction) -> usize {
+        self.extents.iter().position(|e| alike(&e.direction, direction)).unwrap_or_else(|| {
+            self.extents.push(Extent { direction: direction.clone(), range: (0.0, 0.0) });
+            self.extents.len() - 1
+        })
+    }
+
+    /// Something has gone on as well.
+    fn add(&mut self, terms: impl IntoIterator<Item = (u32, f64)>, range: (f64, f64)) {
+        let Some((direction, by)) = direction(terms) else { return };
+        let (low, high) = scaled(by, range);
+        let extent = self.extent_of(&direction);
+        let range = &mut self.extents[extent].range;
+        *range = (range.0 + low, range.1 + high);
+    }
+
+    fn ranges(&self) -> Vec<(f64, f64)> {
+        self.extents.iter().map(|e| e.range).collect()
+    }
+
+    /// What extents add to a state.
+    pub fn added(&self, state: u32) -> (f64, f64) {
+        let terms = self
+            .extents
+            .iter()
+            .enumerate()
+            .filter_map(|(i, e)| e.direction.iter().find(|(s, _)| *s == state).map(|(_, c)| (i, *c)));
+        range_of(terms, &self.ranges())
+    }
+
+    /// Bounds of a state that lie also within its base and what extents add to it.
+    pub fn cut(&self, state: u32, (low, high): (f64, f64)) -> (f64, f64) {
+        let Some(bond) = self.states.get(&state) else { return (low, high) };
+        let ((least, most), (down, up)) = (bond.base.bounds(), self.added(state));
+        let cut = (low.max(least + down), high.min(most + up));
+        if cut.0 <= cut.1 { cut } else { (low, high) }
+    }
+
+    /// How far something goes on in a direction.
+    pub fn range_in(&self, direction: &Direction) -> Option<(f64, f64)> {
+        self.extents.iter().find(|e| alike(&e.direction, direction)).map(|e| e.range)
+    }
+
+    /// Brings extents in as far as no amount falls below nothing; the bounds of each amount.
+    pub fn tighten(&mut self, is_amount: impl Fn(u32) -> bool) -> Vec<(u32, (f64, f64))> {
+        let mut places: BTreeMap<u32, Vec<(usize, f64)>> = BTreeMap::new();
+        for (i, extent) in self.extents.iter().enumerate() {
+            for (state, c) in extent.direction.iter().filter(|(s, _)| is_amount(*s)) {
+                places.entry(*state).or_default().push((i, *c));
+            }
+        }
+        let mut out = Vec::new();
+        for part in parts(self.extents.len(), &places) {
+            out.extend(self.tighten_part(&part, &places));
+        }
+        out
+    }
+
+    /// The same of extents that hang together.
+    fn tighten_part(&mut self, part: &[usize], places: &BTreeMap<u32, Vec<(usize, f64)>>) -> Vec<(u32, (f64, f64))> {
+        let local = |extent: &usize| part.binary_search(extent).ok();
+        let mut amounts = Vec::new();
+        let mut faces = Vec::new();
+        for (state, terms) in places {
+            let terms: Vec<(usize, f64)> = terms.iter().filter_map(|(e, c)| Some((local(e)?, *c))).collect();
+            let Some(bond) = self.states.get(state).filter(|_| !terms.is_empty()) else { continue };
+            amounts.push((*state, bond.base.bounds()));
+            faces.push(Face { most: bond.base.bounds().1, terms });
+        }
+        let mut ranges: Vec<(f64, f64)> = part.iter().map(|e| self.extents[*e].range).collect();
+        polytope::tighten(&faces, &mut ranges);
+        let together = part.len() > 1;
+        if together {
+            let before = ranges.clone();
+            for (i, (low, high)) in ranges.iter_mut().enumerate() {
+                *high = high.min(polytope::most(&[(i, 1.0)], &faces, &before));
+                *low = low.max(-polytope::most(&[(i, -1.0)], &faces, &before));
+            }
+        }
+        let bounds = |((state, (least, most)), face): (&(u32, (f64, f64)), &Face)| {
+            let (mut low, mut high) = range_of(face.terms.iter().copied(), &ranges);
+            if together {
+                high = high.min(polytope::most(&face.terms, &faces, &ranges));
+                let back: Vec<(usize, f64)> = face.terms.iter().map(|(e, c)| (*e, -c)).collect();
+                low = low.max(-polytope::most(&back, &faces, &ranges));
+            }
+            (*state, ((least + low).max(0.0), (most + high).max(0.0)))
+        };
+        let out = amounts.iter().zip(&faces).map(bounds).collect();
+        part.iter().zip(&ranges).for_each(|(extent, range)| self.extents[*extent].range = *range);
+        out
+    }
+
+    /// What is known of a sum, where some of its states hang together.
+    pub fn sum(&self, form: &Form, facts: &Facts) -> Option<Known> {
+        let bound: Vec<bool> = form.terms.iter().map(|(s, _)| self.holds(*s, facts)).collect();
+        if bound.iter().filter(|b| **b).count() < 2 {
+            return None;
+        }
+        let mut sum = Known::Point(form.constant);
+        for ((state, c), bound) in form.terms.iter().zip(&bound) {
+            let known = match self.states.get(state).filter(|_| *bound) {
+                Some(bond) => &bond.base,
+                None => &facts.states[*state as usize],
+            };
+            sum = Known::binary(BinaryOp::Add, &sum, &Known::binary(BinaryOp::Mul, &Known::Point(*c), known));
+        }
+        let (mut low, mut high) = (0.0, 0.0);
+        for extent in &self.extents {
+            let (mut total, mut size) = (0.0, 0.0_f64);
+            let terms = form.terms.iter().zip(&bound).filter(|(_, bound)| **bound);
+            for (state, a) in terms.map(|(term, _)| term) {
+                if let Ok(at) = extent.direction.binary_search_by_key(state, |(s, _)| *s) {
+                    total += a * extent.direction[at].1;
+                    size = size.max((a * extent.direction[at].1).abs());
+                }
+            }
+            if total.abs() > CANCELS * size {
+                let (a, b) = scaled(total, extent.range);
+                (low, high) = (low + a, high + b);
+            }
+        }
+        match (low, high) {
+            (0.0, 0.0) => Some(sum),
+            _ => Some(Known::binary(BinaryOp::Add, &sum, &Known::Range(low, high, Why::Unknown))),
+        }
+    }
+
+    /// A state becomes a sum of states.
+    pub fn assigned(&mut self, state: u32, form: &Form, facts: &Facts) {
+        self.settle(facts);
+        if !form.terms.iter().any(|(s, _)| self.states.contains_key(s)) {
+            return self.release(&[state]);
+        }
+        let mut base = Known::Point(form.constant);
+        for (s, c) in &form.terms {
+            let known = self.states.get(s).map_or(&facts.states[*s as usize], |bond| &bond.base);
+            base = Known::binary(BinaryOp::Add, &base, &Known::binary(BinaryOp::Mul, &Known::Point(*c), known));
+        }
+        let extents = std::mem::take(&mut self.extents);
+        for Extent { direction, range } in extents {
+            let coefficient = |s: &u32| direction.iter().find(|(other, _)| other == s).map_or(0.0, |(_, c)| *c);
+            let new: f64 = form.terms.iter().map(|(s, a)| a * coefficient(s)).sum();
+            let others = direction.iter().copied().filter(|(s, _)| *s != state);
+            self.add(others.chain([(state, new)]), range);
+        }
+        self.states.insert(state, Bond { base, known: Known::nothing() });
+        self.forget_still();
+    }
+
+    /// A share of some states is taken to others.
+    pub fn transferred(&mut self, share: &Known, ways: &[(u32, Option<u32>)], facts: &Facts) {
+        self.settle(facts);
+        let ends = |s: &u32| ways.iter().any(|(from, to)| from == s || to.as_ref() == Some(s));
+        if !self.states.keys().any(ends) {
+            return;
+        }
+        let rest = Known::binary(BinaryOp::Sub, &Known::Point(1.0), share);
+        for (from, to) in ways {
+            self.cover(*from, facts);
+            let held = self.states[from].base.clone();
+            if let Some(bond) = self.states.get_mut(from) {
+                bond.base = Known::binary(BinaryOp::Mul, &rest, &held);
+            }
+            if let Some(to) = to {
+                self.cover(*to, facts);
+                if let Some(bond) = self.states.get_mut(to) {
+                    bond.base = Known::binary(BinaryOp::Add, &bond.base, &Known::binary(BinaryOp::Mul, share, &held));
+                }
+            }
+        }
+        let target = |s: &u32| ways.iter().find(|(from, _)| from == s).map(|(_, to)| *to);
+        let extents = std::mem::take(&mut self.extents);
+        for Extent { direction, range } in extents {
+            let (taken, left): (Vec<_>, Vec<_>) = direction.iter().copied().partition(|(s, _)| target(s).is_some());
+            self.add(left, range);
+            self.add(taken.iter().copied(), shared(&rest, range));
+            let moved = taken.iter().filter_map(|(s, c)| Some((target(s)??, *c)));
+            self.add(moved, shared(share, range));
+        }
+        self.forget_still();
+        if self.extents.len() > MOST_EXTENTS {
+            *self = Bonds::default();
+        }
+    }
+
+    /// Takes what is known of states by themselves as it is now.
+    pub fn stamp(&mut self, facts: &Facts) {
+        self.states.iter_mut().for_each(|(state, bond)| bond.known = facts.states[*state as usize].clone());
+    }
+
+    /// What hangs together whichever of two ways was taken; `out` is what is known of the states then.
+    pub fn join(a: &Facts, b: &Facts, out: &Facts, why: Why) -> Option<Rc<Bonds>> {
+        let [mut one, mut other] = [a, b].map(|facts| {
+            let mut bonds = facts.bonds.as_deref().cloned().unwrap_or_default();
+            bonds.settle(facts);
+            bonds
+        });
+        let states: Vec<u32> = one.states.keys().chain(other.states.keys()).copied().collect();
+        for state in states {
+            one.cover(state, a);
+            other.cover(state, b);
+            if let (Some(bond), Some(with)) = (one.states.get_mut(&state), other.states.get(&state)) {
+                bond.base = bond.base.join(&with.base, why);
+            }
+        }
+        for extent in &other.extents {
+            let at = one.extent_of(&extent.direction);
+            let range = &mut one.extents[at].range;
+            *range = (range.0.min(extent.range.0), range.1.max(extent.range.1));
+        }
+        one.stamp(out);
+        Some(Rc::new(one)).filter(|bonds| !bonds.is_empty())
+    }
+}
+
+/// A range of an extent of which a share is taken.
+fn shared(share: &Known, range: (f64, f64)) -> (f64, f64) {
+    let (low, high) = share.bounds();
+    let ((a, b), (c, d)) = (scaled(low, range), scaled(high, range));
+    (a.min(c), b.max(d))
+}
+
+/// Extents that hang together by amounts they share, in rising order.
+fn parts(count: usize, places: &BTreeMap<u32, Vec<(usize, f64)>>) -> Vec<Vec<usize>> {
+    let mut root: Vec<usize> = (0..count).collect();
+    let find = |root: &[usize], mut at: usize| {
+        while root[at] != at {
+            at = root[at];
+        }
+        at
+    };
+    for terms in places.values() {
+        for two in terms.windows(2) {
+            let (a, b) = (find(&root, two[0].0), find(&root, two[1].0));
+            root[a.max(b)] = a.min(b);
+        }
+    }
+    let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    (0..count).for_each(|i| out.entry(find(&root, i)).or_default().push(i));
+    out.into_values().collect()
+}

@@ -1,0 +1,221 @@
+//! What one branch or job does to another while both go on: a step that keeps from coming what the other waits for. It is
+//! reported only where the times of both are known, so that every run comes to it.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::{Condition, Operation, Step, StepId};
+use matterix_ir::quantity::show_duration;
+use matterix_ir::{Diagnostic, Severity, Span, codes};
+
+use super::Flow;
+use super::facts::Facts;
+use super::value::{Known, Why};
+
+/// Steps that go on beside others.
+#[derive(Clone, Debug)]
+pub(super) struct Rival {
+    /// What is done, in order.
+    pub steps: Vec<StepId>,
+    /// When the first of them begins, s.
+    pub start: Known,
+    /// Whether they begin after those beside them where both begin at one time; none where that is not known.
+    pub later: bool,
+}
+
+/// Effects of a step beside, and when they happen, s.
+struct Effect<'p> {
+    at: (f64, f64),
+    actions: &'p [Action],
+    span: Span,
+    /// The steps they are among begin after those beside them.
+    later: bool,
+}
+
+impl<'p> Flow<'p, '_> {
+    /// Looks whether something beside keeps from coming what is waited for, for at most `longest` s.
+    pub(super) fn stopped_meanwhile(&mut self, condition: &Condition, longest: f64, facts: &Facts) {
+        let rivals = self.rivals_now();
+        let Some(now) = facts.time.exact().filter(|_| !rivals.is_empty() && self.quiet == 0) else { return };
+        let parts = self.parts(condition.node);
+        if parts.timed || self.eval(condition.node, facts).truth() != Some(false) {
+            return;
+        }
+        let mut effects = Vec::new();
+        for rival in &rivals {
+            let mut time = rival.start.bounds();
+            for step in &rival.steps {
+                self.effects(*step, rival.later, &mut time, facts, &mut effects);
+            }
+        }
+        effects.retain(|effect| {
+            let behind = self.behind(&self.changed_by(effect.actions));
+            parts.states.iter().any(|s| behind.contains(s))
+        });
+        effects.sort_by(|a, b| a.at.0.total_cmp(&b.at.0));
+        if effects.iter().any(|e| e.at.0 != e.at.1 || e.at.0 < now) {
+            return;
+        }
+        let Some(last) = effects.last().filter(|last| last.at.0 > now || last.later) else { return };
+        let (span, at) = (last.span, last.at.0);
+        if at - now < longest && self.never_after(condition, &effects, now, longest, facts) {
+            self.keeps_from(condition, span, at - now);
+        }
+    }
+
+    /// What goes on beside what is followed now.
+    fn rivals_now(&self) -> Vec<Rival> {
+        let jobs =
+            self.jobs.values().map(|job| Rival { steps: vec![job.body()], start: job.start().clone(), later: false });
+        self.rivals.iter().flatten().cloned().chain(jobs).collect()
+    }
+
+    /// Whether a condition cannot come true any more when these effects have happened, and not before.
+    fn never_after(
+        &mut self,
+        condition: &Condition,
+        effects: &[Effect<'p>],
+        now: f64,
+        longest: f64,
+        facts: &Facts,
+    ) -> bool {
+        let mut facts = facts.clone();
+        let guards = std::mem::take(&mut self.guards);
+        let reported = std::mem::take(&mut self.reported);
+        self.quiet += 1;
+        let mut at = now;
+        let mut open = true;
+        for effect in effects {
+            self.pass_by_totals(&Known::Point(effect.at.0 - at), &mut facts);
+            open &= self.eval(condition.node, &facts).truth() == Some(false);
+            at = effect.at.0;
+            facts.time = Known::Point(at);
+            self.perform(effect.actions, &mut facts);
+        }
+        self.pass_by_totals(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
+        let never = open && self.eval(condition.node, &facts).truth() == Some(false);
+        self.quiet -= 1;
+        self.guards = guards;
+        self.reported = reported;
+        never
+    }
+
+    fn pass_by_totals(&mut self, duration: &Known, facts: &mut Facts) {
+        let before = facts.clone();
+        self.pass(duration, facts);
+        self.by_totals(duration.bounds().1, &before, facts);
+    }
+
+    fn keeps_from(&mut self, condition: &Condition, span: Span, after: f64) {
+        let wait = self.site();
+        let label = self.label_at(span);
+        let headline = format!("`{label}` stops what another branch or job waits for: `{}`", condition.text);
+        let said = match after > 0.0 {
+            true => format!("{} after the wait begins, which is too early for it", show_duration(after)),
+            false => "as the wait begins".to_string(),
+        };
+        let mut d = Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, said);
+        if after == 0.0 || self.doubt > 0 {
+            d.severity = Severity::Warning;
+        }
+        let d = d.because(wait, format!("`{}` is waited for here", condition.text));
+        let d = d.help("let it wait for the other branch or job, or do both in one sequence");
+        self.found(d, condition.span);
+    }
+
+    /// The text of the step at a place.
+    fn label_at(&self, span: Span) -> String {
+        self.plan.steps.iter().find(|s| s.span == span).map_or_else(String::new, |s| s.label.clone())
+    }
+
+    /// The states that actions change.
+    fn changed_by(&self, actions: &[Action]) -> BTreeSet<u32> {
+        let states = |action: &Action| match action {
+            Action::Assign { state, .. } => vec![*state],
+            Action::Move { from, to, .. } => {
+                let both = [from, to].map(|m| &self.mixtures[*m as usize]);
+                both.into_iter().flatten().map(|(_, state)| *state).collect()
+            }
+        };
+        actions.iter().flat_map(states).collect()
+    }
+
+    /// What a step and those in it do, and when; `time` is when it begins, and then when it ends.
+    fn effects(&mut self, id: StepId, later: bool, time: &mut (f64, f64), facts: &Facts, out: &mut Vec<Effect<'p>>) {
+        let plan = self.plan;
+        let node = plan.get(id);
+        let open = |time: &mut (f64, f64)| time.1 = f64::INFINITY;
+        match &node.step {
+            Step::Operation(operation) => self.effects_of(operation, node.span, later, time, facts, out),
+            Step::Wait { duration } => {
+                let (low, high) = self.eval(*duration, facts).bounds();
+                *time = (time.0 + low.max(0.0), time.1 + high.max(0.0));
+            }
+            Step::Sequence(_)
+            | Step::Skill { .. }
+            | Step::Named { .. }
+            | Step::Keep { .. }
+            | Step::During { .. }
+            | Step::Within { .. } => {
+                for child in node.step.children() {
+                    self.effects(child, later, time, facts, out);
+                }
+            }
+            Step::Guarded { body, handlers, finally } => {
+                self.effects(*body, later, time, facts, out);
+                for (_, handler) in handlers {
+                    self.effects(*handler, later, &mut (time.0, f64::INFINITY), facts, out);
+                }
+                if let Some(finally) = finally {
+                    self.effects(*finally, later, time, facts, out);
+                }
+            }
+            Step::Let { .. } | Step::Expect(_) | Step::Record { .. } | Step::Note(_) | Step::Ask(_) => {}
+            step => {
+                open(time);
+                for child in step.children() {
+                    self.effects(child, later, time, facts, out);
+                    open(time);
+                }
+            }
+        }
+    }
+
+    fn effects_of(
+        &mut self,
+        operation: &'p Operation,
+        span: Span,
+        later: bool,
+        time: &mut (f64, f64),
+        facts: &Facts,
+        out: &mut Vec<Effect<'p>>,
+    ) {
+        out.push(Effect { at: *time, actions: &operation.at_start, span, later });
+        if operation.until.is_some() {
+            time.1 = f64::INFINITY;
+        } else if let Some(takes) = &operation.takes {
+            let (low, high) = self.eval(takes.nominal, facts).bounds();
+            *time = (time.0 + low.max(0.0), time.1 + high.max(0.0));
+        }
+        out.push(Effect { at: *time, actions: &operation.at_end, span, later });
+    }
+
+    /// The steps that follow one in the block it stands in, up to where it is waited for.
+    pub(super) fn after_start(&self, body: StepId) -> Vec<StepId> {
+        let plan = self.plan;
+        let starts = |id: &StepId| matches!(plan.get(*id).step, Step::Start { body: b, .. } if b == body);
+        let name = plan.steps.iter().find_map(|s| match &s.step {
+            Step::Start { job, body: b } if *b == body => Some(job),
+            _ => None,
+        });
+        let awaits = |id: &&StepId| matches!(&plan.get(**id).step, Step::Await { job } if Some(job) == name);
+        let blocks = plan.steps.iter().filter_map(|s| match &s.step {
+            Step::Sequence(steps) => Some(steps),
+            _ => None,
+        });
+        let found = blocks.into_iter().find_map(|steps| Some((steps, steps.iter().position(&starts)?)));
+        let rest =
+            |(steps, at): (&Vec<StepId>, usize)| steps[at + 1..].iter().take_while(|id| !awaits(id)).copied().collect();
+        found.map(rest).unwrap_or_default()
+    }
+}
