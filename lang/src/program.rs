@@ -429,7 +429,7 @@ fn finish(mut diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic
             out.push(d);
         }
     }
-    checks::without_consequences(out, sources)
+    checks::without_consequences(names::imports::joined(out), sources)
 }
 
 /// The values of `--set name=value`, each read as it was typed.
@@ -866,6 +866,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let geometry = lab.geometry(id);
         let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
+        let stopover = lab.is_stopover(id);
         let Geometry { frames, shape, solids, room, moving, collision, visual } = geometry;
         instances.push(SceneInstance {
             name,
@@ -884,6 +885,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             visual,
             inertial,
             friction,
+            stopover,
             room,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,

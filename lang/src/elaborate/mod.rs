@@ -17,6 +17,7 @@ pub mod lab;
 mod labels;
 pub mod laws;
 mod lineage;
+mod mended;
 pub mod mixtures;
 pub mod prune;
 pub mod reach;
