@@ -8,7 +8,7 @@ use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
-use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::check as checks;
@@ -174,7 +174,10 @@ fn examine(
         diagnostics.extend(checks::never_starts(&tables, root, &starts));
     }
     if found_all && uses.len() == tasks.len() {
-        diagnostics.extend(checks::things(sources, &uses));
+        // Where something is wrong, what is missing may be why a thing is not used.
+        let wrong = diagnostics.iter().any(Diagnostic::is_error);
+        let idle = checks::things(sources, &uses);
+        diagnostics.extend(idle.into_iter().filter(|d| !wrong || d.severity == Severity::Advice));
         diagnostics.extend(checks::reagents(&names, sources, root));
     }
     if items.is_empty() {
