@@ -125,19 +125,34 @@ impl Diagnostic {
 
     /// Adds a correction that replaces the text under `span` and leaves no doubt what was meant.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: true, asks: false });
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: true,
+            asks: false,
+        });
         self
     }
 
     /// Adds a correction that replaces the text under `span` by what was probably meant.
     pub fn guess(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: false, asks: false });
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: false,
+            asks: false,
+        });
         self
     }
 
     /// Adds a correction that replaces the text under `span`, one of several of which only a person can tell the right one.
     pub fn ask(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: false, asks: true });
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: false,
+            asks: true,
+        });
         self
     }
 

@@ -155,7 +155,9 @@ pub fn things(sources: &Sources, uses: &[Uses]) -> Vec<Diagnostic> {
         told.2 |= used;
     }
     let mut out = Vec::new();
-    for (reagent, (span, vessel, _)) in filled.into_iter().filter(|(_, (.., used))| !used) {
+    // Where no step has to do with any reagent, none is missing.
+    let doses = filled.values().any(|(.., used)| *used);
+    for (reagent, (span, vessel, _)) in filled.into_iter().filter(|(_, (.., used))| doses && !used) {
         all.remove(span);
         let headline = format!("`{reagent}` stands ready in `{vessel}`, and no workflow of this file uses it");
         let d = Diagnostic::warning(codes::UNUSED, *span, headline, "filled, and never touched");

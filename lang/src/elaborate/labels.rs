@@ -155,7 +155,12 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A concentration of a recipe in the kind of a dimension; undissociated, as a label means it.
-    pub(super) fn concentration_of(&mut self, parts: &[(SpeciesId, f64)], s: SpeciesId, kind: &Dimension) -> Option<f64> {
+    pub(super) fn concentration_of(
+        &mut self,
+        parts: &[(SpeciesId, f64)],
+        s: SpeciesId,
+        kind: &Dimension,
+    ) -> Option<f64> {
         let units = &self.tables.units;
         let (amount, mass, volume) = (units.named("Amount"), units.named("Mass"), units.named("Volume"));
         let solvent = units.named("SolventMass");

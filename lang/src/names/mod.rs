@@ -228,7 +228,8 @@ pub fn verb_text(words: &[Name]) -> String {
 impl<'a> Names<'a> {
     /// Collects the declarations of all modules and resolves their imports.
     pub fn new(modules: &'a [Arc<Module>]) -> (Self, Vec<Diagnostic>) {
-        let mut names = Names { modules, decls: Vec::new(), prelude: BTreeMap::new(), scopes: Vec::new(), own: Vec::new() };
+        let mut names =
+            Names { modules, decls: Vec::new(), prelude: BTreeMap::new(), scopes: Vec::new(), own: Vec::new() };
         let mut diagnostics = Vec::new();
         for (index, module) in modules.iter().enumerate() {
             let own = names.collect(index, module, &mut diagnostics);

@@ -34,11 +34,7 @@ pub fn postures(stage: &Stage<'_>, robot: InstanceId, to: &[Pose]) -> Vec<Vec<f6
                 .map(|((k, variable), now)| {
                     let share = uniform(key(draw, index, k));
                     let (low, high) = (variable.limits.lower, variable.limits.upper);
-                    if variable.is_bounded() {
-                        low + share * (high - low)
-                    } else {
-                        now + (share - 0.5) * TAU
-                    }
+                    if variable.is_bounded() { low + share * (high - low) } else { now + (share - 0.5) * TAU }
                 })
                 .collect();
             let Ok(solution) = solver.solve(&Request { attempts: 4, ..Request::new(target, &start) }) else { continue };
