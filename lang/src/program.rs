@@ -8,7 +8,7 @@ use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
 use matterix_ir::stock::Stock;
-use matterix_ir::{Diagnostic, FileId, Leaves, Program, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::budget;
@@ -182,7 +182,10 @@ fn examine(
         diagnostics.extend(checks::never_starts(&tables, root, &starts));
     }
     if found_all && uses.len() == tasks.len() {
-        diagnostics.extend(checks::things(sources, &uses));
+        // Where something is wrong, what is missing may be why a thing is not used.
+        let wrong = diagnostics.iter().any(Diagnostic::is_error);
+        let idle = checks::things(sources, &uses);
+        diagnostics.extend(idle.into_iter().filter(|d| !wrong || d.severity == Severity::Advice));
         diagnostics.extend(checks::reagents(&names, sources, root));
     }
     if items.is_empty() {
@@ -440,7 +443,7 @@ fn finish(mut diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic
             out.push(d);
         }
     }
-    checks::without_consequences(out, sources)
+    checks::without_consequences(names::imports::joined(out), sources)
 }
 
 /// The values of `--set name=value`, each read as it was typed.
@@ -891,6 +894,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         };
         let geometry = lab.geometry(id);
         let (inertial, friction) = (lab.inertial(id, &geometry), lab.friction(id));
+        let stopover = lab.is_stopover(id);
         let Geometry { frames, shape, solids, room, moving, collision, visual } = geometry;
         instances.push(SceneInstance {
             name,
@@ -909,6 +913,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
             visual,
             inertial,
             friction,
+            stopover,
             room,
             articulation: lab.articulation(id, moving).map(Box::new),
             span,

@@ -80,7 +80,11 @@ pub fn told(sources: &Sources, found: &[Named]) -> (Findings, String) {
 
 /// One line of the list of corrections.
 fn offer((fix, id): (&Fix, &String)) -> String {
-    let sure = if fix.sure { "sure" } else { "a guess" };
+    let sure = match fix {
+        Fix { sure: true, .. } => "sure",
+        Fix { asks: true, .. } => "for a person to choose",
+        _ => "a guess",
+    };
     format!("  {id} ({sure}): {}\n", fix.title)
 }
 

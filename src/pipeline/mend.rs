@@ -14,7 +14,8 @@ const ROUNDS: usize = 20;
 pub enum Fixes {
     /// Those that leave no doubt what was meant.
     Sure,
-    /// What was probably meant as well: names that are near, brackets, amounts. To be read afterwards.
+    /// What was probably meant as well: names that are near, brackets. To be read afterwards. Where only a person can choose between
+    /// corrections, as between a label and its recipe, none is made.
     All,
 }
 
@@ -94,7 +95,7 @@ fn choose(found: &[Diagnostic], which: Fixes, file: FileId) -> Vec<&Fix> {
     for diagnostic in by_place {
         let fix = match which {
             Fixes::Sure => diagnostic.sure_fix(),
-            Fixes::All => diagnostic.fixes.first(),
+            Fixes::All => diagnostic.likely_fix(),
         };
         let Some(fix) = fix else { continue };
         let here = fix.edits.iter().all(|e| e.span.file == file);

@@ -27,7 +27,7 @@ pub(super) fn object(diagnostic: &Diagnostic, texts: &mut Texts<'_>) -> Value {
         .map(|f| {
             let edits: Vec<Value> =
                 f.edits.iter().map(|e| json!({ "span": span(e.span, texts), "text": e.text })).collect();
-            json!({ "title": f.title, "edits": edits, "sure": f.sure })
+            json!({ "title": f.title, "edits": edits, "sure": f.sure, "asks": f.asks })
         })
         .collect();
     let primary = diagnostic.labels.iter().find(|l| l.primary).map(|l| span(l.span, texts));

@@ -157,3 +157,88 @@ fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
     child.wait().expect("it ends");
     assert_eq!(complaints.matches("there is no such file").count(), 1, "{complaints}");
 }
+
+#[test]
+fn a_label_that_its_recipe_misses_is_left_to_a_person() {
+    let dir = folder("mend_label");
+    // A tenth is weighed in, in grams, as a share, and of a stock: whoever rewrites the label hides the slip.
+    let text = "mtx 1\n\nsolution iodide { KI: 0.066 g, water: 100 g } labelled 0.04 mol/kg of KI\n\
+        solution brine { NaCl: 9 %w/w, water: rest } labelled 9 g/L of NaCl\n\
+        solution thin { brine: 10 g, water: 90 g } labelled 0.5 mol/L of NaCl\n";
+    let path = write(&dir, "w.mtx", text);
+    let lines = matterixc_in(&dir, &["check", "w.mtx", "--format", "json"]).out_lines();
+    let offered: Vec<Vec<(String, String)>> = lines
+        .iter()
+        .map(|line| {
+            let fixes = line["fixes"].as_array().expect("fixes");
+            let text = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_string();
+            fixes.iter().map(|f| (text(&f["title"]), text(&f["edits"][0]["text"]))).collect()
+        })
+        .collect();
+    let both = |label: &str, of: &str, amount: &str| {
+        vec![
+            ("correct the label".to_string(), label.to_string()),
+            (format!("correct the amount of {of}"), amount.to_string()),
+        ]
+    };
+    assert_eq!(
+        offered,
+        [
+            both("0.003973 mol/kg", "KI", "0.6684 g"),
+            both("95.91 g/L", "NaCl", "0.8969 %w/w"),
+            both("0.1545 mol/L", "brine", "42.15 g"),
+        ]
+    );
+    assert!(lines.iter().flat_map(|line| line["fixes"].as_array()).flatten().all(|fix| fix["asks"] == true));
+    for fix in ["--fix", "--fix=all"] {
+        assert_eq!(matterixc_in(&dir, &["check", "w.mtx", fix]).code, 1);
+        assert_eq!(fs::read_to_string(&path).expect("the file"), text, "{fix}");
+    }
+    // Either of them mends it.
+    let mended =
+        text.replace("0.066 g", "0.6684 g").replace("9 %w/w", "0.8969 %w/w").replace("0.5 mol/L", "0.01545 mol/L");
+    write(&dir, "w.mtx", &mended);
+    assert_eq!(matterixc_in(&dir, &["check", "w.mtx"]).out, "no findings\n");
+}
+
+#[test]
+fn imports_that_are_missing_are_one_finding_with_one_correction() {
+    let dir = folder("mend_imports");
+    let lab = "lab bench {\n    ambient: 22 degC\n    pump = CavroXlp6000 at (0, 0, 0) m\n    \
+        cup = Beaker50mL at (300, 0, 0) mm holding 10 mL of water\n    between pump and cup { piped: true }\n}\n\
+        workflow go in bench {\n    repeat 2 times { draw 1 mL from cup by pump; push 1 mL into cup by pump }\n    \
+        expect cup.contents.volume > 9 mL\n}\n";
+    for (slip, imports, headline, mended) in [
+        ("all", "", "there is no asset type `CavroXlp6000`", None),
+        (
+            "some",
+            "use std::glassware::Beaker50mL\nuse std::pumps::CavroXlp6000\n",
+            "`piped`, `draw` and `push` are not imported",
+            Some("use std::pumps::{draw, piped, push}"),
+        ),
+        (
+            "listed",
+            "use std::glassware::Beaker50mL\nuse std::pumps::{CavroXlp6000, draw}\n",
+            "`piped` and `push` are not imported",
+            Some("use std::pumps::{CavroXlp6000, draw, piped, push}"),
+        ),
+        (
+            "hidden",
+            "use std::glassware::Beaker50mL\nuse std::pumps::{CavroXlp6000, draw, piped}\n",
+            "another `push` is meant, which is not imported",
+            Some("use std::pumps::{CavroXlp6000, draw, piped, push}"),
+        ),
+    ] {
+        let path = write(&dir, "w.mtx", &format!("mtx 1\n{imports}{lab}"));
+        let lines = matterixc_in(&dir, &["check", "w.mtx", "--format", "json"]).out_lines();
+        assert_eq!(lines.len(), 1, "{slip}: {lines:#?}");
+        if mended.is_some() {
+            assert_eq!(lines[0]["headline"], headline, "{slip}");
+        }
+        assert_eq!(lines[0]["fixes"].as_array().map(Vec::len), Some(1), "{slip}");
+        let ended = matterixc_in(&dir, &["check", "w.mtx", "--fix"]);
+        assert_eq!(ended.out, "no findings\n", "{slip}: {}", ended.err);
+        let now = fs::read_to_string(&path).expect("the file");
+        assert!(mended.is_none_or(|line| now.contains(line)), "{slip}: {now}");
+    }
+}

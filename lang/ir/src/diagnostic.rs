@@ -46,6 +46,25 @@ pub struct Fix {
     /// Whether it says the same as the text was meant to: it may be done without asking. A guess at a name, an amount
     /// or the place of a bracket is a person's to judge.
     pub sure: bool,
+    /// Whether only a person can say which of several corrections is right, as between a label and what is weighed in: it is
+    /// offered and never made unasked.
+    #[serde(default)]
+    pub asks: bool,
+}
+
+/// A name that a file uses and does not import, with where its import goes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Missing {
+    /// The module that declares it: `std::heating`.
+    pub module: String,
+    /// As it stands after the module; none where all of the module is imported.
+    pub name: Option<String>,
+    /// Below the imports of the file.
+    pub below: Span,
+    /// Behind the last name of a list that the file imports from the module already.
+    pub list: Option<Span>,
+    /// No other module declares it.
+    pub only: bool,
 }
 
 /// One finding: *what* in the headline, *where* in the labels, *how to mend* in the help.
@@ -63,6 +82,9 @@ pub struct Diagnostic {
     pub help: Vec<String>,
     /// Corrections an editor can apply.
     pub fixes: Vec<Fix>,
+    /// The import whose absence it is about.
+    #[serde(skip)]
+    pub missing: Option<Missing>,
 }
 
 impl Diagnostic {
@@ -75,6 +97,7 @@ impl Diagnostic {
             labels: vec![Label { span, text: label.into(), primary: true }],
             help: Vec::new(),
             fixes: Vec::new(),
+            missing: None,
         }
     }
 
@@ -102,13 +125,34 @@ impl Diagnostic {
 
     /// Adds a correction that replaces the text under `span` and leaves no doubt what was meant.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: true });
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: true,
+            asks: false,
+        });
         self
     }
 
     /// Adds a correction that replaces the text under `span` by what was probably meant.
     pub fn guess(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
-        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }], sure: false });
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: false,
+            asks: false,
+        });
+        self
+    }
+
+    /// Adds a correction that replaces the text under `span`, one of several of which only a person can tell the right one.
+    pub fn ask(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.fixes.push(Fix {
+            title: title.into(),
+            edits: vec![Edit { span, text: text.into() }],
+            sure: false,
+            asks: true,
+        });
         self
     }
 
@@ -123,6 +167,11 @@ impl Diagnostic {
             [fix] if fix.sure => Some(fix),
             _ => None,
         }
+    }
+
+    /// The correction that was probably meant: the first, unless only a person can choose.
+    pub fn likely_fix(&self) -> Option<&Fix> {
+        self.fixes.first().filter(|_| self.fixes.iter().all(|fix| !fix.asks))
     }
 
     /// Where the cause stands.

@@ -42,7 +42,7 @@ pub mod values;
 pub mod wire;
 
 pub use codes::Code;
-pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity};
+pub use diagnostic::{Diagnostic, Edit, Fix, Label, Missing, Severity};
 pub use graph::{BinaryOp, Env, Graph, Leaves, NodeId, Op, UnaryOp};
 pub use program::Program;
 pub use quantity::Unit;

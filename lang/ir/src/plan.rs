@@ -340,12 +340,45 @@ pub struct Operation {
     pub until: Option<Condition>,
     /// Instances it writes, for its duration.
     pub claims: Vec<InstanceId>,
+    /// States that its needs and effects look at, where it is over at once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reads: Vec<u32>,
     /// Failures it may report.
     pub fails: Vec<String>,
     /// Limits that its effects may pass, by index into [`Plan::limits`].
     pub limits: Vec<u32>,
     /// What its robot does; `None` where nothing moves.
     pub motion: Option<Motion>,
+}
+
+impl Operation {
+    /// Whether it is over at the moment it begins.
+    pub fn is_at_once(&self) -> bool {
+        self.takes.is_none() && self.until.is_none()
+    }
+
+    /// The states it assigns; none where it moves matter, which changes more than these.
+    fn assigned(&self) -> Option<Vec<u32>> {
+        let actions = self.at_start.iter().chain(&self.at_end);
+        let assigned: Option<Vec<u32>> = actions
+            .map(|action| match action {
+                Action::Assign { state, .. } => Some(*state),
+                Action::Move { .. } => None,
+            })
+            .collect();
+        // Of a command without effects nobody knows what it changes.
+        assigned.filter(|states| !states.is_empty())
+    }
+
+    /// Whether two commands of one thing can be given at the same moment: both are over at once, and neither changes what the
+    /// other one changes or looks at, so that their order decides nothing.
+    pub fn is_independent_of(&self, other: &Operation) -> bool {
+        let (Some(own), Some(others)) = (self.assigned(), other.assigned()) else { return false };
+        let apart = |states: &[u32], from: &Operation, writes: &[u32]| {
+            states.iter().all(|s| !writes.contains(s) && !from.reads.contains(s))
+        };
+        self.is_at_once() && other.is_at_once() && apart(&own, other, &others) && apart(&others, self, &own)
+    }
 }
 
 /// Which failures a handler takes.

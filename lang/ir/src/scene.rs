@@ -21,7 +21,7 @@ pub struct Frame {
     pub name: String,
     /// Relative to the asset, or to `from`.
     pub pose: Pose,
-    /// Relative to where the asset last stood before it was picked up, instead of to the asset.
+    /// Relative to where the asset last stood before it was picked up, stopovers aside, instead of to the asset.
     pub stand: bool,
     /// Relative to this link of the asset instead, by index.
     #[serde(default)]
@@ -36,7 +36,7 @@ pub mod frame {
     pub const GRASP: &str = "grasp";
     /// The point of a tool that meets the tip of the robot it is part of, and of a thing that meets what takes it along.
     pub const MOUNT: &str = "mount";
-    /// Where a thing last stood before it was picked up.
+    /// Where a thing last stood before it was picked up, stopovers aside.
     pub const STAND: &str = "stand";
     /// The centre of mass of a thing, where its shape does not tell it.
     pub const CENTRE: &str = "centre";
@@ -173,6 +173,9 @@ pub struct Instance {
     /// Coefficient of friction of its surface, if that is known.
     #[serde(default)]
     pub friction: Option<f64>,
+    /// Whether what is put on it stays for a moment only: it is put back to where it stood before.
+    #[serde(default)]
+    pub stopover: bool,
     /// What it takes out of what it is a part of: a hole in a rack, a well in a plate.
     #[serde(default)]
     pub room: Option<Shape>,

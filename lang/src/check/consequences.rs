@@ -58,6 +58,10 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
     if followed && others().any(|(e, q)| syntax(e) && q.file == p.file && (q.block == p.block || of_lab(q))) {
         return true;
     }
+    // Nor what a step would have done, or a thing would have been, whose name is not imported yet.
+    if followed && others().any(|(e, q)| e.missing.is_some() && q.file == p.file) {
+        return true;
+    }
     // A thing of a lab whose line could not be read has nothing.
     if [codes::UNKNOWN_MEMBER, codes::TYPE_MISMATCH, codes::WRONG_DEVICE, codes::WRONG_KIND].contains(&d.code) {
         let used = words(line_text(sources, p));

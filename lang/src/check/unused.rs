@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
+use matterix_ir::model::Action;
 use matterix_ir::plan::{Argument, Plan, Step};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Sources, Span, codes};
@@ -18,6 +19,9 @@ use crate::syntax::moved::Moved;
 pub struct Uses {
     /// The things by the place of their names, each with whether the workflow has to do with it.
     things: BTreeMap<Span, bool>,
+    /// Reagents that vessels are filled with, by the place of the thing and name, each with where and whether anything is done with
+    /// one of these vessels.
+    reagents: BTreeMap<(Span, String), (String, bool)>,
     /// Names of the things, and whether the lab's file says them outside of its labs.
     said: BTreeMap<String, bool>,
     /// The module of the lab.
@@ -35,6 +39,8 @@ impl Uses {
 impl Moved for Uses {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         self.things = std::mem::take(&mut self.things).into_iter().map(|(span, used)| (to(span), used)).collect();
+        let reagents = std::mem::take(&mut self.reagents).into_iter();
+        self.reagents = reagents.map(|((span, name), told)| ((to(span), name), told)).collect();
     }
 }
 
@@ -87,7 +93,53 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
         inst.span.file == decl.item.span.file && !inst.name.contains('.') && !carriers.contains(id)
     };
     let things = tops().filter(own).map(|id| (lab.instances[id.0 as usize].span, used.contains(&id))).collect();
-    Some(Uses { things, said, module: decl.module })
+    let touched = touched(lab, plan);
+    let mut reagents: BTreeMap<(Span, String), (String, bool)> = BTreeMap::new();
+    for i in 0..lab.instances.len() as u32 {
+        let (id, inst) = (InstanceId(i), &lab.instances[i as usize]);
+        let Some(origin) = inst.origin.clone() else { continue };
+        let thing = top(lab, id);
+        if !own(&thing) {
+            continue;
+        }
+        let vessel = inst.owner.unwrap_or(id);
+        // Of what has many places, each counts by itself: steps name it for the others.
+        let alone = lab.instances.iter().filter(|other| other.origin.is_some() && other.span == inst.span).count() == 1;
+        let label = lab.instances[vessel.0 as usize].name.rsplit(['[', ']']).nth(1).map(str::to_string);
+        let is_used = touched.contains(&id)
+            || touched.contains(&vessel)
+            || used.contains(&thing) && (alone && vessel == thing || touched.contains(&thing))
+            || label.is_some_and(|label| spoken.contains(&label));
+        let name = lab.instances[vessel.0 as usize].name.clone();
+        let span = lab.instances[thing.0 as usize].span;
+        let told = reagents.entry((span, origin)).or_insert((name, false));
+        told.1 |= is_used;
+    }
+    Some(Uses { things, reagents, said, module: decl.module })
+}
+
+/// What the steps of a plan name, set or move matter from or to, vessel by vessel.
+fn touched(lab: &Elaborator<'_>, plan: &Plan) -> BTreeSet<InstanceId> {
+    let mut out: BTreeSet<InstanceId> = BTreeSet::new();
+    let mixture = |m: u32| lab.mixtures.get(m as usize).copied();
+    for step in &plan.steps {
+        let Step::Operation(o) = &step.step else { continue };
+        for (_, argument) in &o.arguments {
+            match argument {
+                Argument::Instance(id) => out.extend([*id]),
+                Argument::Instances(ids) => out.extend(ids),
+                _ => {}
+            }
+        }
+        for action in o.at_start.iter().chain(&o.at_end) {
+            match action {
+                Action::Move { from, to, .. } => out.extend(mixture(*from).into_iter().chain(mixture(*to))),
+                Action::Assign { state, .. } => out.extend(lab.state_owner.get(*state as usize)),
+            }
+        }
+    }
+    out.extend(lab.streams.keys().flat_map(|(_, from, to)| [*from, *to]));
+    out
 }
 
 /// Things that no workflow of the file has to do with.
@@ -96,13 +148,28 @@ pub fn things(sources: &Sources, uses: &[Uses]) -> Vec<Diagnostic> {
     for (span, used) in uses.iter().flat_map(|uses| &uses.things) {
         *all.entry(*span).or_default() |= *used;
     }
+    // A reagent of which no vessel has anything to do with any step: what was to be added is not.
+    let mut filled: BTreeMap<&String, (&Span, &String, bool)> = BTreeMap::new();
+    for ((span, reagent), (vessel, used)) in uses.iter().flat_map(|uses| &uses.reagents) {
+        let told = filled.entry(reagent).or_insert((span, vessel, false));
+        told.2 |= used;
+    }
+    let mut out = Vec::new();
+    // Where no step has to do with any reagent, none is missing.
+    let doses = filled.values().any(|(.., used)| *used);
+    for (reagent, (span, vessel, _)) in filled.into_iter().filter(|(_, (.., used))| doses && !used) {
+        all.remove(span);
+        let headline = format!("`{reagent}` stands ready in `{vessel}`, and no workflow of this file uses it");
+        let d = Diagnostic::warning(codes::UNUSED, *span, headline, "filled, and never touched");
+        out.push(d.help("take it out, or add the step that is missing: is it to be dispensed, poured or drawn?"));
+    }
     let idle = all.into_iter().filter(|(_, used)| !used);
-    idle.map(|(span, _)| {
+    out.extend(idle.map(|(span, _)| {
         let headline = format!("`{}` is not used by any workflow of this file", sources.slice(span));
         Diagnostic::advice(codes::UNUSED, span, headline, "nothing has to do with it")
             .help("take it out, or use it: was another thing meant in one of the steps?")
-    })
-    .collect()
+    }));
+    out
 }
 
 /// Species and solutions of a module that nothing in its file names.

@@ -14,6 +14,8 @@ use crate::eval::{Scope, Type, Value};
 /// Members of the library's bodies that a scene carries, with their dimensions.
 const MASS: (&str, &str) = ("mass", "Mass");
 const FRICTION: (&str, &str) = ("friction", "Ratio");
+/// The member that says whether what is put on a surface stays for a moment only.
+const STOPOVER: &str = "stopover";
 
 /// How many times the moments may be above what the mass has where it is farthest from its centre: shapes are nominal.
 const NOMINAL: f64 = 2.0;
@@ -50,6 +52,13 @@ impl<'a> Elaborator<'a> {
     /// Coefficient of friction of an instance, if it is known.
     pub fn friction(&mut self, id: InstanceId) -> Option<f64> {
         self.plain(id, FRICTION).filter(|f| f.is_finite())
+    }
+
+    /// Whether what is put on an instance stays there for a moment only.
+    pub fn is_stopover(&mut self, id: InstanceId) -> bool {
+        let Some(member) = self.members_of(id, STOPOVER).first().copied() else { return false };
+        let at = self.instances[id.0 as usize].span;
+        matches!(self.member_value(id, member, at), Value::Bool(node) if self.graph.constant(node) == Some(1.0))
     }
 
     /// The moments that an asset gives, xx, xy, xz, yy, yz, zz, and where.

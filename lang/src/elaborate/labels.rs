@@ -4,6 +4,7 @@ use matterix_ir::quantity::show_number;
 use matterix_ir::{Diagnostic, Severity, Span, Unit, codes};
 
 use super::contents::Substance;
+use super::mended::Amount;
 use super::{Elaborator, SpeciesId};
 use crate::ast::{Expr, ExprKind, ItemKind, Labelled};
 use crate::eval::{Num, Scope, Value};
@@ -90,8 +91,15 @@ impl<'a> Elaborator<'a> {
             d = d.because(at, format!("{of} comes from here"));
         }
         let mended = rounded(actual, &unit);
-        let d = d.help(format!("write `labelled {mended} of {of}`"));
-        self.report(d.guess("correct the label", value.span, mended));
+        let amount = self.amount_for(&decl.item.kind, decl.module, s, (&composition, &said.dimension, stated));
+        let d = d.help(format!("if the recipe is right, write `labelled {mended} of {of}`"));
+        // Which of the two is wrong only a person can say: a slip in weighing must not become the label.
+        let mut d = d.ask("correct the label", value.span, mended);
+        if let Some(Amount { at, text, of }) = amount {
+            d = d.help(format!("if the label is right, weigh in `{of}: {text}`"));
+            d = d.ask(format!("correct the amount of {of}"), at, text);
+        }
+        self.report(d);
     }
 
     /// The tolerance of a label as a share of what is stated, given in SI.
@@ -173,7 +181,12 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A concentration of a recipe in the kind of a dimension; of a salt undissociated, as a label means it.
-    fn concentration_of(&mut self, parts: &[(SpeciesId, f64)], s: SpeciesId, kind: &Dimension) -> Option<f64> {
+    pub(super) fn concentration_of(
+        &mut self,
+        parts: &[(SpeciesId, f64)],
+        s: SpeciesId,
+        kind: &Dimension,
+    ) -> Option<f64> {
         let units = &self.tables.units;
         let (amount, mass, volume) = (units.named("Amount"), units.named("Mass"), units.named("Volume"));
         let solvent = units.named("SolventMass");

@@ -719,6 +719,10 @@ impl<'a> Elaborator<'a> {
             Op::State(from) => {
                 self.copies.insert((state, from));
             }
+            Op::Select(_, a, b) if !self.picks.contains_key(&value) => {
+                self.note_held(state, a);
+                self.note_held(state, b);
+            }
             _ => {
                 let picked = self.picks.get(&value).into_iter().flatten();
                 self.holds.entry(state).or_default().extend(picked.map(|i| i64::from(i.0)));

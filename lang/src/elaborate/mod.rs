@@ -20,6 +20,7 @@ pub mod lab;
 mod labels;
 pub mod laws;
 mod lineage;
+mod mended;
 pub mod mixtures;
 mod properties;
 pub mod prune;

@@ -269,6 +269,10 @@ impl Elaborator<'_> {
                 Value::Tuple(pairs.into_iter().map(|(a, b)| self.choose(c, a, b, at)).collect())
             }
             (Value::Error, _) | (_, Value::Error) => Value::Error,
+            (a, b) if is_instance(&a) && is_instance(&b) => {
+                let (Some(a), Some(b)) = (self.value_node(&a), self.value_node(&b)) else { return Value::Error };
+                Value::InstanceNode(self.graph.select(c, a, b))
+            }
             (a, _) => self.expected("two alike values", &a, at),
         }
     }
@@ -323,4 +327,9 @@ impl Elaborator<'_> {
             .find(|(label, _)| words.split(' ').any(|w| w == label))
             .map_or(Value::Nothing, |(_, on)| Value::Instance(*on))
     }
+}
+
+/// Whether a value is an instance, or none, known now or when running.
+fn is_instance(value: &Value) -> bool {
+    matches!(value, Value::Instance(_) | Value::Qualified(..) | Value::InstanceNode(_) | Value::Nothing)
 }

@@ -53,6 +53,9 @@ impl<'a> Planner<'a, '_> {
         }
         let verb_span = call.words.first().map_or(call.span, |w| w.span.to(call.words[count - 1].span));
         let verb = self.choose(&verbs, &object, call, verb_span, scope)?;
+        if self.is_another_meant(&verb, count, call, &object, verb_span, scope.module) {
+            return None;
+        }
         self.lab.note_verb(verb_span, &verb);
         self.lab.verbs.insert(call.span, verb.clone());
         self.said = said;
@@ -95,6 +98,12 @@ impl<'a> Planner<'a, '_> {
         let names = self.lab.tables.names;
         let mut out = Vec::new();
         if let Some(id) = names.lookup(module, verb)
+            && matches!(names.decl(id).item.kind, ItemKind::Skill { .. })
+        {
+            out.push(Verb::Skill(id));
+        }
+        // What an import hides is still meant where its words fit.
+        if let Some(id) = names.hidden(module, verb)
             && matches!(names.decl(id).item.kind, ItemKind::Skill { .. })
         {
             out.push(Verb::Skill(id));
@@ -251,6 +260,50 @@ impl<'a> Planner<'a, '_> {
         }
         self.no_such_device(&lacking, verb_span, call);
         None
+    }
+
+    /// Reports the import that is missing where a visible skill does not fit a call and one of the same name does that the
+    /// file does not import.
+    fn is_another_meant(
+        &mut self,
+        verb: &Verb<'a>,
+        count: usize,
+        call: &Call,
+        object: &Option<(Value, Span)>,
+        span: Span,
+        module: usize,
+    ) -> bool {
+        let Verb::Skill(id) = verb else { return false };
+        let names = self.lab.tables.names;
+        let decl = names.decl(*id);
+        let ItemKind::Skill { sig, .. } = &decl.item.kind else { return false };
+        let here = misfit(sig, call, false) + self.misfit_of_object(sig, decl.module, object);
+        // Of a skill of the file itself the mistake is in the call.
+        if here == 0 || !names.modules[decl.module].is_library() {
+            return false;
+        }
+        let text = verb_text(&call.words[..count]);
+        let fits = |kind: &ItemKind| match kind {
+            ItemKind::Skill { sig: other, .. } => !std::ptr::eq(sig, other) && misfit(other, call, false) < here,
+            _ => false,
+        };
+        let Some(import) = names.import_of(module, &text, fits) else { return false };
+        let headline = format!("another `{text}` is meant, which is not imported");
+        let place = format!("`{}` does not fit this", self.form(sig));
+        self.lab.report(import.offered(Diagnostic::error(codes::UNKNOWN_VERB, span, headline, place)));
+        true
+    }
+
+    /// How badly what a verb is about fits: a quantity where a thing is expected says more than a word that is missing.
+    fn misfit_of_object(&mut self, sig: &'a Sig, module: usize, object: &Option<(Value, Span)>) -> usize {
+        let (Some(param), Some((value, _))) = (sig.params.first(), object) else { return 0 };
+        let Some(ty) = &param.ty else { return 0 };
+        let quantity = matches!(self.lab.resolve_parameter_type(ty, module), Type::Quantity { .. });
+        match value {
+            Value::Num(_) if !quantity => 2,
+            Value::Instance(_) | Value::Qualified(..) if quantity => 2,
+            _ => 0,
+        }
     }
 
     fn no_such_device(

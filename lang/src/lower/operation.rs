@@ -5,7 +5,7 @@ use std::sync::Arc;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption, Step, StepId, Takes};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use super::Planner;
 use super::call::Bound;
@@ -107,6 +107,7 @@ impl<'a> Planner<'a, '_> {
             takes: None,
             until: None,
             claims: Vec::new(),
+            reads: Vec::new(),
             fails: Vec::new(),
             limits: Vec::new(),
             motion: None,
@@ -155,6 +156,9 @@ impl<'a> Planner<'a, '_> {
             self.lab.diagnostics.truncate(sound);
         }
         operation.claims = self.claims(&operation.at_end);
+        if operation.is_at_once() {
+            operation.reads = self.reads(&operation);
+        }
         Some((operation, invariants))
     }
 
@@ -242,6 +246,25 @@ impl<'a> Planner<'a, '_> {
                     }
                 }
             }
+        }
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+
+    /// The states that the needs and effects of an operation look at.
+    fn reads(&self, operation: &Operation) -> Vec<u32> {
+        let mut out = Vec::new();
+        let values = operation.at_end.iter().filter_map(|action| match action {
+            Action::Assign { value, .. } => Some(*value),
+            Action::Move { .. } => None,
+        });
+        for node in operation.needs.iter().map(|need| need.node).chain(values) {
+            self.lab.graph.visit(node, |op| {
+                if let Op::State(state) = op {
+                    out.push(state);
+                }
+            });
         }
         out.sort_unstable();
         out.dedup();

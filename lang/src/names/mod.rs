@@ -1,6 +1,6 @@
 //! Modules, declarations and scopes: which item a name stands for.
 
-mod imports;
+pub mod imports;
 pub mod near;
 
 use std::collections::BTreeMap;
@@ -53,6 +53,8 @@ pub struct Names<'a> {
     pub modules: &'a [Arc<Module>],
     /// All named items.
     pub decls: Vec<Decl<'a>>,
+    /// What every module sees without an import.
+    prelude: BTreeMap<Arc<str>, DeclId>,
     scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
     own: Vec<BTreeMap<Arc<str>, DeclId>>,
 }
@@ -227,13 +229,15 @@ pub fn verb_text(words: &[Name]) -> String {
 impl<'a> Names<'a> {
     /// Collects the declarations of all modules and resolves their imports.
     pub fn new(modules: &'a [Arc<Module>]) -> (Self, Vec<Diagnostic>) {
-        let mut names = Names { modules, decls: Vec::new(), scopes: Vec::new(), own: Vec::new() };
+        let mut names =
+            Names { modules, decls: Vec::new(), prelude: BTreeMap::new(), scopes: Vec::new(), own: Vec::new() };
         let mut diagnostics = Vec::new();
         for (index, module) in modules.iter().enumerate() {
             let own = names.collect(index, module, &mut diagnostics);
             names.own.push(own);
         }
         let prelude = names.prelude();
+        names.prelude.clone_from(&prelude);
         for (index, module) in modules.iter().enumerate() {
             let mut scope = prelude.clone();
             names.import(module, &mut scope, &mut diagnostics);
@@ -372,6 +376,13 @@ impl<'a> Names<'a> {
     /// What `name` stands for in a module.
     pub fn lookup(&self, module: usize, name: &str) -> Option<DeclId> {
         self.scopes[module].get(name).copied()
+    }
+
+    /// What `name` of the library stands for where an import hides what every module sees.
+    pub fn hidden(&self, module: usize, name: &str) -> Option<DeclId> {
+        let shown = self.lookup(module, name)?;
+        let library = self.modules[self.decl(shown).module].is_library();
+        self.prelude.get(name).copied().filter(|id| library && *id != shown)
     }
 
     /// What the names that each module sees stand for.

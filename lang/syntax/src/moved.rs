@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use matterix_ir::mesh::Mesh;
 use matterix_ir::robot::Robot;
-use matterix_ir::{Diagnostic, Edit, FileId, Fix, Label, Span};
+use matterix_ir::{Diagnostic, Edit, FileId, Fix, Label, Missing, Span};
 
 use crate::ast::*;
 
@@ -77,8 +77,9 @@ macro_rules! parts {
 parts! {
     Label { span text primary }
     Edit { span text }
-    Fix { title edits sure }
-    Diagnostic { code severity headline labels help fixes }
+    Fix { title edits sure asks }
+    Missing { module name below list only }
+    Diagnostic { code severity headline labels help fixes missing }
     Name { text span }
     Path { segments span }
     UnitText { text span }

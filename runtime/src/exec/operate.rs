@@ -73,7 +73,11 @@ impl<'p> Executor<'p, '_> {
                 return Some(format!("`{own}` uses `{name}` while `{}` holds it", self.label(holder)));
             }
             let exclusive = self.claims.own_holder(instance, &within);
-            let mut others = self.claims.uses(instance, self.now).filter(|u| u.frame != id);
+            let independent = |u: &Use| match &self.plan.get(u.step).step {
+                Step::Operation(other) => operation.is_independent_of(other),
+                _ => false,
+            };
+            let mut others = self.claims.uses(instance, self.now).filter(|u| u.frame != id && !independent(u));
             let other = others
                 .find(|u| u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u)))?;
             let other = &self.plan.get(other.step).label;

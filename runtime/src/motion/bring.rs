@@ -14,6 +14,9 @@ use super::stage::Stage;
 /// How far a gripper draws back from what it has let go before it goes elsewhere, m.
 const RETREAT: f64 = 0.10;
 
+/// After how many postures to which no way was found no other is tried.
+const LOST: usize = 4;
+
 /// How a tip is brought to a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Way {
@@ -208,10 +211,12 @@ impl Stage<'_> {
             Refused::Collides(_) if way != Way::Straight => postures(self, robot, to),
             _ => Vec::new(),
         };
+        let mut lost = 0;
         for q in others {
             match self.way(robot, &arm, &q, within) {
                 Ok(part) => return Ok(vec![part]),
-                Err(Refused::NoWay) => break,
+                Err(Refused::NoWay) if lost + 1 >= LOST || self.is_weary() => break,
+                Err(Refused::NoWay) => lost += 1,
                 Err(_) => {}
             }
         }

@@ -48,6 +48,14 @@ impl Carrying {
         Some(())
     }
 
+    /// Where an instance stood when the run began.
+    pub fn stood_at_first(&self, id: InstanceId) -> Option<Stand> {
+        match self.first.get(id.0 as usize)? {
+            Carried::Stands(stand) => Some(*stand),
+            Carried::Held(..) => None,
+        }
+    }
+
     /// Whether an instance is carried otherwise than at first.
     pub fn is_moved(&self, id: InstanceId) -> bool {
         self.now.get(id.0 as usize) != self.first.get(id.0 as usize)

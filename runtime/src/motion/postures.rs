@@ -1,9 +1,13 @@
 //! Other postures of a robot at a goal: for where the nearest one runs into something.
 
+use std::f64::consts::TAU;
+
 use matterix_ir::pose::Pose;
+use matterix_ir::robot::JointKind;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::inverse::Request;
 use matterix_motion::pose::pose;
+use matterix_motion::{Chain, Variable};
 
 use super::stage::Stage;
 use crate::backend::noise::{key, uniform};
@@ -30,22 +34,35 @@ pub fn postures(stage: &Stage<'_>, robot: InstanceId, to: &[Pose]) -> Vec<Vec<f6
                 .map(|((k, variable), now)| {
                     let share = uniform(key(draw, index, k));
                     let (low, high) = (variable.limits.lower, variable.limits.upper);
-                    if variable.is_bounded() {
-                        low + share * (high - low)
-                    } else {
-                        now + (share - 0.5) * std::f64::consts::TAU
-                    }
+                    if variable.is_bounded() { low + share * (high - low) } else { now + (share - 0.5) * TAU }
                 })
                 .collect();
             let Ok(solution) = solver.solve(&Request { attempts: 4, ..Request::new(target, &start) }) else { continue };
+            let q = unwound(&actor.chain, solution.q, &now);
             let apart = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            if found.iter().any(|(_, q)| apart(q, &solution.q) < ALIKE) {
+            if found.iter().any(|(_, known)| apart(known, &q) < ALIKE) {
                 continue;
             }
-            let far = solution.q.iter().zip(&now).map(|(a, b)| (a - b) * (a - b)).sum();
-            found.push((far, solution.q));
+            let far = q.iter().zip(&now).map(|(a, b)| (a - b) * (a - b)).sum();
+            found.push((far, q));
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     found.into_iter().map(|(_, q)| q).collect()
+}
+
+/// The same posture with each joint that turns as few turns as its limits allow from where it is: a robot that comes from
+/// elsewhere need not wind up.
+fn unwound(chain: &Chain, q: Vec<f64>, now: &[f64]) -> Vec<f64> {
+    let nearer = |((at, variable), now): ((f64, &Variable), &f64)| {
+        if variable.kind == JointKind::Prismatic {
+            return at;
+        }
+        let turns = ((now - at) / TAU).round();
+        let (low, high) = (variable.limits.lower, variable.limits.upper);
+        let least = ((low - at) / TAU).ceil();
+        let most = ((high - at) / TAU).floor();
+        if least > most { at } else { at + TAU * turns.clamp(least, most) }
+    };
+    q.into_iter().zip(chain.variables()).zip(now).map(nearer).collect()
 }

@@ -393,7 +393,10 @@ impl<'p> Stage<'p> {
             },
         };
         if let (Carried::Held(..), Carried::Stands(old)) = (new, old) {
-            self.before.insert(id, old);
+            // From a stopover it goes back to where it stood before that.
+            let passing = old.below().is_some_and(|on| self.scene.get(on).stopover);
+            let stood = if passing { self.before.get(&id).copied().or(self.carried.stood_at_first(id)) } else { None };
+            self.before.insert(id, stood.unwrap_or(old));
         }
         self.carried.set(id, new);
         self.changes += 1;

@@ -183,3 +183,33 @@ fn an_operation_in_finally_waits_for_its_instance() {
     let root = lab.par(&[busy, block]);
     assert_eq!(lab.run(root).passed().notes(), "off@6");
 }
+
+/// A command that is over at once and sets a state of a device; `reads` is what its needs look at.
+fn sets(lab: &mut Lab, verb: &str, device: matterix_ir::scene::InstanceId, state: u32, reads: &[u32]) -> StepId {
+    let value = lab.number(1.0);
+    let action = matterix_ir::model::Action::Assign { state, value, span: matterix_ir::Span::default() };
+    let operation = lab.operation(verb);
+    lab.op(Operation { claims: vec![device], at_start: vec![action], reads: reads.to_vec(), ..operation })
+}
+
+#[test]
+fn commands_of_one_instant_meet_where_neither_touches_what_the_other_does() {
+    let mut lab = Lab::new();
+    let plate = lab.instance("hotplate");
+    let (heating, stirring) = (lab.state("heating", 0.0), lab.state("stirring", 0.0));
+    let (a, b) = (sets(&mut lab, "heat", plate, heating, &[]), sets(&mut lab, "stir", plate, stirring, &[]));
+    let root = lab.par(&[a, b]);
+    lab.run(root).passed();
+    // Both set the same.
+    let (a, b) = (sets(&mut lab, "heat", plate, heating, &[]), sets(&mut lab, "cool", plate, heating, &[]));
+    let root = lab.par(&[a, b]);
+    assert_eq!(lab.run(root).failed(), "claimed");
+    // One needs what the other one sets.
+    let (a, b) = (sets(&mut lab, "heat", plate, heating, &[]), sets(&mut lab, "stir", plate, stirring, &[heating]));
+    let root = lab.par(&[a, b]);
+    assert_eq!(lab.run(root).failed(), "claimed");
+    // One of them lasts.
+    let (a, b) = (lab.busy("spin", &[plate], 5.0), sets(&mut lab, "stir", plate, stirring, &[]));
+    let root = lab.par(&[a, b]);
+    assert_eq!(lab.run(root).failed(), "claimed");
+}

@@ -23,7 +23,8 @@ use crate::{args, files};
 pub enum Which {
     /// Those that leave no doubt what was meant.
     Sure,
-    /// What was probably meant as well: names that are near, brackets, amounts. To be read afterwards.
+    /// What was probably meant as well: names that are near, brackets. To be read afterwards. Of corrections that exclude each
+    /// other, as of a label and its recipe, none is made: give the `id` of one.
     All,
 }
 

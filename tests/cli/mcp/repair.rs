@@ -84,7 +84,9 @@ fn all_corrections_at_once_come_to_the_same() {
     let mut client = Client::new(&folder("mcp_repair_all"));
     for (mistake, text) in broken() {
         let data = client.data("fix", json!({ "text": text, "which": "all", "fidelity": "process" }));
-        assert_eq!((&data["errors"], &data["written"]), (&json!(0), &json!(false)), "{mistake}: {data}");
+        // Whether the label is wrong or what is weighed in, a person says.
+        let left = u32::from(mistake.starts_with("a label"));
+        assert_eq!((&data["errors"], &data["written"]), (&json!(left), &json!(false)), "{mistake}: {data}");
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Action;
-use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::plan::{Operation, Plan, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, codes};
 use matterix_timing::usage::{self, Use};
@@ -119,6 +119,7 @@ fn line(times: &Times<'_>, step: StepId) -> StepId {
 fn clash(times: &Times<'_>, a: &Use, b: &Use) -> Option<bool> {
     if !times.beside(a.step, b.step)
         || take_turns(times, a, b)
+        || independent(times, a.step, b.step)
         || expected(times.plan, &times.timing, a.step, "claimed")
     {
         return None;
@@ -147,23 +148,41 @@ fn take_turns(times: &Times<'_>, a: &Use, b: &Use) -> bool {
     !claimed(a, b).is_disjoint(&claimed(b, a))
 }
 
+/// Whether all that is done in one step can be done at the moment of all that is done in the other.
+fn independent(times: &Times<'_>, a: StepId, b: StepId) -> bool {
+    let others = operations(times.plan, b);
+    let own = operations(times.plan, a);
+    at_once(times, a) && at_once(times, b) && own.iter().all(|a| others.iter().all(|b| a.is_independent_of(b)))
+}
+
+fn at_once(times: &Times<'_>, step: StepId) -> bool {
+    times.timing.visit(step).is_some_and(|v| v.lasts.max <= 0.0)
+}
+
 /// Two commands that are over at once meet only by chance, and only those that set the same are then in doubt.
 fn harmless(times: &Times<'_>, a: StepId, b: StepId) -> bool {
-    let at_once = |s: StepId| times.timing.visit(s).is_some_and(|v| v.lasts.max <= 0.0);
-    at_once(a) && at_once(b) && written(times.plan, a).is_disjoint(&written(times.plan, b))
+    at_once(times, a) && at_once(times, b) && written(times.plan, a).is_disjoint(&written(times.plan, b))
 }
 
 /// The states that a step and what is below it assign.
 fn written(plan: &Plan, step: StepId) -> BTreeSet<u32> {
-    let mut out = BTreeSet::new();
+    let actions = operations(plan, step).into_iter().flat_map(|o| o.at_start.iter().chain(&o.at_end));
+    actions
+        .filter_map(|action| match action {
+            Action::Assign { state, .. } => Some(*state),
+            Action::Move { .. } => None,
+        })
+        .collect()
+}
+
+/// The operations of a step and of what is below it.
+fn operations(plan: &Plan, step: StepId) -> Vec<&Operation> {
+    let mut out = Vec::new();
     let mut open = vec![step];
     while let Some(step) = open.pop() {
         let node = &plan.get(step).step;
         if let Step::Operation(operation) = node {
-            out.extend(operation.at_start.iter().chain(&operation.at_end).filter_map(|a| match a {
-                Action::Assign { state, .. } => Some(*state),
-                _ => None,
-            }));
+            out.push(&**operation);
         }
         open.extend(node.children());
     }

@@ -141,7 +141,9 @@ impl Layout<'_> {
         self.enter(&token, how);
         let opened = before.is_none_or(|b| b.kind == Kind::OpenBody);
         let same_line = how == Break::No && gap.comments.is_empty();
-        if self.separator && same_line && token.kind != Kind::CloseBody {
+        // Steps on one line are told apart by a `;` in the one style, also where a brace does it.
+        let step = token.begins == Begins::Line && !opened;
+        if (self.separator || step) && same_line && token.kind != Kind::CloseBody {
             self.out.push(if token.begins == Begins::Field { ',' } else { ';' });
         }
         self.separator = false;

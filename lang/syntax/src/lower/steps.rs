@@ -13,6 +13,12 @@ use super::{
 };
 use crate::ast::{Block, Call, Expr, ExprKind, Handlers, Name, Path, Stmt, StmtKind};
 
+/// Whether what stands before a node ends with a brace.
+fn closed_before(node: &Node) -> bool {
+    let span = node.as_span();
+    span.get_input().get(..span.start()).is_some_and(|text| text.trim_end().ends_with('}'))
+}
+
 impl Lower<'_> {
     pub(super) fn block_in(&mut self, kids: &mut Kids) -> Block {
         kids.eat(Rule::block).map_or_else(Block::default, |node| self.block(node))
@@ -27,6 +33,8 @@ impl Lower<'_> {
             let start = part.as_span().start();
             match part.as_rule() {
                 Rule::end => continue,
+                Rule::beside if closed_before(&part) => continue,
+                Rule::beside => self.mistakes.rest(Rule::only_stmt, before.unwrap_or(start), &part),
                 Rule::bad_rest => self.mistakes.rest(Rule::only_stmt, before.unwrap_or(start), &part),
                 Rule::bad_stmt => stmts.push(self.bad_stmt(part, before)),
                 _ => {

@@ -55,6 +55,7 @@ fn instance(name: &str, kind: &str, support: Option<u32>, at: [f64; 3], shape: O
         visual: None,
         inertial: None,
         friction: None,
+        stopover: false,
         room: None,
         articulation: None,
         span: line(2),
