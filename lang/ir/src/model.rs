@@ -202,8 +202,10 @@ pub struct Balance {
     /// Magnitude against which the error is judged, SI: the sum of the magnitudes of the terms.
     pub magnitude: NodeId,
     /// The states that are added up, each with its factor.
+    #[serde(default)]
     pub terms: Vec<(u32, f64)>,
     /// Processes that may make or lose some.
+    #[serde(default)]
     pub doubts: Vec<Doubt>,
 }
 
@@ -222,13 +224,27 @@ pub struct Suspect {
     pub heatless: bool,
 }
 
-/// The temperatures of a lab, where some of them are watched.
+/// What a run watches where laws or effects of the user's own change mixtures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Temperatures {
     /// What is watched.
     pub suspects: Vec<Suspect>,
     /// All others, K.
     pub others: Vec<NodeId>,
+    /// Amounts that laws of the user's own may take more of than there is.
+    #[serde(default)]
+    pub drained: Vec<Drained>,
+}
+
+/// An amount that a law or effect of the user's own may bring below nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drained {
+    /// Index into [`Model::states`].
+    pub state: u32,
+    /// The law: `over(still)`.
+    pub law: String,
+    /// Its place in the text.
+    pub span: Span,
 }
 
 /// The flattened model of one lab.
@@ -257,5 +273,6 @@ pub struct Model {
     /// Sums that must close.
     pub balances: Vec<Balance>,
     /// Temperatures that must stay physical.
+    #[serde(default)]
     pub temperatures: Temperatures,
 }
