@@ -23,6 +23,7 @@ mod gripping;
 mod harness;
 mod hollow;
 mod joints;
+mod laws;
 mod lsp;
 mod mcp;
 mod meant;

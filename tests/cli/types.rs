@@ -249,7 +249,7 @@ lab station(offset: Length = 0 mm) {
     ambient: 22 degC
     table = OpticalTable at (offset, 0 m, 0 m)
     cup = Beaker50mL on table holding 10 g of water
-    between table and cup { conductance: 1 W/K }
+    between table and cup { sliding: 0.4 }
 }
 lab pair { include station as near; include station as far at (0, 2, 0) m { offset: 5 mm } }
 lab full { include pair as left at (1, 0, 0) m; include station as right; spare = Beaker50mL on left.far.table }

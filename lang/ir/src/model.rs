@@ -212,8 +212,10 @@ pub struct Balance {
     /// Magnitude against which the error is judged, SI: the sum of the magnitudes of the terms.
     pub magnitude: NodeId,
     /// The states that are added up, each with its factor.
+    #[serde(default)]
     pub terms: Vec<(u32, f64)>,
     /// Processes that may make or lose some.
+    #[serde(default)]
     pub doubts: Vec<Doubt>,
 }
 
@@ -232,13 +234,27 @@ pub struct Suspect {
     pub heatless: bool,
 }
 
-/// The temperatures of a lab, where some of them are watched.
+/// What a run watches where laws or effects of the user's own change mixtures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Temperatures {
     /// What is watched.
     pub suspects: Vec<Suspect>,
     /// All others, K.
     pub others: Vec<NodeId>,
+    /// Amounts that laws of the user's own may take more of than there is.
+    #[serde(default)]
+    pub drained: Vec<Drained>,
+}
+
+/// An amount that a law or effect of the user's own may bring below nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drained {
+    /// Index into [`Model::states`].
+    pub state: u32,
+    /// The law: `over(still)`.
+    pub law: String,
+    /// Its place in the text.
+    pub span: Span,
 }
 
 /// Two species that should not be in one mixture.
@@ -301,6 +317,7 @@ pub struct Model {
     /// Sums that must close.
     pub balances: Vec<Balance>,
     /// Temperatures that must stay physical.
+    #[serde(default)]
     pub temperatures: Temperatures,
     /// What should not meet, of what may be in one mixture of the lab.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -2,7 +2,7 @@
 //!
 //! Where the compiler has shown that nothing of the kind can happen there is nothing to look at.
 
-use matterix_ir::model::Model;
+use matterix_ir::model::{Domain, Model};
 use matterix_ir::{Span, codes};
 
 use super::Engine;
@@ -11,6 +11,9 @@ use crate::ledger::CLOSURE;
 
 /// A mixture may be so much warmer or colder than everything else was before its law is blamed, K.
 const MARGIN: f64 = 1.0;
+
+/// An amount below nothing by less than this share of its scale is nothing.
+const ROUNDING: f64 = 1e-3;
 
 /// What is counted between two looks.
 #[derive(Debug, Default)]
@@ -28,7 +31,10 @@ pub(super) struct Suspicion {
 impl Suspicion {
     pub(super) fn new(model: &Model) -> Self {
         let doubts = model.balances.iter().any(|b| !b.doubts.is_empty());
-        Suspicion { watchful: doubts || !model.temperatures.suspects.is_empty(), ..Suspicion::default() }
+        Suspicion {
+            watchful: doubts || !model.temperatures.suspects.is_empty() || !model.temperatures.drained.is_empty(),
+            ..Suspicion::default()
+        }
     }
 
     /// Counts the assignment of a state that changes it by so much.
@@ -85,6 +91,19 @@ impl Engine<'_> {
     /// Fails where a suspected temperature cannot be.
     pub(super) fn check_temperatures(&mut self) -> Result<(), Fault> {
         let temperatures = &self.model.temperatures;
+        for drained in &temperatures.drained {
+            let (state, value) = (&self.model.states[drained.state as usize], self.states[drained.state as usize]);
+            if value < -ROUNDING * state.scale {
+                let shown = match &state.domain {
+                    Domain::Quantity(unit) => unit.show(value),
+                    _ => value.to_string(),
+                };
+                let message = format!("`{}` takes more than there is: `{}` is {shown}", drained.law, state.name);
+                return Err(Fault::new(codes::TRANSFER_FRACTION, self.time, message)
+                    .at(drained.span)
+                    .help("let the rate follow what is left, or give the law a `while` that ends it"));
+            }
+        }
         if temperatures.suspects.is_empty() {
             return Ok(());
         }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Action, Event, Suspect, Temperatures};
+use matterix_ir::model::{Action, Drained, Event, Suspect, Temperatures};
 use matterix_ir::plan::{Plan, Step};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Span, codes};
@@ -20,7 +20,7 @@ impl<'a> Elaborator<'a> {
             return Temperatures::default();
         }
         let reacting = self.reacting();
-        let mut out = Temperatures::default();
+        let mut out = Temperatures { drained: self.drained(events, plan), ..Temperatures::default() };
         for index in 0..self.instances.len() as u32 {
             let id = InstanceId(index);
             for (name, value) in self.temperatures_of(id) {
@@ -87,6 +87,36 @@ impl<'a> Elaborator<'a> {
             }
         }
         out
+    }
+
+    /// Amounts that own laws change, each with one of them.
+    fn drained(&self, events: &[Event], plan: &Plan) -> Vec<Drained> {
+        let library = library(self);
+        let own = |span: &Span| !library.contains(&span.file);
+        let amounts: BTreeSet<u32> =
+            self.extensive.iter().filter(|(k, _)| k.species.is_some()).map(|(_, s)| *s).collect();
+        let mut out: BTreeMap<u32, Drained> = BTreeMap::new();
+        let mut add = |state: u32, law: &str, span: Span| {
+            if amounts.contains(&state) && own(&span) {
+                out.entry(state).or_insert_with(|| Drained { state, law: law.to_string(), span });
+            }
+        };
+        for (state, parts) in &self.rates {
+            for p in parts.iter().map(|c| &self.processes[c.process]) {
+                add(*state, &p.name, p.span);
+            }
+        }
+        let written =
+            |a: &Action| if let Action::Assign { state, span, .. } = a { Some((*state, *span)) } else { None };
+        for event in events {
+            event.actions.iter().filter_map(written).for_each(|(state, _)| add(state, &event.name, event.span));
+        }
+        for step in &plan.steps {
+            let Step::Operation(o) = &step.step else { continue };
+            let actions = o.at_start.iter().chain(&o.at_end);
+            actions.filter_map(written).for_each(|(state, span)| add(state, &step.label, span));
+        }
+        out.into_values().collect()
     }
 
     /// What may get warm or cold by a reaction.

@@ -1,0 +1,342 @@
+//! Laws, events and effects of a user's own: what they write reaches the run, and what they make, lose or leave behind is told.
+
+use serde_json::Value;
+
+use crate::harness::{folder, matterixc, root, write};
+
+/// The findings of a text: severity, code and line.
+fn found(name: &str, text: &str) -> Vec<(String, String, u64)> {
+    let file = write(&folder(&format!("laws_{name}")), "law.mtx", text);
+    let lines = matterixc(&["check", "--format", "json", &file]).out_lines();
+    let text = |v: &Value| v.as_str().unwrap_or_default().to_string();
+    lines
+        .iter()
+        .map(|d| (text(&d["severity"]), text(&d["code"]), d["span"]["start"]["line"].as_u64().unwrap_or_default()))
+        .collect()
+}
+
+/// The report of a run of a text, and how it ended.
+fn ran(name: &str, text: &str) -> (i32, Value) {
+    let file = write(&folder(&format!("laws_{name}_run")), "law.mtx", text);
+    let ran = matterixc(&["run", "--format", "json", &file]);
+    (ran.code, serde_json::from_str(&ran.out).unwrap_or_else(|e| panic!("{name}: {e}: {}{}", ran.out, ran.err)))
+}
+
+fn passes(name: &str, text: &str) -> Value {
+    let (code, report) = ran(name, text);
+    assert_eq!(code, 0, "{name}: {report:#}");
+    report
+}
+
+/// The amount of a species in a mixture at the end, SI.
+fn amount(report: &Value, mixture: &str, species: &str) -> f64 {
+    let all = report["containers"].as_array().expect("containers");
+    let of = all.iter().find(|m| m["name"] == mixture).unwrap_or_else(|| panic!("no {mixture}"));
+    let all = of["species"].as_array().expect("species");
+    let found = all.iter().find(|c| c["name"] == species).unwrap_or_else(|| panic!("no {species} in {mixture}"));
+    found["amount"].as_f64().expect("an amount")
+}
+
+fn sample(name: &str) -> String {
+    std::fs::read_to_string(root().join("tests/cases/laws").join(name)).expect("the sample is there")
+}
+
+const LAB: &str = "mtx 1\nuse std::glassware::Beaker250mL\n";
+
+#[test]
+fn samples_run_to_their_ends() {
+    for name in [
+        "dropped",
+        "dropped2",
+        "evaporation_lost",
+        "pair",
+        "partition",
+        "partition_typed",
+        "swap",
+        "wet_salt_false_error",
+    ] {
+        passes(name, &sample(&format!("{name}.mtx")));
+    }
+}
+
+#[test]
+fn matter_that_a_law_brings_arrives() {
+    let report = passes("evaporated", &sample("evaporation_lost.mtx"));
+    assert!((amount(&report, "b.contents", "EtOH") - 0.06).abs() < 1e-6);
+    for name in ["partition", "partition_typed"] {
+        let report = passes(name, &sample(&format!("{name}.mtx")));
+        let ratio = amount(&report, "org.contents", "I2") / 0.02 / (amount(&report, "aq.contents", "I2") / 0.1);
+        assert!((ratio - 85.0).abs() < 0.1, "{name}: {ratio}");
+    }
+}
+
+#[test]
+fn laws_in_a_chain_and_in_a_circle_reach_all_vessels() {
+    let law = "fn passes(a: Container, b: Container) -> Frequency = 0 Hz
+process filter(a: Container, b: Container) while passes(a, b) > 0 Hz {
+    for s in a.contents.species {
+        let q = passes(a, b) * a.contents.amount[s]
+        let h = q * s.heat_capacity * (a.contents.temperature - reference_temperature)
+        a.contents.amount[s]' -= q
+        a.contents.enthalpy' -= h
+        b.contents.amount[s]' += q
+        b.contents.enthalpy' += h
+    }
+}
+";
+    let lab = |pairs: &str| {
+        format!(
+            "{LAB}{law}lab bench {{\n    ambient: 10 degC\n    a = Beaker250mL at (0, 0, 0) m holding 100 g of water + 10 g of EtOH\n    b = Beaker250mL at (1, 0, 0) m\n    c = Beaker250mL at (2, 0, 0) m holding 1 g of MeOH\n{pairs}}}\n"
+        )
+    };
+    let chain = lab("    between a and b { passes: 0.01 Hz }\n    between b and c { passes: 0.01 Hz }\n");
+    let text = format!(
+        "{chain}workflow go in bench {{ wait 1 h; expect c.contents.amount[EtOH] > 200 mmol and a.contents.amount[MeOH] == 0 mol and c.contents.temperature > 9.99 degC and c.contents.temperature < 10.01 degC }}\n"
+    );
+    assert_eq!(found("chain", &text), []);
+    passes("chain", &text);
+    let circle = lab(
+        "    between a and b { passes: 0.01 Hz }\n    between b and c { passes: 0.01 Hz }\n    between c and a { passes: 0.01 Hz }\n",
+    );
+    let text = format!(
+        "{circle}workflow go in bench {{ wait 1 h; expect a.contents.amount[MeOH] in 10 mmol .. 11 mmol and b.contents.amount[MeOH] in 10 mmol .. 11 mmol }}\n"
+    );
+    assert_eq!(found("circle", &text), []);
+    passes("circle", &text);
+}
+
+#[test]
+fn a_law_over_a_grid_of_wells_brings_only_what_gets_there() {
+    let text = "mtx 1
+asset Plate6: WellPlate { wells[A1 .. B3] = Well { max_volume: 1 mL } at (-20, 10, 3) mm pitch (20, 20) mm }
+relation wicks(a: Vessel, b: Vessel)
+process wicking(a: Vessel, b: Vessel) while wicks(a, b) {
+    a.contents.amount[dye]' -= 0.01 Hz * a.contents.amount[dye]
+    b.contents.amount[dye]' += 0.01 Hz * a.contents.amount[dye]
+}
+species dye { formula: \"C2H6O\", density: 1 g/mL, heat_capacity: 0.1 J/(mol*K) }
+lab bench {
+    ambient: 25 degC
+    plate = Plate6 at (0, 0, 0) m holding { A1: 500 uL of water + 1 umol of dye, A2: 100 uL of EtOH }
+    between plate[A1] and plate[A2] { wicks: true }
+    between plate[A2] and plate[A3] { wicks: true }
+    between plate[B1] and plate[B2] { wicks: true }
+}
+workflow go in bench { wait 1 h; expect plate[A3].contents.amount[dye] > 0.99 umol }
+";
+    passes("wells", text);
+    let waits = text
+        .replace("expect plate[A3].contents.amount[dye] > 0.99 umol", "expect plate[B2].contents.amount[dye] > 1 nmol");
+    assert!(found("wells_never", &waits).iter().any(|f| f.1 == "never-made"), "{:?}", found("wells_never", &waits));
+}
+
+#[test]
+fn events_and_effects_that_add_a_species_add_it() {
+    let text = format!(
+        "{LAB}asset Into: Container {{ mass: 28 g, capacity: 27 J/K, air: 0 W/K, wall: 0 W/K, contents: {{ air: 0 W/K }}, max_volume: 70 mL }}
+event sets(a: Beaker250mL, b: Into) when elapsed >= 1 min {{
+    let n = a.contents.amount[EtOH]
+    a.contents.amount[EtOH] = 0 mol
+    b.contents.amount[EtOH] = b.contents.amount[EtOH] + n
+}}
+lab bench {{ ambient: 25 degC; x = Beaker250mL at (0, 0, 0) m holding 10 g of EtOH; y = Into at (1, 0, 0) m }}
+workflow go in bench {{ wait 2 min; expect y.contents.amount[EtOH] > 0.2 mol and x.contents.amount[EtOH] == 0 mol }}
+"
+    );
+    let left = found("event", &text);
+    assert_eq!(left.iter().map(|f| (f.1.as_str(), f.2)).collect::<Vec<_>>(), [("heat-left-behind", 4)]);
+    passes("event", &text);
+    let text = format!(
+        "{LAB}extern skill spoon(n: Amount) from(a: Container) into(b: Container)
+    effect a.contents.amount[EtOH] = a.contents.amount[EtOH] - n, b.contents.amount[EtOH] = b.contents.amount[EtOH] + n
+    takes 5 s
+lab bench {{ ambient: 25 degC; x = Beaker250mL at (0, 0, 0) m holding 10 g of EtOH; y = Beaker250mL at (1, 0, 0) m; z = Beaker250mL at (2, 0, 0) m }}
+workflow go in bench {{ spoon 0.1 mol from x into y; spoon 0.05 mol from y into z; expect z.contents.amount[EtOH] in 0.0499 mol .. 0.0501 mol }}
+"
+    );
+    let left = found("effect", &text);
+    assert_eq!(left.iter().map(|f| (f.1.as_str(), f.2)).collect::<Vec<_>>(), [("heat-left-behind", 4)]);
+    passes("effect", &text);
+}
+
+#[test]
+fn own_extensive_quantities_per_species_are_written_too() {
+    let text = "mtx 1
+capability Bed { extensive bound: Amount per Species = 0 mol { scale: 1 umol } }
+asset Column: Bed {}
+process binding(b: Bed) while elapsed < 10 s { b.bound[water]' += 1 mmol/s; b.bound[EtOH]' -= 0 mol/s }
+lab bench { ambient: 25 degC, bed = Column }
+workflow go in bench { wait 20 s; expect bed.bound[water] > 9 mmol }
+";
+    let all = found("bed", text);
+    assert_eq!(all.first().map(|f| (f.1.as_str(), f.2)), Some(("balance-breach", 4)), "{all:?}");
+}
+
+#[test]
+fn laws_that_make_or_lose_matter_are_found_where_they_stand() {
+    let lab = "lab bench { ambient: 25 degC; a = Beaker250mL at (0, 0, 0) m holding 10 g of EtOH }\nworkflow go in bench { wait 5 min }\n";
+    let breach = |line| vec![("error".to_string(), "balance-breach".to_string(), line)];
+    let turns = |species: &str, by: &str| {
+        format!(
+            "{LAB}{species}\nprocess turn(m: Mixture) while m.mass > 0 kg {{\n    let q = m.amount[EtOH] * 0.01 1/s\n    m.amount[EtOH]' -= q\n    m.amount[thing]' += {by} * q\n}}\n{lab}"
+        )
+    };
+    let isomer = "species thing { formula: \"C2H6O\", density: 0.7 g/mL, heat_capacity: 120 J/(mol*K) }";
+    let other = "species thing { formula: \"CH4O\", density: 0.7 g/mL, heat_capacity: 80 J/(mol*K) }";
+    assert_eq!(found("turn_isomer", &turns(isomer, "1")), []);
+    assert_eq!(found("turn_other", &turns(other, "1")), breach(4));
+    assert_eq!(found("turn_twice", &turns(isomer, "2")), breach(4));
+    let gone =
+        format!("{LAB}process gone(m: Mixture) while m.amount[EtOH] > 1 mmol {{ m.amount[EtOH]' -= 1 mmol/s }}\n{lab}");
+    assert_eq!(found("gone", &gone), breach(3));
+    let event =
+        format!("{LAB}event spill(m: Mixture) when elapsed > 1 min {{ m.amount[EtOH] = 0.5 * m.amount[EtOH] }}\n{lab}");
+    assert_eq!(found("spill", &event), breach(3));
+    // Two ways of writing the same rate conserve what they carry.
+    let same = format!(
+        "{LAB}{isomer}\nprocess turn(m: Mixture) while m.mass > 0 kg {{\n    m.amount[EtOH]' -= (m.amount[EtOH] + m.amount[EtOH]) * 0.005 1/s\n    m.amount[thing]' += m.amount[EtOH] * 0.01 1/s\n}}\n{lab}"
+    );
+    assert_eq!(found("same", &same), []);
+    passes("same", &same);
+}
+
+#[test]
+fn a_breach_in_a_run_names_the_law_and_the_step() {
+    let text = format!(
+        "{LAB}process leak(m: Mixture) while elapsed > 2 h and m.mass > 0 kg {{\n    m.amount[EtOH]' -= 1 mmol/h\n}}\nlab bench {{ ambient: 25 degC; a = Beaker250mL at (0, 0, 0) m holding 10 g of EtOH }}\nworkflow go in bench {{ wait 1 h; wait 2 h; wait 1 h }}\n"
+    );
+    let (code, report) = ran("leak", &text);
+    assert_eq!(code, 1);
+    let failure = &report["failure"];
+    assert_eq!(failure["name"], "balance-breach", "{failure:#}");
+    assert_eq!(failure["time"].as_f64(), Some(3.0 * 3600.0), "{failure:#}");
+    let text = failure["text"].as_str().unwrap_or_default();
+    assert!(text.contains("leak(a.contents)"), "{failure:#}");
+}
+
+#[test]
+fn heat_that_stays_behind_is_warned_of_and_no_temperature_is_below_zero() {
+    let warned = found("left", &sample("evaporation_lost.mtx"));
+    assert_eq!(
+        warned.iter().map(|f| (f.0.as_str(), f.1.as_str(), f.2)).collect::<Vec<_>>(),
+        [("warning", "heat-left-behind", 7)]
+    );
+    let moved = sample("evaporation_lost.mtx").replace(
+        "a.contents.amount[EtOH]' -= 1 mmol/s\n        b.contents.amount[EtOH]' += 1 mmol/s",
+        "move(0.01 1/s, from: a, to: b)",
+    );
+    assert_eq!(found("moved", &moved), []);
+    let (code, report) = ran(
+        "cold",
+        "mtx 1\nuse std::glassware::Beaker50mL\nprocess cooler(v: Container) while elapsed < 1 h { v.contents.enthalpy' -= 200 W }\nlab bench { ambient: 22 degC; cup = Beaker50mL at (0, 0, 0) m holding 20 mL of water }\nworkflow chill in bench { wait 1 h }\n",
+    );
+    assert_eq!(code, 1);
+    assert_eq!(report["failure"]["name"], "nonphysical-temperature", "{:#}", report["failure"]);
+}
+
+#[test]
+fn a_law_that_takes_more_than_there_is_ends_the_run() {
+    let text = sample("evaporation_lost.mtx")
+        .replace(" while a.contents.amount[EtOH] > 1 mmol", "")
+        .replace("wait 1 min", "wait 10 min")
+        .replace("20 mL of EtOH", "20 mL of EtOH + 20 mL of water");
+    let (code, report) = ran("drained", &text);
+    assert_eq!(code, 1);
+    assert_eq!(report["failure"]["name"], "transfer-fraction", "{:#}", report["failure"]);
+    assert_eq!(report["failure"]["line"], 7);
+}
+
+#[test]
+fn what_a_law_brings_together_is_screened() {
+    let text = format!(
+        "{LAB}fn passes(a: Container, b: Container) -> Frequency = 0 Hz
+process filter(a: Container, b: Container) while passes(a, b) > 0 Hz {{
+    let q = passes(a, b) * a.contents.amount[NaOCl]
+    a.contents.amount[NaOCl]' -= q
+    b.contents.amount[NaOCl]' += q
+}}
+lab bench {{
+    ambient: 25 degC
+    a = Beaker250mL at (0, 0, 0) m holding 20 g of NaOCl
+    b = Beaker250mL at (1, 0, 0) m holding 50 g of HCl
+    between a and b {{ passes: 0.01 Hz }}
+}}
+workflow go in bench {{ wait 1 h }}
+"
+    );
+    let all = found("screened", &text);
+    assert!(all.iter().any(|f| f.1 == "incompatible-mix"), "{all:?}");
+    let apart = text.replace("between a and b { passes: 0.01 Hz }", "");
+    let all = found("apart", &apart);
+    assert!(!all.iter().any(|f| f.1 == "incompatible-mix"), "{all:?}");
+}
+
+#[test]
+fn events_do_their_statements_in_the_order_of_the_text() {
+    let text = "mtx 1
+capability M { state a: Ratio = 1; state b: Ratio = 2; state c: Bool = true
+  state w: up | down = up; state v: up | down = down
+  event swap when elapsed >= 1 s { let t = a; a = b; b = t }
+  event words when elapsed >= 1 s { let t = w; w = v; v = t }
+  event both when elapsed >= 3 s { if a > 1.5 { a = 0; b = 7; c = false } else { a = 9 } } }
+asset A: M {}
+lab l { ambient: 25 degC, m = A }
+workflow go in l { wait 2 s; expect m.a == 2 and m.b == 1 and m.w == down and m.v == up; wait 2 s; expect m.a == 0 and m.b == 7 and not m.c }
+";
+    assert_eq!(found("order", text), []);
+    passes("order", text);
+    let text = format!(
+        "{LAB}event share(a: Container, b: Body) when elapsed >= 1 s and a.support == b {{ let v = a.contents.volume / 2; move(v, from: a, to: b.contents); move(v, from: a, to: b.contents) }}\n"
+    );
+    let text = text.replace("b: Body", "b: Container").replace("from: a, to: b.contents", "from: a, to: b");
+    let text = format!(
+        "{text}lab bench {{ ambient: 25 degC; low = Beaker250mL at (0, 0, 0) m; high = Beaker250mL on low holding 100 g of water }}\nworkflow go in bench {{ wait 2 s; expect high.contents.volume < 1 uL }}\n"
+    );
+    passes("share", &text);
+}
+
+#[test]
+fn pair_parameters_keep_their_order() {
+    let kinds = "capability Tank { state level: Ratio }\nasset T: Tank {}\n";
+    let lab = "lab bench {\n    ambient: 25 degC\n    bottom = T { level: 0 }\n    top = T { level: 1 }\n    between top and bottom { rate: 1 Hz }\n}\n";
+    let law = "process drain(a: Tank, b: Tank) while rate(a, b) > 0 Hz { let q = rate(a, b) * a.level; a.level' -= q; b.level' += q }\n";
+    let flow = |f: &str, goes: &str| {
+        format!("mtx 1\n{kinds}{f}\n{law}{lab}workflow go in bench {{ wait 100 s; expect {goes} }}\n")
+    };
+    passes("ordered", &flow("fn rate(a: Tank, b: Tank) -> Frequency = 0 Hz", "bottom.level > 0.99"));
+    passes(
+        "both",
+        &flow("fn rate(a: Tank, b: Tank) -> Frequency = 0 Hz { symmetric: true }", "bottom.level in 0.49 .. 0.51"),
+    );
+    // A law that exists once for both takes them as the lab gives them.
+    let once = flow(
+        "fn rate(a: Tank, b: Tank) -> Frequency = 0 Hz\nrelation near(a: Tank, b: Tank) symmetric",
+        "bottom.level > 0.99",
+    )
+    .replace("while rate(a, b) > 0 Hz", "while near(a, b)")
+    .replace("{ rate: 1 Hz }", "{ rate: 1 Hz, near: true }");
+    passes("once", &once);
+    let kinds = "mtx 1\ncapability Tank { state level: Ratio }\nasset T: Tank {}\ncapability Sink {}\nasset S: Sink {}\nfn rate(a: Tank, b: Sink) -> Frequency = 0 Hz\n";
+    let lab = |pair: &str| {
+        format!(
+            "{kinds}lab bench {{ ambient: 25 degC, t = T {{ level: 1 }}, s = S\n{pair}\n}}\nworkflow go in bench {{ wait 1 s; expect rate(t, s) == 1 Hz }}\n"
+        )
+    };
+    passes("turned", &lab("between s and t { rate: 1 Hz }"));
+    let code = |name: &str, pair: &str| found(name, &lab(pair)).first().map(|f| f.1.clone());
+    assert_eq!(code("unfit", "between t and t { rate: 1 Hz }").as_deref(), Some("type-mismatch"));
+    assert_eq!(
+        code("twice", "between s and t { rate: 1 Hz }\nbetween t and s { rate: 2 Hz }").as_deref(),
+        Some("duplicate-name")
+    );
+}
+
+#[test]
+fn no_heat_capacity_is_negative() {
+    for (salt, water) in [("2 g of NaCl", "0.2 g"), ("5 g of NaOH", "1 mg"), ("1 g of MgCl2", "0.5 g")] {
+        let text = format!(
+            "mtx 1\nuse std::glassware::Beaker50mL\nuse std::heating::IkaRctBasic\nspecies MgCl2 {{ formula: \"MgCl2\", density: 2.32 g/mL, heat_capacity: 71.4 J/(mol*K), dissolves: Mg2+ + 2 Cl- }}\nlab bench {{ ambient: 22 degC, plate = IkaRctBasic at (2, 0, 0) m, cup = Beaker50mL on plate holding {salt} + {water} of water }}\nworkflow go in bench {{ heat plate to 80 degC; wait 1 h; expect cup.contents.temperature > 40 degC and cup.contents.temperature < 80 degC }} finally {{ stop heating plate }}\n"
+        );
+        passes(salt, &text);
+    }
+}
