@@ -101,12 +101,13 @@ fn ordinary_liquids_may_meet() {
         ("acetic", "50 g of acetone", "20 g of acetic_acid"),
         ("buffer", "50 g of water + 1 g of acetic_acid", "20 g of water + 0.4 g of NaOH"),
         ("nitrate", "50 g of water + 1 g of KNO3", "20 g of water + 1 g of HCl"),
-        ("silver", "50 g of water + 1 g of NaCl", "20 g of water + 0.5 g of AgNO3"),
         ("solvents", "50 g of toluene", "20 g of EtOAc"),
         ("thin_permanganate", "50 g of water + 1 g of H2SO4", "20 g of water + 0.05 g of KMnO4"),
     ] {
         assert_eq!(poured(name, target, source), [], "{name}");
     }
+    let silver = poured("silver", "50 g of water + 1 g of NaCl", "20 g of water + 0.5 g of AgNO3");
+    assert_eq!(silver, [("undissolved".to_string(), "warning".to_string())]);
 }
 
 #[test]
@@ -271,7 +272,9 @@ workflow fill in deck {
     transfer 50 uL from stock[A3] to plate[B1] by ot2.left using tips { tips: each }
 }
 ";
-    let found = findings("wells", &deck.replace("3 g of HNO3", "9 g of HNO3"));
+    let mut found = findings("wells", &deck.replace("3 g of HNO3", "9 g of HNO3"));
+    // That acid of 64 % is measured out by volume is another matter.
+    found.retain(|f| f.0 != "volume-of-strong-solution");
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!((found[0].0.as_str(), found[0].2), ("incompatible-mix", 13));
     assert_eq!(findings("wells_clean", &deck.replace("plate[B1]", "plate[B2]")), []);
@@ -289,9 +292,10 @@ fn set_points_above_boiling_and_flash_points_are_cautioned() {
     let boils = |line| vec![("above-boiling-point".to_string(), line)];
     assert_eq!(of("boil", "50 g of acetone", "heat scale to 80 degC"), boils(18));
     assert_eq!(of("warm", "50 g of acetone", "heat scale to 50 degC"), []);
-    assert_eq!(of("thin", "50 g of water + 2 g of acetone", "heat scale to 80 degC"), []);
+    assert_eq!(of("thin", "50 g of water + 0.5 g of EtOH", "heat scale to 95 degC"), []);
     assert_eq!(of("flash", "50 g of DMF", "heat scale to 90 degC"), [("above-flash-point".to_string(), 18)]);
     assert_eq!(of("off", "50 g of acetone", "heat scale to 50 degC\n    stop heating scale"), []);
+    assert_eq!(of("half", "50 g of hexane + 50 g of EtOAc", "heat scale to 110 degC"), boils(18));
     // The vessel may come after the set point.
     let later = plate("50 g of acetone", "heat scale to 80 degC\n    place waste on scale by arm");
     let later = later.replace("waste = Beaker250mL on scale", "waste = Beaker250mL on table at (450, 450) mm");
