@@ -13,7 +13,11 @@ fn contents_begin_and_mix_as_the_lab_says() {
 #[test]
 fn a_study_varies_how_warm_contents_begin() {
     let ended = matterixc(&["study", CASE]);
-    assert!(ended.out.contains("vary hot.contents.initial_temperature in 60 degC .. 90 degC by grid(4)"), "{}", ended.out);
+    assert!(
+        ended.out.contains("vary hot.contents.initial_temperature in 60 degC .. 90 degC by grid(4)"),
+        "{}",
+        ended.out
+    );
     assert!(!ended.out.contains("error"), "{}", ended.out);
 }
 

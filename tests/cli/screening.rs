@@ -343,7 +343,7 @@ fn what_is_declared_wrongly_is_said_where_it_stands() {
         wrong("text", "incompatible ketone with water { consequence: \"heat\", source: \"s\" }"),
         of("type-mismatch")
     );
-    assert_eq!(wrong("allow", "allow incompatible ketone with wter \"x\""), of("unknown-name"));
+    assert_eq!(wrong("allowed", "allow incompatible ketone with wter \"x\""), of("unknown-name"));
     assert_eq!(wrong("stated", "species g { by: mass, reactive_groups: [keton] }"), of("unknown-name"));
     assert_eq!(wrong("when", "hazard h(p: Heater) when p.targt > 3 degC"), of("unknown-member"));
     assert_eq!(wrong("twice", "material glass {}\nmaterial glass {}"), of("duplicate-name"));

@@ -42,7 +42,7 @@ impl Screen {
                 }
                 ItemKind::Material { name, fields } => {
                     unknown_fields(fields, MATERIAL, "a material", reader.found);
-                    forms(fields, &[], &["title", "source"], reader.found);
+                    forms(fields, &[], &["source"], reader.found);
                     screen.materials.insert(id, reader.title(fields, name));
                 }
                 _ => {}
@@ -82,7 +82,6 @@ impl Screen {
 impl<'a> Reader<'_, 'a> {
     fn group(&mut self, decl: DeclId, name: &Name, fields: &'a [Field]) -> Group {
         unknown_fields(fields, GROUP, "a reactive group", self.found);
-        forms(fields, &["members"], &[], self.found);
         let module = self.names.decl(decl).module;
         if field(fields, "smarts").is_none() && field(fields, "members").is_none() {
             self.missing(name, "`smarts` or `members`", "nothing belongs to it", "smarts: [\"...\"]");
@@ -101,7 +100,6 @@ impl<'a> Reader<'_, 'a> {
 
     fn pair(&mut self, fields: &'a [Field], span: Span, module: usize) -> Option<Incompatibility> {
         unknown_fields(fields, PAIR, "an incompatibility", self.found);
-        forms(fields, &[], &["source"], self.found);
         let source = self.source(fields, span, "this pair");
         let Some(f) = field(fields, "consequence") else {
             let name = Name { text: "this pair".into(), span };
