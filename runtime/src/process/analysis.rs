@@ -200,12 +200,34 @@ impl<'g> Analysis<'g> {
         }
     }
 
+    /// A term as a multiple of one of `fluxes`, if it is: the heat of a reaction of what the reaction turns over.
+    fn multiple(&self, (factor, node): (f64, NodeId), fluxes: &[NodeId]) -> (f64, NodeId) {
+        let Op::Binary(BinaryOp::Mul, a, b) = self.graph.op(node) else { return (factor, node) };
+        for (constant, flux) in [(a, b), (b, a)] {
+            let flux = NodeId(self.fact(flux).same);
+            if factor.abs() == 1.0 && !self.fact(constant).varies && fluxes.binary_search(&flux).is_ok() {
+                return (factor * self.fact(constant).now, flux);
+            }
+        }
+        (factor, node)
+    }
+
     /// The tape that computes rates of change: as [`Analysis::tape`], but sums of many terms are as good as exact, so that
     /// what one state loses others gain to the last digit.
     pub(super) fn rates(&self, outputs: &[NodeId], moving: &[u32]) -> Tape {
-        let sums = outputs.iter().map(|&output| {
+        let mut all: Vec<Vec<(f64, NodeId)>> = Vec::new();
+        for &output in outputs {
             let mut terms = Vec::new();
             self.terms(output, 1.0, &mut terms);
+            all.push(terms);
+        }
+        let mut fluxes: Vec<NodeId> = all.iter().flatten().map(|t| t.1).collect();
+        fluxes.sort_unstable();
+        fluxes.dedup();
+        let sums = all.into_iter().map(|mut terms| {
+            for term in &mut terms {
+                *term = self.multiple(*term, &fluxes);
+            }
             let plain = terms.len() < 2 || (terms.len() == 2 && terms.iter().all(|t| t.0.abs() == 1.0));
             if plain { Vec::new() } else { terms }
         });

@@ -13,7 +13,7 @@ pub(super) enum Step {
     Sum(u32, u32),
 }
 
-/// A register times a whole number.
+/// A multiple of a register.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Term {
     pub(super) factor: f64,
@@ -93,7 +93,7 @@ impl Tape {
     }
 }
 
-/// The sum of products with whole numbers, rounded once: near an equilibrium fast terms cancel, and what rounding left of them
+/// The sum of products, rounded once: near an equilibrium fast terms cancel, and what rounding left of them
 /// would make or destroy matter (Ogita, Rump and Oishi 2005: dot product in twice the precision).
 fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut sum, mut error) = (0.0, 0.0);
@@ -108,16 +108,22 @@ fn exact_sum(terms: impl Iterator<Item = (f64, f64)>) -> f64 {
     if all.is_finite() { all } else { sum }
 }
 
-/// The rounded product with a small whole number, and what rounding took from it (Dekker 1971).
+/// The rounded product, and what rounding took from it (Dekker 1971).
 fn two_product(factor: f64, value: f64) -> (f64, f64) {
     let product = factor * value;
     if factor.abs() == 1.0 {
         return (product, 0.0);
     }
+    let ((a, b), (c, d)) = (split(factor), split(value));
+    (product, ((a * c - product) + a * d + b * c) + b * d)
+}
+
+/// A number as the sum of two of half its digits (Veltkamp 1968).
+fn split(value: f64) -> (f64, f64) {
     const SPLIT: f64 = 134_217_729.0;
     let high = SPLIT * value;
     let high = high - (high - value);
-    (product, (factor * high - product) + factor * (value - high))
+    (high, value - high)
 }
 
 #[cfg(test)]
@@ -130,6 +136,10 @@ mod tests {
         assert_eq!(exact_sum([(1.0, 1e-12), (3.0, q), (-3.0, q)].into_iter()), 1e-12);
         let net = exact_sum([(3.0, q), (1.0, 1e-4), (-3.0, r), (-1.0, 1e-4)].into_iter());
         assert_eq!(net, exact_sum([(3.0, q), (-3.0, r)].into_iter()));
+        let heat = exact_sum([(-20_000.1, 7.5e9), (20_000.1, 7.5e9)].into_iter());
+        assert_eq!(heat, 0.0);
+        let heat = exact_sum([(-20_000.1, 7.5e9), (1e-3, 1.0), (20_000.1, 7.5e9)].into_iter());
+        assert!((heat - 1e-3).abs() < 1e-15);
         assert_eq!(exact_sum([(1.0, f64::INFINITY), (1.0, 1.0)].into_iter()), f64::INFINITY);
     }
 }
