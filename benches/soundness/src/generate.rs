@@ -50,8 +50,9 @@ fn drawn(random: &mut Random) -> Plan {
 fn dials(body: &Block) -> usize {
     let mut n = 0;
     each(body, &mut |stmt| {
-        if let Kind::If(Condition::Dial(d), ..) | Kind::While(Condition::Dial(d), ..) | Kind::Until(Condition::Dial(d), ..) =
-            stmt.kind
+        if let Kind::If(Condition::Dial(d), ..)
+        | Kind::While(Condition::Dial(d), ..)
+        | Kind::Until(Condition::Dial(d), ..) = stmt.kind
         {
             n = n.max(d + 1);
         }
@@ -89,7 +90,7 @@ fn cup(random: &mut Random, theme: Theme, number: usize) -> Cup {
         Theme::Reaction => &[0, 0, 1, ACID],
         _ => &[0, 1],
     };
-    let liquid = random.pick(liquids).copied().unwrap_or(0);
+    let liquid = random.pick(liquids).copied().filter(|_| number > 0).unwrap_or(0);
     let max = random.within(30, 100) * 10;
     let (most, cap) = match theme {
         Theme::Tips => (300, None),

@@ -69,7 +69,7 @@ pub enum Step {
 pub struct Execution {
     /// How it ended.
     pub end: End,
-    /// What went wrong and had no handler of its own name.
+    /// What went wrong and had no handler.
     pub violations: Vec<Violation>,
     /// What happened, in order.
     pub steps: Vec<Step>,
@@ -417,7 +417,10 @@ impl<'p> Machine<'p, '_> {
                 self.done(stmt);
             }
             Frame::Parallel { .. } => self.threads[t].state = State::Joins,
-            Frame::Guard { jobs, .. } | Frame::Try { jobs, .. } | Frame::Claim { jobs, .. } | Frame::Root { jobs, .. } => {
+            Frame::Guard { jobs, .. }
+            | Frame::Try { jobs, .. }
+            | Frame::Claim { jobs, .. }
+            | Frame::Root { jobs, .. } => {
                 let jobs = jobs.clone();
                 self.close(t, &jobs);
             }
@@ -681,16 +684,17 @@ impl<'p> Machine<'p, '_> {
         self.threads[t].state = State::Unwinds { failure: Some(failure) };
     }
 
-    /// Whether a block around has a handler of this very name, or another block to try.
+    /// Whether a block around has a handler for it, or another block to try.
     fn thought_of(&self, t: usize, name: &str) -> bool {
         let thread = &self.threads[t];
         let takes = |f: &Frame<'_>| match f {
-            Frame::Guard { handlers, handling: false, .. } => handlers.iter().any(|h| h.on == name),
+            Frame::Guard { handlers, handling: false, .. } => {
+                handlers.iter().any(|h| h.on == name || h.on == "failure")
+            }
             Frame::Try { second: false, .. } => true,
             _ => false,
         };
-        !name.is_empty()
-            && (thread.frames.iter().any(takes) || thread.parent.is_some_and(|p| self.thought_of(p, name)))
+        !name.is_empty() && (thread.frames.iter().any(takes) || thread.parent.is_some_and(|p| self.thought_of(p, name)))
     }
 
     /// A wait for a condition.
@@ -723,7 +727,8 @@ impl<'p> Machine<'p, '_> {
             Condition::On(o) => Thing::Oven(o),
             Condition::Dial(_) => return,
         };
-        let writers: Vec<usize> = self.touches.iter().filter(|x| x.thing == thing && x.write).map(|x| x.thread).collect();
+        let writers: Vec<usize> =
+            self.touches.iter().filter(|x| x.thing == thing && x.write).map(|x| x.thread).collect();
         for writer in writers.into_iter().filter(|w| *w != t) {
             self.learn(t, writer);
         }
@@ -765,7 +770,10 @@ impl<'p> Machine<'p, '_> {
         let (stmt, waited) = match self.threads[t].frames.last() {
             Some(Frame::Parallel { stmt, children }) => (Some(*stmt), children.clone()),
             Some(
-                Frame::Guard { jobs, .. } | Frame::Try { jobs, .. } | Frame::Claim { jobs, .. } | Frame::Root { jobs, .. },
+                Frame::Guard { jobs, .. }
+                | Frame::Try { jobs, .. }
+                | Frame::Claim { jobs, .. }
+                | Frame::Root { jobs, .. },
             ) => (None, jobs.clone()),
             _ => (None, Vec::new()),
         };
@@ -827,7 +835,10 @@ impl<'p> Machine<'p, '_> {
             }
             Some(Frame::Parallel { children: inside, .. }) => inside.clone(),
             Some(
-                Frame::Guard { jobs, .. } | Frame::Try { jobs, .. } | Frame::Claim { jobs, .. } | Frame::Root { jobs, .. },
+                Frame::Guard { jobs, .. }
+                | Frame::Try { jobs, .. }
+                | Frame::Claim { jobs, .. }
+                | Frame::Root { jobs, .. },
             ) => jobs.clone(),
             _ => Vec::new(),
         };

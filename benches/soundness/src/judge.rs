@@ -210,7 +210,11 @@ impl<'p> Places<'p> {
     }
 
     fn thing(&self, cup: usize) -> String {
-        if self.plan.theme == Theme::Tips { format!("plate[{}].contents", well(cup)) } else { format!("c{cup}.contents") }
+        if self.plan.theme == Theme::Tips {
+            format!("plate[{}].contents", well(cup))
+        } else {
+            format!("c{cup}.contents")
+        }
     }
 }
 
@@ -229,15 +233,26 @@ impl Verdict {
             if finding.severity != Severity::Error {
                 continue;
             }
-            let clean = match finding.stmts.first() {
-                Some(id) => self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code)),
+            // Who of two that meet is in fault is a matter of words.
+            let between = ["claimed-twice", "deadlock"].contains(&finding.code);
+            let first = finding.stmts.first().filter(|_| !between);
+            let done = |id: &Id| self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code));
+            // Where it goes wrong in the same way in every order, the place is a matter of which order is told of.
+            let elsewhere = !self.summary.certain || self.goes_wrong(finding.code);
+            let clean = match first {
                 None => self.summary.clean,
+                Some(id) => done(id) && (self.summary.clean || !elsewhere),
             };
             if clean {
                 let place = finding.stmts.first().map(|id| places.of(*id)).unwrap_or_default();
                 self.differ(Sort::FalseError, finding.code, place, finding.headline.clone());
             }
         }
+    }
+
+    /// Whether some execution fails with a code.
+    fn goes_wrong(&self, code: &str) -> bool {
+        self.summary.fates.values().any(|f| f.failed.contains_key(code))
     }
 
     /// What `check --strict` is content with although it goes wrong in some execution, if it is.
@@ -252,8 +267,8 @@ impl Verdict {
 
     /// Executions against what is known at every statement.
     fn enclosures(&mut self, plan: &Plan, known: &Points, at: &Lines<'_>, places: &Places<'_>) {
-        // What a `retry` does once more is not followed.
-        if places.again {
+        // What a `retry` does once more is not followed, and no run has what an error keeps from running.
+        if places.again || self.findings.iter().any(|f| f.severity == Severity::Error) {
             return;
         }
         let number = known.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
@@ -263,7 +278,12 @@ impl Verdict {
             let worlds = fate.after.clone();
             match &point.after {
                 None if !worlds.is_empty() && self.findings.is_empty() => {
-                    self.differ(Sort::Outside, "unreached", places.of(id), format!("nothing goes on behind `{}`", point.label));
+                    self.differ(
+                        Sort::Outside,
+                        "unreached",
+                        places.of(id),
+                        format!("nothing goes on behind `{}`", point.label),
+                    );
                 }
                 None => {}
                 Some(after) => {
@@ -305,20 +325,27 @@ impl Verdict {
         let number = program.plan.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
         for (span, values) in std::mem::take(&mut watch.begun) {
             let Some(id) = at.stmt(number, span) else { continue };
-            let Some(point) = places.before.get(&id).and_then(|before| {
-                known?.points.iter().find(|p| at.stmt(number, p.span) == Some(*before))
-            }) else {
+            let Some(point) = places
+                .before
+                .get(&id)
+                .and_then(|before| known?.points.iter().find(|p| at.stmt(number, p.span) == Some(*before)))
+            else {
                 continue;
             };
             let Some(after) = &point.after else { continue };
             for ((thing, fact), value) in watch.names.clone().iter().zip(&values) {
-                let fact = after.things.iter().find(|t| t.name == *thing).and_then(|t| {
-                    t.facts.iter().chain(&t.species).find(|f| f.name == *fact)
-                });
+                let fact = after
+                    .things
+                    .iter()
+                    .find(|t| t.name == *thing)
+                    .and_then(|t| t.facts.iter().chain(&t.species).find(|f| f.name == *fact));
                 if let (Some(fact), Some(value), false) = (fact, value, places.again)
                     && !encloses(&fact.value, *value, slack(&fact.name))
                 {
-                    let what = format!("run: {thing}.{} is {value} behind `{}`, not in {:?}", fact.name, point.label, fact.value);
+                    let what = format!(
+                        "run: {thing}.{} is {value} behind `{}`, not in {:?}",
+                        fact.name, point.label, fact.value
+                    );
                     self.differ(Sort::Outside, fact.name.clone(), places.of(id), what);
                 }
             }
@@ -418,7 +445,9 @@ impl<'p> Watch<'p> {
         for observable in &program.model.observables {
             for cup in 0..plan.lab.cups.len() {
                 let thing = places.thing(cup);
-                let Some(member) = observable.name.strip_prefix(&thing).and_then(|m| m.strip_prefix('.')) else { continue };
+                let Some(member) = observable.name.strip_prefix(&thing).and_then(|m| m.strip_prefix('.')) else {
+                    continue;
+                };
                 let member = member.strip_prefix("amount[").and_then(|m| m.strip_suffix(']')).unwrap_or(member);
                 if let [node] = observable.value[..] {
                     names.push((thing, member.to_string()));
