@@ -65,6 +65,7 @@ fn lab(random: &mut Random, theme: Theme) -> Lab {
     let cups = match theme {
         Theme::Devices | Theme::Claims => 0,
         Theme::Heat => 2,
+        Theme::Hazards => random.within(3, 4),
         _ => random.within(2, 4),
     };
     for i in 0..cups {
@@ -90,14 +91,19 @@ fn cup(random: &mut Random, theme: Theme, number: usize) -> Cup {
         Theme::Reaction => &[0, 0, 1, ACID],
         _ => &[0, 1],
     };
-    let liquid = random.pick(liquids).copied().filter(|_| number > 0).unwrap_or(0);
+    let liquid = match (theme, number) {
+        (Theme::Hazards, 1) => ACID,
+        (Theme::Hazards, 2) => CYAN,
+        (_, 0) => 0,
+        _ => random.pick(liquids).copied().unwrap_or(0),
+    };
     let max = random.within(30, 100) * 10;
     let (most, cap) = match theme {
         Theme::Tips => (300, None),
         Theme::Heat => (50_000, None),
         _ => (max * 4 / 5, random.chance(25).then(|| random.chance(25))),
     };
-    let filled = number == 0 || random.chance(65);
+    let filled = number == 0 || theme == Theme::Hazards && number < 3 || random.chance(65);
     let volume = (random.within(most / 8, most) / 10 * 10) as u32;
     Cup { max: max as u32, holds: filled.then_some((liquid, volume)), cap }
 }

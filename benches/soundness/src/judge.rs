@@ -267,8 +267,9 @@ impl Verdict {
 
     /// Executions against what is known at every statement.
     fn enclosures(&mut self, plan: &Plan, known: &Points, at: &Lines<'_>, places: &Places<'_>) {
-        // What a `retry` does once more is not followed, and no run has what an error keeps from running.
-        if places.again || self.findings.iter().any(|f| f.severity == Severity::Error) {
+        // What a `retry` does once more is not followed, after a finding what it is about counts as not known, and what was missed
+        // is told of as that.
+        if places.again || !self.clean_without("") || !self.summary.violations.is_empty() {
             return;
         }
         let number = known.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
@@ -323,6 +324,7 @@ impl Verdict {
         let outcome = run(program, &RunOptions::default(), &mut watch);
         self.ran = true;
         let number = program.plan.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
+        let followed = !places.again && self.clean_without("") && self.summary.violations.is_empty();
         for (span, values) in std::mem::take(&mut watch.begun) {
             let Some(id) = at.stmt(number, span) else { continue };
             let Some(point) = places
@@ -339,7 +341,7 @@ impl Verdict {
                     .iter()
                     .find(|t| t.name == *thing)
                     .and_then(|t| t.facts.iter().chain(&t.species).find(|f| f.name == *fact));
-                if let (Some(fact), Some(value), false) = (fact, value, places.again)
+                if let (Some(fact), Some(value), true) = (fact, value, followed)
                     && !encloses(&fact.value, *value, slack(&fact.name))
                 {
                     let what = format!(
