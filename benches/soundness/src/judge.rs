@@ -237,11 +237,13 @@ impl Verdict {
             let between = ["claimed-twice", "deadlock"].contains(&finding.code);
             let first = finding.stmts.first().filter(|_| !between);
             let done = |id: &Id| self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code));
+            // Behind another error nothing is certain.
+            let alone = self.findings.iter().filter(|f| f.severity == Severity::Error).count() == 1;
             // Where it goes wrong in the same way in every order, the place is a matter of which order is told of.
             let elsewhere = !self.summary.certain || self.goes_wrong(finding.code);
             let clean = match first {
                 None => self.summary.clean,
-                Some(id) => done(id) && (self.summary.clean || !elsewhere),
+                Some(id) => done(id) && (self.summary.clean || !elsewhere && alone),
             };
             if clean {
                 let place = finding.stmts.first().map(|id| places.of(*id)).unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::plan::{Action, Block, Condition, Handler, Id, Kind, LIQUIDS, Lab, Plan, Remedy, Stmt, Theme, Thing};
+use crate::plan::{ACID, Action, Block, Condition, Handler, Id, Kind, LIQUIDS, Lab, Plan, Remedy, Stmt, Theme, Thing};
 
 /// A file with several plans.
 #[derive(Debug, Default)]
@@ -93,8 +93,8 @@ pub fn print(plans: &[Plan]) -> Text {
     out.line("mtx 1", None);
     out.line("use std::glassware::Beaker50mL", None);
     out.line("use std::opentrons::{Corning96, OT2, P300Single, TipRack300}", None);
-    for l in LIQUIDS {
-        let text = match reaction && l.heat != 3.0 {
+    for (i, l) in LIQUIDS.iter().enumerate() {
+        let text = match reaction && i < ACID {
             true => format!(
                 "species {} {{ formula: \"C2H6O\", density: {} g/mL, heat_capacity: 100 J/(mol*K) }}",
                 l.name, l.density

@@ -10,10 +10,33 @@ use matterix_soundness::survey::{Judged, survey};
 const PLANS: u64 = 500;
 
 /// Disagreements that are not mended yet: the seed, and what it is about.
-const KNOWN: &[(u64, &str)] = &[];
+const KNOWN: &[(u64, &str)] = &[
+    // Two steps that meet in a block with `try`, which takes the failure.
+    (86, "FalseError claimed-twice"),
+    (275, "FalseError claimed-twice"),
+    (292, "FalseError claimed-twice"),
+    // Left on along some way only.
+    (195, "Missed unfinished"),
+    (376, "Missed unfinished"),
+    (414, "Missed unfinished"),
+    // A reaction changes the volume.
+    (380, "Missed volume-underflow"),
+    (406, "Missed transfer-fraction"),
+    (449, "Missed transfer-fraction"),
+    (499, "Missed transfer-fraction"),
+    // Behind a failure that is certain and handled nothing is followed.
+    (42, "Missed transfer-fraction"),
+    (345, "Missed capped"),
+    (378, "Outside unreached"),
+    (379, "Missed transfer-fraction"),
+    // `finally` behind a `fail` that comes before a job.
+    (267, "Outside mass"),
+    (267, "Outside red"),
+    (267, "Outside volume"),
+];
 
 /// Families of checks that the machine must miss when they are switched off.
-const MISSED: &[char] = &['V', 'T', 'P', 'R'];
+const MISSED: &[char] = &['V', 'T', 'P', 'R', 'H'];
 
 #[test]
 fn nothing_disagrees_that_is_not_known() {

@@ -70,7 +70,7 @@ fn what_is_left_on_in_one_way_is_seen() {
 
 #[test]
 fn a_wait_for_noise_ends_before_and_after_what_goes_on_beside_it() {
-    let wait = block(vec![Kind::Until(Condition::Dial(0), 5_000, None), Kind::Do(Action::Drip(100, 1, 0))], 10);
+    let wait = block(vec![Kind::Until(Condition::Dial(0), 20_000, None), Kind::Do(Action::Drip(100, 1, 0))], 10);
     let other = block(vec![Kind::Wait(4_000), Kind::Do(Action::Drip(100, 0, 2))], 20);
     let summary = of(vec![Kind::Parallel(vec![wait, other])]);
     assert!(summary.complete && codes(&summary).contains(&"incompatible-mix") && summary.clean);
