@@ -1,0 +1,407 @@
+//! How a lab stands, and the laws by which it changes: written from the texts of the library, not from the twin.
+
+use crate::plan::{ACID, Action, CYAN, Condition, LIQUIDS, Plan, Theme};
+
+/// Volumes and masses below this count as nothing, uL and mg.
+pub const NOTHING: f64 = 1e-6;
+
+/// Temperature of the air, degC.
+const AMBIENT: f64 = 22.0;
+
+/// Longest step of the integration of heat, s.
+const STEP: f64 = 0.25;
+
+/// Rate constant of the reaction `turn`, 1/s.
+const RATE: f64 = 0.02;
+
+/// Smallest and largest stroke of the pipette, uL.
+const STROKES: (f64, f64) = (20.0, 300.0);
+
+/// So many tips a rack has.
+const TIPS: usize = 96;
+
+/// A mixture: mg of each liquid, its heat in J above 0 degC, and which liquids it has met.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Mixture {
+    /// mg by liquid.
+    pub mass: [f64; 4],
+    /// J.
+    pub heat: f64,
+    /// A bit for each liquid in it or that was in it.
+    pub seen: u8,
+}
+
+impl Mixture {
+    /// uL.
+    pub fn volume(&self) -> f64 {
+        self.mass.iter().zip(LIQUIDS).map(|(m, l)| m / l.density).sum()
+    }
+
+    /// J/K.
+    pub fn capacity(&self) -> f64 {
+        self.mass.iter().zip(LIQUIDS).map(|(m, l)| m / 1000.0 * l.heat).sum()
+    }
+
+    /// degC; that of the air where there is nothing.
+    pub fn temperature(&self) -> f64 {
+        let capacity = self.capacity();
+        if capacity > 0.0 { self.heat / capacity } else { AMBIENT }
+    }
+
+    /// Takes a share out.
+    fn take(&mut self, share: f64) -> Mixture {
+        let mut out = Mixture { seen: self.seen, ..Mixture::default() };
+        for (o, m) in out.mass.iter_mut().zip(&mut self.mass) {
+            *o = *m * share;
+            *m -= *o;
+        }
+        out.heat = self.heat * share;
+        self.heat -= out.heat;
+        out
+    }
+
+    fn add(&mut self, other: Mixture) {
+        for (m, o) in self.mass.iter_mut().zip(other.mass) {
+            *m += o;
+        }
+        self.heat += other.heat;
+        self.seen |= other.seen;
+    }
+}
+
+/// A vessel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vessel {
+    /// What is in it.
+    pub contents: Mixture,
+    /// To the brim, uL.
+    pub max: f64,
+    /// Whether its cap is on; none where it has none.
+    pub cap: Option<bool>,
+    /// Temperature of its glass, degC.
+    pub glass: f64,
+}
+
+/// A device with a lid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Oven {
+    /// Whether its lid is open.
+    pub open: bool,
+    /// Whether it is on.
+    pub burning: bool,
+}
+
+/// A hot plate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plate {
+    /// Whether it heats.
+    pub hot: bool,
+    /// Its set point, degC.
+    pub goal: f64,
+    /// degC.
+    pub temperature: f64,
+}
+
+/// The whole lab.
+#[derive(Clone, Debug, PartialEq)]
+pub struct World {
+    /// Vessels.
+    pub cups: Vec<Vessel>,
+    /// Devices with a lid.
+    pub ovens: Vec<Oven>,
+    /// Hot plates.
+    pub plates: Vec<Plate>,
+    /// What the tip of the pipette holds, where it has one.
+    pub tip: Option<Mixture>,
+    tips: usize,
+    reacts: bool,
+}
+
+/// Why a step does not go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// A failure with a name.
+    Failure(&'static str),
+    /// Nothing can go on.
+    Fault,
+}
+
+impl World {
+    /// As a plan finds it.
+    pub fn new(plan: &Plan) -> Self {
+        let tips = plan.theme == Theme::Tips;
+        let cups = plan.lab.cups.iter().map(|cup| {
+            let mut contents = Mixture::default();
+            if let Some((liquid, volume)) = cup.holds {
+                contents.mass[liquid] = f64::from(volume) * LIQUIDS[liquid].density;
+                contents.heat = contents.capacity() * AMBIENT;
+                contents.seen = 1 << liquid;
+            }
+            let max = match (tips, plan.lab.plates > 0) {
+                (true, _) => 360.0,
+                (_, true) => 70_000.0,
+                _ => f64::from(cup.max),
+            };
+            Vessel { contents, max, cap: if tips || plan.lab.plates > 0 { None } else { cup.cap }, glass: AMBIENT }
+        });
+        World {
+            cups: cups.collect(),
+            ovens: plan.lab.ovens.iter().map(|&open| Oven { open, burning: false }).collect(),
+            plates: vec![Plate { hot: false, goal: AMBIENT, temperature: AMBIENT }; plan.lab.plates],
+            tip: None,
+            tips: TIPS,
+            reacts: plan.theme == Theme::Reaction,
+        }
+    }
+
+    /// How long an action lasts, s.
+    pub fn duration(action: &Action) -> f64 {
+        match *action {
+            Action::Drip(..) => 1.13,
+            Action::Tip(..) => 0.71,
+            Action::Double(..) => 0.0,
+            Action::Cap(_) | Action::Uncap(_) => 2.3,
+            Action::Fire(_) => 1.7,
+            Action::Quench(_) => 0.93,
+            Action::Open(_) => 1.37,
+            Action::Close(_) => 1.51,
+            Action::Heat(..) => 1.19,
+            Action::Cool(_) => 0.83,
+            Action::TakeTip | Action::DropTip => 4.0,
+            Action::Aspirate(v, _) | Action::Dispense(v, _) => 1.5 + f64::from(v) / 92.86,
+            Action::BlowOut(_) => 1.5,
+        }
+    }
+
+    /// Whether a condition holds; none where it depends on noise.
+    pub fn holds(&self, condition: &Condition) -> Option<bool> {
+        match *condition {
+            Condition::Dial(_) => None,
+            Condition::Fuller(c, v) => Some(self.cups[c].contents.volume() > f64::from(v)),
+            Condition::On(o) => Some(self.ovens[o].burning),
+            Condition::Warm(c, t) => Some(self.cups[c].contents.temperature() >= f64::from(t)),
+        }
+    }
+
+    /// Whether a quantity is so near its limit that rounding decides.
+    pub fn close(&self, condition: &Condition) -> bool {
+        match *condition {
+            Condition::Fuller(c, v) => (self.cups[c].contents.volume() - f64::from(v)).abs() < 1e-3,
+            Condition::Warm(c, t) => (self.cups[c].contents.temperature() - f64::from(t)).abs() < 1e-3,
+            _ => false,
+        }
+    }
+
+    /// What an action needs when it begins.
+    pub fn needs(&self, action: &Action) -> Result<(), Refusal> {
+        let need = |holds: bool, name: &'static str| if holds { Ok(()) } else { Err(Refusal::Failure(name)) };
+        let uncapped = |c: usize| self.cups[c].cap != Some(true);
+        let volume = |c: usize| self.cups[c].contents.volume();
+        match *action {
+            Action::Drip(v, a, b) => {
+                need(volume(a) >= f64::from(v) - NOTHING, "volume_underflow")?;
+                need(self.cups[b].max - volume(b) >= f64::from(v) - NOTHING, "volume_overflow")?;
+                need(uncapped(a) && uncapped(b), "capped")
+            }
+            Action::Fire(o) => need(!self.ovens[o].open, "lid_open"),
+            Action::Open(o) => need(!self.ovens[o].burning, "still_moving"),
+            Action::TakeTip => {
+                need(self.tip.is_none(), "tip_on_tip")?;
+                need(self.tips > 0, "out_of_tips")
+            }
+            Action::DropTip => need(self.tip.is_some(), "no_tip"),
+            Action::Aspirate(v, c) => {
+                let Some(tip) = self.tip else { return Err(Refusal::Failure("no_tip")) };
+                let v = f64::from(v);
+                need(v >= STROKES.0, "below_minimum")?;
+                need(tip.volume() + v <= STROKES.1 + NOTHING, "tip_overflow")?;
+                need(volume(c) > NOTHING, "never_filled")?;
+                need(volume(c) >= v - NOTHING, "volume_underflow")?;
+                need(tip.seen & !self.cups[c].contents.seen == 0, "contamination")
+            }
+            Action::Dispense(v, c) => {
+                let Some(tip) = self.tip else { return Err(Refusal::Failure("no_tip")) };
+                let v = f64::from(v);
+                need(v >= STROKES.0, "below_minimum")?;
+                need(tip.volume() >= v - NOTHING, "volume_underflow")?;
+                need(volume(c) + v <= self.cups[c].max + NOTHING, "volume_overflow")
+            }
+            Action::BlowOut(c) => {
+                let Some(tip) = self.tip else { return Err(Refusal::Failure("no_tip")) };
+                need(volume(c) + tip.volume() <= self.cups[c].max + NOTHING, "volume_overflow")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether an action presumes what is not so.
+    pub fn presumes_wrongly(&self, action: &Action) -> bool {
+        match *action {
+            Action::Cap(c) => self.cups[c].cap == Some(true),
+            Action::Uncap(c) => self.cups[c].cap == Some(false),
+            _ => false,
+        }
+    }
+
+    /// Whether the effects of an action come at its end: those of an `extern skill` do, those of a command at its start.
+    pub fn at_end(action: &Action) -> bool {
+        matches!(action, Action::Drip(..) | Action::Tip(..))
+    }
+
+    /// What an action does.
+    pub fn effect(&mut self, action: &Action) -> Result<(), Refusal> {
+        match *action {
+            Action::Drip(v, a, b) | Action::Tip(v, a, b) => return self.pour(f64::from(v), a, b),
+            Action::Cap(c) => self.cups[c].cap = Some(true),
+            Action::Uncap(c) => self.cups[c].cap = Some(false),
+            Action::Fire(o) => self.ovens[o].burning = true,
+            Action::Quench(o) => self.ovens[o].burning = false,
+            Action::Open(o) => self.ovens[o].open = true,
+            Action::Close(o) => self.ovens[o].open = false,
+            Action::Heat(p, t) => (self.plates[p].hot, self.plates[p].goal) = (true, f64::from(t)),
+            Action::Cool(p) => self.plates[p].hot = false,
+            Action::TakeTip => (self.tip, self.tips) = (Some(Mixture::default()), self.tips - 1),
+            Action::DropTip => self.tip = None,
+            Action::Aspirate(v, c) => {
+                let volume = self.cups[c].contents.volume();
+                let taken = self.cups[c].contents.take((f64::from(v) / volume).min(1.0));
+                if let Some(tip) = &mut self.tip {
+                    tip.add(taken);
+                }
+            }
+            Action::Dispense(v, c) => {
+                let given = self.tip.as_mut().map(|tip| tip.take((f64::from(v) / tip.volume()).min(1.0)));
+                self.cups[c].contents.add(given.unwrap_or_default());
+            }
+            Action::BlowOut(c) => {
+                if let Some(tip) = self.tip.as_mut().filter(|t| t.volume() > 0.0) {
+                    let given = tip.take(1.0);
+                    self.cups[c].contents.add(given);
+                }
+            }
+            Action::Double(..) => {}
+        }
+        Ok(())
+    }
+
+    /// Moves a volume without asking; the target may flow over.
+    fn pour(&mut self, volume: f64, from: usize, to: usize) -> Result<(), Refusal> {
+        let there = self.cups[from].contents.volume();
+        if there < volume - NOTHING {
+            return Err(Refusal::Fault);
+        }
+        let moved = self.cups[from].contents.take((volume / there).min(1.0));
+        self.cups[to].contents.add(moved);
+        match self.cups[to].contents.volume() > self.cups[to].max + 0.001 {
+            true => Err(Refusal::Failure("volume_overflow")),
+            false => Ok(()),
+        }
+    }
+
+    /// The first vessel in which something dangerous has come together.
+    pub fn danger(&self) -> Option<usize> {
+        let both = |m: &Mixture| m.mass[ACID] > NOTHING && m.mass[CYAN] > NOTHING;
+        self.cups.iter().position(|c| both(&c.contents))
+    }
+
+    /// Lets time pass, s; `until` stops it when a condition comes true. Says how much has passed.
+    pub fn pass(&mut self, time: f64, until: &[Condition]) -> f64 {
+        if self.reacts {
+            self.react(time);
+        }
+        if self.plates.is_empty() {
+            return time;
+        }
+        let mut passed = 0.0;
+        while passed < time {
+            let step = STEP.min(time - passed);
+            let before = self.clone();
+            self.warm(step);
+            if until.iter().any(|c| self.holds(c) == Some(true)) {
+                let (mut low, mut high) = (0.0, step);
+                for _ in 0..40 {
+                    let middle = (low + high) / 2.0;
+                    let mut there = before.clone();
+                    there.warm(middle);
+                    match until.iter().any(|c| there.holds(c) == Some(true)) {
+                        true => (*self, high) = (there, middle),
+                        false => low = middle,
+                    }
+                }
+                return passed + high;
+            }
+            passed += step;
+        }
+        time
+    }
+
+    /// The reaction of first order in closed form.
+    fn react(&mut self, time: f64) {
+        let tip = self.tip.as_mut();
+        for mixture in self.cups.iter_mut().map(|c| &mut c.contents).chain(tip) {
+            let turned = mixture.mass[0] * -f64::exp_m1(-RATE * time);
+            mixture.mass[0] -= turned;
+            mixture.mass[1] += turned;
+        }
+    }
+
+    /// One step of the method of Runge and Kutta of fourth order.
+    fn warm(&mut self, h: f64) {
+        let x = self.warmth();
+        let moved = |x: &[f64], k: &[f64], h: f64| -> Vec<f64> { x.iter().zip(k).map(|(x, k)| x + h * k).collect() };
+        let k1 = self.flows(&x);
+        let k2 = self.flows(&moved(&x, &k1, h / 2.0));
+        let k3 = self.flows(&moved(&x, &k2, h / 2.0));
+        let k4 = self.flows(&moved(&x, &k3, h));
+        let sum = |i: usize| k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i];
+        let x: Vec<f64> = (0..x.len()).map(|i| x[i] + h / 6.0 * sum(i)).collect();
+        let plates = self.plates.len();
+        for (i, plate) in self.plates.iter_mut().enumerate() {
+            plate.temperature = x[i];
+        }
+        for (i, cup) in self.cups.iter_mut().enumerate() {
+            cup.glass = x[plates + 2 * i];
+            cup.contents.heat = x[plates + 2 * i + 1];
+        }
+    }
+
+    /// Temperatures of plates, then of each glass with the heat of what it holds.
+    fn warmth(&self) -> Vec<f64> {
+        let cups = self.cups.iter().flat_map(|c| [c.glass, c.contents.heat]);
+        self.plates.iter().map(|p| p.temperature).chain(cups).collect()
+    }
+
+    /// Rates of these: Newton's law of cooling, conduction through the foot and the wall, and the heater.
+    fn flows(&self, x: &[f64]) -> Vec<f64> {
+        let plates = self.plates.len();
+        let mut flows = vec![0.0; x.len()];
+        for (i, plate) in self.plates.iter().enumerate() {
+            let heater = if plate.hot { (30.0 * (plate.goal - x[i])).clamp(0.0, 200.0) } else { 0.0 };
+            flows[i] += heater - 0.3 * (x[i] - AMBIENT);
+        }
+        for (i, cup) in self.cups.iter().enumerate() {
+            let (glass, heat) = (plates + 2 * i, plates + 2 * i + 1);
+            flows[glass] -= 0.09 * (x[glass] - AMBIENT);
+            if i < plates {
+                let q = 0.9 * (x[i] - x[glass]);
+                flows[i] -= q;
+                flows[glass] += q;
+            }
+            let capacity = cup.contents.capacity();
+            if capacity > 0.0 {
+                let inside = x[heat] / capacity;
+                let q = 0.8 * (x[glass] - inside);
+                flows[glass] -= q;
+                flows[heat] += q - 0.013 * (inside - AMBIENT);
+            }
+        }
+        for (i, flow) in flows.iter_mut().enumerate() {
+            if i < plates {
+                *flow /= 300.0;
+            } else if (i - plates) % 2 == 0 {
+                *flow /= 27.0;
+            }
+        }
+        flows
+    }
+}
