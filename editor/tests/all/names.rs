@@ -39,7 +39,7 @@ workflow cook(target: Temperature = warm) in bench {
     step look { expect beaker.contents.temperature > 40 degC }
     for x in [1 s, 2 s] { wait x }
     expect crate.lid == open and look.elapsed < 1 h and rise > 1 K
-}
+} finally { stop heating plate }
 "#;
 
 /// The lab with a mark at the n-th occurrence of a text, `|` within it where the cursor stands.

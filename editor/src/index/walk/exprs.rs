@@ -20,6 +20,9 @@ const FIXED: &[(&str, &str)] = &[
 /// Folds over a set.
 const FOLDS: &[&str] = &["sum", "product", "min", "max", "all", "any"];
 
+/// The set of all reactions.
+const REACTION: &str = "Reaction";
+
 /// Shapes of things, and turning.
 const SHAPES: &[&str] = &["box", "cylinder", "sphere", "mesh", "vessel", "turned", "rpy"];
 
@@ -80,8 +83,16 @@ impl Walk<'_> {
             ExprKind::Call(callee, args) => self.function(callee, args),
             ExprKind::Fold { fold, var, set, body } => {
                 self.language(fold.span, "over all of a set");
-                let set = self.expr(set);
-                let each = self.each(&set.sort);
+                let each = match &*set.kind {
+                    ExprKind::Name(n) if n.text == REACTION && self.find(n).is_none() => {
+                        self.language(n.span, "every reaction of the file and what it imports");
+                        Sort::Reaction
+                    }
+                    _ => {
+                        let set = self.expr(set);
+                        self.each(&set.sort)
+                    }
+                };
                 let mut result = Found::nothing();
                 self.inside(e.span, |this| {
                     this.bind(Kind::Variable, var, e.span, &Found::of(each));

@@ -2,7 +2,7 @@
 
 use matterix_lang::ast::{Expr, ExprKind, FieldValue, Item, ItemKind, Name, Path, StmtKind};
 
-use super::Walk;
+use super::{Found, Walk};
 use crate::index::{Kind, Meaning};
 
 impl Walk<'_> {
@@ -82,6 +82,9 @@ impl Walk<'_> {
             ItemKind::Accept { name, .. } => self.global(name),
             ItemKind::Hazard { params, of, after, when, because, .. } => {
                 self.params(params);
+                if let Some(share) = of.iter().chain(after).find_map(share_moved) {
+                    self.bind(Kind::Variable, share, item.span, &Found::of(Sort::number()));
+                }
                 self.exprs(of.iter().chain(after));
                 self.expr(when);
                 because.iter().for_each(|words| self.said_of(when, words));
@@ -212,4 +215,13 @@ impl Walk<'_> {
             _ => {}
         }
     }
+}
+
+/// The name that `move(share, from: a, to: b)` gives to the share.
+fn share_moved(of: &Expr) -> Option<&Name> {
+    let ExprKind::Call(_, args) = &*of.kind else { return None };
+    args.iter().find(|a| a.name.is_none()).and_then(|a| match &*a.value.kind {
+        ExprKind::Name(n) if args.len() == 3 => Some(n),
+        _ => None,
+    })
 }
