@@ -33,7 +33,7 @@ workflow warm in bench {
     heat plate to 60 degC
     wait until beaker.contents.temperature > 40 degC timeout 4 h
     stop heating plate
-}
+} finally { stop heating plate }
 ";
 
 #[test]

@@ -26,7 +26,7 @@ workflow w(n: Int = 2) in bench {
     for t in [1 s, 2 s] { wait t }
     go (cup, plate) to (cup, n)
     sequence { wait until elapsed > 1 s timeout 1 min } on timeout { wait 1 s } on failure { wait 2 s }
-    expect piped(cup, plate) and first > 0.7 m
+    expect piped(plate, cup) and first > 0.7 m
 }
 ";
 

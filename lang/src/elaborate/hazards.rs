@@ -178,8 +178,7 @@ impl<'a> Elaborator<'a> {
                     _ => continue,
                 },
             };
-            let hazard =
-                if self.enter(name.span) { self.hazard(declared, watched, shown, &mut scope) } else { None };
+            let hazard = if self.enter(name.span) { self.hazard(declared, watched, shown, &mut scope) } else { None };
             self.leave();
             out.extend(hazard.map(|h| Hazard { measure, ..h }));
         }

@@ -8,7 +8,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::instances::Setting;
 use super::{Elaborator, Pair};
 use crate::ast::{
-    self, AssetLine, AssetLiteral, Contents, Expr, ExprKind, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
+    self, AssetLine, AssetLiteral, Contents, Expr, ExprKind, Field, FieldValue, Holding, ItemKind, LabLineKind, Name,
+    Path,
 };
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
