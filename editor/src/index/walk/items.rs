@@ -1,6 +1,7 @@
 //! Items: what is declared at the top of a file.
 
 use matterix_lang::ast::{Expr, ExprKind, FieldValue, Item, ItemKind, Name, Path, StmtKind};
+use matterix_lang::meanings::Sort;
 
 use super::{Found, Walk};
 use crate::index::{Kind, Meaning};
