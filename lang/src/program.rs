@@ -602,7 +602,8 @@ fn judge_anew<'a>(
     let foreseen = std::mem::take(&mut package.foreseen);
     let mut judged = crate::share::over(&open, |task| {
         // A processor that is free for it makes the draft.
-        let foreseen = foreseen.of(names, task).filter(|_| 2 * open.len() <= crate::share::processors());
+        let free = 2 * open.len() <= crate::share::processors();
+        let foreseen = foreseen.of(names, task).filter(|reach| free && reach.is_of(tables));
         judge(tables, sources, task, asked, foreseen)
     })
     .into_iter();

@@ -66,7 +66,8 @@ fn a_line_that_cannot_be_read_is_not_judged() {
 
 #[test]
 fn an_independent_mistake_on_another_line_is_reported_too() {
-    let wrong = BENCH.replace("100 g of water", "100 g water").replace("stop heating plate", "stop heating plaet");
+    let wrong =
+        BENCH.replace("100 g of water", "100 g water").replace("    stop heating plate", "    stop heating plaet");
     let codes: Vec<String> = findings("two", &wrong).into_iter().map(|f| f.0).collect();
     assert_eq!(codes, ["syntax", "unknown-name"]);
 }

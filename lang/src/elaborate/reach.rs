@@ -28,6 +28,12 @@ impl Reach {
         self.sets.get(mixture)
     }
 
+    /// Whether all its species are of a table: one that an earlier state of a text led to may name some that are gone.
+    pub fn is_of(&self, tables: &Tables<'_>) -> bool {
+        let species = tables.species.iter().count();
+        self.sets.values().chain(self.written.values()).flatten().all(|s| (s.0 as usize) < species)
+    }
+
     /// The reagents that can get into a mixture; known only where something asks for lineage.
     pub fn origins<'r>(&'r self, mixture: &str) -> impl Iterator<Item = &'r str> + use<'r> {
         self.origins.get(mixture).into_iter().flatten().map(String::as_str)

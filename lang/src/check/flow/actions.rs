@@ -316,6 +316,12 @@ impl Flow<'_, '_> {
         self.forget(&changed.into_iter().collect::<Vec<_>>(), facts);
     }
 
+    /// Does what an event does; the states that are no longer what they were.
+    pub fn happen(&mut self, event: u32, facts: &mut Facts) -> Vec<u32> {
+        let events = self.events;
+        events[event as usize].actions.iter().flat_map(|action| self.act(action, facts)).collect()
+    }
+
     /// The events that look at any of these states.
     pub fn events_on(&self, states: &[u32]) -> Vec<u32> {
         states.iter().filter_map(|s| self.events_of.get(s)).flatten().copied().collect()

@@ -16,8 +16,8 @@ use super::fluxes::Row;
 use super::polytope::scaled;
 use super::value::{Known, Why};
 
-/// A rate below this share of a state's scale per second moves nothing that matters within the longest run.
-const STILL: f64 = 1e-9;
+/// A rate below this share of a state's scale per second is rounding.
+const STILL: f64 = 1e-13;
 
 /// Doublings of a face's distance before it counts as without bound.
 const DOUBLINGS: usize = 50;
@@ -105,7 +105,11 @@ impl Flow<'_, '_> {
             }
             let mut due = self.events_on(&moved);
             due.append(&mut timed);
+            let mut recurring = due.clone();
             self.fire(due, facts);
+            recurring.sort_unstable();
+            recurring.dedup();
+            self.recur(&recurring, facts);
             if facts.unsettled.is_empty() || moved.is_empty() {
                 return;
             }
@@ -113,6 +117,40 @@ impl Flow<'_, '_> {
         let states: Vec<u32> = facts.moving.iter().map(|i| self.derivatives[*i as usize].state).collect();
         facts.forget(&states);
         facts.barrier = None;
+    }
+
+    /// Events that time may bring about more than once: what they would change further counts as unknown.
+    fn recur(&mut self, due: &[u32], facts: &mut Facts) {
+        let due: Vec<u32> = due.iter().copied().filter(|i| facts.fired[*i as usize].is_none()).collect();
+        let moving: Vec<u32> = facts.moving.iter().map(|i| self.derivatives[*i as usize].state).collect();
+        // Each turn forgets a state or ends.
+        while let Some(states) = due.iter().find_map(|i| self.further(*i, &due, &moving, facts)) {
+            self.forget(&states, facts);
+        }
+    }
+
+    /// States that an event would change further if it came about once more; none where nothing makes its condition false and true again.
+    fn further(&mut self, event: u32, due: &[u32], moving: &[u32], facts: &Facts) -> Option<Vec<u32>> {
+        let when = self.events[event as usize].when;
+        let mut again = facts.clone();
+        self.assume(when, true, &mut again);
+        let changed = self.happen(event, &mut again);
+        let mut later = again.clone();
+        let mut others: Vec<u32> = moving.to_vec();
+        for other in due.iter().filter(|other| **other != event) {
+            others.extend(self.happen(*other, &mut facts.clone()));
+        }
+        later.forget(&others);
+        if self.eval(when, &later).truth() == Some(false) {
+            return None;
+        }
+        let grows = |state: &u32| {
+            let ((low, high), (least, most)) =
+                (facts.states[*state as usize].bounds(), again.states[*state as usize].bounds());
+            least < low || most > high
+        };
+        let states: Vec<u32> = changed.into_iter().filter(grows).collect();
+        Some(states).filter(|states| !states.is_empty())
     }
 
     /// Lets the laws act for at most `longest` s; the states that are no longer what they were.
