@@ -257,13 +257,16 @@ pub struct Drained {
     pub span: Span,
 }
 
+/// Ions by their index into [`Model::species`], with their number.
+pub type Ions = Vec<(u32, f64)>;
+
 /// Two species that should not be in one mixture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Incompatible {
     /// Index into [`Model::species`].
     pub species: (u32, u32),
     /// The ions of each by their index and number, where it dissolves: where all of them are, it counts as there.
-    pub ions: (Vec<(u32, f64)>, Vec<(u32, f64)>),
+    pub ions: (Ions, Ions),
     /// Content of each from which on it counts, mol per kg of mixture (kg per kg where it is counted by mass).
     pub least: (f64, f64),
     /// How bad it is.

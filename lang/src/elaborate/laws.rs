@@ -657,7 +657,7 @@ impl<'a> Elaborator<'a> {
             return None;
         }
         let actions = self.event_actions(&e.laws, scope, (&name, e.name.span));
-        (!actions.is_empty()).then(|| Event { name, when, actions, span: e.name.span })
+        (!actions.is_empty()).then_some(Event { name, when, actions, span: e.name.span })
     }
 
     /// A transfer; mixtures are numbered in the order of the instances.
