@@ -48,7 +48,7 @@ fn the_format_of_a_beginning_stays() {
 fn what_follows_from_the_rest_does_not_vary() {
     let dir = folder("derived_path");
     let text = std::fs::read_to_string(crate::harness::root().join(CASE)).expect("the case is there");
-    write(&dir, "a.mtx", &text.replace("vary hot.contents.initial_temperature", "vary hot.contents.temperature"));
+    write(&dir, "a.mtx", text.replace("vary hot.contents.initial_temperature", "vary hot.contents.temperature"));
     let ended = matterixc_in(&dir, &["check", "a.mtx"]);
     assert_eq!(ended.code, 1);
     let said = ended.out.replace('\n', " ");

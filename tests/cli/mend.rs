@@ -229,7 +229,7 @@ fn imports_that_are_missing_are_one_finding_with_one_correction() {
             Some("use std::pumps::{CavroXlp6000, draw, piped, push}"),
         ),
     ] {
-        let path = write(&dir, "w.mtx", &format!("mtx 1\n{imports}{lab}"));
+        let path = write(&dir, "w.mtx", format!("mtx 1\n{imports}{lab}"));
         let lines = matterixc_in(&dir, &["check", "w.mtx", "--format", "json"]).out_lines();
         assert_eq!(lines.len(), 1, "{slip}: {lines:#?}");
         if mended.is_some() {

@@ -74,7 +74,7 @@ pub fn explore(plan: &Plan, budget: usize, seed: u64) -> Summary {
     let mut random = Random::new(seed ^ 0x5eed);
     while summary.executions < budget {
         let lot = summary.executions >= budget / 2;
-        let random = lot.then(|| Random::new(random.next()));
+        let random = lot.then(|| Random::new(random.draw()));
         let mut ways = Ways { prefix: prefix.clone(), taken: Vec::new(), random };
         summary.take(execute(plan, &mut ways));
         if lot {

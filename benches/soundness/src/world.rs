@@ -398,7 +398,7 @@ impl World {
         for (i, flow) in flows.iter_mut().enumerate() {
             if i < plates {
                 *flow /= 300.0;
-            } else if (i - plates) % 2 == 0 {
+            } else if (i - plates).is_multiple_of(2) {
                 *flow /= 27.0;
             }
         }
