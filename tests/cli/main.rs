@@ -33,6 +33,7 @@ mod motion;
 mod mutants;
 mod new;
 mod offers;
+mod open;
 mod orders;
 mod overlap;
 mod pages;

@@ -43,6 +43,11 @@ fn what_runs_out_runs_out_at_its_time() {
 }
 
 #[test]
+fn what_recurs_what_is_slow_and_what_cools_down_is_followed() {
+    pass("slow.mtx", &["counts", "drips", "reacts_at_nanomolar", "cools_down_to_its_set_point"]);
+}
+
+#[test]
 fn a_reading_is_that_of_the_moment_when_the_step_is_called() {
     let all = [
         "of_a_command",
