@@ -14,6 +14,7 @@ use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::budget;
 use crate::check as checks;
 use crate::elaborate::geometry::Geometry;
+use crate::elaborate::hazards::dangers;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::{Num, Type, Value};
@@ -689,7 +690,8 @@ fn build<'a>(
     let questions = (wanted == Wanted::Contents)
         .then(|| Questions::of(&mut elaborator, observables.iter().filter(|o| o.1.is_none()).map(|o| (o.0, &o.2))));
     let asked = questions.as_ref().map(|q| q.nodes.as_slice());
-    let (windows, seen) = checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
+    let checks::Judged { windows, seen, hazards } =
+        checks::plan(&mut elaborator, sources, &plan, &derivatives, &events, asked);
     starts.windows = windows;
     let points = questions.and_then(|q| q.answered(&elaborator, sources, &plan, seen));
     let starts = Some(starts);
@@ -724,7 +726,7 @@ fn build<'a>(
         true => {
             let held = elaborator.instances.iter().flat_map(|i| &i.contents);
             let brought = held.map(|(s, _)| *s).collect();
-            (crate::screen::watched(tables, &mixtures, &brought), elaborator.dangers())
+            (crate::screen::watched(tables, &mixtures, &brought), dangers(hazards.as_deref().unwrap_or_default()))
         }
         false => (Vec::new(), Vec::new()),
     };

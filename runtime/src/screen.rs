@@ -155,8 +155,8 @@ impl<'p> Screen<'p> {
             let danger = &self.program.model.dangers[index];
             let now = engine.truth(danger.when);
             let before = std::mem::replace(&mut self.there[index], now);
-            let known = self.found.iter().any(|f| f.diagnostic.headline == danger.headline);
-            if !now || before || known {
+            let known = || self.found.iter().any(|f| f.diagnostic.headline == danger.headline);
+            if !now || before || known() {
                 continue;
             }
             let span = self.place(None).unwrap_or(danger.span);

@@ -1,6 +1,7 @@
 //! What would go wrong, one family of checks a file.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 mod consequences;
 mod declarations;
@@ -18,6 +19,7 @@ use matterix_ir::{Diagnostic, NodeId, Sources};
 
 use self::flow::Window;
 pub use self::flow::{After, Known, Seen};
+use crate::elaborate::hazards::Hazard;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::ReactionId;
@@ -62,8 +64,18 @@ pub fn model(lab: &mut Elaborator<'_>) {
 
 pub use kinetics::{Starts, never_starts, starts};
 
-/// Checks the plan against what is known before the run. What is known of the nodes in `asked` is given back for the
-/// start and for every statement.
+/// What comes of a plan beside its findings.
+#[derive(Default)]
+pub struct Judged {
+    /// Between which temperatures each reaction can go on; nothing where the plan was not followed.
+    pub windows: Option<BTreeMap<ReactionId, Window>>,
+    /// What is known of the nodes that were asked for, at the start and at every statement.
+    pub seen: Vec<Seen>,
+    /// The hazards of the lab; none where contents and transfers are not right.
+    pub hazards: Option<Arc<[Hazard]>>,
+}
+
+/// Checks the plan against what is known before the run, and tells what is known of the nodes in `asked`.
 pub fn plan(
     lab: &mut Elaborator<'_>,
     sources: &Sources,
@@ -71,11 +83,12 @@ pub fn plan(
     derivatives: &[Derivative],
     events: &[Event],
     asked: Option<&[NodeId]>,
-) -> (Option<BTreeMap<ReactionId, Window>>, Vec<Seen>) {
+) -> Judged {
     // What is not whole cannot be followed.
     let whole = |d: &Diagnostic| !d.is_error() || matches!(d.code.family, "S1" | "H1" | "M1");
     let is_whole = lab.diagnostics.iter().all(whole);
     let ready = mixing::ready(lab);
+    let hazards = ready.as_ref().map(mixing::Ready::hazards);
     let about = &*lab;
     let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
     let takes = || time::plan(about, plan, derivatives, events);
@@ -86,7 +99,7 @@ pub fn plan(
     };
     met.into_iter().chain(taken).for_each(|d| lab.report(d));
     if !lab.diagnostics.iter().all(whole) {
-        return (None, Vec::new());
+        return Judged { hazards, ..Judged::default() };
     }
     let about = &*lab;
     let follow = || flow::check(about, sources, plan, events, derivatives, asked);
@@ -94,7 +107,7 @@ pub fn plan(
     for d in found {
         lab.report(d);
     }
-    (Some(windows), seen)
+    Judged { windows: Some(windows), seen, hazards }
 }
 
 /// Plans of fewer steps are judged faster by one thread than a second one starts.

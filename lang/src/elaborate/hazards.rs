@@ -77,6 +77,20 @@ impl Hazard {
     }
 }
 
+/// What a run watches for. What depends on no state is there from the start or never, which is told before the run.
+pub fn dangers(hazards: &[Hazard]) -> Vec<Danger> {
+    let all = hazards.iter().filter(|h| h.watched == Watched::Steps && !h.states.is_empty());
+    let danger = |h: &Hazard| Danger {
+        code: h.code(),
+        severity: h.severity(),
+        when: h.when,
+        headline: h.headline(),
+        help: h.help.iter().cloned().collect(),
+        span: h.span,
+    };
+    all.map(danger).collect()
+}
+
 /// What is bound wherever a condition asks for any of several, with what it asks there.
 type Bound = Vec<(NodeId, Vec<(String, Value)>)>;
 
@@ -95,7 +109,7 @@ struct Declared<'a> {
 }
 
 /// `move(share, from: a, to: b)` after `of`: the names it gives to the share and the two mixtures.
-fn transfer(of: &Expr) -> Option<(&Expr, &Expr, &Expr)> {
+pub fn transfer(of: &Expr) -> Option<(&Expr, &Expr, &Expr)> {
     let ExprKind::Call(callee, args) = &*of.kind else { return None };
     let named = |key: &str| args.iter().find(|a| a.name.as_ref().is_some_and(|n| n.text == key)).map(|a| &a.value);
     let is_move = matches!(&*callee.kind, ExprKind::Name(n) if n.text == "move");
@@ -123,20 +137,6 @@ fn accepted(tables: &Tables<'_>) -> BTreeSet<DeclId> {
 }
 
 impl<'a> Elaborator<'a> {
-    /// What a run watches for. What depends on no state is there from the start or never, which is told before the run.
-    pub fn dangers(&mut self) -> Vec<Danger> {
-        let all = self.hazards().into_iter().filter(|h| h.watched == Watched::Steps && !h.states.is_empty());
-        let danger = |h: Hazard| Danger {
-            code: h.code(),
-            severity: h.severity(),
-            when: h.when,
-            headline: h.headline(),
-            help: h.help.iter().cloned().collect(),
-            span: h.span,
-        };
-        all.map(danger).collect()
-    }
-
     /// Every hazard on every fitting combination of instances, but for those that cannot come about or are accepted.
     pub fn hazards(&mut self) -> Vec<Hazard> {
         let mut out = Vec::new();

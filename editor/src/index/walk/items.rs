@@ -1,6 +1,7 @@
 //! Items: what is declared at the top of a file.
 
 use matterix_lang::ast::{Expr, ExprKind, FieldValue, Item, ItemKind, Name, Path, StmtKind};
+use matterix_lang::elaborate::hazards::transfer;
 use matterix_lang::meanings::Sort;
 
 use super::{Found, Walk};
@@ -220,9 +221,8 @@ impl Walk<'_> {
 
 /// The name that `move(share, from: a, to: b)` gives to the share.
 fn share_moved(of: &Expr) -> Option<&Name> {
-    let ExprKind::Call(_, args) = &*of.kind else { return None };
-    args.iter().find(|a| a.name.is_none()).and_then(|a| match &*a.value.kind {
-        ExprKind::Name(n) if args.len() == 3 => Some(n),
+    match &*transfer(of)?.0.kind {
+        ExprKind::Name(n) => Some(n),
         _ => None,
-    })
+    }
 }

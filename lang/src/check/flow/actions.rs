@@ -280,10 +280,7 @@ impl Flow<'_, '_> {
                     continue;
                 }
                 let untouched = facts.clone();
-                let mut changed = Vec::new();
-                for action in &event.actions {
-                    changed.extend(self.act(action, facts));
-                }
+                let changed = self.happen(i, facts);
                 if (now, before) != (Some(true), Some(false)) {
                     let happened = facts.clone();
                     *facts = untouched.join(happened, &untouched, self.site(), Why::Unknown);

@@ -124,23 +124,30 @@ impl Flow<'_, '_> {
         let due: Vec<u32> = due.iter().copied().filter(|i| facts.fired[*i as usize].is_none()).collect();
         let moving: Vec<u32> = facts.moving.iter().map(|i| self.derivatives[*i as usize].state).collect();
         // Each turn forgets a state or ends.
-        while let Some(states) = due.iter().find_map(|i| self.further(*i, &due, &moving, facts)) {
+        while let Some(states) = self.further(&due, &moving, facts) {
             self.forget(&states, facts);
         }
     }
 
-    /// States that an event would change further if it came about once more; none where nothing makes its condition false and true again.
-    fn further(&mut self, event: u32, due: &[u32], moving: &[u32], facts: &Facts) -> Option<Vec<u32>> {
+    /// States that one of these events would change further if it came about once more; none where each of them comes about no more.
+    fn further(&mut self, due: &[u32], moving: &[u32], facts: &Facts) -> Option<Vec<u32>> {
+        let changes: Vec<Vec<u32>> = due.iter().map(|event| self.happen(*event, &mut facts.clone())).collect();
+        due.iter().enumerate().find_map(|(own, event)| {
+            let others = changes.iter().enumerate().filter(|(other, _)| *other != own).flat_map(|(_, states)| states);
+            let others: Vec<u32> = moving.iter().chain(others).copied().collect();
+            self.changed_again(*event, &others, facts)
+        })
+    }
+
+    /// States that an event would change further if it came about once more; none where nothing that may change by then makes its
+    /// condition false and true again.
+    fn changed_again(&mut self, event: u32, others: &[u32], facts: &Facts) -> Option<Vec<u32>> {
         let when = self.events[event as usize].when;
         let mut again = facts.clone();
         self.assume(when, true, &mut again);
         let changed = self.happen(event, &mut again);
         let mut later = again.clone();
-        let mut others: Vec<u32> = moving.to_vec();
-        for other in due.iter().filter(|other| **other != event) {
-            others.extend(self.happen(*other, &mut facts.clone()));
-        }
-        later.forget(&others);
+        later.forget(others);
         if self.eval(when, &later).truth() == Some(false) {
             return None;
         }

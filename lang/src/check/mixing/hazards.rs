@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
+use std::sync::Arc;
 
 use matterix_ir::model::Domain;
 use matterix_ir::plan::{Said, Step, StepId};
@@ -15,7 +16,7 @@ use crate::elaborate::hazards::{Hazard, Watched};
 
 /// The hazards of a lab, by the states they depend on.
 pub(super) struct Hazards {
-    pub all: Vec<Hazard>,
+    pub all: Arc<[Hazard]>,
     by_state: BTreeMap<u32, Vec<usize>>,
     /// What is reported already, until it is over.
     present: BTreeSet<usize>,
@@ -36,7 +37,7 @@ impl Hazards {
             }
         }
         let (present, standing, since, told) = (BTreeSet::new(), BTreeMap::new(), BTreeMap::new(), BTreeSet::new());
-        Hazards { all, by_state, present, standing, since, told }
+        Hazards { all: all.into(), by_state, present, standing, since, told }
     }
 }
 

@@ -15,6 +15,7 @@ mod uses;
 mod world;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use matterix_ir::model::{Action, Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
@@ -23,6 +24,7 @@ use matterix_ir::{Diagnostic, FileId, Severity, Span};
 
 use super::time::Times;
 use crate::ast::{MemberKind, Role};
+use crate::elaborate::hazards::Hazard;
 use crate::elaborate::{Elaborator, SpeciesId};
 use crate::eval::{Type, Value};
 use crate::names::DeclId;
@@ -82,6 +84,13 @@ struct Pending {
 pub struct Ready {
     materials: BTreeMap<InstanceId, DeclId>,
     hazards: Hazards,
+}
+
+impl Ready {
+    /// The hazards of the lab.
+    pub fn hazards(&self) -> Arc<[Hazard]> {
+        self.hazards.all.clone()
+    }
 }
 
 /// Makes a lab ready; none where contents and transfers are not right, as one cannot tell then what meets.
