@@ -289,7 +289,9 @@ impl Flow<'_, '_> {
             moving: BTreeSet::new(),
             faces: 0,
         };
-        for round in 0..=2 * SWEEPS {
+        // Faces that late sweeps cross are without bound from then on, and each flux starts once, so that this ends.
+        let mut round = 0;
+        while !due.is_empty() {
             let mut crossed = BTreeSet::new();
             for i in std::mem::take(&mut due) {
                 match self.kind(i) {
@@ -297,10 +299,8 @@ impl Flow<'_, '_> {
                     kind => self.push_out(i, &kind, round >= SWEEPS, facts, &mut box_, &mut crossed),
                 }
             }
-            if crossed.is_empty() {
-                break;
-            }
             due = crossed;
+            round += 1;
         }
         if box_.faces <= MOST_MOVING {
             self.narrow(facts, &mut box_);
@@ -317,7 +317,7 @@ impl Flow<'_, '_> {
     fn react(&mut self, derivative: u32, row: &Row, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
         let stoichiometry = self.stoichiometry();
         let still = self.still(self.derivatives[derivative as usize].state);
-        let mut grown = BTreeSet::new();
+        let mut more = false;
         for (flux, c) in &row.fluxes {
             let (low, high) = self.flux(&stoichiometry.fluxes[*flux], &making.within);
             if !making.active.contains(flux) && (low * c).abs() <= still && (high * c).abs() <= still {
@@ -328,30 +328,43 @@ impl Flow<'_, '_> {
             let (low, high) = scaled(*by, (low, high));
             let mut bonds = making.within.bonds.as_deref().cloned().unwrap_or_default();
             direction.iter().for_each(|(state, _)| bonds.cover(*state, facts));
-            let extent = bonds.extent_of(direction);
-            let (down, up) = making.ways.entry(extent).or_default();
-            let new = (low < 0.0 && !*down, high > 0.0 && !*up);
-            (*down, *up) = (*down || new.0, *up || new.1);
-            let range = &mut bonds.extents[extent].range;
-            *range = (if new.0 { f64::NEG_INFINITY } else { range.0 }, if new.1 { f64::INFINITY } else { range.1 });
-            if new.0 || new.1 {
-                grown.extend(direction.iter().map(|(state, _)| *state));
+            let (down, up) = making.ways.entry(bonds.extent_of(direction)).or_default();
+            if (low < 0.0 && !*down) || (high > 0.0 && !*up) {
+                (*down, *up) = (*down || low < 0.0, *up || high > 0.0);
+                more = true;
                 making.within.bonds = Some(Rc::new(bonds));
             }
         }
         if row.fluxes.iter().any(|(flux, _)| making.active.contains(flux)) {
             making.moving.insert(derivative);
         }
-        if grown.is_empty() {
-            return;
+        if more {
+            self.go_further(facts, making, crossed);
         }
+    }
+
+    /// Bounds extents anew where more of them go on: what one uses up another may give back, as a catalyst.
+    fn go_further(&mut self, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
         let Some(mut bonds) = making.within.bonds.as_deref().cloned() else { return };
-        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state)) {
-            making.within.states[state as usize] = Known::Range(low, high, Why::Unknown);
+        let before: Vec<(f64, f64)> = bonds.extents.iter().map(|e| e.range).collect();
+        for (extent, (down, up)) in &making.ways {
+            let range = &mut bonds.extents[*extent].range;
+            *range = (if *down { f64::NEG_INFINITY } else { range.0 }, if *up { f64::INFINITY } else { range.1 });
         }
+        let mut changed = BTreeSet::new();
+        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state)) {
+            let known = Known::Range(low, high, Why::Unknown);
+            if making.within.states[state as usize] != known {
+                making.within.states[state as usize] = known;
+                changed.insert(state);
+            }
+        }
+        let further = bonds.extents.iter().zip(&before).filter(|(extent, before)| extent.range != **before);
+        changed.extend(further.flat_map(|(extent, _)| extent.direction.iter().map(|(state, _)| *state)));
         bonds.stamp(&making.within);
         making.within.bonds = Some(Rc::new(bonds));
-        for state in grown {
+        let stoichiometry = self.stoichiometry();
+        for state in changed {
             let of = stoichiometry.of_state.get(&state).copied();
             if let Some(i) = of.filter(|_| !self.is_amount(state)) {
                 self.put(i, facts, making);
@@ -399,7 +412,8 @@ impl Flow<'_, '_> {
         for wall in walls.into_iter().flatten() {
             let (down, up) = self.crossings(wall, making);
             let (start_low, start_high) = self.begins(wall, facts);
-            let (mut low, mut high) = self.faces(wall, making);
+            let before = self.faces(wall, making);
+            let (mut low, mut high) = before;
             if up {
                 let open = far || self.is_amount(state);
                 high = if open { f64::INFINITY } else { self.face(wall, high, start_high, 1.0, making) };
@@ -411,7 +425,7 @@ impl Flow<'_, '_> {
                     false => self.face(wall, low, start_low, -1.0, making),
                 };
             }
-            if up || down {
+            if (up || down) && (low, high) != before {
                 self.set_faces(wall, (low, high), facts, making);
                 crossed.insert(derivative);
                 crossed.extend(self.rates_of.get(&state).into_iter().flatten());
