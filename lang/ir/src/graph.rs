@@ -332,13 +332,16 @@ impl Graph {
         self.add(Op::Select(c, a, b))
     }
 
+    /// Constants are worked out here; a quotient of nothing stays as it is written, for whoever asks for its value to report.
     fn fold(&self, op: Op) -> Op {
         let value = match op {
-            Op::Unary(o, a) => self.constant(a).map(|a| unary(o, a)),
-            Op::Binary(o, a, b) => self.constant(a).zip(self.constant(b)).map(|(a, b)| binary(o, a, b)),
+            Op::Unary(o, a) => self.constant(a).map(|a| (unary(o, a), a.is_finite())),
+            Op::Binary(o, a, b) => {
+                self.constant(a).zip(self.constant(b)).map(|(a, b)| (binary(o, a, b), a.is_finite() && b.is_finite()))
+            }
             _ => None,
         };
-        value.map_or(op, Op::Const)
+        value.filter(|(result, finite)| result.is_finite() || !finite).map_or(op, |(result, _)| Op::Const(result))
     }
 
     /// Exact identities only: nothing here changes a finite result's bits, except that `x - x` and `-x + x` become 0.

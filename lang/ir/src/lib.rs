@@ -6,6 +6,7 @@
 //! - [`span`], [`diagnostic`], [`codes`]: where something stands in the text and what is wrong with it.
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
+//! - [`undefined`]: expressions that have no value.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`wire`]: how devices are spoken to.
@@ -38,6 +39,7 @@ pub mod span;
 pub mod stock;
 pub mod study;
 pub mod text;
+pub mod undefined;
 pub mod values;
 pub mod wire;
 

@@ -69,6 +69,11 @@ pub trait Backend {
         self.value(node, out)
     }
 
+    /// Fails where a node has no value now: something is divided by 0, say.
+    fn defined(&mut self, _node: NodeId) -> Result<(), Fault> {
+        Ok(())
+    }
+
     /// How to follow a condition from now on.
     fn follow(&mut self, condition: NodeId) -> Follow;
 

@@ -7,6 +7,7 @@ use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Motion, Operation};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
+use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{Leaves, NodeId};
 
 use super::{Backend, Follow, Prepared, Status, Ticket, next_report, noise, watch};
@@ -324,6 +325,17 @@ impl Backend for Sim<'_> {
 
     fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
         Ok(Some(self.measure(node, out)))
+    }
+
+    fn defined(&mut self, node: NodeId) -> Result<(), Fault> {
+        let graph = &self.model().graph;
+        match undefined(graph, node, &mut |n| Some(self.engine.eval(n))) {
+            Some(at) => {
+                let message = format!("this has no value: {}", why(graph.op(at)));
+                Err(Fault::new(codes::NOT_A_NUMBER, self.engine.time(), message))
+            }
+            None => Ok(()),
+        }
     }
 
     fn follow(&mut self, condition: NodeId) -> Follow {

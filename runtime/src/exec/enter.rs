@@ -102,8 +102,11 @@ impl<'p> Executor<'p, '_> {
     fn perform(&mut self, id: StepId, step: &'p Step) -> Result<(), Fault> {
         match step {
             Step::Let { local, value } => {
-                let value = self.backend.value(*value, self.out)?;
-                self.backend.set_local(*local, value);
+                let known = self.backend.value(*value, self.out)?;
+                if known.is_some_and(|v| !v.is_finite()) {
+                    self.backend.defined(*value)?;
+                }
+                self.backend.set_local(*local, known);
             }
             Step::Expect(conditions) => self.expect(id, conditions)?,
             Step::Record { name, value, unit, every } => {

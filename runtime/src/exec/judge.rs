@@ -44,7 +44,7 @@ impl Raised {
 impl Executor<'_, '_> {
     /// Whether a condition holds, with readings sampled now; `None` if it cannot be known.
     pub(super) fn holds(&mut self, condition: &Condition) -> Result<Option<bool>, Fault> {
-        let value = self.backend.value(condition.node, self.out).map_err(|f| at(f, condition.span))?;
+        let value = self.true_value(condition.node).map_err(|f| at(f, condition.span))?;
         Ok(value.map(truth))
     }
 
@@ -59,7 +59,16 @@ impl Executor<'_, '_> {
 
     /// Whether a followed condition holds now.
     pub(super) fn follower_holds(&mut self, follower: &Follower) -> Result<bool, Fault> {
-        Ok(self.backend.value(follower.node(), self.out)?.is_none_or(truth))
+        Ok(self.true_value(follower.node())?.is_none_or(truth))
+    }
+
+    /// The value of a condition; fails where it holds by a number that is none.
+    fn true_value(&mut self, node: NodeId) -> Result<Option<f64>, Fault> {
+        let value = self.backend.value(node, self.out)?;
+        if value.is_some_and(truth) {
+            self.backend.defined(node)?;
+        }
+        Ok(value)
     }
 
     /// Notes that a condition was taken to hold.
@@ -119,8 +128,9 @@ impl Executor<'_, '_> {
         for condition in conditions {
             let seen = self.backend.observe(condition.node, self.out).map_err(|f| at(f, condition.span))?;
             let verdict = match seen.map(truth) {
-                Some(true) => Verdict::Passed,
-                Some(false) => Verdict::Failed,
+                // What has no value is as nobody expects it.
+                Some(true) if self.backend.defined(condition.node).is_ok() => Verdict::Passed,
+                Some(_) => Verdict::Failed,
                 None => Verdict::NotObserved,
             };
             let compared = self.measured(&condition.compared);

@@ -2,7 +2,8 @@
 
 use matterix_ir::plan::{Comparison, Condition};
 use matterix_ir::quantity::show_number;
-use matterix_ir::{Code, Span, codes};
+use matterix_ir::undefined::{undefined, why};
+use matterix_ir::{Code, NodeId, Span, codes};
 
 use super::Flow;
 use super::facts::Facts;
@@ -36,6 +37,19 @@ impl Flow<'_, '_> {
                 );
             }
         }
+    }
+
+    /// Whether a number that the plan asks for is none, as something is divided by 0; reported.
+    pub(super) fn without_value(&mut self, node: NodeId, span: Span, facts: &Facts) -> bool {
+        if self.is_shared(node) {
+            return false;
+        }
+        let graph = &self.lab.graph;
+        let Some(at) = undefined(graph, node, &mut |n| self.eval(n, facts).exact()) else { return false };
+        let headline = format!("this has no value: {}", why(graph.op(at)));
+        let d = self.at_site(codes::NOT_A_NUMBER, headline, "asked for here".to_string(), self.doubt > 0);
+        self.found(d, span);
+        true
     }
 
     /// A loop that goes on at its last turn.

@@ -94,8 +94,11 @@ impl Flow<'_, '_> {
                 Some(after)
             }
             Step::Let { local, value } => {
-                let value = self.eval(*value, &facts);
-                facts.keep(*local, value);
+                let known = self.eval(*value, &facts);
+                if !known.exact().is_some_and(f64::is_finite) {
+                    self.without_value(*value, node.span, &facts);
+                }
+                facts.keep(*local, known);
                 Some(facts)
             }
             Step::Wait { duration } => {
@@ -161,6 +164,9 @@ impl Flow<'_, '_> {
             Step::Expect(conditions) => {
                 // What holds on some ways only is the run's to judge.
                 for c in conditions {
+                    if self.without_value(c.node, c.span, &facts) {
+                        continue;
+                    }
                     if self.eval(c.node, &facts).truth() == Some(false) && !self.is_shared(c.node) {
                         self.unexpected(c, &facts);
                     }
