@@ -2,7 +2,7 @@
 
 use matterix_ir::{Diagnostic, Sources, codes};
 
-use super::ignored;
+use super::{ignored, returns};
 use crate::ast::{AssetLine, Field, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
 use crate::budget::Budget;
 use crate::elaborate::reach::Reach;
@@ -11,7 +11,7 @@ use crate::eval::types::unsupported;
 use crate::eval::{Scope, Type, Value};
 use crate::lower::{Planner, script};
 use crate::meanings::Seeing;
-use crate::names::DeclId;
+use crate::names::{DeclId, verb_text};
 
 /// Checks the declarations of one module.
 pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Vec<Diagnostic> {
@@ -102,7 +102,10 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
         }
         ItemKind::Species { .. } => lab.check_species(id),
         ItemKind::Material { fields, .. } => material(lab, fields, module),
-        ItemKind::Skill { .. } => {
+        ItemKind::Skill { sig, body, handlers, .. } => {
+            if let (Some(_), Some(body)) = (&sig.result, body) {
+                report(lab, returns::check(&verb_text(&sig.verb), sig.span, body, handlers));
+            }
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }

@@ -10,6 +10,7 @@ mod flow;
 mod ignored;
 mod kinetics;
 mod mixing;
+mod returns;
 mod time;
 mod unused;
 
