@@ -93,9 +93,18 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
     for step in &plan.steps {
         let Step::Guarded { body, handlers, .. } = &step.step else { continue };
         let raised = raised(plan, *body);
-        for (caught, handler) in handlers {
-            let (Caught::Named(name), at) = (caught, plan.get(*handler).span) else { continue };
+        for (place, (caught, handler)) in handlers.iter().enumerate() {
+            let at = plan.get(*handler).span;
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
+            let before = handlers[..place].iter().find(|(other, _)| matches!(other, Caught::Any) || other == caught);
+            if let Some((_, first)) = before.filter(|_| own && !out.iter().any(|d| d.span() == at)) {
+                let headline = "a handler before this one takes the same failures";
+                let d = Diagnostic::warning(codes::DEAD_BRANCH, at, headline, "never done");
+                let d = d.because(plan.get(*first).span, "the first that fits is done");
+                out.push(d.help("put the handler for all failures last"));
+                continue;
+            }
+            let Caught::Named(name) = caught else { continue };
             if raised.contains(name) || told.contains(name.as_str()) {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
@@ -113,6 +122,7 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
 /// All that a step may fail with.
 fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BTreeSet::new();
+    let mut awaited: BTreeSet<StepId> = BTreeSet::new();
     let mut todo = vec![root];
     while let Some(id) = todo.pop() {
         let step = &plan.get(id).step;
@@ -139,13 +149,26 @@ fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
             Step::Within { .. } => add("late"),
             Step::WaitUntil { timeout: Some(_), .. } | Step::Hold { timeout: Some(_), .. } => add("timeout"),
             Step::RepeatWhile { .. } => add("max"),
-            Step::Start { .. } | Step::Await { .. } => add("job"),
+            Step::Start { .. } => add("job"),
+            Step::Await { job } => {
+                add("job");
+                // The failure of the job becomes that of whoever waits for it.
+                todo.extend(bodies(plan, job).filter(|body| awaited.insert(*body)));
+            }
             Step::Fail { name, .. } => add(name),
             _ => {}
         }
         todo.extend(step.children());
     }
     out
+}
+
+/// What a job does, wherever it is started.
+fn bodies<'a>(plan: &'a Plan, awaited: &'a str) -> impl Iterator<Item = StepId> + 'a {
+    plan.steps.iter().filter_map(move |step| match &step.step {
+        Step::Start { job, body } if job == awaited => Some(*body),
+        _ => None,
+    })
 }
 
 fn fails(clause: &Clause) -> Option<&Vec<crate::ast::Name>> {
