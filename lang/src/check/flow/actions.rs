@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption};
-use matterix_ir::{BinaryOp, NodeId, Severity};
+use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::Flow;
 use super::bonds::{Bonds, Form};
@@ -41,9 +41,10 @@ impl Flow<'_, '_> {
                     break;
                 }
                 None => {
-                    if value.why() == Some(Why::Paths) && self.is_cleared(need.span) {
+                    let fails = self.fails_on_a_way(need.node, facts);
+                    if fails && self.is_cleared(need.span) {
                         self.assume(need.node, true, facts);
-                    } else if value.why() == Some(Why::Paths) && !self.is_shared(need.node) {
+                    } else if fails && !self.is_shared(need.node) {
                         let name = need.failure();
                         if !self.is_taken(name) {
                             self.unmet(label, need, facts, true);
@@ -55,6 +56,17 @@ impl Flow<'_, '_> {
             }
         }
         met
+    }
+
+    /// Whether a condition that may hold is false on some way that leads here. Of an `and` one part decides, whatever is
+    /// known of the others.
+    fn fails_on_a_way(&mut self, node: NodeId, facts: &Facts) -> bool {
+        let value = self.eval(node, facts);
+        match self.lab.graph.op(node) {
+            _ if value.truth().is_some() => false,
+            Op::Binary(BinaryOp::And, a, b) => self.fails_on_a_way(a, facts) || self.fails_on_a_way(b, facts),
+            _ => value.why() == Some(Why::Paths),
+        }
     }
 
     /// Looks at what a command presumes. Steps that clean up may do so in vain.
@@ -141,7 +153,9 @@ impl Flow<'_, '_> {
                 Some(true) => continue,
                 Some(false) => false,
                 None if self.is_cleared(limit.condition.span) => continue,
-                None if value.why() == Some(Why::Paths) && !self.is_shared(limit.condition.node) => true,
+                None if self.fails_on_a_way(limit.condition.node, facts) && !self.is_shared(limit.condition.node) => {
+                    true
+                }
                 None => continue,
             };
             let name = limit.condition.failure();
