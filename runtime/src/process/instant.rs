@@ -111,8 +111,11 @@ impl Engine<'_> {
     fn refused(&self, refusal: Refusal) -> Fault {
         match refusal {
             Refusal::Fraction(fraction) => {
-                let message =
-                    format!("the transfer takes {} times what there is", matterix_ir::quantity::show_number(fraction));
+                let shown = matterix_ir::quantity::show_number;
+                let message = match fraction {
+                    1.0..1.01 => format!("the transfer takes {} % more than there is", shown(100.0 * (fraction - 1.0))),
+                    _ => format!("the transfer takes {} times what there is", shown(fraction)),
+                };
                 let help =
                     if fraction > 1.0 { "more is asked for than the source holds" } else { "is the source empty?" };
                 Fault::new(codes::TRANSFER_FRACTION, self.time, message).help(help)
