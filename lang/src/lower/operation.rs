@@ -402,6 +402,9 @@ impl<'a> Planner<'a, '_> {
         for p in sig.all_params().chain(options) {
             let ty = p.ty.as_ref().map(|ty| self.lab.resolve_parameter_type(ty, module));
             let value = ty.map_or(Value::Error, |ty| self.lab.placeholder(&ty, &p.name.text));
+            if let Value::Instance(id) = value {
+                self.lab.instances[id.0 as usize].span = p.name.span;
+            }
             scope.bind(p.name.text.clone(), value);
         }
         Bound { values: scope.vars.clone() }

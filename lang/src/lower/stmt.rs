@@ -505,7 +505,17 @@ impl<'a> Planner<'a, '_> {
 
     fn record(&mut self, value: &'a Expr, every: &'a Expr, span: Span, scope: &mut Scope) -> Option<StepId> {
         let v = self.lab.expr(value, scope);
-        let every = self.duration_node(every, scope, "every")?;
+        let interval = self.duration_node(every, scope, "every")?;
+        if self.lab.graph.constant(interval) == Some(0.0) {
+            let headline = "an interval of `record` cannot be 0";
+            self.lab.report(Diagnostic::error(
+                codes::TYPE_MISMATCH,
+                every.span,
+                headline,
+                "no time between two samples",
+            ));
+            return None;
+        }
         let (nodes, unit) = match v {
             Value::Num(n) => {
                 let unit = self.lab.unit_of(&n);
@@ -534,7 +544,7 @@ impl<'a> Planner<'a, '_> {
         };
         let name = self.column(value.span, scope);
         let label = self.text(span);
-        Some(self.add(label, span, Step::Record { name, value: nodes, unit, every }))
+        Some(self.add(label, span, Step::Record { name, value: nodes, unit, every: interval }))
     }
 
     /// Binds a workflow's parameters: given from outside, or their defaults. Returns them as shown.
