@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
-use matterix_ir::{Diagnostic, Span, codes};
+use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use crate::ast::{Clause, ClauseKind, ItemKind, Sig, WireKind};
-use crate::elaborate::Tables;
+use crate::elaborate::Elaborator;
 use crate::names::verb_text;
 
 /// Names of failures, each with the first statement that it comes from.
@@ -74,7 +74,12 @@ pub fn beyond(plan: &Plan, within: Span) -> Vec<Diagnostic> {
 }
 
 /// Handlers of a workflow for failures that nothing in their block raises, though others do; each once.
-pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
+pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> {
+    let tables = lab.tables;
+    let handles = |s: &PlanStep| matches!(&s.step, Step::Guarded { handlers, .. } if !handlers.is_empty());
+    if !plan.steps.iter().any(handles) {
+        return Vec::new();
+    }
     // A driver may know failures that no step declares.
     let drivers = tables.names.decls.iter().filter_map(|decl| match &decl.item.kind {
         ItemKind::Driver { wires, .. } => Some(wires),
@@ -88,11 +93,12 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
         })
         .collect();
     let declared = tables.failures();
+    let flowing = flowing(plan, lab);
     let mut out: Vec<Diagnostic> = Vec::new();
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
         let Step::Guarded { body, handlers, .. } = &step.step else { continue };
-        let raised = raised(plan, *body);
+        let raised = raised(plan, *body, &flowing);
         for (place, (caught, handler)) in handlers.iter().enumerate() {
             let at = plan.get(*handler).span;
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
@@ -119,8 +125,15 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
     out
 }
 
-/// All that a step may fail with.
-fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
+/// The failures of limits that laws may break while time passes.
+fn flowing(plan: &Plan, lab: &Elaborator<'_>) -> BTreeSet<String> {
+    let moves = |op: &Op| matches!(op, Op::Time) || matches!(op, Op::State(s) if lab.rates.contains_key(s));
+    let limits = plan.limits.iter().filter(|l| lab.graph.depends(l.condition.node, moves));
+    limits.map(|l| l.condition.failure().to_string()).collect()
+}
+
+/// All that a step may fail with, where time may bring about some of it.
+fn raised(plan: &Plan, root: StepId, flowing: &BTreeSet<String>) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BTreeSet::new();
     let mut awaited: BTreeSet<StepId> = BTreeSet::new();
     let mut todo = vec![root];
@@ -129,6 +142,11 @@ fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
         let mut add = |name: &str| {
             out.insert(name.to_string());
         };
+        if matches!(step, Step::Wait { .. } | Step::WaitUntil { .. } | Step::Hold { .. } | Step::Await { .. })
+            || matches!(step, Step::Operation(o) if !o.is_at_once())
+        {
+            flowing.iter().for_each(|name| add(name));
+        }
         match step {
             Step::Operation(o) => {
                 o.fails.iter().for_each(|name| add(name));

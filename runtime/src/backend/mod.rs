@@ -74,6 +74,18 @@ pub trait Backend {
         Ok(())
     }
 
+    /// Whether a limit of the plan, by its index and condition, holds now; `None` if it cannot be known here. What does not is
+    /// not told again while time passes.
+    fn limit(&mut self, _: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
+        Ok(self.value(condition, out)?.map(|v| v != 0.0 && !v.is_nan()))
+    }
+
+    /// The states that decide how those of a limit of the plan change, by its index: what their rates rest on, then what those of
+    /// these rest on, and so on.
+    fn decide(&self, _: u32) -> Vec<Vec<u32>> {
+        Vec::new()
+    }
+
     /// How to follow a condition from now on.
     fn follow(&mut self, condition: NodeId) -> Follow;
 
@@ -89,7 +101,8 @@ pub trait Backend {
     /// Abandons an operation.
     fn halt(&mut self, ticket: Ticket);
 
-    /// Lets time pass until `until` (finite) or until a watch has its value, whichever comes first; at once if one has.
+    /// Lets time pass until `until` (finite), until a watch has its value or until a limit of the plan breaks, whichever comes
+    /// first; at once if one has.
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault>;
 }
 

@@ -81,7 +81,8 @@ enum Ends {
 
 impl<'m> Sim<'m> {
     /// Simulates with `engine`, which has been started on `prepared.model`; noise follows `seed`.
-    pub fn new(engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
+    pub fn new(mut engine: Engine<'m>, prepared: &'m Prepared, seed: u64) -> Self {
+        engine.keep(&prepared.keeps);
         let (running, sampled) = (BTreeMap::new(), BTreeMap::new());
         let (told, given) = (BTreeMap::new(), BTreeMap::new());
         let (moves, swung) = (Moves::default(), None);
@@ -336,6 +337,16 @@ impl Backend for Sim<'_> {
             }
             None => Ok(()),
         }
+    }
+
+    fn limit(&mut self, limit: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
+        let holds = self.measure(self.prepared.keeps.node(limit).unwrap_or(condition), out) != 0.0;
+        self.engine.note_limit(limit, holds);
+        Ok(Some(holds))
+    }
+
+    fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
+        self.prepared.keeps.decide(&self.prepared.model, limit)
     }
 
     fn follow(&mut self, condition: NodeId) -> Follow {

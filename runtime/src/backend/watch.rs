@@ -1,4 +1,5 @@
-//! The model made ready for watching: a copy in which conditions on readings can be followed without their imperfection.
+//! The model made ready for watching: a copy in which conditions on readings can be followed without their imperfection, and
+//! limits are broken only where they are clearly passed.
 
 use std::collections::BTreeMap;
 
@@ -7,6 +8,7 @@ use matterix_ir::plan::{Condition, Plan, Step};
 use matterix_ir::{Graph, NodeId, Op, Program};
 
 use super::{Follow, noise};
+use crate::process::Keeps;
 
 /// The model of a program with, for each condition on readings, how to follow it.
 #[derive(Clone, Debug)]
@@ -14,6 +16,8 @@ pub struct Prepared {
     /// The program's model; its graph has further nodes at the end.
     pub model: Model,
     follow: BTreeMap<NodeId, Follow>,
+    /// What things keep at all times.
+    pub keeps: Keeps,
 }
 
 impl Prepared {
@@ -35,7 +39,8 @@ impl Prepared {
             };
             follow.insert(condition.node, how);
         }
-        Prepared { model, follow }
+        let keeps = Keeps::new(&mut model, program.plan.limits.iter().map(|l| l.condition.node));
+        Prepared { model, follow, keeps }
     }
 
     /// How to follow this condition.

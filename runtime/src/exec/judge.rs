@@ -173,7 +173,7 @@ pub(super) fn truth(value: f64) -> bool {
 }
 
 /// The fault, at `span` where it has no place of its own.
-fn at(mut fault: Fault, span: Span) -> Fault {
+pub(super) fn at(mut fault: Fault, span: Span) -> Fault {
     fault.span = fault.span.or(Some(span));
     fault
 }

@@ -20,6 +20,7 @@ mod failure;
 mod frame;
 mod jobs;
 mod judge;
+mod kept;
 mod listener;
 mod monitored;
 mod operate;

@@ -7,7 +7,7 @@ use matterix_ir::scene::InstanceId;
 use super::Executor;
 use super::claims::{Request, Use};
 use super::frame::{End, Follower, FrameId, Kind, Stop};
-use super::judge::Raised;
+use super::judge::{Raised, at};
 use super::listener::OperationState;
 use crate::backend::{Follow, Status};
 use crate::fault::Fault;
@@ -152,9 +152,13 @@ impl<'p> Executor<'p, '_> {
     fn within_limits(&mut self, id: FrameId, operation: &Operation) -> Result<bool, Fault> {
         let plan = self.plan;
         let Some(step) = self.frames.get(&id).and_then(|f| f.step) else { return Ok(true) };
-        for limit in operation.limits.iter().filter_map(|i| plan.limits.get(*i as usize)) {
-            let limit = &limit.condition;
-            if !self.judge(step, limit)? {
+        for &index in &operation.limits {
+            let Some(limit) = plan.limits.get(index as usize).map(|l| &l.condition) else { continue };
+            let holds = self.backend.limit(index, limit.node, self.out).map_err(|f| at(f, limit.span))?;
+            if holds.is_none() {
+                self.assume(step, limit);
+            }
+            if holds == Some(false) {
                 let label = self.label(id).to_owned();
                 let text = format!("`{label}` does not keep `{}`", limit.text);
                 let raised = self.refused(limit, &label, text);
@@ -187,7 +191,7 @@ impl<'p> Executor<'p, '_> {
         }
     }
 
-    fn label(&self, id: FrameId) -> &str {
+    pub(super) fn label(&self, id: FrameId) -> &str {
         self.frames.get(&id).and_then(|f| f.step).map_or("", |s| &self.plan.get(s).label)
     }
 

@@ -117,6 +117,10 @@ impl Executor<'_, '_> {
                 Fired::new()
             }
             Advance::Watch(indices) => fired(agenda, indices),
+            Advance::Broken(limits) => {
+                self.limits_broken(&limits);
+                Fired::new()
+            }
         };
         if self.now > before {
             self.taken = 0;

@@ -24,11 +24,16 @@ enum Stretch {
 }
 
 impl Engine<'_> {
-    /// Goes on to `until` (s, finite), or to the first instant at which one of `watches` holds. Events that become true on
-    /// the way fire. Fails where the solution cannot be followed.
+    /// Goes on to `until` (s, finite), or to the first instant at which a limit breaks or one of `watches` holds. Events that
+    /// become true on the way fire. Fails where the solution cannot be followed.
     pub fn advance(&mut self, until: f64, watches: &[Watch], observer: &mut dyn Observer) -> Result<Advance, Fault> {
         let nodes: Vec<NodeId> = watches.iter().map(|w| w.node).collect();
         loop {
+            let broken = self.newly_broken();
+            if !broken.is_empty() {
+                self.check_suspects()?;
+                return Ok(Advance::Broken(broken));
+            }
             let held: Vec<usize> =
                 (0..watches.len()).filter(|&i| self.truth(watches[i].node) == watches[i].value).collect();
             if !held.is_empty() {
@@ -50,7 +55,8 @@ impl Engine<'_> {
         if self.mode.is_some() {
             return Ok(());
         }
-        let mode = self.law.mode(self.model, self.env());
+        let mut mode = self.law.mode(self.model, self.env());
+        self.watch_limits(&mut mode);
         let goes_on = self.integrator.as_ref().is_some_and(|i| i.moving == mode.moving && *i.rates() == mode.rates);
         if !goes_on {
             self.integrator = None;
@@ -81,8 +87,9 @@ impl Engine<'_> {
     fn segment(&mut self, until: f64, nodes: &[NodeId], observer: &mut dyn Observer) -> Result<(), Fault> {
         let Some(mut mode) = self.mode.take() else { return Ok(()) };
         let mut watching = watched(self.model, nodes, &mode.moving, self.env());
-        let stop = mode.switches.stop.min(watching.stop);
-        let mut guide = Guide { switches: [&mut mode.switches, &mut watching], target: until.min(stop) };
+        let stop = mode.switches.stop.min(watching.stop).min(mode.limits.stop);
+        let switches = [&mut mode.switches, &mut watching, &mut mode.limits];
+        let mut guide = Guide { switches, target: until.min(stop) };
         let end = match self.integrator.take() {
             None => self.rest(&mut guide),
             Some(mut integrator) => {
@@ -98,11 +105,15 @@ impl Engine<'_> {
                     self.touches.push(crossing.node);
                     self.forget();
                 }
+                self.limits.crossed();
                 self.count_crossing(crossing.node)?;
                 self.show(observer);
                 self.settle(None, observer)
             }
-            _ if self.time == stop => self.settle(None, observer),
+            _ if self.time == stop => {
+                self.limits.crossed();
+                self.settle(None, observer)
+            }
             _ => Ok(()),
         }
     }
@@ -164,7 +175,12 @@ impl Engine<'_> {
         times.push(end);
         let mut values = vec![0.0; moving.len()];
         let crossing = guide.crossing(clock, from, &times, &mut values, &mut |time, out| dense.at(time, out));
-        let reached = crossing.map_or(end, |c| c.time);
+        let mut reached = crossing.map_or(end, |c| c.time);
+        times.retain(|&t| t < reached);
+        times.push(reached);
+        let drained = self.first_drained(dense, moving, from, &times);
+        let drained = drained.map(|(time, drained)| (time, drained.clone()));
+        reached = drained.as_ref().map_or(reached, |(time, _)| *time);
         dense.at(reached, &mut values);
         dense.reached = reached;
         for (&state, &value) in moving.iter().zip(&values) {
@@ -173,6 +189,10 @@ impl Engine<'_> {
         let on_target = crossing.is_none() && reached == target;
         self.arrive(if on_target { guide.target } else { clock.lab(reached).clamp(self.time, guide.target) });
         self.check_states(Some(moving))?;
+        if let Some((_, drained)) = &drained {
+            self.show(observer);
+            return Err(self.overdrawn(drained, "is used up"));
+        }
         if reached == dense.end {
             self.show(observer);
         }
@@ -249,8 +269,8 @@ impl Engine<'_> {
 
 /// What to look out for in a segment, and how far to go.
 struct Guide<'s> {
-    /// The model's and the caller's.
-    switches: [&'s mut Switches; 2],
+    /// Of the model, of the caller, of the limits.
+    switches: [&'s mut Switches; 3],
     target: f64,
 }
 

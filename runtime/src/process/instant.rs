@@ -137,6 +137,7 @@ impl Engine<'_> {
         *place = value;
         self.sampled = false;
         self.forget();
+        self.limits.wrote(state);
         if self.integrator.as_ref().is_some_and(|i| i.moving.binary_search(&state).is_ok()) {
             self.integrator = None;
         }

@@ -8,6 +8,7 @@
 //! - `analysis`, `mode`: which part of the graph that is.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
+//! - `limits`: what things keep at all times.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
 //! - `advance`, `instant`: the loop over segments, and what happens between two.
 
@@ -17,6 +18,7 @@ mod clock;
 mod dense;
 mod instant;
 mod integrator;
+mod limits;
 mod memo;
 mod mode;
 mod suspicion;
@@ -37,7 +39,10 @@ use crate::fault::Fault;
 pub use crate::ledger::BalanceReport;
 use crate::ledger::Balances;
 
+pub use limits::Keeps;
+
 use integrator::Integrator;
+use limits::Limits;
 use memo::Memo;
 use mode::{Law, Mode};
 use suspicion::Suspicion;
@@ -92,6 +97,8 @@ pub enum Advance {
     Reached,
     /// These watches hold now, by their index.
     Watch(Vec<usize>),
+    /// These limits hold no longer, by their index.
+    Broken(Vec<u32>),
 }
 
 /// A model on its way through time.
@@ -120,6 +127,7 @@ pub struct Engine<'m> {
     sampled: bool,
     balances: Balances,
     suspicion: Suspicion,
+    limits: Limits<'m>,
     memo: RefCell<Memo>,
 }
 
@@ -145,6 +153,7 @@ impl<'m> Engine<'m> {
             sampled: false,
             balances: Balances::default(),
             suspicion: Suspicion::new(model),
+            limits: Limits::default(),
             memo: RefCell::new(Memo::new(&model.graph)),
         };
         engine.states = model.states.iter().map(|s| engine.eval(s.initial)).collect();

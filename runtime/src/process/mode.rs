@@ -17,6 +17,8 @@ pub(super) struct Mode {
     pub(super) rates: Tape,
     /// What the model's own conditions depend on.
     pub(super) switches: Switches,
+    /// What the limits depend on that may break.
+    pub(super) limits: Switches,
 }
 
 /// The expressions of the model that decide how it evolves.
@@ -65,7 +67,7 @@ impl Law {
         let (moving, rates): (Vec<u32>, Vec<NodeId>) = laws.into_iter().unzip();
         let rates = analysis.rates(&rates, &moving);
         let switches = Switches::new(analysis, model.graph.ops(), self.roots.iter().copied(), &moving, time);
-        Mode { moving, rates, switches }
+        Mode { moving, rates, switches, limits: Switches::none() }
     }
 }
 

@@ -2,10 +2,11 @@
 //!
 //! Where the compiler has shown that nothing of the kind can happen there is nothing to look at.
 
-use matterix_ir::model::{Domain, Model};
+use matterix_ir::model::{Domain, Drained, Model};
 use matterix_ir::{Span, codes};
 
 use super::Engine;
+use super::dense::Dense;
 use crate::fault::Fault;
 use crate::ledger::CLOSURE;
 
@@ -14,6 +15,9 @@ const MARGIN: f64 = 1.0;
 
 /// An amount below nothing by less than this share of its scale is nothing.
 const ROUNDING: f64 = 1e-3;
+
+/// Halvings that find when an amount is used up.
+const BISECTIONS: usize = 60;
 
 /// What is counted between two looks.
 #[derive(Debug, Default)]
@@ -60,6 +64,46 @@ impl Suspicion {
 }
 
 impl Engine<'_> {
+    /// The first amount that a law takes more of than there is, and when it is used up, s on the clock of `dense`: between `from`
+    /// and the last of `times` (ascending).
+    pub(super) fn first_drained(
+        &self,
+        dense: &Dense,
+        moving: &[u32],
+        from: f64,
+        times: &[f64],
+    ) -> Option<(f64, &Drained)> {
+        let states = &self.model.states;
+        let watched = self.model.temperatures.drained.iter();
+        let watched: Vec<(usize, &Drained)> =
+            watched.filter_map(|d| Some((moving.binary_search(&d.state).ok()?, d))).collect();
+        if watched.is_empty() {
+            return None;
+        }
+        let mut values = vec![0.0; moving.len()];
+        let mut low = from;
+        for &high in times {
+            dense.at(high, &mut values);
+            let below = |(place, d): &&(usize, &Drained)| values[*place] < -ROUNDING * states[d.state as usize].scale;
+            let gone: Vec<(usize, &Drained)> = watched.iter().filter(below).copied().collect();
+            let ends = gone.into_iter().map(|(place, d)| (used_up(dense, place, low, high, &mut values), d));
+            if let Some(first) = ends.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                return Some(first);
+            }
+            low = high;
+        }
+        None
+    }
+
+    /// The fault of an amount that a law takes more of than there is.
+    pub(super) fn overdrawn(&self, drained: &Drained, how: &str) -> Fault {
+        let name = &self.model.states[drained.state as usize].name;
+        let message = format!("`{}` takes more than there is: `{name}` {how}", drained.law);
+        Fault::new(codes::TRANSFER_FRACTION, self.time, message)
+            .at(drained.span)
+            .help("let the rate follow what is left, or give the law a `while` that ends it")
+    }
+
     /// Fails where what was assigned since the last look makes or loses something; `who` did it.
     pub(super) fn judge_instant(&mut self, who: &str, span: Option<Span>) -> Result<(), Fault> {
         let added = std::mem::take(&mut self.suspicion.added);
@@ -98,10 +142,7 @@ impl Engine<'_> {
                     Domain::Quantity(unit) => unit.show(value),
                     _ => value.to_string(),
                 };
-                let message = format!("`{}` takes more than there is: `{}` is {shown}", drained.law, state.name);
-                return Err(Fault::new(codes::TRANSFER_FRACTION, self.time, message)
-                    .at(drained.span)
-                    .help("let the rate follow what is left, or give the law a `while` that ends it"));
+                return Err(self.overdrawn(drained, &format!("is {shown}")));
             }
         }
         if temperatures.suspects.is_empty() {
@@ -140,4 +181,14 @@ impl Engine<'_> {
         }
         Ok(())
     }
+}
+
+/// The last time between `low` and `high` at which a moving state is not below nothing.
+fn used_up(dense: &Dense, place: usize, mut low: f64, mut high: f64, values: &mut [f64]) -> f64 {
+    for _ in 0..BISECTIONS {
+        let middle = low + 0.5 * (high - low);
+        dense.at(middle, values);
+        if values[place] < 0.0 { high = middle } else { low = middle }
+    }
+    low
 }

@@ -10,6 +10,7 @@ use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::Flow;
 use super::bonds::{Bonds, Form};
+use super::course::Course;
 use super::facts::Facts;
 use super::value::{Known, Why};
 
@@ -138,7 +139,12 @@ impl Flow<'_, '_> {
         }
         let due = self.events_on(&changed);
         self.fire(due, facts);
-        let limits = changed.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
+        self.limits_on(&changed, facts);
+    }
+
+    /// Looks at the limits that depend on these states.
+    pub(super) fn limits_on(&mut self, states: &[u32], facts: &mut Facts) {
+        let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
         self.limits(limits, facts);
     }
 
@@ -355,8 +361,10 @@ impl Flow<'_, '_> {
                 let value = self.eval(node, &facts);
                 if value.truth() != Some(true) {
                     self.stopped_meanwhile(until, f64::INFINITY, &facts);
-                    self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
-                    self.assume(node, true, &mut facts);
+                    if !matches!(self.course(f64::INFINITY, Some(node), &mut facts), Course::Reached) {
+                        self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
+                        self.assume(node, true, &mut facts);
+                    }
                 }
             }
             (Some(takes), None) => {

@@ -25,9 +25,9 @@ pub struct Parts {
 
 /// Numbers, as long as all are known exactly and no comparison hangs on rounding; what comes of them is what
 /// [`Known`] makes of points.
-struct Exact<'f> {
-    params: &'f [Known],
-    facts: &'f Facts,
+pub(super) struct Exact<'f> {
+    pub params: &'f [Known],
+    pub facts: &'f Facts,
 }
 
 impl Rules for Exact<'_> {

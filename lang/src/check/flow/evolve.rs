@@ -11,6 +11,7 @@ use matterix_ir::{BinaryOp, Op};
 
 use super::Flow;
 use super::bonds::Bonds;
+use super::course::Course;
 use super::facts::Facts;
 use super::fluxes::Row;
 use super::polytope::scaled;
@@ -94,6 +95,18 @@ impl Flow<'_, '_> {
         if longest <= 0.0 {
             return;
         }
+        let course = duration.exact().map(|exact| self.course(exact, None, facts));
+        let rest = match course {
+            Some(Course::Passed | Course::Reached) => return,
+            Some(Course::Left(left)) if left < longest => Known::Point(left),
+            _ => duration.clone(),
+        };
+        self.drift(&rest, facts);
+    }
+
+    /// Time passes; what moves is known within bounds, whether it moves evenly or not.
+    pub(super) fn drift(&mut self, duration: &Known, facts: &mut Facts) {
+        let (_, longest) = duration.bounds();
         facts.time = Known::binary(BinaryOp::Add, &facts.time, duration);
         facts.reopen(|s| self.lab.rates.contains_key(&s));
         let mut timed = self.timed.clone();
@@ -110,6 +123,7 @@ impl Flow<'_, '_> {
             recurring.sort_unstable();
             recurring.dedup();
             self.recur(&recurring, facts);
+            self.limits_on(&moved, facts);
             if facts.unsettled.is_empty() || moved.is_empty() {
                 return;
             }

@@ -17,8 +17,8 @@ const MOST_TERMS: usize = 256;
 /// Something that goes on: what its rate is, while conditions come out so.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Flux {
-    rate: NodeId,
-    conditions: Vec<(NodeId, bool)>,
+    pub(super) rate: NodeId,
+    pub(super) conditions: Vec<(NodeId, bool)>,
 }
 
 /// How a rate is made up.

@@ -129,7 +129,7 @@ impl<'p> Flow<'p, '_> {
     }
 
     /// The states that actions change.
-    fn changed_by(&self, actions: &[Action]) -> BTreeSet<u32> {
+    pub(super) fn changed_by(&self, actions: &[Action]) -> BTreeSet<u32> {
         let states = |action: &Action| match action {
             Action::Assign { state, .. } => vec![*state],
             Action::Move { from, to, .. } => {

@@ -63,7 +63,7 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
 impl Flow<'_, '_> {
     /// Starts a job.
     pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: Facts) -> Option<Facts> {
-        let (start, writes) = (facts.time.clone(), self.writes(body));
+        let (start, writes) = (facts.time.clone(), self.sets_going(self.writes(body)));
         let end = match self.late {
             true => None,
             false => {
@@ -121,7 +121,7 @@ impl Flow<'_, '_> {
     }
 
     fn job(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
-        let others = self.beside(body);
+        let others = self.sets_going(self.beside(body));
         self.begin_job(&others);
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };

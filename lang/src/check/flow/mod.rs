@@ -9,8 +9,11 @@
 mod actions;
 mod beside;
 mod bonds;
+mod course;
 mod demands;
+mod dual;
 mod eval;
+mod even;
 mod evolve;
 mod facts;
 mod fluxes;
@@ -81,8 +84,12 @@ struct Flow<'l, 'a> {
     formulas: Formulas,
     /// Room for exact values.
     numbers: Vec<f64>,
+    /// Room for numbers with their rates.
+    duals: Vec<dual::Dual>,
     /// What goes on by the laws, where that was asked for.
     stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
+    /// What may move evenly, where that was asked for.
+    tracks: Option<Rc<even::Tracks>>,
     /// Derivatives as sums of what goes on, as far as they were asked for.
     terms_known: FxHashMap<u32, totals::Terms>,
     /// Nodes as sums of states, as far as they were asked for.
@@ -212,7 +219,9 @@ impl<'l, 'a> Flow<'l, 'a> {
             orders: vec![None; lab.graph.ops().len()],
             formulas: Formulas::default(),
             numbers: Vec::new(),
+            duals: Vec::new(),
             stoichiometry: None,
+            tracks: None,
             terms_known: FxHashMap::default(),
             forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),

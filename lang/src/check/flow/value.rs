@@ -29,7 +29,7 @@ pub enum Known {
 const MOST: usize = 8;
 
 /// Numbers closer than this, relative to the larger, are not told apart.
-const CLOSE: f64 = 1e-10;
+pub(super) const CLOSE: f64 = 1e-10;
 
 thread_local! {
     /// No and yes, of which many comparisons are made.

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use matterix_ir::plan::{Caught, Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
+use super::course::Course;
 use super::facts::Facts;
 use super::interference::Rival;
 use super::jobs::in_both;
@@ -202,7 +203,13 @@ impl Flow<'_, '_> {
             self.stopped_meanwhile(condition, longest, &facts);
         }
         let before = facts.clone();
-        self.pass(&Known::Range(0.0, longest, Why::Unknown), &mut facts);
+        let course =
+            if shared { Course::Left(longest) } else { self.course(longest, Some(condition.node), &mut facts) };
+        match course {
+            Course::Reached => return Some(facts),
+            Course::Passed => {}
+            Course::Left(left) => self.pass(&Known::Range(0.0, left, Why::Unknown), &mut facts),
+        }
         if value.truth() == Some(false) && self.eval(condition.node, &facts).truth().is_none() {
             self.by_totals(longest, &before, &mut facts);
         }
@@ -369,7 +376,7 @@ impl Flow<'_, '_> {
 
     /// Forgets what a body changes.
     fn widen(&mut self, body: StepId, facts: &mut Facts) {
-        let states: Vec<u32> = self.writes(body).into_iter().collect();
+        let states: Vec<u32> = self.sets_going(self.writes(body)).into_iter().collect();
         self.forget(&states, facts);
     }
 
@@ -390,7 +397,7 @@ impl Flow<'_, '_> {
     /// Branches side by side: followed one after the other, in the order of the text and the other way round. What goes
     /// wrong in one order only may be right in the order of the run.
     fn parallel(&mut self, branches: &[StepId], facts: Facts) -> Option<Facts> {
-        let writes: Vec<BTreeSet<u32>> = branches.iter().map(|b| self.writes(*b)).collect();
+        let writes: Vec<BTreeSet<u32>> = branches.iter().map(|b| self.sets_going(self.writes(*b))).collect();
         let forward: Vec<usize> = (0..branches.len()).collect();
         let backward: Vec<usize> = forward.iter().rev().copied().collect();
         let mark = self.findings.len();

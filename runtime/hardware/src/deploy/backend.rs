@@ -39,6 +39,15 @@ impl Backend for Hardware<'_, '_> {
         }
     }
 
+    fn limit(&mut self, limit: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
+        self.eval(condition, out)?;
+        self.twin.limit(limit, condition, out)
+    }
+
+    fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
+        self.twin.decide(limit)
+    }
+
     fn follow(&mut self, condition: NodeId) -> Follow {
         let (told, _) = self.observed.asks(&self.program.model, condition);
         if told.is_empty() {
@@ -214,8 +223,16 @@ impl Backend for Hardware<'_, '_> {
         match self.next_entry() {
             Some(Entry::Time { t, fired, .. }) => {
                 self.replay.pop_front();
-                while self.twin.now() < t {
-                    self.twin.advance(t, &[], out)?;
+                let mut broken = Vec::new();
+                loop {
+                    if let Advance::Broken(limits) = self.twin.advance(t, &[], out)? {
+                        broken.extend(limits);
+                    } else if self.twin.now() >= t {
+                        break;
+                    }
+                }
+                if !broken.is_empty() {
+                    return Ok(Advance::Broken(broken));
                 }
                 return Ok(if fired.is_empty() && t >= until { Advance::Reached } else { Advance::Watch(fired) });
             }
@@ -227,8 +244,9 @@ impl Backend for Hardware<'_, '_> {
             let now = self.twin.now();
             let clock = if self.is_dry() { f64::INFINITY } else { self.clock() };
             let target = until.min(clock).min(self.next_beat()).max(now);
-            if let Advance::Watch(fired) = self.twin.advance(target, watches, out)? {
-                break Advance::Watch(fired);
+            match self.twin.advance(target, watches, out)? {
+                Advance::Reached => {}
+                stopped => break stopped,
             }
             self.beat(true, out)?;
             if self.twin.now() >= until {
@@ -245,7 +263,7 @@ impl Backend for Hardware<'_, '_> {
         };
         let fired = match &outcome {
             Advance::Watch(fired) => fired.clone(),
-            Advance::Reached => Vec::new(),
+            Advance::Reached | Advance::Broken(_) => Vec::new(),
         };
         self.journal.note(&Entry::Time { t: self.twin.now(), fired, wall: wall() });
         Ok(outcome)

@@ -66,6 +66,14 @@ impl Backend for Paced<'_, '_, '_> {
         self.inner.observe(node, out)
     }
 
+    fn limit(&mut self, limit: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
+        self.inner.limit(limit, condition, out)
+    }
+
+    fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
+        self.inner.decide(limit)
+    }
+
     fn follow(&mut self, condition: NodeId) -> Follow {
         self.inner.follow(condition)
     }
@@ -92,7 +100,7 @@ impl Backend for Paced<'_, '_, '_> {
             self.answer(out)?;
             let target = until.min(self.clock()).max(self.inner.now());
             match self.inner.advance(target, watches, out)? {
-                Advance::Watch(fired) => return Ok(Advance::Watch(fired)),
+                stopped @ (Advance::Watch(_) | Advance::Broken(_)) => return Ok(stopped),
                 Advance::Reached if self.inner.now() >= until => return Ok(Advance::Reached),
                 Advance::Reached => {}
             }

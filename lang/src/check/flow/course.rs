@@ -1,0 +1,296 @@
+//! The course of what moves evenly while time passes: from one change of a condition to the next, each at its moment, with the
+//! events that happen there and the limits that are passed on the way.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
+
+use super::Flow;
+use super::dual::{Along, Dual};
+use super::eval::Exact;
+use super::even::{Even, Tracks};
+use super::facts::Facts;
+use super::value::{CLOSE, Known};
+
+/// Changes of conditions within one step before the rest of it is followed in bounds.
+const MOST_CHANGES: usize = 64;
+
+/// A difference that departs from a straight line by less than this share of what is compared is one.
+const STRAIGHT: f64 = 1e-9;
+
+/// How a course ends.
+pub(super) enum Course {
+    /// What was waited for has come.
+    Reached,
+    /// All of the time has passed.
+    Passed,
+    /// Further on nothing moves evenly: what is left of the time, s.
+    Left(f64),
+}
+
+/// Two sides of a comparison, or of what bends a line.
+type Sides = (NodeId, Option<NodeId>);
+
+/// A limit that was passed on the way, with what was known there.
+struct Passed {
+    limit: u32,
+    there: Facts,
+}
+
+impl Flow<'_, '_> {
+    /// Follows what moves evenly for at most `longest` s, or until a condition holds.
+    pub(super) fn course(&mut self, longest: f64, until: Option<NodeId>, facts: &mut Facts) -> Course {
+        let tracks = self.tracks();
+        if tracks.list.is_empty() {
+            return Course::Left(longest);
+        }
+        let mut passed = Vec::new();
+        let begun = facts.clone();
+        let end = self.along(&tracks, longest, until, facts, &mut passed);
+        if begun.time != facts.time {
+            self.limits_passed(&Even::default(), &begun, facts, &mut passed);
+        }
+        for Passed { limit, there } in passed {
+            self.pass_limit(limit, there, facts);
+        }
+        end
+    }
+
+    fn along(
+        &mut self,
+        tracks: &Tracks,
+        longest: f64,
+        until: Option<NodeId>,
+        facts: &mut Facts,
+        passed: &mut Vec<Passed>,
+    ) -> Course {
+        let mut left = longest;
+        let mut last = Even::default();
+        let begun = facts.clone();
+        for _ in 0..MOST_CHANGES {
+            let even = self.even(facts, &last);
+            if even.slopes.is_empty() {
+                break;
+            }
+            if left > 0.0 {
+                self.limits_passed(&even, &begun, facts, passed);
+            }
+            let sides = self.sides(tracks, &even, until);
+            let Some(next) = self.next_change(&sides, &even, left, facts) else { break };
+            let dry = dry_at(&even, &self.amounts);
+            let step = next.min(left).min(dry.unwrap_or(f64::INFINITY));
+            if !step.is_finite() {
+                break;
+            }
+            let before = facts.clone();
+            self.go_along(step, &even, &sides, facts);
+            left -= step;
+            if dry.is_some_and(|dry| dry <= step) {
+                self.runs_dry(&even, step, facts);
+                return Course::Left(left);
+            }
+            self.events_along(&even, &before, facts);
+            if until.is_some_and(|node| self.truth_beyond(node, &even, facts) == Some(true)) {
+                return Course::Reached;
+            }
+            if left <= 0.0 {
+                return Course::Passed;
+            }
+            last = even;
+        }
+        Course::Left(left)
+    }
+
+    /// What is compared in conditions that what moves evenly decides.
+    fn sides(&mut self, tracks: &Tracks, even: &Even, until: Option<NodeId>) -> Vec<Sides> {
+        let states: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
+        let events = self.events_on(&states).into_iter().chain(self.timed.iter().copied());
+        let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten();
+        let mut roots: BTreeSet<NodeId> = events.map(|i| self.events[i as usize].when).collect();
+        roots.extend(limits.map(|i| self.plan.limits[*i as usize].condition.node));
+        roots.extend(tracks.conditions.iter().copied().chain(until));
+        let mut sides = BTreeSet::new();
+        for root in roots {
+            for node in self.order(root).iter() {
+                match self.lab.graph.op(*node) {
+                    Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq | BinaryOp::Min | BinaryOp::Max, a, b) => {
+                        _ = sides.insert((a, Some(b)))
+                    }
+                    Op::Unary(UnaryOp::Abs | UnaryOp::Floor, a) => _ = sides.insert((a, None)),
+                    _ => {}
+                }
+            }
+        }
+        let touched = |node: &NodeId, flow: &mut Self| {
+            let parts = flow.parts(*node);
+            parts.timed || parts.states.iter().any(|s| even.moves(*s))
+        };
+        sides.into_iter().filter(|(a, b)| touched(a, self) || b.is_some_and(|b| touched(&b, self))).collect()
+    }
+
+    /// How long it is until the first of these differences changes its sign, s; none where one of them may do so that is not
+    /// followed.
+    fn next_change(&mut self, sides: &[Sides], even: &Even, left: f64, facts: &Facts) -> Option<f64> {
+        let mut next = f64::INFINITY;
+        let mut followed = Vec::new();
+        for side in sides {
+            // What rests on other things as well is looked at when the time has passed.
+            let Some((now, slope, size)) = self.difference(*side, even, 0.0, facts) else { continue };
+            followed.push(*side);
+            let at = -now / slope;
+            if slope != 0.0 && now.abs() > CLOSE * size && at > 0.0 {
+                next = next.min(at);
+            }
+        }
+        let end = next.min(left);
+        if !end.is_finite() {
+            return Some(next);
+        }
+        for side in followed {
+            let (now, _, size) = self.difference(side, even, 0.0, facts)?;
+            let (half, ..) = self.difference(side, even, 0.5 * end, facts)?;
+            let (then, _, far) = self.difference(side, even, end, facts)?;
+            if (half - 0.5 * (now + then)).abs() > STRAIGHT * size.max(far) {
+                return None;
+            }
+        }
+        Some(next)
+    }
+
+    /// The difference of two sides after a time, how fast it changes, and the size of the larger one.
+    fn difference(&mut self, (a, b): Sides, even: &Even, time: f64, facts: &Facts) -> Option<(f64, f64, f64)> {
+        let a = self.along_at(a, even, time, facts)?;
+        let b = b.map_or(Some(Dual::default()), |b| self.along_at(b, even, time, facts))?;
+        let known = |v: f64| if v.is_nan() { 0.0 } else { v };
+        Some((known(a.value - b.value), known(a.slope - b.slope), a.value.abs().max(b.value.abs())))
+    }
+
+    fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &Facts) -> Option<Dual> {
+        let along = Along { exact: Exact { params: &self.params, facts }, even, time };
+        self.formulas.of(&self.lab.graph, node).value(&along, &mut self.duals)
+    }
+
+    /// Whether a condition holds from now on while states move so, even where what it compares has just become equal.
+    pub(super) fn truth_beyond(&mut self, node: NodeId, even: &Even, facts: &Facts) -> Option<bool> {
+        let by_motion = self.along_at(node, even, 0.0, facts).map(|dual| dual.value != 0.0);
+        by_motion.or_else(|| self.eval(node, facts).truth())
+    }
+
+    /// Lets time pass in which what moves evenly does so; what else moves is known in bounds.
+    fn go_along(&mut self, step: f64, even: &Even, sides: &[Sides], facts: &mut Facts) {
+        let before = facts.clone();
+        let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
+        let events = self.events_on(&followed);
+        self.quiet += 1;
+        let guards = std::mem::take(&mut self.guards);
+        self.drift(&Known::Point(step), facts);
+        self.guards = guards;
+        self.quiet -= 1;
+        // What the events that are followed do is done at their moment.
+        let set: BTreeSet<u32> =
+            events.iter().flat_map(|i| self.changed_by(&self.events[*i as usize].actions)).collect();
+        let kept = set.into_iter().filter(|s| !even.open.contains(s)).chain(followed.iter().copied());
+        let kept: Vec<u32> =
+            kept.chain(self.tracks().list.iter().map(|t| t.state).filter(|s| !even.open.contains(s))).collect();
+        let back: Vec<(u32, Known)> = kept.iter().map(|s| (*s, before.states[*s as usize].clone())).collect();
+        facts.rebind(|bonds, _| bonds.release(&kept));
+        back.into_iter().for_each(|(s, known)| facts.states[s as usize] = known);
+        for i in events {
+            facts.fired[i as usize] = before.fired[i as usize];
+        }
+        facts.history = before.history;
+        let mut changes: Vec<(u32, Known)> =
+            even.slopes.iter().map(|(s, value, slope)| (*s, Known::point(value + slope * step))).collect();
+        for (a, b) in sides {
+            self.snap(*a, *b, &mut changes, facts);
+        }
+        self.write(changes, facts);
+        facts.barrier = None;
+    }
+
+    /// A state that has come to a number, give or take rounding, is that number.
+    fn snap(&mut self, a: NodeId, b: Option<NodeId>, changes: &mut [(u32, Known)], facts: &Facts) {
+        let Some(b) = b else { return };
+        for (moving, still) in [(a, b), (b, a)] {
+            let Op::State(state) = self.lab.graph.op(moving) else { continue };
+            let Some(goal) = self.eval(still, facts).exact() else { continue };
+            if self.parts(still).states.iter().any(|s| changes.iter().any(|(c, _)| c == s)) {
+                continue;
+            }
+            for (_, known) in changes.iter_mut().filter(|(s, _)| *s == state) {
+                if known.exact().is_some_and(|v| (v - goal).abs() <= 1e-12 * goal.abs()) {
+                    *known = Known::Point(goal);
+                }
+            }
+        }
+    }
+
+    /// Events that what moved evenly brings about now.
+    fn events_along(&mut self, even: &Even, before: &Facts, facts: &mut Facts) {
+        let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
+        let mut due = self.events_on(&followed);
+        due.extend(&self.timed);
+        due.sort_unstable();
+        due.dedup();
+        for i in due {
+            let now = self.truth_beyond(self.events[i as usize].when, even, facts);
+            facts.fired[i as usize] = now;
+            if now == Some(true) && before.fired[i as usize] != Some(true) {
+                let changed = self.happen(i, facts);
+                let on = self.events_on(&changed).into_iter().filter(|e| *e != i).collect();
+                self.fire(on, facts);
+            }
+        }
+    }
+
+    /// Notes the limits that hold no longer.
+    fn limits_passed(&mut self, even: &Even, before: &Facts, facts: &Facts, passed: &mut Vec<Passed>) {
+        let changed = (0..self.lab.states.len() as u32)
+            .filter(|s| even.moves(*s) || before.states[*s as usize] != facts.states[*s as usize]);
+        let due: BTreeSet<u32> = changed.filter_map(|s| self.limits_of.get(&s)).flatten().copied().collect();
+        for limit in due {
+            let node = self.plan.limits[limit as usize].condition.node;
+            let new = !passed.iter().any(|p| p.limit == limit);
+            if new
+                && self.truth_beyond(node, even, facts) == Some(false)
+                && self.eval(node, before).truth() != Some(false)
+            {
+                passed.push(Passed { limit, there: facts.clone() });
+            }
+        }
+    }
+
+    /// Reports a limit that was passed on the way: by what it comes to in the end, where it still does not hold then.
+    fn pass_limit(&mut self, index: u32, there: Facts, facts: &mut Facts) {
+        let limit = &self.plan.limits[index as usize];
+        let name = limit.condition.failure();
+        if !self.is_taken(name) {
+            let lasts = self.eval(limit.condition.node, facts).truth() == Some(false);
+            let shown = if lasts { facts.clone() } else { there.clone() };
+            self.passed(limit, &shown, false);
+        }
+        self.raise(name, there);
+        let states = self.parts(limit.condition.node).states.clone();
+        self.forget(&states, facts);
+    }
+
+    /// A stream takes more than there is.
+    fn runs_dry(&mut self, even: &Even, step: f64, facts: &mut Facts) {
+        let empty = even.slopes.iter().filter(|(s, value, slope)| {
+            self.amounts.contains(s) && *slope < 0.0 && value + slope * step <= STRAIGHT * value
+        });
+        let empty: Vec<u32> = empty.map(|(s, ..)| *s).collect();
+        let from = self.mixtures.iter().position(|m| m.iter().any(|(_, s)| empty.contains(s)));
+        if let Some(from) = from {
+            self.emptied(from, facts);
+        }
+        let moved: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
+        self.forget(&moved, facts);
+    }
+}
+
+/// When the first amount that a stream takes is used up, s.
+fn dry_at(even: &Even, amounts: &BTreeSet<u32>) -> Option<f64> {
+    let falls = even.slopes.iter().filter(|(s, value, slope)| amounts.contains(s) && *slope < 0.0 && *value > 0.0);
+    falls.map(|(_, value, slope)| -value / slope).min_by(f64::total_cmp)
+}

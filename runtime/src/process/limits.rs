@@ -1,0 +1,175 @@
+//! Limits that things keep at all times: which of them what moves may break, and which are broken.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::Model;
+use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
+
+use super::Engine;
+use super::mode::{Mode, watched};
+
+/// A limit that depends on what moves is broken where it is passed by more than this share: ten times the relative error that
+/// a step may have. So one that is only touched holds.
+const SLACK: f64 = 1e-7;
+
+/// A condition that must hold all the time, with what it rests on.
+#[derive(Clone, Debug)]
+struct Kept {
+    /// Not 0 while it holds.
+    node: NodeId,
+    /// The states below it, ascending.
+    states: Vec<u32>,
+    /// Whether time stands below it.
+    timed: bool,
+}
+
+/// The limits of a plan, made ready for watching.
+#[derive(Clone, Debug, Default)]
+pub struct Keeps {
+    kept: Vec<Kept>,
+    /// By state, the limits that rest on it.
+    of_state: Vec<Vec<u32>>,
+}
+
+impl Keeps {
+    /// These conditions; those that depend on what moves get operations of their own in the graph of `model`.
+    pub fn new(model: &mut Model, conditions: impl IntoIterator<Item = NodeId>) -> Self {
+        let mut moving = vec![false; model.states.len()];
+        for derivative in model.derivatives.iter().filter(|d| model.graph.constant(d.rate) != Some(0.0)) {
+            moving[derivative.state as usize] = true;
+        }
+        let mut keeps = Keeps { kept: Vec::new(), of_state: vec![Vec::new(); model.states.len()] };
+        for (i, condition) in conditions.into_iter().enumerate() {
+            let mut kept = Kept { node: condition, states: Vec::new(), timed: false };
+            model.graph.visit(condition, |op| match op {
+                Op::State(s) => kept.states.push(s),
+                Op::Time => kept.timed = true,
+                _ => {}
+            });
+            kept.states.sort_unstable();
+            kept.states.iter().for_each(|&s| keeps.of_state[s as usize].push(i as u32));
+            if kept.states.iter().any(|&s| moving[s as usize]) {
+                kept.node = with_slack(&mut model.graph, condition);
+            }
+            keeps.kept.push(kept);
+        }
+        keeps
+    }
+
+    /// The condition of a limit as it is judged.
+    pub fn node(&self, limit: u32) -> Option<NodeId> {
+        self.kept.get(limit as usize).map(|kept| kept.node)
+    }
+
+    /// The states that decide how those of a limit change: what their rates rest on, then what the rates of these rest on, and so
+    /// on; at last those of the limit itself.
+    pub fn decide(&self, model: &Model, limit: u32) -> Vec<Vec<u32>> {
+        let own = self.kept.get(limit as usize).map(|kept| kept.states.clone()).unwrap_or_default();
+        let mut seen: BTreeSet<u32> = own.iter().copied().collect();
+        let (mut layers, mut last) = (Vec::new(), own.clone());
+        while !last.is_empty() {
+            let mut next = BTreeSet::new();
+            for derivative in model.derivatives.iter().filter(|d| last.contains(&d.state)) {
+                model.graph.visit(derivative.rate, |op| {
+                    if let Op::State(s) = op {
+                        next.insert(s);
+                    }
+                });
+            }
+            last = next.into_iter().filter(|s| seen.insert(*s)).collect();
+            layers.push(last.clone());
+        }
+        layers.push(own);
+        layers
+    }
+}
+
+/// A condition whose comparisons hold up to [`SLACK`] beyond where they are met.
+fn with_slack(graph: &mut Graph, node: NodeId) -> NodeId {
+    match graph.op(node) {
+        Op::Binary(op @ (BinaryOp::And | BinaryOp::Or), a, b) => {
+            let (a, b) = (with_slack(graph, a), with_slack(graph, b));
+            graph.binary(op, a, b)
+        }
+        Op::Binary(op @ (BinaryOp::Lt | BinaryOp::Le), a, b) => {
+            let (size_a, size_b) = (graph.unary(UnaryOp::Abs, a), graph.unary(UnaryOp::Abs, b));
+            let size = graph.binary(BinaryOp::Max, size_a, size_b);
+            let share = graph.number(SLACK);
+            let slack = graph.binary(BinaryOp::Mul, share, size);
+            let most = graph.binary(BinaryOp::Add, b, slack);
+            graph.binary(op, a, most)
+        }
+        _ => node,
+    }
+}
+
+/// Where the limits of a run stand.
+#[derive(Debug, Default)]
+pub(super) struct Limits<'m> {
+    all: Option<&'m Keeps>,
+    /// Whether each was broken when last looked at.
+    broken: Vec<bool>,
+    /// Those to look at before time goes on.
+    due: BTreeSet<u32>,
+    /// Those that change with what moves now.
+    live: Vec<u32>,
+}
+
+impl Limits<'_> {
+    /// A state has been set from outside the integration.
+    pub(super) fn wrote(&mut self, state: u32) {
+        if let Some(of) = self.all.and_then(|all| all.of_state.get(state as usize)) {
+            self.due.extend(of);
+        }
+    }
+
+    /// A comparison has changed.
+    pub(super) fn crossed(&mut self) {
+        self.due.extend(&self.live);
+    }
+}
+
+impl<'m> Engine<'m> {
+    /// Watches these limits from now on.
+    pub fn keep(&mut self, all: &'m Keeps) {
+        let broken = vec![false; all.kept.len()];
+        self.limits = Limits { all: Some(all), broken, ..Limits::default() };
+        self.mode = None;
+    }
+
+    /// Notes whether a limit holds, as someone has just seen: what is known to be broken is not told again.
+    pub fn note_limit(&mut self, limit: u32, holds: bool) {
+        if let Some(broken) = self.limits.broken.get_mut(limit as usize) {
+            *broken = !holds;
+        }
+    }
+
+    /// The limits that have been broken since they were last looked at.
+    pub(super) fn newly_broken(&mut self) -> Vec<u32> {
+        let due = std::mem::take(&mut self.limits.due);
+        let mut found = Vec::new();
+        for i in due {
+            let Some(node) = self.limits.all.and_then(|all| all.node(i)) else { continue };
+            let holds = self.truth(node);
+            let before = std::mem::replace(&mut self.limits.broken[i as usize], !holds);
+            if !holds && !before {
+                found.push(i);
+            }
+        }
+        found
+    }
+
+    /// The limits that may break while a law holds are watched with it.
+    pub(super) fn watch_limits(&mut self, mode: &mut Mode) {
+        let Some(all) = self.limits.all else { return };
+        let moves = |kept: &Kept| kept.timed || kept.states.iter().any(|s| mode.moving.binary_search(s).is_ok());
+        let live = (0..all.kept.len()).filter(|&i| moves(&all.kept[i]));
+        self.limits.live = live.map(|i| i as u32).collect();
+        if self.limits.live.is_empty() {
+            return;
+        }
+        self.limits.crossed();
+        let nodes: Vec<NodeId> = self.limits.live.iter().map(|&i| all.kept[i as usize].node).collect();
+        mode.limits = watched(self.model, &nodes, &mode.moving, self.env());
+    }
+}
