@@ -6,6 +6,7 @@
 //! - [`span`], [`diagnostic`], [`codes`]: where something stands in the text and what is wrong with it.
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
+//! - [`interval`]: operations on all numbers between two.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`wire`]: how devices are spoken to.
@@ -20,6 +21,7 @@ pub mod extent;
 pub mod footing;
 pub mod graph;
 pub mod inertia;
+pub mod interval;
 pub mod math;
 pub mod mesh;
 pub mod message;

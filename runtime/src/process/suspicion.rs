@@ -2,7 +2,7 @@
 //!
 //! Where the compiler has shown that nothing of the kind can happen there is nothing to look at.
 
-use matterix_ir::model::{Domain, Model};
+use matterix_ir::model::{Domain, Drained, Model};
 use matterix_ir::{Span, codes};
 
 use super::Engine;
@@ -14,6 +14,9 @@ const MARGIN: f64 = 1.0;
 
 /// An amount below nothing by less than this share of its scale is nothing.
 const ROUNDING: f64 = 1e-3;
+
+/// The same as a share of what there was, where no scale is declared.
+const LEFT_OVER: f64 = 1e-6;
 
 /// What is counted between two looks.
 #[derive(Debug, Default)]
@@ -88,22 +91,44 @@ impl Engine<'_> {
         self.check_balances(None)
     }
 
+    /// Fails where a law has taken more of an amount than there is.
+    pub(super) fn check_drained(&self) -> Result<(), Fault> {
+        let overdrawn = |d: &&Drained| self.states[d.state as usize] < -self.residue(d);
+        self.model.temperatures.drained.iter().find(overdrawn).map_or(Ok(()), |d| Err(self.takes_too_much(d)))
+    }
+
+    /// The amount that a law would take more of than there is, if one has run out.
+    pub(super) fn run_dry(&self) -> Option<Fault> {
+        let taken = |d: &Drained| {
+            let rate = self.model.derivatives.iter().find(|of| of.state == d.state).map(|of| self.eval(of.rate));
+            rate.is_some_and(|rate| rate < 0.0 || !rate.is_finite())
+        };
+        let dry = |d: &&Drained| self.states[d.state as usize].abs() <= self.residue(d) && taken(d);
+        self.model.temperatures.drained.iter().find(dry).map(|d| self.takes_too_much(d))
+    }
+
+    /// What counts as nothing of an amount.
+    fn residue(&self, drained: &Drained) -> f64 {
+        let state = drained.state as usize;
+        self.model.states[state].scale.map_or(LEFT_OVER * self.sizes[state], |scale| ROUNDING * scale)
+    }
+
+    fn takes_too_much(&self, drained: &Drained) -> Fault {
+        let (state, value) = (&self.model.states[drained.state as usize], self.states[drained.state as usize]);
+        let shown = match &state.domain {
+            Domain::Quantity(unit) => unit.show(value),
+            _ => value.to_string(),
+        };
+        let message = format!("`{}` takes more than there is: `{}` is {shown}", drained.law, state.name);
+        Fault::new(codes::TRANSFER_FRACTION, self.time, message)
+            .at(drained.span)
+            .help("let the rate follow what is left, or give the law a `while` that ends it")
+    }
+
     /// Fails where a suspected temperature cannot be.
     pub(super) fn check_temperatures(&mut self) -> Result<(), Fault> {
+        self.check_drained()?;
         let temperatures = &self.model.temperatures;
-        for drained in &temperatures.drained {
-            let (state, value) = (&self.model.states[drained.state as usize], self.states[drained.state as usize]);
-            if value < -ROUNDING * state.scale {
-                let shown = match &state.domain {
-                    Domain::Quantity(unit) => unit.show(value),
-                    _ => value.to_string(),
-                };
-                let message = format!("`{}` takes more than there is: `{}` is {shown}", drained.law, state.name);
-                return Err(Fault::new(codes::TRANSFER_FRACTION, self.time, message)
-                    .at(drained.span)
-                    .help("let the rate follow what is left, or give the law a `while` that ends it"));
-            }
-        }
         if temperatures.suspects.is_empty() {
             return Ok(());
         }
