@@ -44,7 +44,7 @@ impl Behaviour {
             (_, None, None) => Some("failed".to_string()),
         };
         watch.operations.sort_by(|a, b| a.1.total_cmp(&b.1).then_with(|| a.0.cmp(&b.0)));
-        let states = program.model.states.iter().map(|s| (s.name.clone(), s.scale)).collect();
+        let states = program.model.states.iter().map(|s| (s.name.clone(), s.scale.unwrap_or(1.0))).collect();
         Behaviour { failure, end: outcome.end_time, states, samples: watch.samples, operations: watch.operations }
     }
 

@@ -123,6 +123,8 @@ fn run_watched(
         Ok(engine) => engine,
         Err(fault) => return refused(program, fault),
     };
+    let mut engine = engine;
+    engine.heed(options.limits.cancel);
     let mut sim = Sim::new(engine, prepared, options.seed);
     let moves = options.fidelity == Fidelity::Motion;
     sim = match Stage::new(program) {

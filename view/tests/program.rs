@@ -64,7 +64,7 @@ fn program() -> (Program, Sources) {
     }];
     let name = "beaker.contents.amount[water]".into();
     let domain = Domain::Quantity(Unit::scaled("mol", 1.0));
-    model.states = vec![State { name, domain, initial, scale: 1e-6, span: Span::default() }];
+    model.states = vec![State { name, domain, initial, scale: Some(1e-6), span: Span::default() }];
     let unit = Unit::scaled("mL", 1e-6);
     model.observables = vec![Observable { name: "beaker.contents.volume".into(), value: vec![volume], unit }];
     model.mixtures = vec![Mixture {

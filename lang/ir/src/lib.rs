@@ -7,6 +7,7 @@
 //! - [`quantity`]: dimensions and units as they are shown to people. All numbers in a program are SI.
 //! - [`graph`]: the one expression form, in SSA, with its reference evaluator and its printer.
 //! - [`undefined`]: expressions that have no value.
+//! - [`interval`]: operations on all numbers between two.
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`wire`]: how devices are spoken to.
@@ -21,6 +22,7 @@ pub mod extent;
 pub mod footing;
 pub mod graph;
 pub mod inertia;
+pub mod interval;
 pub mod math;
 pub mod mesh;
 pub mod message;

@@ -27,8 +27,10 @@ pub struct State {
     pub domain: Domain,
     /// Its value when the run begins; depends on parameters and constants only.
     pub initial: NodeId,
-    /// Magnitude below which differences do not matter, SI: the absolute error tolerance is derived from it.
-    pub scale: f64,
+    /// Magnitude below which differences do not matter, SI, where that is declared: the absolute error tolerance is derived
+    /// from it, and elsewhere from the values that the state has.
+    #[serde(default)]
+    pub scale: Option<f64>,
     /// Its declaration.
     pub span: Span,
 }

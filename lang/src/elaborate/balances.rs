@@ -147,7 +147,7 @@ impl Elaborator<'_> {
             name: format!("{balance} by {}", info.name),
             domain: Domain::Quantity(unit.clone()),
             initial: self.graph.number(0.0),
-            scale: DOUBT_SCALE,
+            scale: Some(DOUBT_SCALE),
             span: info.span,
         });
         self.state_owner.push(matterix_ir::scene::InstanceId(0));

@@ -24,7 +24,7 @@ impl Elaborator<'_> {
         let initial = self.graph.number(f64::from(u8::from(held)));
         let index = self.states.len() as u32;
         self.state_owner.push(mixture);
-        self.states.push(State { name, domain: Domain::Bool, initial, scale: 1.0, span });
+        self.states.push(State { name, domain: Domain::Bool, initial, scale: Some(1.0), span });
         self.lineage.entry(mixture).or_default().insert(origin.to_string(), index);
         Some(self.graph.add(Op::State(index)))
     }

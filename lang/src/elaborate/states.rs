@@ -64,7 +64,7 @@ impl<'a> Elaborator<'a> {
         name: String,
         ty: &Type,
         options: &'a [NamedExpr],
-        scale: f64,
+        scale: Option<f64>,
         span: Span,
     ) -> u32 {
         let domain = match ty {
@@ -115,8 +115,8 @@ impl<'a> Elaborator<'a> {
     }
 
     /// `{ scale: 1 mmol }`: the magnitude below which differences do not matter.
-    fn scale_of(&mut self, options: &'a [NamedExpr], module: usize, ty: &Type) -> f64 {
-        let Some(o) = options.iter().find(|o| o.name.text == "scale") else { return 1.0 };
+    fn scale_of(&mut self, options: &'a [NamedExpr], module: usize, ty: &Type) -> Option<f64> {
+        let o = options.iter().find(|o| o.name.text == "scale")?;
         let expected = match ty {
             Type::Quantity { dimension, .. } => {
                 Type::Quantity { dimension: dimension.clone(), point: false, optional: false }
@@ -125,8 +125,8 @@ impl<'a> Elaborator<'a> {
         };
         let v = self.expr(&o.value, &mut Scope::module(module));
         match self.coerce(v, &expected, o.value.span, "scale") {
-            Value::Num(n) => self.graph.constant(n.node).unwrap_or(1.0),
-            _ => 1.0,
+            Value::Num(n) => self.graph.constant(n.node),
+            _ => None,
         }
     }
 

@@ -10,7 +10,7 @@ use matterix_ir::plan::{Operation, Plan};
 use matterix_ir::{NodeId, Op};
 
 use super::unknown::{self, Known};
-use super::{Backend, Follow, Status, Ticket};
+use super::{Backend, Follow, Moments, Status, Ticket};
 use crate::exec::Listener;
 use crate::fault::Fault;
 use crate::process::{Advance, Watch};
@@ -30,6 +30,7 @@ pub struct Dry<'m> {
     /// Whether each event's condition was known to hold when last looked at.
     held: Vec<bool>,
     time: f64,
+    moments: Moments,
     running: BTreeMap<Ticket, Running>,
     started: u64,
 }
@@ -59,6 +60,7 @@ impl<'m> Dry<'m> {
             readings: model.readings.iter().map(|r| r.value).collect(),
             held: vec![false; model.events.len()],
             time: 0.0,
+            moments: Moments::default(),
             running: BTreeMap::new(),
             started: 0,
         }
@@ -170,6 +172,10 @@ impl Backend for Dry<'_> {
         self.time
     }
 
+    fn moment_after(&mut self, duration: f64) -> f64 {
+        self.moments.after(self.time, duration)
+    }
+
     fn value(&mut self, node: NodeId, _: &mut dyn Listener) -> Result<Option<f64>, Fault> {
         Ok(self.at(node, self.time))
     }
@@ -190,7 +196,10 @@ impl Backend for Dry<'_> {
         let duration = nominal.filter(|d| d.is_finite() && *d >= 0.0).unwrap_or(0.0);
         let ticket = Ticket(self.started);
         self.started += 1;
-        self.running.insert(ticket, Running { ends: self.time + duration, at_end: operation.at_end.clone() });
+        self.running.insert(
+            ticket,
+            Running { ends: self.moments.after(self.time, duration), at_end: operation.at_end.clone() },
+        );
         Ok(ticket)
     }
 

@@ -4,6 +4,7 @@
 //! the dry run and hardware obey the same plan in the same way.
 
 pub mod dry;
+mod moments;
 pub mod noise;
 pub mod sim;
 mod unknown;
@@ -13,6 +14,7 @@ use matterix_ir::NodeId;
 use matterix_ir::plan::Operation;
 
 pub use dry::Dry;
+pub use moments::Moments;
 pub use sim::{Moves, Sim};
 pub use watch::Prepared;
 
@@ -60,6 +62,11 @@ pub enum Follow {
 pub trait Backend {
     /// The time now.
     fn now(&self) -> f64;
+
+    /// The moment so many seconds after now: sums of many durations are as good as exact.
+    fn moment_after(&mut self, duration: f64) -> f64 {
+        self.now() + duration
+    }
 
     /// The value now, with readings sampled (and told) now; `None` if it cannot be known here.
     fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault>;

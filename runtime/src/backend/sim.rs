@@ -10,7 +10,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{Leaves, NodeId};
 
-use super::{Backend, Follow, Prepared, Status, Ticket, next_report, noise, watch};
+use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
 use crate::exec::Listener;
 use crate::fault::Fault;
 use crate::motion::{Refused, Stage, supported};
@@ -32,6 +32,7 @@ pub struct Sim<'m> {
     engine: Engine<'m>,
     prepared: &'m Prepared,
     seed: u64,
+    moments: Moments,
     running: BTreeMap<Ticket, Running>,
     started: u64,
     /// What a part that moved by itself ran into, until an operation has failed of it.
@@ -86,7 +87,8 @@ impl<'m> Sim<'m> {
         let (running, sampled) = (BTreeMap::new(), BTreeMap::new());
         let (told, given) = (BTreeMap::new(), BTreeMap::new());
         let (moves, swung) = (Moves::default(), None);
-        Sim { stage: None, moves, engine, prepared, seed, running, started: 0, swung, sampled, told, given }
+        let moments = Moments::default();
+        Sim { stage: None, moves, engine, prepared, seed, moments, running, started: 0, swung, sampled, told, given }
     }
 
     /// Things have places from now on. Where robots move, their motions take the time they need, and fail where there is
@@ -153,7 +155,7 @@ impl<'m> Sim<'m> {
     /// longer than the bounds of its duration allow; `begun` is when it first tried, s.
     fn attempt(&mut self, operation: &Operation, begun: f64, out: &mut dyn Listener) -> Result<Ends, Fault> {
         let refused = match self.perform(operation, out) {
-            Ok(Some(duration)) => return Ok(Ends::At(self.engine.time() + self.rest(operation) + duration)),
+            Ok(Some(duration)) => return Ok(Ends::At(self.moment_after(self.rest(operation) + duration))),
             Ok(None) => return self.end_of(operation, out),
             Err(refused) => refused,
         };
@@ -255,7 +257,7 @@ impl<'m> Sim<'m> {
         let Some(takes) = operation.takes else { return Ok(Ends::At(now)) };
         let nominal = self.measure(takes.nominal, out);
         if nominal.is_finite() && nominal >= 0.0 {
-            return Ok(Ends::At(now + nominal));
+            return Ok(Ends::At(self.moment_after(nominal)));
         }
         Err(Fault {
             code: codes::UNUSABLE_NUMBER,
@@ -347,6 +349,10 @@ impl Backend for Sim<'_> {
 
     fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
         self.prepared.keeps.decide(&self.prepared.model, limit)
+    }
+
+    fn moment_after(&mut self, duration: f64) -> f64 {
+        self.moments.after(self.engine.time(), duration)
     }
 
     fn follow(&mut self, condition: NodeId) -> Follow {

@@ -156,7 +156,8 @@ impl<'p> Executor<'p, '_> {
         let plan = self.plan;
         match &plan.get(step).step {
             Step::Wait { duration } => {
-                let at = self.now + self.duration(*duration, "the time to wait")?.unwrap_or(0.0);
+                let duration = self.duration(*duration, "the time to wait")?.unwrap_or(0.0);
+                let at = self.backend.moment_after(duration);
                 self.set_kind(id, Kind::Wait { at });
                 self.end_if(id, at <= self.now);
             }
@@ -174,11 +175,12 @@ impl<'p> Executor<'p, '_> {
                 let duration = self.duration(*duration, "the time to hold")?.unwrap_or(0.0);
                 let deadline = self.deadline(*timeout)?;
                 let Some(follower) = self.follower(step, condition) else {
-                    self.set_kind(id, Kind::Wait { at: self.now + duration });
+                    let at = self.backend.moment_after(duration);
+                    self.set_kind(id, Kind::Wait { at });
                     self.end_if(id, duration <= 0.0);
                     return Ok(());
                 };
-                let end = self.follower_holds(&follower)?.then_some(self.now + duration);
+                let end = self.follower_holds(&follower)?.then(|| self.backend.moment_after(duration));
                 self.set_kind(id, Kind::Hold { follower, duration, end, deadline });
                 self.end_if(id, end.is_some_and(|e| e <= self.now));
             }
@@ -196,7 +198,7 @@ impl<'p> Executor<'p, '_> {
     fn deadline(&mut self, timeout: Option<NodeId>) -> Result<f64, Fault> {
         let Some(node) = timeout else { return Ok(f64::INFINITY) };
         let timeout = self.duration(node, "the timeout")?;
-        Ok(timeout.map_or(f64::INFINITY, |t| self.now + t))
+        Ok(timeout.map_or(f64::INFINITY, |t| self.backend.moment_after(t)))
     }
 
     fn begin_within(&mut self, id: FrameId, limit: NodeId, since: NodeId, body: StepId) -> Result<(), Fault> {

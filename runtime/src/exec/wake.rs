@@ -237,7 +237,7 @@ impl Executor<'_, '_> {
         }
         let (mut follower, mut end) = (follower, end);
         match self.news(&mut follower, end.is_none(), fired)? {
-            Some(true) => end = end.or(Some(self.now + duration)),
+            Some(true) => end = end.or_else(|| Some(self.backend.moment_after(duration))),
             Some(false) => end = None,
             None => {}
         }

@@ -4,9 +4,10 @@ use matterix_ir::{NodeId, codes};
 
 use super::clock::Clock;
 use super::dense::Dense;
-use super::integrator::{Integrator, Next};
+use super::integrator::{Integrator, Next, STEP_SHARE, Stuck};
 use super::mode::watched;
-use super::switch::{Crossing, Switches};
+use super::switch::{Crossing, Switches, Unseen};
+use super::tolerance::Tolerance;
 use super::{Advance, Engine, Observer, Watch};
 use crate::fault::Fault;
 
@@ -44,6 +45,10 @@ impl Engine<'_> {
                 self.check_suspects()?;
                 return Ok(Advance::Reached);
             }
+            if self.is_cancelled() {
+                self.cancel = None;
+                return Ok(Advance::Watch(Vec::new()));
+            }
             self.release(observer);
             self.prepare()?;
             self.segment(until, &nodes, observer)?;
@@ -59,7 +64,7 @@ impl Engine<'_> {
         self.watch_limits(&mut mode);
         let goes_on = self.integrator.as_ref().is_some_and(|i| i.moving == mode.moving && *i.rates() == mode.rates);
         if !goes_on {
-            self.integrator = None;
+            self.leave_integration();
         }
         if self.integrator.is_none() && !mode.moving.is_empty() {
             let values = self.values(&mode.moving);
@@ -69,11 +74,16 @@ impl Engine<'_> {
             if let Some(i) = broken {
                 return Err(self.no_rate(mode.moving[i]));
             }
-            let scale =
-                |&s: &u32| Some(self.model.states[s as usize].scale).filter(|s| s.is_normal()).unwrap_or(1.0).abs();
-            let atol = mode.moving.iter().map(|s| self.options.rtol * scale(s)).collect();
             let (rates, moving) = (mode.rates.clone(), mode.moving.clone());
-            self.integrator = Some(Integrator::new(rates, moving, self.time, &values, self.options.rtol, atol));
+            let scale = |s: &u32| self.model.states[*s as usize].scale.filter(|s| s.is_normal()).map(f64::abs);
+            let scales = moving.iter().map(scale).collect();
+            let sizes: Vec<f64> = moving.iter().map(|s| self.sizes[*s as usize]).collect();
+            let rtol = STEP_SHARE * self.options.rtol;
+            let tolerance = Tolerance::new(rtol, scales, &sizes, &rates, self.time, &values);
+            for (state, size) in moving.iter().zip(tolerance.sizes()) {
+                self.sizes[*state as usize] = *size;
+            }
+            self.integrator = Some(Integrator::new(rates, moving, self.time, &values, tolerance));
         }
         self.mode = Some(mode);
         Ok(())
@@ -91,7 +101,7 @@ impl Engine<'_> {
         let switches = [&mut mode.switches, &mut watching, &mut mode.limits];
         let mut guide = Guide { switches, target: until.min(stop) };
         let end = match self.integrator.take() {
-            None => self.rest(&mut guide),
+            None => self.rest(&mut guide)?,
             Some(mut integrator) => {
                 let end = self.follow(&mut integrator, &mut guide, observer);
                 self.integrator = Some(integrator);
@@ -119,17 +129,18 @@ impl Engine<'_> {
     }
 
     /// No state moves: time jumps, unless comparisons must be looked at on the way.
-    fn rest(&mut self, guide: &mut Guide<'_>) -> Stretch {
+    fn rest(&mut self, guide: &mut Guide<'_>) -> Result<Stretch, Fault> {
         let looks = guide.switches.iter().any(|s| s.follows_time);
-        while self.time < guide.target {
+        while self.time < guide.target && !self.is_cancelled() {
             let end = if looks { guide.target.min(self.time + LOOK) } else { guide.target };
-            if let Some(crossing) = guide.crossing(Clock::LAB, self.time, &[end], &mut [], &mut |_, _| {}) {
+            let crossing = guide.crossing(Clock::LAB, self.time, &[end], &mut [], &mut |_, _| {});
+            if let Some(crossing) = crossing.map_err(|unseen| self.unseen(unseen))? {
                 self.arrive(crossing.time);
-                return Stretch::Crossed(crossing);
+                return Ok(Stretch::Crossed(crossing));
             }
             self.arrive(end);
         }
-        Stretch::Target
+        Ok(Stretch::Target)
     }
 
     /// Follows the integration, first through what is known already.
@@ -148,13 +159,16 @@ impl Engine<'_> {
             let driven = integrator.drive(&mut |dense| {
                 end = self.stretch(dense, &moving, guide, observer);
                 match end {
+                    Ok(Stretch::On) if self.is_cancelled() => Next::Pause,
                     Ok(Stretch::On) => Next::Step,
                     Ok(Stretch::Target) => Next::Pause,
                     _ => Next::Stop,
                 }
             });
-            if driven.is_err() {
-                return Err(self.stuck(&moving));
+            match driven {
+                Ok(()) => {}
+                Err(Stuck::Short) => return Err(self.stuck(&moving)),
+                Err(Stuck::Busy) => return Err(self.restless(None)),
             }
         }
         end
@@ -175,6 +189,7 @@ impl Engine<'_> {
         times.push(end);
         let mut values = vec![0.0; moving.len()];
         let crossing = guide.crossing(clock, from, &times, &mut values, &mut |time, out| dense.at(time, out));
+        let crossing = crossing.map_err(|unseen| self.unseen(unseen))?;
         let mut reached = crossing.map_or(end, |c| c.time);
         times.retain(|&t| t < reached);
         times.push(reached);
@@ -238,6 +253,24 @@ impl Engine<'_> {
         }
     }
 
+    /// The fault of a condition that may change more often than can be looked at.
+    fn unseen(&self, Unseen(node): Unseen) -> Fault {
+        self.restless(Some(node))
+    }
+
+    /// The fault of a law or condition that follows the clock too fast.
+    fn restless(&self, node: Option<NodeId>) -> Fault {
+        let place = node.and_then(|node| self.user_of(node));
+        let name = place.map_or("a law".to_owned(), |(name, _)| format!("`{name}`"));
+        let message = format!("{name} changes with the time more often than a run can follow");
+        let fault = Fault::new(codes::INTEGRATION_FAILED, self.time, message)
+            .help("give it a longer period, or write its mean over the time");
+        match place {
+            Some((_, span)) => fault.at(span),
+            None => fault,
+        }
+    }
+
     fn running_now(&self) -> Option<String> {
         let processes = self.model.processes.iter().zip(&self.running).filter(|(_, running)| **running);
         let names: Vec<String> = processes.map(|(p, _)| format!("`{}`", p.name)).take(5).collect();
@@ -246,10 +279,13 @@ impl Engine<'_> {
 
     /// The fault of an integration that finds no step: named after the state that changes fastest.
     fn stuck(&self, moving: &[u32]) -> Fault {
+        if let Some(fault) = self.run_dry() {
+            return fault;
+        }
         let rates = self.model.derivatives.iter().filter(|d| moving.contains(&d.state));
         let pace = |d: &matterix_ir::model::Derivative| {
             let (state, value) = (&self.model.states[d.state as usize], self.states[d.state as usize]);
-            self.eval(d.rate).abs() / (value.abs() + state.scale.abs())
+            self.eval(d.rate).abs() / (value.abs() + state.scale.unwrap_or(self.sizes[d.state as usize]).abs())
         };
         let Some(fastest) = rates.max_by(|a, b| pace(a).total_cmp(&pace(b))) else {
             return Fault::new(codes::INTEGRATION_FAILED, self.time, "no step is short enough");
@@ -283,15 +319,15 @@ impl Guide<'_> {
         times: &[f64],
         moving: &mut [f64],
         path: &mut dyn FnMut(f64, &mut [f64]),
-    ) -> Option<Crossing> {
+    ) -> Result<Option<Crossing>, Unseen> {
         let mut first: Option<Crossing> = None;
         for switches in &mut self.switches {
-            let found = switches.first_crossing(clock, from, times.iter().copied(), moving, path);
+            let found = switches.first_crossing(clock, from, times.iter().copied(), moving, path)?;
             first = match (first, found) {
                 (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),
                 (a, b) => a.or(b),
             };
         }
-        first
+        Ok(first)
     }
 }

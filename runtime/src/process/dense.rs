@@ -56,6 +56,11 @@ impl Dense {
         Ok(())
     }
 
+    /// The moving states at the end.
+    pub(super) fn last(&self) -> &[f64] {
+        &self.values[DEGREE]
+    }
+
     fn time(&self, k: usize) -> f64 {
         if k == DEGREE { self.end } else { self.start + POINTS[k] * (self.end - self.start) }
     }

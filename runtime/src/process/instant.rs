@@ -139,8 +139,9 @@ impl Engine<'_> {
         self.forget();
         self.limits.wrote(state);
         if self.integrator.as_ref().is_some_and(|i| i.moving.binary_search(&state).is_ok()) {
-            self.integrator = None;
+            self.leave_integration();
         }
+        self.sizes[state as usize] = 0.0;
     }
 
     /// Equalities that were true at one instant only are false again.
@@ -167,14 +168,19 @@ impl Engine<'_> {
         if self.time - first > CHATTER_TIME { Ok(()) } else { Err(self.chatters(node)) }
     }
 
-    /// The fault, named after the event or process whose condition it is.
-    fn chatters(&self, node: NodeId) -> Fault {
+    /// The event, process or state whose condition or rate uses a comparison, and where it stands.
+    pub(super) fn user_of(&self, node: NodeId) -> Option<(&str, Span)> {
         let graph = &self.model.graph;
         let uses = |root: NodeId| root.0 >= node.0 && graph.schedule([root]).contains(&node);
         let event = self.model.events.iter().find(|e| uses(e.when)).map(|e| (&e.name, e.span));
         let process = self.model.processes.iter().find(|p| p.guard.is_some_and(uses)).map(|p| (&p.name, p.span));
         let rate = self.model.derivatives.iter().find(|d| uses(d.rate)).map(|d| &self.model.states[d.state as usize]);
-        let place = event.or(process).or(rate.map(|s| (&s.name, s.span)));
+        event.or(process).or(rate.map(|s| (&s.name, s.span))).map(|(name, span)| (name.as_str(), span))
+    }
+
+    /// The fault, named after the event or process whose condition it is.
+    fn chatters(&self, node: NodeId) -> Fault {
+        let place = self.user_of(node);
         let name = place.map_or("a condition", |(name, _)| name);
         let message = format!("`{name}` switches on and off more than {CHATTER} times within {CHATTER_TIME} s");
         let fault = Fault::new(codes::CHATTERING, self.time, message)

@@ -21,10 +21,15 @@ use super::clock::Clock;
 use super::dense::Dense;
 use super::tangent;
 use super::tape::Tape;
+use super::timed::{Busy, Timed};
+use super::tolerance::Tolerance;
 
 /// Attempts to find a step are given up below this length, s: far below what any law of nature needs, and far above the
 /// least double.
 const SHORTEST_STEP: f64 = 1e-60;
+
+/// A solver is left after so many steps, so that they are counted.
+const MOST_STEPS: usize = 1000;
 
 /// A step this short as a part of the time counted is one after which counting begins anew.
 const FINE: f64 = 1e-8;
@@ -32,13 +37,19 @@ const FINE: f64 = 1e-8;
 /// So many steps in a row that lab time cannot resolve lead nowhere.
 const STANDSTILL: usize = 100_000;
 
+/// So many steps in a row within [`CRAWL_TIME`] lead nowhere.
+const CRAWL: usize = 20_000;
+
+/// What happens in a lab takes longer than this, s, or is over after far fewer steps than [`CRAWL`].
+const CRAWL_TIME: f64 = 1e-6;
+
 /// How often the error of one step is found too large, each time halving it at least: enough to get from 1 s to
 /// [`SHORTEST_STEP`].
 const REFUSALS: usize = 400;
 
 /// The error allowed in one step as a part of the tolerance asked for. The errors of many steps add up: on the analytic
 /// cases of the tests to 80 times that of one.
-const STEP_SHARE: f64 = 0.02;
+pub(super) const STEP_SHARE: f64 = 0.02;
 
 /// How many steps are taken at least when the solver is set up. It lengthens its steps only after several of one length,
 /// so that a caller who looks often would otherwise keep them short for ever.
@@ -47,6 +58,8 @@ const RUN: usize = 12;
 /// The right-hand side and its directional derivative, with their scratch memory.
 struct Field {
     rates: Tape,
+    /// What of them follows the clock alone.
+    timed: Option<Timed>,
     clock: Clock,
     work: RefCell<Work>,
 }
@@ -64,7 +77,8 @@ impl Field {
         let registers = rates.registers();
         let moving = vec![0.0; rates.inputs];
         let work = RefCell::new(Work { tangents: registers.clone(), registers, time: f64::NAN, moving });
-        Field { work, rates, clock }
+        let timed = Timed::of(&rates);
+        Field { work, rates, timed, clock }
     }
 
     /// Counts time by `clock`.
@@ -90,6 +104,20 @@ impl Field {
         }
     }
 
+    /// How fast an error of a state dies out by itself, per s.
+    fn damping(&self, moving: &[f64], time: f64, state: usize) -> f64 {
+        let mut direction = vec![0.0; moving.len()];
+        direction[state] = 1.0;
+        let mut slopes = vec![0.0; moving.len()];
+        self.slope(moving, time, &direction, &mut slopes);
+        (-slopes[state]).max(0.0)
+    }
+
+    /// The length, s, that a step of `length` from `time` has to keep to, if it has to.
+    fn limit(&self, time: f64, length: f64, moving: &[f64]) -> Result<Option<f64>, Busy> {
+        self.timed.as_ref().map_or(Ok(None), |timed| timed.limit(self.clock.lab(time), length, moving))
+    }
+
     fn compute(&self, work: &mut Work, moving: &[f64], time: f64) {
         if work.time != time || work.moving != moving {
             self.rates.run(self.clock.lab(time), moving, &mut work.registers);
@@ -112,17 +140,21 @@ pub(super) struct Integrator {
     field: Field,
     /// Where the solver stands; absent before its first step.
     state: Option<State>,
-    rtol: f64,
-    atol: Vec<f64>,
+    /// How accurately.
+    pub(super) tolerance: Tolerance,
+    /// The longest first step, s, if something that follows the clock is near.
+    first: Option<f64>,
+    /// Steps since the lab time `since`, s.
+    crawled: usize,
+    since: f64,
 }
 
 impl Integrator {
     /// Prepares to integrate `rates` of the states `moving` from `time`, s, and `values` on.
-    pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], rtol: f64, atol: Vec<f64>) -> Self {
-        let (rtol, atol) = (STEP_SHARE * rtol, atol.into_iter().map(|a| STEP_SHARE * a).collect());
+    pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], tolerance: Tolerance) -> Self {
         let dense = Dense::still(time, values);
         let (ahead, field) = (VecDeque::new(), Field::new(rates, dense.clock));
-        Integrator { moving, dense, ahead, field, state: None, rtol, atol }
+        Integrator { moving, dense, ahead, field, state: None, tolerance, first: None, crawled: 0, since: time }
     }
 
     /// The law it integrates.
@@ -138,23 +170,39 @@ impl Integrator {
                 return Ok(());
             }
         }
-        let mut idle = 0;
         loop {
             if self.state.as_ref().is_none_or(|state| state.as_ref().h < FINE * self.dense.end) {
                 self.restart();
             }
-            let setting = Setting { field: &self.field, rtol: self.rtol, atol: &self.atol };
-            let begin = self.dense.clock.lab(self.dense.end);
+            let setting = Setting { field: &self.field, tolerance: &self.tolerance, first: self.first.take() };
             let driven = drive(setting, self.state.take(), &mut self.dense, &mut self.ahead, visit)?;
             self.state = driven.state;
-            if !driven.fine {
-                return Ok(());
+            let length = match driven.left {
+                Left::Visited => return Ok(()),
+                Left::Short => None,
+                Left::Before(limit) => {
+                    self.first = Some(limit);
+                    None
+                }
+                Left::Outgrown(length) => Some(length),
+            };
+            if let Some(length) = length {
+                let (field, end, values) = (&self.field, self.dense.end, self.dense.last());
+                self.tolerance.renew(values, length, &mut |state| field.damping(values, end, state));
             }
-            idle = if self.dense.clock.lab(self.dense.end) > begin { 0 } else { idle + driven.steps };
-            if idle > STANDSTILL {
-                return Err(Stuck);
-            }
+            self.count(driven.steps)?;
         }
+    }
+
+    /// Counts steps; too many within a time in which nothing happens lead nowhere.
+    fn count(&mut self, steps: usize) -> Result<(), Stuck> {
+        let now = self.dense.clock.lab(self.dense.end);
+        if now - self.since > CRAWL_TIME {
+            (self.since, self.crawled) = (now, 0);
+        }
+        self.crawled += steps.max(1);
+        let moved = now > self.since;
+        if self.crawled > if moved { CRAWL } else { STANDSTILL } { Err(Stuck::Short) } else { Ok(()) }
     }
 
     /// Counts time from the end of the last step on.
@@ -178,21 +226,33 @@ pub(super) enum Next {
     Stop,
 }
 
-/// No step is short enough.
+/// Why an integration cannot go on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stuck;
+pub(super) enum Stuck {
+    /// No step is short enough.
+    Short,
+    /// The clock changes its law too often to be followed.
+    Busy,
+}
 
 impl From<DiffsolError> for Stuck {
     fn from(_: DiffsolError) -> Self {
-        Stuck
+        Stuck::Short
+    }
+}
+
+impl From<Busy> for Stuck {
+    fn from(_: Busy) -> Self {
+        Stuck::Busy
     }
 }
 
 /// What is integrated, and how accurately.
 struct Setting<'f> {
     field: &'f Field,
-    rtol: f64,
-    atol: &'f [f64],
+    tolerance: &'f Tolerance,
+    /// The longest first step of a new solver, s.
+    first: Option<f64>,
 }
 
 /// How far a solver went.
@@ -201,8 +261,19 @@ struct Driven {
     state: Option<State>,
     /// Steps it took.
     steps: usize,
-    /// Whether it was left because its steps became too short for the time counted.
-    fine: bool,
+    left: Left,
+}
+
+/// Why a solver was left.
+enum Left {
+    /// The visitor said so.
+    Visited,
+    /// Its steps became too short for the time counted, or many.
+    Short,
+    /// Something that follows the clock happens within its next step, which must be no longer than this, s.
+    Before(f64),
+    /// States have grown beyond their tolerances in a step of this length, s.
+    Outgrown(f64),
 }
 
 /// Steps on from `dense`. After a pause some more steps are taken ahead; one that fails is left to the next call, which
@@ -213,8 +284,9 @@ fn drive(
     dense: &mut Dense,
     ahead: &mut VecDeque<Dense>,
     visit: &mut dyn FnMut(&mut Dense) -> Next,
-) -> Result<Driven, DiffsolError> {
-    let Setting { field, rtol, atol } = setting;
+) -> Result<Driven, Stuck> {
+    let Setting { field, tolerance, first } = setting;
+    let (rtol, atol) = (tolerance.rtol, &tolerance.atol);
     let start = dense.end;
     let mut initial = vec![0.0; atol.len()];
     dense.at(start, &mut initial);
@@ -234,7 +306,12 @@ fn drive(
     problem.ode_options.max_error_test_failures = REFUSALS;
     let state = match state {
         Some(state) => state,
-        None => BdfState::new(&problem, 1)?,
+        None => {
+            let mut state = BdfState::new(&problem, 1)?;
+            let length = state.as_mut().h;
+            *length = first.map_or(*length, |first| length.min(first));
+            state
+        }
     };
     let mut solver = problem.bdf_solver::<NalgebraLU<f64>>(state)?;
     let mut sampled = NalgebraVec::zeros(initial.len(), *problem.context());
@@ -251,19 +328,27 @@ fn drive(
     };
     let mut steps = 0;
     loop {
+        if let Some(limit) = field.limit(dense.end, solver.state().h, dense.last())? {
+            return Ok(Driven { state: None, steps, left: Left::Before(limit) });
+        }
         step(dense, &mut solver)?;
         steps += 1;
         match visit(dense) {
-            Next::Step if solver.state().h < FINE * dense.end || steps > STANDSTILL => {
-                return Ok(Driven { state: Some(solver.into_state()), steps, fine: true });
+            Next::Step if solver.state().h < FINE * dense.end || steps > MOST_STEPS => {
+                return Ok(Driven { state: Some(solver.into_state()), steps, left: Left::Short });
+            }
+            Next::Step if tolerance.is_outgrown(dense.last(), solver.state().h) => {
+                let left = Left::Outgrown(solver.state().h);
+                return Ok(Driven { state: Some(solver.into_state()), steps, left });
             }
             Next::Step => {}
             Next::Stop => break,
             Next::Pause => {
                 for _ in steps..RUN {
                     let mut next = ahead.back().unwrap_or(dense).clone();
-                    if step(&mut next, &mut solver).is_err() {
-                        return Ok(Driven { state: None, steps, fine: false });
+                    let seen = matches!(field.limit(next.end, solver.state().h, next.last()), Ok(None));
+                    if !seen || step(&mut next, &mut solver).is_err() {
+                        return Ok(Driven { state: None, steps, left: Left::Visited });
                     }
                     ahead.push_back(next);
                 }
@@ -271,5 +356,5 @@ fn drive(
             }
         }
     }
-    Ok(Driven { state: Some(solver.into_state()), steps, fine: false })
+    Ok(Driven { state: Some(solver.into_state()), steps, left: Left::Visited })
 }

@@ -9,6 +9,7 @@
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
 //! - `limits`: what things keep at all times.
+//! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
 //! - `advance`, `instant`: the loop over segments, and what happens between two.
 
@@ -27,9 +28,12 @@ mod tangent;
 mod tape;
 #[cfg(test)]
 mod tests;
+mod timed;
+mod tolerance;
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::graph::Env;
 use matterix_ir::model::{Action, Balance, Doubt, Model};
@@ -50,7 +54,7 @@ use suspicion::Suspicion;
 /// How accurately to integrate, and when to give up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Relative error of a step; the absolute one is this times the scale of the state.
+    /// Relative error of a step; the absolute one is this times the scale of the state, declared or by the values that occur.
     pub rtol: f64,
     /// More events than this at one instant are a fault.
     pub max_events_per_instant: usize,
@@ -111,6 +115,10 @@ pub struct Engine<'m> {
     time: f64,
     states: Vec<f64>,
     law: Law,
+    /// By state, the largest magnitude since it was last set, as far as a law moved it.
+    sizes: Vec<f64>,
+    /// Set from outside to leave off early, once.
+    cancel: Option<&'m AtomicBool>,
     /// What holds now; absent after a discontinuity until it is needed again.
     mode: Option<Mode>,
     /// The integration under way, if any state moves.
@@ -143,6 +151,8 @@ impl<'m> Engine<'m> {
             readings: vec![f64::NAN; model.readings.len()],
             time: 0.0,
             states: vec![0.0; model.states.len()],
+            sizes: vec![0.0; model.states.len()],
+            cancel: None,
             law: Law::new(model),
             mode: None,
             integrator: None,
@@ -163,6 +173,12 @@ impl<'m> Engine<'m> {
         engine.forget();
         engine.balances = Balances::open(model, &engine.states, |n| engine.eval(n));
         Ok(engine)
+    }
+
+    /// From here on `cancel`, once set, ends the advance under way at an instant of its own, as if a watch without index had
+    /// fired; those that follow go on.
+    pub fn heed(&mut self, cancel: Option<&'m AtomicBool>) {
+        self.cancel = cancel;
     }
 
     /// Reports the processes that run, fires the events that are true and takes the first sample.
@@ -263,6 +279,18 @@ impl<'m> Engine<'m> {
     /// How every balance stands.
     pub fn balances(&self) -> Vec<BalanceReport> {
         self.balances.report(self.model, &self.states, |n| self.eval(n))
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+    }
+
+    /// Gives up the integration under way; what states were worth is kept.
+    fn leave_integration(&mut self) {
+        let Some(integrator) = self.integrator.take() else { return };
+        for (state, size) in integrator.moving.iter().zip(integrator.tolerance.sizes()) {
+            self.sizes[*state as usize] = *size;
+        }
     }
 
     fn env(&self) -> Env<'_> {

@@ -19,6 +19,9 @@ const ROUNDING: f64 = 1e-3;
 /// Halvings that find when an amount is used up.
 const BISECTIONS: usize = 60;
 
+/// The same as a share of what there was, where no scale is declared.
+const LEFT_OVER: f64 = 1e-6;
+
 /// What is counted between two looks.
 #[derive(Debug, Default)]
 pub(super) struct Suspicion {
@@ -73,7 +76,6 @@ impl Engine<'_> {
         from: f64,
         times: &[f64],
     ) -> Option<(f64, &Drained)> {
-        let states = &self.model.states;
         let watched = self.model.temperatures.drained.iter();
         let watched: Vec<(usize, &Drained)> =
             watched.filter_map(|d| Some((moving.binary_search(&d.state).ok()?, d))).collect();
@@ -84,7 +86,7 @@ impl Engine<'_> {
         let mut low = from;
         for &high in times {
             dense.at(high, &mut values);
-            let below = |(place, d): &&(usize, &Drained)| values[*place] < -ROUNDING * states[d.state as usize].scale;
+            let below = |(place, d): &&(usize, &Drained)| values[*place] < -self.residue(d);
             let gone: Vec<(usize, &Drained)> = watched.iter().filter(below).copied().collect();
             let ends = gone.into_iter().map(|(place, d)| (used_up(dense, place, low, high, &mut values), d));
             if let Some(first) = ends.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -132,19 +134,41 @@ impl Engine<'_> {
         self.check_balances(None)
     }
 
+    /// Fails where a law has taken more of an amount than there is.
+    pub(super) fn check_drained(&self) -> Result<(), Fault> {
+        let overdrawn = |d: &&Drained| self.states[d.state as usize] < -self.residue(d);
+        self.model.temperatures.drained.iter().find(overdrawn).map_or(Ok(()), |d| Err(self.takes_too_much(d)))
+    }
+
+    /// The amount that a law would take more of than there is, if one has run out.
+    pub(super) fn run_dry(&self) -> Option<Fault> {
+        let taken = |d: &Drained| {
+            let rate = self.model.derivatives.iter().find(|of| of.state == d.state).map(|of| self.eval(of.rate));
+            rate.is_some_and(|rate| rate < 0.0 || !rate.is_finite())
+        };
+        let dry = |d: &&Drained| self.states[d.state as usize].abs() <= self.residue(d) && taken(d);
+        self.model.temperatures.drained.iter().find(dry).map(|d| self.takes_too_much(d))
+    }
+
+    /// What counts as nothing of an amount.
+    fn residue(&self, drained: &Drained) -> f64 {
+        let state = drained.state as usize;
+        self.model.states[state].scale.map_or(LEFT_OVER * self.sizes[state], |scale| ROUNDING * scale)
+    }
+
+    fn takes_too_much(&self, drained: &Drained) -> Fault {
+        let (state, value) = (&self.model.states[drained.state as usize], self.states[drained.state as usize]);
+        let shown = match &state.domain {
+            Domain::Quantity(unit) => unit.show(value),
+            _ => value.to_string(),
+        };
+        self.overdrawn(drained, &format!("is {shown}"))
+    }
+
     /// Fails where a suspected temperature cannot be.
     pub(super) fn check_temperatures(&mut self) -> Result<(), Fault> {
+        self.check_drained()?;
         let temperatures = &self.model.temperatures;
-        for drained in &temperatures.drained {
-            let (state, value) = (&self.model.states[drained.state as usize], self.states[drained.state as usize]);
-            if value < -ROUNDING * state.scale {
-                let shown = match &state.domain {
-                    Domain::Quantity(unit) => unit.show(value),
-                    _ => value.to_string(),
-                };
-                return Err(self.overdrawn(drained, &format!("is {shown}")));
-            }
-        }
         if temperatures.suspects.is_empty() {
             return Ok(());
         }

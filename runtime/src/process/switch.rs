@@ -1,17 +1,31 @@
 //! Comparisons whose truth may change: watched while a segment is integrated, and located when they do.
 
 use matterix_ir::graph::binary;
-use matterix_ir::{BinaryOp, NodeId, Op};
+use matterix_ir::interval::Interval;
+use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::analysis::Analysis;
 use super::clock::Clock;
-use super::tape::Tape;
+use super::tape::{Step, Tape};
 
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
 /// Times below this one are located as closely as this one, s.
 const LEAST: f64 = 1e-30;
+
+/// Changes that last no longer than this are not looked for between two points where nothing has changed, s.
+const NARROW: f64 = 1e-6;
+
+/// So many pieces of the way between two points are looked at before it is given up.
+const MOST_PIECES: usize = 20_000;
+
+/// A state may go beyond its values at the ends and in the middle of a piece by this share of their distance.
+const BULGE: f64 = 0.5;
+
+/// A comparison that may change unseen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unseen(pub(super) NodeId);
 
 /// A comparison and the truth it has within the segment.
 #[derive(Clone, Debug)]
@@ -46,8 +60,22 @@ pub(super) struct Switches {
     clock: Clock,
     /// The first instant at which a comparison of time itself changes, s; infinite if none does.
     pub(super) stop: f64,
+    /// The comparisons whose sides may turn round between two points, with what bounds them.
+    folded: Folded,
     /// Whether a watched comparison depends on time in a way that cannot be solved for it.
     pub(super) follows_time: bool,
+}
+
+/// The comparisons that may change and change back between two points: one side is a wave, a square, a magnitude.
+#[derive(Clone, Debug, Default)]
+struct Folded {
+    /// By their place among the comparisons.
+    list: Vec<usize>,
+    /// Their sides, in the same order.
+    tape: Tape,
+    bounds: Vec<Interval>,
+    /// Values of the moving states at the ends and in the middle of a piece.
+    ends: [Vec<f64>; 3],
 }
 
 /// A comparison that has just changed.
@@ -93,7 +121,20 @@ impl Switches {
         }
         switches.tape = analysis.tape(&sides, moving);
         switches.registers = switches.tape.registers();
+        if switches.tape.steps.iter().any(folds) {
+            switches.fold(analysis, &sides, moving);
+        }
         switches
+    }
+
+    /// Finds the comparisons that may turn round.
+    fn fold(&mut self, analysis: &Analysis<'_>, sides: &[NodeId], moving: &[u32]) {
+        let turns = |i: &usize| analysis.tape(&sides[2 * i..2 * i + 2], moving).steps.iter().any(folds);
+        let list: Vec<usize> = (0..self.list.len()).filter(turns).collect();
+        let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
+        let tape = analysis.tape(&sides, moving);
+        let ends = std::array::from_fn(|_| vec![0.0; moving.len()]);
+        self.folded = Folded { bounds: tape.intervals(), list, tape, ends };
     }
 
     fn run(&mut self, time: f64, moving: &[f64]) {
@@ -115,9 +156,9 @@ impl Switches {
         times: impl Iterator<Item = f64>,
         moving: &mut [f64],
         path: &mut dyn FnMut(f64, &mut [f64]),
-    ) -> Option<Crossing> {
+    ) -> Result<Option<Crossing>, Unseen> {
         if self.list.is_empty() {
-            return None;
+            return Ok(None);
         }
         self.clock = clock;
         let mut low = from;
@@ -126,15 +167,86 @@ impl Switches {
             self.run(high, moving);
             let changed: Vec<usize> =
                 (0..self.list.len()).filter(|&i| self.is_changed(i, Switch::clearly_changed)).collect();
-            let located = changed.into_iter().map(|i| (self.locate(i, low, high, moving, path), i));
-            if let Some((time, i)) = located.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            let mut located: Vec<(f64, usize)> = Vec::new();
+            for i in changed {
+                located.push((self.locate(i, low, high, moving, path), i));
+            }
+            for place in 0..self.folded.list.len() {
+                let end = located.iter().fold(high, |end, (time, _)| end.min(*time));
+                if let Some(seen) = self.hidden(place, low, end, moving, path)? {
+                    let i = self.folded.list[place];
+                    located.push((self.locate(i, low, seen, moving, path), i));
+                }
+            }
+            if let Some((time, i)) = located.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
                 let Switch { node, op, truth, .. } = self.list[i];
                 let time = self.settled(i, time, high, moving, path);
-                return Some(Crossing { time, node, touch: op == BinaryOp::Eq && !truth });
+                return Ok(Some(Crossing { time, node, touch: op == BinaryOp::Eq && !truth }));
             }
             low = high;
         }
-        None
+        Ok(None)
+    }
+
+    /// An instant between `low` and `high` at which a comparison that may turn round has changed, the first that is found from
+    /// `low` on; none where its sides stay apart.
+    fn hidden(
+        &mut self,
+        place: usize,
+        low: f64,
+        high: f64,
+        moving: &mut [f64],
+        path: &mut dyn FnMut(f64, &mut [f64]),
+    ) -> Result<Option<f64>, Unseen> {
+        let i = self.folded.list[place];
+        let mut todo = vec![(low, high)];
+        let mut pieces = 0;
+        while let Some((from, to)) = todo.pop() {
+            pieces += 1;
+            if pieces > MOST_PIECES {
+                return Err(Unseen(self.list[i].node));
+            }
+            if self.stays(place, (from, to), path) {
+                continue;
+            }
+            let middle = from + 0.5 * (to - from);
+            path(middle, moving);
+            self.run(middle, moving);
+            if self.is_changed(i, Switch::clearly_changed) {
+                return Ok(Some(middle));
+            }
+            if to - from > NARROW.max(64.0 * rounding(to)) {
+                todo.extend([(middle, to), (from, middle)]);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether a comparison that may turn round has the same truth throughout a piece.
+    fn stays(&mut self, place: usize, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) -> bool {
+        let Folded { list, tape, bounds, ends } = &mut self.folded;
+        if tape.inputs > 0 {
+            let times = [from, from + 0.5 * (to - from), to];
+            ends.iter_mut().zip(times).for_each(|(values, time)| path(time, values));
+        }
+        let [first, middle, last] = &*ends;
+        let states = first.iter().zip(middle).zip(last).map(|((a, b), c)| {
+            let (low, high) = (a.min(*b).min(*c), a.max(*b).max(*c));
+            let more = BULGE * (high - low);
+            (low - more, high + more)
+        });
+        tape.enclose((self.clock.lab(from), self.clock.lab(to)), states, bounds);
+        let side = |k: usize| bounds[tape.outputs[k] as usize];
+        let ((a, b), (c, d)) = (side(2 * place), side(2 * place + 1));
+        let switch = &self.list[list[place]];
+        match switch.op {
+            BinaryOp::Lt if switch.truth => b < c,
+            BinaryOp::Lt => a >= d,
+            BinaryOp::Le if switch.truth => b <= c,
+            BinaryOp::Le => a > d,
+            // An equality that does not hold is crossed where the sides change places.
+            _ => b < c || a > d,
+        }
     }
 
     fn is_changed(&self, i: usize, test: fn(&Switch, f64, f64) -> bool) -> bool {
@@ -204,4 +316,14 @@ fn stop(analysis: &Analysis<'_>, (a, b): (NodeId, NodeId), switch: &Switch, now:
         }
     }
     Some((time > now && changed(time)).then_some(time))
+}
+
+/// Whether a step may turn round: give the same value before and after it gave others.
+fn folds(step: &Step) -> bool {
+    match *step {
+        Step::Unary(op, _) => matches!(op, UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Abs | UnaryOp::Floor),
+        Step::Binary(BinaryOp::Mul, a, b) => a == b,
+        Step::Binary(op, ..) => op == BinaryOp::Pow,
+        _ => false,
+    }
 }

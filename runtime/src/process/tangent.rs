@@ -32,6 +32,38 @@ pub(super) fn push(tape: &Tape, registers: &[f64], direction: &[f64], tangents: 
     }
 }
 
+/// Bounds of what rounding does to each result of a run of `tape` whose values `registers` hold (running error analysis:
+/// Wilkinson 1963). States and time are taken as rounded once.
+pub(super) fn noise(tape: &Tape, registers: &[f64]) -> Vec<f64> {
+    let first = tape.first_result();
+    let mut noise = vec![0.0; registers.len()];
+    for i in tape.time()..first {
+        noise[i] = f64::EPSILON * registers[i].abs();
+    }
+    for (i, step) in tape.steps.iter().enumerate() {
+        let value = registers[first + i];
+        let carried = match *step {
+            Step::Unary(op, a) => match noise[a as usize] {
+                0.0 => 0.0,
+                noise => (unary(op, registers[a as usize], value) * noise).abs(),
+            },
+            Step::Binary(op, a, b) => {
+                let (a, b) = (a as usize, b as usize);
+                let of = |slopes| binary(op, (registers[a], registers[b]), value, slopes).abs();
+                let one = |noise: f64, slopes| if noise == 0.0 { 0.0 } else { of(slopes) };
+                one(noise[a], (noise[a], 0.0)) + one(noise[b], (0.0, noise[b]))
+            }
+            Step::Select(c, a, b) => noise[if registers[c as usize] != 0.0 { a } else { b } as usize],
+            Step::Sum(first, count) => {
+                tape.summed(first, count).map(|t| (t.factor * noise[t.register as usize]).abs()).sum()
+            }
+        };
+        let all = carried + f64::EPSILON * value.abs();
+        noise[first + i] = if all.is_finite() { all } else { 0.0 };
+    }
+    noise
+}
+
 /// `d value / d a`.
 fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
     match op {

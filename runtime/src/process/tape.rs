@@ -1,6 +1,7 @@
 //! A compact program for the numbers that change within one segment.
 
 use matterix_ir::graph::{binary, unary};
+use matterix_ir::interval::{self, Interval};
 use matterix_ir::{BinaryOp, UnaryOp};
 
 /// One operation on registers; its result goes to the next free register.
@@ -76,6 +77,36 @@ impl Tape {
                 Step::Sum(first, count) => {
                     exact_sum(self.summed(first, count).map(|t| (t.factor, registers[t.register as usize])))
                 }
+            };
+        }
+    }
+
+    /// Bounds of all registers for [`Tape::enclose`], constants filled in.
+    pub(super) fn intervals(&self) -> Vec<Interval> {
+        self.registers().into_iter().map(|v| (v, v)).collect()
+    }
+
+    /// Bounds of all results over a span of time, s, and of the moving states.
+    pub(super) fn enclose(&self, time: Interval, moving: impl Iterator<Item = Interval>, bounds: &mut [Interval]) {
+        let first = self.first_result();
+        bounds[self.time()] = time;
+        bounds[self.time() + 1..first].iter_mut().zip(moving).for_each(|(place, state)| *place = state);
+        for (i, step) in self.steps.iter().enumerate() {
+            bounds[first + i] = match *step {
+                Step::Unary(op, a) => interval::of_unary(op, bounds[a as usize]),
+                // A number times itself is a square.
+                Step::Binary(BinaryOp::Mul, a, b) if a == b => {
+                    interval::of_binary(BinaryOp::Pow, bounds[a as usize], (2.0, 2.0))
+                }
+                Step::Binary(op, a, b) => interval::of_binary(op, bounds[a as usize], bounds[b as usize]),
+                Step::Select(c, a, b) => {
+                    interval::of_select(bounds[c as usize], bounds[a as usize], bounds[b as usize])
+                }
+                Step::Sum(first, count) => self.summed(first, count).fold((0.0, 0.0), |sum, term| {
+                    let part = (term.factor, term.factor);
+                    let part = interval::of_binary(BinaryOp::Mul, part, bounds[term.register as usize]);
+                    interval::of_binary(BinaryOp::Add, sum, part)
+                }),
             };
         }
     }

@@ -12,7 +12,7 @@ fn first_order_decay() {
     let a = b.state("a", 2.0);
     let rate = b.scale(-0.3, a);
     b.rate(0, rate);
-    b.model.states[0].scale = 1e-3;
+    b.model.states[0].scale = Some(1e-3);
     for t in [0.1, 1.0, 10.0, 30.0] {
         close(run(&b.model, t).0.states()[0], 2.0 * (-0.3 * t).exp(), ACCURACY);
     }
@@ -150,7 +150,7 @@ fn robertson() {
     let mut b = Build::default();
     let (x, y, z) = (b.state("y1", 1.0), b.state("y2", 0.0), b.state("y3", 0.0));
     for (state, scale) in b.model.states.iter_mut().zip([1e-6, 1e-10, 1.0]) {
-        state.scale = scale;
+        state.scale = Some(scale);
     }
     let slow = b.scale(0.04, x);
     let product = b.mul(y, z);
@@ -222,7 +222,7 @@ fn many_states() {
 fn event_in_robertson() {
     let mut b = Build::default();
     let (x, y, z) = (b.state("y1", 1.0), b.state("y2", 0.0), b.state("y3", 0.0));
-    b.model.states[1].scale = 1e-6;
+    b.model.states[1].scale = Some(1e-6);
     let slow = b.scale(0.04, x);
     let product = b.mul(y, z);
     let back = b.scale(1e4, product);

@@ -25,7 +25,7 @@ fn bench(target: f64) -> Bench {
     b.state("heated", 0.0);
     b.state("to air", 0.0);
     for state in &mut b.model.states {
-        state.scale = 1000.0;
+        state.scale = Some(1000.0);
     }
     let rise = std::array::from_fn::<_, 3, _>(|i| b.scale(1.0 / CAPACITY[i], heat[i]));
     let rise_target = b.num(target - AMBIENT);

@@ -90,7 +90,7 @@ fn second_order_at_the_rate_of_neutralisation() {
     let k = 1.4e11;
     for (a, c) in [(0.5, 0.5), (0.5, 0.3), (0.1, 2.0), (1e-7, 1.0), (1.0, 1e-7)] {
         let mut b = combine(k, a, c);
-        b.model.states.iter_mut().for_each(|s| s.scale = f64::min(a, c));
+        b.model.states.iter_mut().for_each(|s| s.scale = Some(f64::min(a, c)));
         for turns in [0.1, 1.0, 10.0] {
             let t = turns / (k * f64::max(a, c));
             let z = run(&b.model, t).0.states()[2];
@@ -129,7 +129,7 @@ fn a_fast_way_there_and_back_comes_to_equilibrium() {
 fn water_ionises() {
     for (h, oh) in [(0.0, 0.0), (1e-3, 0.0), (0.0, 1e-2), (1.0, 1.0)] {
         let mut b = combine(1.4e11, h, oh);
-        b.model.states.iter_mut().for_each(|s| s.scale = 1e-6);
+        b.model.states.iter_mut().for_each(|s| s.scale = Some(1e-6));
         let made = b.num(1.4e11 * 1e-14);
         let rates: Vec<NodeId> = b.model.derivatives.iter().map(|d| d.rate).collect();
         for (i, rate) in rates.into_iter().take(2).enumerate() {
@@ -148,7 +148,7 @@ fn water_ionises() {
 fn states_of_any_scale_are_followed() {
     for scale in [1e-18, 1e-12, 1e-6, 1.0, 1e6] {
         let mut b = decay(50.0);
-        b.model.states[1].scale = scale;
+        b.model.states[1].scale = Some(scale);
         let (engine, _) = run(&b.model, 0.1);
         close(engine.states()[1], 1.0 - (-5.0f64).exp(), ACCURACY * f64::max(scale, 1.0));
     }

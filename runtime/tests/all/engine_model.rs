@@ -30,7 +30,7 @@ impl Build {
         let index = self.model.states.len() as u32;
         let domain = Domain::Quantity(Unit::one());
         let span = Span { start: index + 1, end: index + 2, ..Span::default() };
-        self.model.states.push(State { name: name.into(), domain, initial, scale: 1.0, span });
+        self.model.states.push(State { name: name.into(), domain, initial, scale: Some(1.0), span });
         self.model.graph.add(Op::State(index))
     }
 

@@ -78,7 +78,13 @@ impl Lab {
     pub fn state(&mut self, name: &str, initial: f64) -> u32 {
         let initial = self.number(initial);
         let domain = Domain::Quantity(unit());
-        self.program.model.states.push(State { name: name.into(), domain, initial, scale: 1.0, span: Span::default() });
+        self.program.model.states.push(State {
+            name: name.into(),
+            domain,
+            initial,
+            scale: Some(1.0),
+            span: Span::default(),
+        });
         self.program.model.states.len() as u32 - 1
     }
 

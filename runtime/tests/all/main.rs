@@ -7,6 +7,8 @@ mod engine_fast;
 mod engine_faults;
 mod engine_model;
 mod engine_segments;
+mod engine_sizes;
+mod engine_unseen;
 mod exec_asked;
 mod exec_build;
 mod exec_claims;

@@ -20,6 +20,9 @@ use super::value::{Known, Why};
 /// A rate below this share of a state's scale per second is rounding.
 const STILL: f64 = 1e-13;
 
+/// A state without a declared scale has this share of its value as its scale.
+const DEPTH: f64 = 1e-3;
+
 /// Doublings of a face's distance before it counts as without bound.
 const DOUBLINGS: usize = 50;
 
@@ -330,7 +333,7 @@ impl Flow<'_, '_> {
     /// Lets the fluxes that change an amount go as far as they can.
     fn react(&mut self, derivative: u32, row: &Row, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
         let stoichiometry = self.stoichiometry();
-        let still = self.still(self.derivatives[derivative as usize].state);
+        let still = self.still(self.derivatives[derivative as usize].state, facts);
         let mut more = false;
         for (flux, c) in &row.fluxes {
             let (low, high) = self.flux(&stoichiometry.fluxes[*flux], &making.within);
@@ -409,7 +412,7 @@ impl Flow<'_, '_> {
         let state = self.derivatives[derivative as usize].state;
         let (a, b) = self.rate(derivative, &making.within);
         if !making.moving.contains(&derivative) {
-            let still = self.still(state);
+            let still = self.still(state, facts);
             if a.abs() <= still && b.abs() <= still {
                 return;
             }
@@ -498,7 +501,15 @@ impl Flow<'_, '_> {
     fn face(&mut self, wall: Wall, from: f64, start: f64, side: f64, making: &mut Making) -> f64 {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let state = self.derivatives[i as usize].state;
-        let mut step = self.lab.states[state as usize].scale.max((from - start).abs());
+        let mut step = match self.scale(state, &making.within) {
+            scale if scale > 0.0 => scale,
+            // What is nothing at first has the size that it comes to in a second.
+            _ => {
+                let (slow, fast) = self.rate_at(wall, from, making);
+                if side > 0.0 { fast } else { -slow }
+            }
+        };
+        step = step.max((from - start).abs());
         let (mut near, mut far) = (from, from + side * step);
         let mut doublings = 0;
         while self.outwards(wall, far, side, making) {
@@ -567,7 +578,7 @@ impl Flow<'_, '_> {
     fn crossings(&mut self, wall: Wall, making: &mut Making) -> (bool, bool) {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let (low, high) = self.faces(wall, making);
-        let still = self.still(self.derivatives[i as usize].state);
+        let still = self.still(self.derivatives[i as usize].state, &making.within);
         let down = low.is_finite() && self.rate_at(wall, low, making).0 < -still;
         let up = high.is_finite() && self.rate_at(wall, high, making).1 > still;
         (down, up)
@@ -614,8 +625,16 @@ impl Flow<'_, '_> {
         bounds
     }
 
-    fn still(&self, state: u32) -> f64 {
-        STILL * self.lab.states[state as usize].scale
+    fn still(&self, state: u32, facts: &Facts) -> f64 {
+        STILL * self.scale(state, facts)
+    }
+
+    /// The declared scale of a state, else a share of the largest value that it may have; 0 where that is nothing.
+    fn scale(&self, state: u32, facts: &Facts) -> f64 {
+        self.lab.states[state as usize].scale.unwrap_or_else(|| {
+            let (low, high) = facts.states[state as usize].bounds();
+            DEPTH * [low, high].iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()))
+        })
     }
 
     /// Whether a state is an amount of a species, which is never less than nothing.

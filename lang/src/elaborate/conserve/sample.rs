@@ -13,7 +13,7 @@ pub const POINTS: u64 = 12;
 /// Times are drawn below this, s.
 const LONGEST: f64 = 3600.0;
 
-/// What is not there at the start is tried at up to so many times its scale.
+/// What is not there at the start is tried at up to so many times its scale or, without one, the unit that it is shown in.
 const SPREAD: f64 = 1e4;
 
 /// A state of the lab.
@@ -59,7 +59,7 @@ impl<'l, 'a> Point<'l, 'a> {
             Domain::Bool => f64::from(u8::from(drawn < 0.5)),
             Domain::Enum(words) => (drawn * words.len() as f64).floor(),
             Domain::Quantity(_) if begins != 0.0 => begins * (0.5 + drawn),
-            Domain::Quantity(_) => of.scale * SPREAD * drawn,
+            Domain::Quantity(unit) => of.scale.unwrap_or(unit.factor) * SPREAD * drawn,
         }
     }
 

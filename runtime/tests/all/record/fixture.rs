@@ -79,7 +79,7 @@ fn scene() -> Scene {
 }
 
 fn state(name: &str, domain: Domain, initial: matterix_ir::NodeId) -> State {
-    State { name: name.into(), domain, initial, scale: 1e-6, span: line(2) }
+    State { name: name.into(), domain, initial, scale: Some(1e-6), span: line(2) }
 }
 
 fn species(name: &str, formula: &str, molar_mass: f64) -> Species {
