@@ -88,6 +88,7 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
         })
         .collect();
     let declared = tables.failures();
+    let dangers = tables.dangers();
     let mut out: Vec<Diagnostic> = Vec::new();
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
@@ -96,7 +97,7 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
         for (caught, handler) in handlers {
             let (Caught::Named(name), at) = (caught, plan.get(*handler).span) else { continue };
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
-            if raised.contains(name) || told.contains(name.as_str()) {
+            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
                 let headline = format!("nothing before it fails with `{name}`");
