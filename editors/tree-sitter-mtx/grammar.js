@@ -183,8 +183,17 @@ module.exports = grammar({
     option: ($) => seq(field('name', alias($._any_word, $.field_name)), ':', nl($), field('value', $.expression)),
 
     // ---- steps
-    // A step may begin on the line of the one before it, if a word of the language begins it.
-    block: ($) => lines($, $.statement, choice($._separator, $._beside)),
+    // Behind a closing brace the next step may stand on the same line, if a word of the language begins it.
+    block: ($) => seq(
+      '{', nl($), repeat(choice(seq($.statement, $._separator), seq($._closed, $._beside))), optional($.statement), '}',
+    ),
+    _closed: ($) => choice(
+      $.step_statement, $.if_statement, $.repeat_statement, $.for_statement, $.within_statement, $.keep_statement, $.try_statement,
+      $.claim_statement, $.sequence_statement, $.parallel_statement, alias($._closed_call, $.call),
+    ),
+    _closed_call: ($) => seq(
+      alias($._first_word, $.verb_word), repeat(alias($._next_word, $.verb_word)), optional($._operand), repeat($.labelled), $.options,
+    ),
     statement: ($) => choice(
       $.let_statement, $.wait_statement, $.step_statement, $.if_statement, $.repeat_statement, $.for_statement, $.within_statement,
       $.hold_statement, $.keep_statement, $.try_statement, $.retry_statement, $.claim_statement, $.sequence_statement, $.parallel_statement,

@@ -28,7 +28,7 @@ static const char RESERVED[] =
     " needs not note of on onto or parallel presumes record repeat retry return sends sequence start step takes through timeout to try until"
     " using wait while with within ";
 
-// With these a step may begin on the line of the one before it. `for` also stands in `hold c for 1 min`.
+// With these a step may begin behind a closing brace on its line. `for` also stands in `hold c for 1 min`.
 static const char STEPS[] =
     " let wait step if repeat for within hold keep try retry claim sequence parallel start await fail expect record note ask return ";
 
