@@ -165,8 +165,7 @@ fn files_begin_with_items() {
 fn properties_of_ones_own_are_offered_as_those_of_the_library() {
     let own = "mtx 1\ncapability Species {\n    /// Of a rat.\n    param toxicity: MassFraction\n}\n";
     has(&in_text(&format!("{own}species A {{ $0 }}")), &["toxicity", "density", "same_as"], &["heat"]);
-    let law = "species A { toxicity: 1 %w/w, density: 1 g/mL }\nfn harm(s: Species) = s.$0";
-    has(&in_text(&format!("{own}{law}")), &["toxicity", "density", "charge"], &["heat"]);
+    has(&offers("expect water.$0"), &["density", "pka", "charge"], &["heat"]);
 }
 
 #[test]

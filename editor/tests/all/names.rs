@@ -167,6 +167,7 @@ capability Species {
 species poison { by: mass, density: 1 g/mL, specific_heat: 2 J/(g*K), toxicity: 1 %w/w, melting_point: 300 K }
 /// It smokes.
 hazard smokes(h: Heater) when h.target > 150 degC \"less\"
+fn harm(s: Species) -> MassFraction = s.toxicity
 /// It is much.
 caution much(v: Vessel) of v.contents.volume when sum(s in having(v.contents.species, \"toxicity\"): s.toxicity) > 0 %w/w \"less\"
 allow much \"in a hood\"
@@ -184,7 +185,7 @@ workflow warm in bench {
     let cases: &[(&str, &[&str])] = &[
         ("1 g/mL, specific_heat: 2 J/(g*K), |toxicity", &["param toxicity", "Of a rat."]),
         ("%w/w, |melting_point", &["param melting_point", "std::chemistry"]),
-        ("s.|toxicity", &["param toxicity", "Of a rat."]),
+        ("= s.|toxicity", &["param toxicity", "Of a rat."]),
         ("allow |much", &["caution much", "It is much."]),
         ("on |smokes", &["hazard smokes", "It smokes."]),
         ("water at 40 deg|C", &["Temperature"]),
