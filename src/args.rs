@@ -525,8 +525,10 @@ pub struct McpArgs {
 /// `matterixc explain`.
 #[derive(Debug, Args)]
 pub struct ExplainArgs {
-    /// A code as in `error[CODE]`, or a family such as `U1`; all codes without it.
+    /// A code as in `error[CODE]`, the name of a failure, or a family such as `U1`; all codes without it.
     pub code: Option<String>,
+    /// Files that give the name, for failures and hazards of your own.
+    pub files: Vec<PathBuf>,
     /// Print the index of the pages.
     #[arg(long, hide = true)]
     pub index: bool,

@@ -52,7 +52,7 @@ module.exports = grammar({
   externals: ($) => [
     $._newline, $._blank_line, $._nl_clause, $._nl_more,
     $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_argument, $._species_index, $._less,
-    $._tight, $._same_line, $._error_sentinel,
+    $._tight, $._same_line, $._beside, $._error_sentinel,
   ],
 
   extras: ($) => [/[ \t\r]/, $.doc_comment, $.comment, $._blank_line],
@@ -183,7 +183,17 @@ module.exports = grammar({
     option: ($) => seq(field('name', alias($._any_word, $.field_name)), ':', nl($), field('value', $.expression)),
 
     // ---- steps
-    block: ($) => block_of($, $.statement),
+    // Behind a closing brace the next step may stand on the same line, if a word of the language begins it.
+    block: ($) => seq(
+      '{', nl($), repeat(choice(seq($.statement, $._separator), seq($._closed, $._beside))), optional($.statement), '}',
+    ),
+    _closed: ($) => choice(
+      $.step_statement, $.if_statement, $.repeat_statement, $.for_statement, $.within_statement, $.keep_statement, $.try_statement,
+      $.claim_statement, $.sequence_statement, $.parallel_statement, alias($._closed_call, $.call),
+    ),
+    _closed_call: ($) => seq(
+      alias($._first_word, $.verb_word), repeat(alias($._next_word, $.verb_word)), optional($._operand), repeat($.labelled), $.options,
+    ),
     statement: ($) => choice(
       $.let_statement, $.wait_statement, $.step_statement, $.if_statement, $.repeat_statement, $.for_statement, $.within_statement,
       $.hold_statement, $.keep_statement, $.try_statement, $.retry_statement, $.claim_statement, $.sequence_statement, $.parallel_statement,

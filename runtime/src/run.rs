@@ -1,7 +1,7 @@
 //! A program from its initial state to its outcome.
 
 use matterix_ir::plan::{Plan, Step};
-use matterix_ir::{Program, codes};
+use matterix_ir::{Program, Severity, codes};
 use serde::Serialize;
 
 use crate::backend::{Dry, Moves, Prepared, Sim};
@@ -12,8 +12,7 @@ use crate::exec::{
 use crate::fault::Fault;
 use crate::motion::Stage;
 use crate::process::{BalanceReport, Engine, Options};
-pub use crate::screen::Finding;
-use crate::screen::Screen;
+pub use crate::screen::{Finding, Screen};
 
 /// How closely the world is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -54,7 +53,7 @@ pub struct Outcome {
     pub suppressed: Vec<FailureTrace>,
     /// What the run has left on or in hand, with the steps that used it last.
     pub unfinished: Vec<FailureTrace>,
-    /// Species that have met and should not, and hazards that came about, in order.
+    /// Warnings of the screen, in order: species that have met and should not, and hazards that came about. An error is a failure.
     pub findings: Vec<Finding>,
     /// In the order of their judgement.
     pub expectations: Vec<ExpectationResult>,
@@ -103,10 +102,11 @@ pub fn run_ready(
         return run_watched(program, prepared, params, options, out);
     }
     let mut outcome = run_watched(program, prepared, params, options, &mut Tee(&mut screen, out));
-    if screen.is_grave() && outcome.status == RunStatus::Passed {
+    outcome.findings = screen.into_found();
+    let is_grave = outcome.findings.iter().any(|f| f.diagnostic.severity == Severity::Error);
+    if is_grave && outcome.status == RunStatus::Passed {
         outcome.status = RunStatus::ExpectationFailed;
     }
-    outcome.findings = screen.found;
     outcome
 }
 

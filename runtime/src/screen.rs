@@ -1,14 +1,17 @@
 //! What a run watches its mixtures and devices for: species that should not meet, hazards and cautions, on actual contents and
-//! temperatures. A screen looks on; it changes nothing of the run.
+//! temperatures. A warning is kept as a finding, an error raises an alarm: before an operation that would bring it about at one
+//! stroke, or as soon as it is there.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::cell::OnceCell;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use matterix_ir::model::{Action, Incompatible};
+use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
-use matterix_ir::{Diagnostic, Program, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Op, Program, Severity, Span, codes};
 use serde::Serialize;
 
-use crate::exec::{Listener, OperationState, StepState};
+use crate::exec::{Alarm, Listener, OperationState, StepState};
+use crate::ledger::transfer;
 use crate::process::{Engine, Observer};
 
 /// Less of a species, mol per kg of mixture, is what equilibria and rounding leave, and counts as none.
@@ -16,6 +19,9 @@ const TRACE: f64 = 1e-6;
 
 /// Recipes are rounded: what is at a limit within their digits counts.
 const ROUNDED: f64 = 1.0 - 1e-6;
+
+/// What handlers know it by that substances meet that must not.
+const MIX: &str = "incompatible_mix";
 
 /// A finding of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,25 +60,30 @@ struct Pair<'p> {
 }
 
 /// Looks at every moment of a run that is shown.
-pub(crate) struct Screen<'p> {
+pub struct Screen<'p> {
     program: &'p Program,
     /// Pairs by mixture, the gravest first.
     pairs: Vec<(usize, Vec<Pair<'p>>)>,
-    /// What is told already, by mixture and consequence.
-    told: BTreeSet<(usize, &'p str)>,
+    /// Which of them have met, by mixture and consequence.
+    met: BTreeSet<(usize, &'p str)>,
     /// Which dangers were there when last looked at.
     there: Vec<bool>,
+    /// The states that each danger depends on.
+    read: OnceCell<Vec<BTreeSet<u32>>>,
     /// Steps around each step.
     above: BTreeMap<StepId, StepId>,
     /// Operations that go on, the latest last.
     going: Vec<StepId>,
     /// The operation that began or ended last.
     last: Option<StepId>,
-    pub(crate) found: Vec<Finding>,
+    /// Errors that nobody has asked for yet, with the time.
+    alarms: VecDeque<(f64, Alarm)>,
+    found: Vec<Finding>,
 }
 
 impl<'p> Screen<'p> {
-    pub(crate) fn new(program: &'p Program) -> Self {
+    /// A screen of a program that has not begun.
+    pub fn new(program: &'p Program) -> Self {
         let model = &program.model;
         let mut pairs = Vec::new();
         for (index, mixture) in model.mixtures.iter().enumerate() {
@@ -96,78 +107,177 @@ impl<'p> Screen<'p> {
         Screen {
             program,
             pairs,
-            told: BTreeSet::new(),
+            met: BTreeSet::new(),
             there: vec![false; model.dangers.len()],
+            read: OnceCell::new(),
             above,
             going: Vec::new(),
             last: None,
+            alarms: VecDeque::new(),
             found: Vec::new(),
         }
     }
 
     /// Whether there is nothing to watch for.
-    pub(crate) fn is_idle(&self) -> bool {
+    pub fn is_idle(&self) -> bool {
         self.pairs.is_empty() && self.there.is_empty()
     }
 
-    /// The statement of the user's that has to do with a mixture now, or with anything.
-    fn place(&self, mixture: Option<usize>) -> Option<Span> {
-        let plan = &self.program.plan;
+    /// The warnings, and the errors that came about when nothing went on any more, in order.
+    pub fn into_found(self) -> Vec<Finding> {
+        let mut found = self.found;
+        found.extend(self.alarms.into_iter().map(|(time, alarm)| Finding { time, diagnostic: alarm.found }));
+        found.sort_by(|a, b| a.time.total_cmp(&b.time));
+        found
+    }
+
+    /// The operation that has to do with a mixture now, or with anything.
+    fn operation_at(&self, mixture: Option<usize>) -> Option<StepId> {
         let concerns = |id: &&StepId| {
-            let Step::Operation(o) = &plan.get(**id).step else { return false };
+            let Step::Operation(o) = &self.program.plan.get(**id).step else { return false };
             let mut actions = o.at_start.iter().chain(&o.at_end);
             actions.any(|a| matches!(a, Action::Move { to, .. } if Some(*to as usize) == mixture))
         };
-        let latest = self.going.iter().rev().find(concerns).or(self.going.last()).or(self.last.as_ref()).copied();
+        self.going.iter().rev().find(concerns).or(self.going.last()).or(self.last.as_ref()).copied()
+    }
+
+    /// A step and those around it, innermost first.
+    fn around(&self, step: Option<StepId>) -> impl Iterator<Item = StepId> {
+        std::iter::successors(step, |id| self.above.get(id).copied())
+    }
+
+    /// The statement of the user's that a step belongs to.
+    fn place(&self, step: Option<StepId>) -> Option<Span> {
+        let plan = &self.program.plan;
         let own = plan.get(plan.root).span.file;
-        let around = std::iter::successors(latest, |id| self.above.get(id).copied());
-        around.map(|id| plan.get(id).span).find(|span| span.file == own && !span.is_empty())
+        self.around(step).map(|id| plan.get(id).span).find(|span| span.file == own && !span.is_empty())
+    }
+
+    /// Keeps a warning, raises the alarm for an error.
+    fn tell(&mut self, time: f64, name: &str, step: Option<StepId>, found: Diagnostic) {
+        if found.severity == Severity::Error {
+            let alarm = Alarm { name: name.to_string(), found, around: self.around(step).collect() };
+            self.alarms.push_back((time, alarm));
+        } else if !self.found.iter().any(|f| f.diagnostic.headline == found.headline) {
+            self.found.push(Finding { time, diagnostic: found });
+        }
+    }
+
+    /// The gravest of the pairs of a mixture that meet: the others are mended with it.
+    fn meeting<'s>(&self, mixture: usize, pairs: &'s [Pair<'p>], states: &[f64]) -> Option<&'s Pair<'p>> {
+        let some = |p: &Pair<'_>| p.sides.0.amount(states) > 0.0 && p.sides.1.amount(states) > 0.0;
+        if !pairs.iter().any(some) {
+            return None;
+        }
+        let masses = self.program.model.mixtures[mixture].contents.iter().map(|c| {
+            let molar_mass = self.program.model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
+            states[c.state as usize] * molar_mass
+        });
+        let mass: f64 = masses.sum();
+        pairs.iter().find(|p| {
+            let (least_a, least_b) = p.incompatible.least;
+            let enough = |side: &Side, least: f64| side.amount(states) >= least.max(TRACE) * mass * ROUNDED;
+            some(p) && enough(&p.sides.0, least_a) && enough(&p.sides.1, least_b)
+        })
     }
 
     fn look(&mut self, time: f64, engine: &Engine<'_>) {
         let states = engine.states();
-        for (mixture, pairs) in &self.pairs {
-            let some = |p: &Pair<'_>| p.sides.0.amount(states) > 0.0 && p.sides.1.amount(states) > 0.0;
-            if !pairs.iter().any(some) {
+        let pairs = std::mem::take(&mut self.pairs);
+        for (mixture, pairs) in &pairs {
+            let Some(pair) = self.meeting(*mixture, pairs, states) else {
+                self.met.retain(|(met, _)| met != mixture);
                 continue;
-            }
-            let of = &self.program.model.mixtures[*mixture];
-            let masses = of.contents.iter().map(|c| {
-                let molar_mass = self.program.model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
-                states[c.state as usize] * molar_mass
-            });
-            let mass: f64 = masses.sum();
-            let meets = |p: &&Pair<'_>| {
-                let (least_a, least_b) = p.incompatible.least;
-                let enough = |side: &Side, least: f64| side.amount(states) >= least.max(TRACE) * mass * ROUNDED;
-                some(p) && enough(&p.sides.0, least_a) && enough(&p.sides.1, least_b)
             };
-            // The gravest of what meets at one moment: the others are mended with it.
-            let Some(pair) = pairs.iter().find(meets) else { continue };
-            if !self.told.insert((*mixture, pair.incompatible.words.as_str())) {
+            if !self.met.insert((*mixture, pair.incompatible.words.as_str())) {
                 continue;
             }
-            let place = self.place(Some(*mixture));
-            let diagnostic = self.incompatible(*mixture, pair.incompatible, place);
-            self.found.push(Finding { time, diagnostic });
+            let step = self.operation_at(Some(*mixture));
+            let found = self.incompatible(*mixture, pair.incompatible, step);
+            self.tell(time, MIX, step, found);
         }
-        for index in 0..self.there.len() {
-            let danger = &self.program.model.dangers[index];
+        self.pairs = pairs;
+        let program = self.program;
+        for (index, danger) in program.model.dangers.iter().enumerate() {
             let now = engine.truth(danger.when);
-            let before = std::mem::replace(&mut self.there[index], now);
-            let known = || self.found.iter().any(|f| f.diagnostic.headline == danger.headline);
-            if !now || before || known() {
-                continue;
+            if !std::mem::replace(&mut self.there[index], now) && now {
+                let step = self.operation_at(None);
+                let found = self.danger(danger, step);
+                self.tell(time, &danger.name, step, found);
             }
-            let span = self.place(None).unwrap_or(danger.span);
-            let mut diagnostic = Diagnostic::error(danger.code, span, danger.headline.clone(), "it came about here");
-            diagnostic.severity = danger.severity;
-            diagnostic.help.clone_from(&danger.help);
-            self.found.push(Finding { time, diagnostic });
         }
     }
 
-    fn incompatible(&self, mixture: usize, pair: &Incompatible, place: Option<Span>) -> Diagnostic {
+    /// The states that an operation leaves if nothing else happens, and those that it changes; none where it cannot be carried out.
+    fn after(engine: &Engine<'_>, operation: &Operation) -> Option<(Vec<f64>, BTreeSet<u32>)> {
+        let mut states = engine.states().to_vec();
+        let mut changed = BTreeSet::new();
+        for action in operation.at_start.iter().chain(&operation.at_end) {
+            match *action {
+                Action::Assign { state, value, .. } => {
+                    let value = engine.eval_with(value, &states);
+                    *states.get_mut(state as usize)? = value;
+                    changed.insert(state);
+                }
+                Action::Move { fraction, from, to, .. } => {
+                    let fraction = engine.eval_with(fraction, &states);
+                    let mixtures = &engine.model().mixtures;
+                    let (from, to) = (mixtures.get(from as usize)?, mixtures.get(to as usize)?);
+                    transfer(&mut states, fraction, from, to).ok()?;
+                    changed.extend(from.extensive.iter().chain(&to.extensive).map(|(_, state)| *state));
+                }
+            }
+        }
+        Some((states, changed))
+    }
+
+    /// The first error that an operation would bring about.
+    fn would(&self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
+        let (states, changed) = Self::after(engine, operation)?;
+        let model = &self.program.model;
+        let label = &self.program.plan.get(step).label;
+        let alarm = |name: &str, mut found: Diagnostic| {
+            found.headline = format!("`{label}` is not carried out: {}", found.headline);
+            Alarm { name: name.to_string(), found, around: self.around(Some(step)).collect() }
+        };
+        for (mixture, pairs) in &self.pairs {
+            if !model.mixtures[*mixture].contents.iter().any(|c| changed.contains(&c.state)) {
+                continue;
+            }
+            let Some(pair) = self.meeting(*mixture, pairs, &states) else { continue };
+            let Incompatible { severity, words, .. } = pair.incompatible;
+            if *severity == Severity::Error && !self.met.contains(&(*mixture, words.as_str())) {
+                return Some(alarm(MIX, self.incompatible(*mixture, pair.incompatible, Some(step))));
+            }
+        }
+        let read = self.read.get_or_init(|| model.dangers.iter().map(|d| self.states_of(d)).collect());
+        let mut dangers = model.dangers.iter().zip(&self.there).zip(read);
+        let (danger, _) = dangers.find(|((danger, there), read)| {
+            let new = danger.severity == Severity::Error && !**there && !read.is_disjoint(&changed);
+            new && matches!(engine.eval_with(danger.when, &states), v if v != 0.0 && !v.is_nan())
+        })?;
+        Some(alarm(&danger.0.name, self.danger(danger.0, Some(step))))
+    }
+
+    fn states_of(&self, danger: &Danger) -> BTreeSet<u32> {
+        let mut states = BTreeSet::new();
+        self.program.model.graph.visit(danger.when, |op| {
+            if let Op::State(state) = op {
+                states.insert(state);
+            }
+        });
+        states
+    }
+
+    fn danger(&self, danger: &Danger, step: Option<StepId>) -> Diagnostic {
+        let span = self.place(step).unwrap_or(danger.span);
+        let mut found = Diagnostic::error(danger.code, span, danger.headline.clone(), "it came about here");
+        found.severity = danger.severity;
+        found.help.clone_from(&danger.help);
+        found
+    }
+
+    fn incompatible(&self, mixture: usize, pair: &Incompatible, step: Option<StepId>) -> Diagnostic {
         let (model, scene) = (&self.program.model, &self.program.scene);
         let species = |index: u32| model.species.get(index as usize).map_or("?", |s| s.name.as_str());
         let (a, b) = (species(pair.species.0), species(pair.species.1));
@@ -175,16 +285,12 @@ impl<'p> Screen<'p> {
         let own = scene.instances.get(instance.0 as usize);
         let vessel = own.and_then(|i| i.owner).and_then(|o| scene.instances.get(o.0 as usize)).or(own);
         let (name, span) = vessel.map_or(("?", Span::default()), |v| (v.name.as_str(), v.span));
-        let headline = format!("`{a}` and `{b}` have come together in `{name}`: {}", pair.words);
-        let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place.unwrap_or(span), headline, "while this went on");
+        let headline = format!("`{a}` and `{b}` come together in `{name}`: {}", pair.words);
+        let place = self.place(step).unwrap_or(span);
+        let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place, headline, "while this went on");
         d.severity = pair.severity;
         d.help.extend(pair.help.iter().cloned());
         d.help(format!("if this is meant, say so: `allow incompatible {a} with {b} \"why\"`"))
-    }
-
-    /// Whether one of the findings is an error.
-    pub(crate) fn is_grave(&self) -> bool {
-        self.found.iter().any(|f| f.diagnostic.severity == Severity::Error)
     }
 }
 
@@ -196,6 +302,10 @@ impl Observer for Screen<'_> {
     fn event(&mut self, _: f64, _: usize) {}
 
     fn process(&mut self, _: f64, _: usize, _: bool) {}
+
+    fn stops(&self) -> bool {
+        !self.alarms.is_empty()
+    }
 }
 
 impl Listener for Screen<'_> {
@@ -212,5 +322,13 @@ impl Listener for Screen<'_> {
 
     fn operation(&mut self, _: f64, step: StepId, _: &Operation, _: OperationState) {
         self.last = Some(step);
+    }
+
+    fn foreseen(&mut self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
+        self.would(engine, step, operation)
+    }
+
+    fn alarm(&mut self) -> Option<Alarm> {
+        self.alarms.pop_front().map(|(_, alarm)| alarm)
     }
 }

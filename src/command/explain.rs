@@ -1,12 +1,16 @@
 //! `matterixc explain`.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use matterix_ir::{Code, codes};
 
 use crate::Exit;
 use crate::args::ExplainArgs;
+use crate::files;
 use crate::terminal::{Stream, complain, print};
+
+use super::named::named;
 
 /// Text above the table of the index.
 const INDEX_HEAD: &str = include_str!("../template/codes.md");
@@ -16,6 +20,9 @@ pub fn explain(args: &ExplainArgs) -> Exit {
     if args.index {
         print(Stream::Out, &index());
         return Exit::Fine;
+    }
+    if let (Some(name), false) = (&args.code, args.files.is_empty()) {
+        return super::or_complain(own(name, &args.files));
     }
     match explanation(args.code.as_deref()) {
         Ok(page) => {
@@ -28,6 +35,21 @@ pub fn explain(args: &ExplainArgs) -> Exit {
             Exit::Usage
         }
     }
+}
+
+/// What files say of a name of their own; `Err` says in words what is wrong with usage or files.
+fn own(name: &str, files: &[PathBuf]) -> Result<Exit, String> {
+    let mut found = false;
+    for path in files {
+        let text = String::from_utf8_lossy(&files::read(path)?).into_owned();
+        if let Some(said) = named(name, &path.display().to_string(), &text) {
+            print(Stream::Out, &said);
+            found = true;
+        }
+    }
+    let nothing =
+        || format!("nothing in these files is called `{name}`: name a failure, a hazard or an `ends` of theirs");
+    found.then_some(Exit::Fine).ok_or_else(nothing)
 }
 
 /// The page of a code, the codes of a family, or all without one; `Err` says what may have been meant.
@@ -43,14 +65,15 @@ pub fn explanation(given: Option<&str>) -> Result<String, String> {
     }
     Err(match nearest(&name) {
         Some(code) => format!("did you mean `{code}`?"),
-        None => "`matterixc explain` lists all codes".to_string(),
+        None => "`matterixc explain` lists all codes; a name that a file gives is explained with it, `matterixc explain NAME FILE`"
+            .to_string(),
     })
 }
 
-/// The code in what was pasted: `error[unit-mismatch]:` is `unit-mismatch`.
+/// The code in what was pasted: `error[unit-mismatch]:` is `unit-mismatch`, and so is the failure `unit_mismatch`.
 fn bare(given: &str) -> String {
     let inner = given.split_once('[').map_or(given, |(_, rest)| rest);
-    inner.split(']').next().unwrap_or_default().trim().to_lowercase()
+    inner.split(']').next().unwrap_or_default().trim().to_lowercase().replace('_', "-")
 }
 
 fn nearest(name: &str) -> Option<&'static str> {

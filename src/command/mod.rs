@@ -11,6 +11,7 @@ mod fit;
 mod fmt;
 mod lsp;
 mod mcp;
+mod named;
 mod new;
 mod plan;
 mod play;

@@ -13,9 +13,10 @@ use matterix_hardware::deploy::{
 use matterix_hardware::link::Trouble;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 use matterix_runtime::backend::{Prepared, Sim};
-use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Verdict};
+use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Engine, Observer, Options};
+use matterix_runtime::run::Screen;
 
 use crate::terminal::{Stream, print};
 
@@ -81,7 +82,8 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let prepared = Prepared::new(program);
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
-    let engine = match engine.and_then(|mut engine| engine.start(&mut ()).map(|()| engine)) {
+    let mut screen = Screen::new(program);
+    let engine = match engine.and_then(|mut engine| engine.start(&mut screen).map(|()| engine)) {
         Ok(engine) => engine,
         Err(fault) => return Ok(Deployed::not_begun(vec![of_fault(fault)])),
     };
@@ -119,6 +121,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     }
     let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
     let mut told = Told { person: plan.person, cancel: plan.cancel };
+    let mut told = Tee(&mut screen, &mut told);
     let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
     if let Some(unreached) = hardware.unreached() {
         return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
@@ -126,6 +129,7 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
     let stopped = !well && plan.cancel.load(Ordering::Relaxed);
     let mut found = findings(&execution, sources);
+    found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     if !well {
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }

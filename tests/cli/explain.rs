@@ -1,6 +1,6 @@
 //! `matterixc explain`.
 
-use crate::harness::matterixc;
+use crate::harness::{folder, matterixc, root, write};
 
 #[test]
 fn a_code_is_explained_by_its_page() {
@@ -31,5 +31,37 @@ fn an_unknown_code_is_a_usage_error_with_a_suggestion() {
     assert_eq!(ended.err, "error: there is no diagnostic code `syntx`\nhelp: did you mean `syntax`?\n");
     let ended = matterixc(&["explain", "zzzzzzzzzzzzzzzz"]);
     assert_eq!(ended.code, 2);
-    assert!(ended.err.ends_with("help: `matterixc explain` lists all codes\n"), "{}", ended.err);
+    assert!(ended.err.contains("help: `matterixc explain` lists all codes; "), "{}", ended.err);
+}
+
+#[test]
+fn names_of_failures_are_explained_those_of_a_file_with_it() {
+    let page = matterixc(&["explain", "left_in_tip"]);
+    assert!(page.code == 0 && page.out.starts_with("# left-in-tip\n"), "{}", page.out);
+    let text = "mtx 1\nhazard hot(p: Heater) when p.target > 60 degC \"less\"\n";
+    let file = write(&folder("explain"), "hot.mtx", text);
+    let own = matterixc(&["explain", "hot", &file]);
+    assert!(own.code == 0 && own.out.contains("Line 2, a hazard"), "{}{}", own.out, own.err);
+    let none = matterixc(&["explain", "cold", &file]);
+    assert_eq!((none.code, none.out.as_str()), (2, ""));
+    assert!(none.err.contains("nothing in these files is called `cold`"), "{}", none.err);
+}
+
+#[test]
+fn every_failure_of_the_library_has_a_page() {
+    for file in std::fs::read_dir(root().join("stdlib")).expect("the folder is there") {
+        let path = file.expect("it can be read").path();
+        let text = std::fs::read_to_string(&path).expect("it is text");
+        // A name after `else` stands before its help, except where something ends: that is `unfinished`.
+        for (line, name) in
+            text.lines().filter_map(|l| Some((l, l.split(" else ").nth(1).or(l.trim().strip_prefix("else "))?)))
+        {
+            let mut words = name.split_whitespace();
+            let (Some(name), Some(help)) = (words.next(), words.next()) else { continue };
+            if help.starts_with('"') && !name.starts_with("left_") || name == "left_in_tip" {
+                let code = name.replace('_', "-");
+                assert!(matterix_ir::codes::find(&code).is_some(), "{}: `{name}` has no page: {line}", path.display());
+            }
+        }
+    }
 }

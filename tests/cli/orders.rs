@@ -1,7 +1,7 @@
 //! Steps that run beside each other: what meets in one order of them and not in another, in `check` and in the run; what is left on
 //! along one way; circles of claims and uses of one thing, however many there are.
 
-use crate::harness::{folder, matterixc, write};
+use crate::harness::{folder, matterixc, matterixc_in, write};
 
 /// Code, severity and line of every finding of a check.
 fn findings(name: &str, text: &str) -> Vec<(String, String, u64)> {
@@ -119,15 +119,99 @@ fn the_run_screens_what_is_there() {
     assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
     let report = std::fs::read_to_string(out.join("report.json")).expect("the report is written");
     let report: serde_json::Value = serde_json::from_str(&report).expect("the report is JSON");
-    assert_eq!(report["status"], "missed");
-    assert_eq!(report["findings"][0]["code"], MIX);
-    assert_eq!(report["findings"][0]["severity"], "error");
-    assert_eq!(report["findings"][0]["line"], 19);
+    assert_eq!(report["status"], "failed");
+    assert_eq!(report["failure"]["name"], "incompatible_mix");
+    assert!(report["failure"]["trace"].as_array().is_some_and(|t| t.iter().any(|s| s["line"] == 19)), "{report:#}");
+    assert!(ended.err.contains("error[incompatible-mix]"), "{}", ended.err);
     // What is allowed is meant in the run, too.
     let allowed = vessels(steps).replacen("lab bench", "allow incompatible NaCN with HCl \"in a hood\"\nlab bench", 1);
     let path = write(&dir, "allowed.mtx", allowed);
     let ended = matterixc(&["run", &path]);
     assert_eq!(ended.code, 0, "{}{}", ended.out, ended.err);
+}
+
+/// How a run of some text ended: exit status, report.
+fn ran(name: &str, text: &str) -> (i32, serde_json::Value) {
+    let path = write(&folder(&format!("orders_{name}_run")), "bench.mtx", text);
+    let ended = matterixc(&["run", &path, "--format", "json"]);
+    let report = serde_json::from_str(&ended.out).unwrap_or_else(|e| panic!("{name}: {e}: {}{}", ended.out, ended.err));
+    (ended.code, report)
+}
+
+#[test]
+fn what_must_not_meet_is_a_failure_that_a_handler_takes() {
+    let steps = "parallel {
+ step one { wait until r.contents.volume > 1 mL timeout 1 h; claim b { shift 20 mL from a to b by p } }
+ step two { wait until r.contents.volume > 1 mL timeout 1 h; claim b { shift 20 mL from b to c by q } }
+} on incompatible_mix { note \"kept apart\" }";
+    let (code, report) = ran("handled", &vessels(steps));
+    assert_eq!((code, &report["status"]), (0, &"passed".into()), "{report:#}");
+    // The step that would mix them is not carried out.
+    let other = steps.replace("on incompatible_mix", "on broken");
+    let (code, report) = ran("not_handled", &vessels(&other));
+    assert_eq!((code, &report["failure"]["name"]), (1, &"incompatible_mix".into()), "{report:#}");
+    // It is known to be a failure.
+    assert_eq!(findings("handled", &vessels(steps)), []);
+}
+
+/// A plate that warms water; the hazard looks at the water's temperature, which only a run knows.
+fn reheated(line: &str, end: &str) -> String {
+    format!(
+        "mtx 1
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+{line}
+lab bench {{
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    beaker = Beaker250mL on plate holding 100 g of water
+}}
+workflow warm in bench {{
+    heat plate to 50 degC
+    wait until plate.temperature >= 40 degC timeout 1 h
+    wait 20 min
+    heat plate to 60 degC
+    wait 1 min
+}} {end} finally {{ stop heating plate }}
+"
+    )
+}
+
+#[test]
+fn hazards_of_a_run_are_failures_and_cautions_are_notes() {
+    let line = "reheats(p: Heater, v: Container) when p.target > 55 degC and v.contents.temperature > 25 degC \"cool it first\"";
+    let hazard = format!("hazard {line}");
+    let (code, report) = ran("hazard", &reheated(&hazard, ""));
+    assert_eq!((code, &report["failure"]["name"]), (1, &"reheats".into()), "{report:#}");
+    assert_eq!(report["failure"]["trace"][0]["line"], 14);
+    let (code, report) = ran("hazard_handled", &reheated(&hazard, "on reheats { note \"it stays at 50\" }"));
+    assert_eq!((code, &report["status"]), (0, &"passed".into()), "{report:#}");
+    let (code, report) = ran("caution", &reheated(&format!("caution {line}"), ""));
+    assert_eq!((code, &report["findings"][0]["severity"]), (0, &"warning".into()), "{report:#}");
+    let (code, report) = ran("hazard_allowed", &reheated(&format!("{hazard}\nallow reheats \"in a hood\""), ""));
+    assert_eq!((code, &report["status"]), (0, &"passed".into()), "{report:#}");
+    // What comes about while time passes fails the step that goes on.
+    let slow = "hazard too_warm(v: Container) when v.contents.temperature > 30 degC \"stop\"";
+    let (code, report) = ran("hazard_slow", &reheated(slow, ""));
+    assert_eq!((code, &report["failure"]["name"]), (1, &"too_warm".into()), "{report:#}");
+    assert_eq!(report["failure"]["trace"][0]["label"], "wait 20 min");
+    assert!(report["end"].as_f64().is_some_and(|end| end < 900.0), "it stops before the wait is over: {report:#}");
+}
+
+#[test]
+fn what_a_step_would_bring_about_is_never_sent_to_a_device() {
+    let line = "hazard reheats(p: Heater, v: Container) when p.target > 55 degC and v.contents.temperature > 25 degC \"cool it first\"";
+    let dir = folder("orders_deployed");
+    write(&dir, "lab.mtx", reheated(line, ""));
+    write(&dir, "lab.toml", "[plate]\naddress = \"127.0.0.1:1\"\n");
+    let dry = |dir: &std::path::Path| matterixc_in(dir, &["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "dry"]);
+    let ended = dry(&dir);
+    assert_eq!(ended.code, 1, "{}{}", ended.out, ended.err);
+    assert!(ended.out.contains("OUT_SP_1 50") && !ended.out.contains("OUT_SP_1 60"), "{}", ended.out);
+    assert!(ended.out.contains("STOP_1") && ended.err.contains("error[hazard]"), "{}{}", ended.out, ended.err);
+    write(&dir, "lab.mtx", reheated("", ""));
+    let ended = dry(&dir);
+    assert!(ended.code == 0 && ended.out.contains("OUT_SP_1 60"), "{}{}", ended.out, ended.err);
 }
 
 /// A plate with a beaker, and steps from line 10 on.

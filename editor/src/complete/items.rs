@@ -90,27 +90,7 @@ const MANY: &[(&str, &str)] = &[
 
 /// Fields by the word of their item.
 const FIELDS: &[(&str, &[&str])] = &[
-    (
-        "species",
-        &[
-            "formula",
-            "smiles",
-            "density",
-            "molar_volume",
-            "heat_capacity",
-            "specific_heat",
-            "absorbs",
-            "boiling_point",
-            "melting_point",
-            "flash_point",
-            "phase",
-            "hazards",
-            "reactive_groups",
-            "same_as",
-            "dissolves",
-            "by",
-        ],
-    ),
+    ("species", &["formula", "smiles", "reactive_groups", "same_as", "dissolves", "by"]),
     ("reaction", &["rate", "order", "valid", "enthalpy", "template", "requires", "reverse", "reverse_order"]),
     ("reactive_group", &["title", "smarts", "unless", "members", "above", "source"]),
     ("material", &["title", "friction", "source"]),
@@ -208,7 +188,11 @@ impl Place<'_> {
             && depth == 1
             && begins
         {
-            return fields.iter().for_each(|f| self.keyword(f, &format!("{f}: "), 10, out));
+            fields.iter().for_each(|f| self.keyword(f, &format!("{f}: "), 10, out));
+            if item == "species" {
+                self.properties(out);
+            }
+            return;
         }
         if matches!(item, "species" | "solution" | "reaction" | "reactive_group" | "incompatible") && begins {
             return self.globals(&[Kind::Species, Kind::Solution], 10, out);
@@ -243,6 +227,16 @@ impl Place<'_> {
             self.assets(wanted.sort.as_ref(), 6, out);
         }
         self.value_offers(&wanted, out);
+    }
+
+    /// What the library and files state of species.
+    fn properties(&self, out: &mut Offers) {
+        for def in self.index.properties() {
+            let d = self.index.def(def);
+            let (label, text) = (d.name.clone(), format!("{}: ", d.name));
+            let detail = self.index.sort_words(&d.sort);
+            out.all.push(Completion { label, text, kind: Offer::Def(d.kind), detail, def: Some(def), rank: 10 });
+        }
     }
 
     fn is_call(&self, head: &[super::context::Token<'_>]) -> bool {

@@ -256,7 +256,7 @@ impl Place<'_> {
     fn failures(&self, out: &mut Offers) {
         // Those of the package before those of the library.
         let rank = |d: &Def| 8 + 2 * u8::from(self.index.is_library(d.span.file));
-        let all = self.index.defs().filter(|(_, d)| d.kind == Kind::Failure);
+        let all = self.index.defs().filter(|(_, d)| matches!(d.kind, Kind::Failure | Kind::Hazard));
         let mut all: Vec<_> = all.map(|(id, d)| (rank(d), id, d.name.clone())).collect();
         all.sort_by_key(|failure| failure.0);
         for (rank, id, name) in all {
@@ -264,11 +264,20 @@ impl Place<'_> {
                 out.all.push(self.offer(&name, id, rank));
             }
         }
-        for name in
-            ["failure", "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job"]
-        {
-            self.keyword(name, name, 12, out);
-        }
+        const BUILT_IN: [&str; 11] = [
+            "failure",
+            "timeout",
+            "late",
+            "max",
+            "broken",
+            "need",
+            "promise",
+            "claimed",
+            "wrong_reagent",
+            "job",
+            "incompatible_mix",
+        ];
+        BUILT_IN.iter().for_each(|name| self.keyword(name, name, 12, out));
     }
 
     /// Prepositions of a call that are not there yet.

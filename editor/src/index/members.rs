@@ -76,6 +76,22 @@ const OF_SHAPE: &[(&str, &str)] = &[
 ];
 
 impl Index {
+    /// What can be stated of a species: the parameters of every `capability Species`.
+    pub(crate) fn properties(&self) -> impl Iterator<Item = DefId> {
+        let kinds = self.defs().filter(|(_, d)| d.kind == Kind::Capability && d.name == "Species");
+        kinds.flat_map(|(_, d)| d.inside.iter().copied()).filter(|def| self.def(*def).kind == Kind::Member)
+    }
+
+    /// The property of species with this name.
+    pub(crate) fn property(&self, name: &str) -> Option<DefId> {
+        self.properties().find(|def| self.def(*def).name == name)
+    }
+
+    fn stated(&self, def: DefId) -> Member {
+        let d = self.def(def);
+        Member { name: d.name.clone(), meaning: Meaning::Def(def), sort: d.sort.clone() }
+    }
+
     /// The member of a value with this name.
     pub(crate) fn member_of(&self, base: &Sort, name: &str) -> Option<Member> {
         match base {
@@ -103,7 +119,7 @@ impl Index {
                 sort: (**inner).clone(),
             }),
             Sort::Species => {
-                let found = known(OF_SPECIES, name);
+                let found = self.property(name).map(|def| self.stated(def)).or_else(|| known(OF_SPECIES, name));
                 Some(found.unwrap_or_else(|| Member {
                     name: name.into(),
                     meaning: Meaning::Language("a property that is stated of the species"),
@@ -322,7 +338,13 @@ impl Index {
                 inside.filter_map(|d| self.of_lab(lab, &self.def(d).name)).collect()
             }
             Sort::List(_) => [OF_LIST, OF_GRID].into_iter().flat_map(listed).collect(),
-            Sort::Species => listed(OF_SPECIES),
+            Sort::Species => {
+                let mut out: Vec<Member> = self.properties().map(|def| self.stated(def)).collect();
+                let known: Vec<Member> =
+                    listed(OF_SPECIES).into_iter().filter(|m| !out.iter().any(|o| o.name == m.name)).collect();
+                out.extend(known);
+                out
+            }
             Sort::Reaction => listed(OF_REACTION),
             Sort::Step => listed(OF_STEP),
             Sort::Range(_) => listed(&[("min", ""), ("max", "")]),

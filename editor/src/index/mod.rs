@@ -209,6 +209,11 @@ impl Index {
         self.own.failures.get(name).or_else(|| self.library.failures.get(name)).map(|f| f.0)
     }
 
+    /// The hazard or caution of this name: a run may fail with it.
+    pub(crate) fn hazard(&self, name: &str) -> Option<DefId> {
+        self.defs().find(|(_, d)| d.kind == Kind::Hazard && d.name == name).map(|(id, _)| id)
+    }
+
     /// The unit or dimension of this name, without prefix.
     pub(crate) fn measure(&self, name: &str) -> Option<DefId> {
         self.own.measures.get(name).or_else(|| self.library.measures.get(name)).copied()

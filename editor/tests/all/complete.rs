@@ -158,7 +158,14 @@ fn files_begin_with_items() {
     has(&in_text("mtx 1\nasset A: $0"), &["Vessel", "Body"], &["heat"]);
     has(&in_text("mtx 1\ncapability A {\n    $0\n}"), &["state", "param", "command"], &["heat"]);
     has(&in_text("mtx 1\ncapability A {\n    param x: $0\n}"), &["Temperature", "Bool"], &[]);
-    has(&in_text("mtx 1\nspecies A { $0 }"), &["formula", "density"], &[]);
+    has(&in_text("mtx 1\nspecies A { $0 }"), &["formula", "density", "pka"], &[]);
+}
+
+#[test]
+fn properties_of_ones_own_are_offered_as_those_of_the_library() {
+    let own = "mtx 1\ncapability Species {\n    /// Of a rat.\n    param toxicity: MassFraction\n}\n";
+    has(&in_text(&format!("{own}species A {{ $0 }}")), &["toxicity", "density", "same_as"], &["heat"]);
+    has(&offers("expect water.$0"), &["density", "pka", "charge"], &["heat"]);
 }
 
 #[test]

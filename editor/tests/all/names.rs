@@ -156,6 +156,49 @@ fn hover_says_what_a_name_is() {
 }
 
 #[test]
+fn hover_knows_properties_hazards_and_what_is_allowed() {
+    let text = "mtx 1
+use std::glassware::Beaker50mL
+use std::heating::IkaRetControl
+capability Species {
+    /// Of a rat.
+    param toxicity: MassFraction
+}
+species poison { by: mass, density: 1 g/mL, specific_heat: 2 J/(g*K), toxicity: 1 %w/w, melting_point: 300 K }
+/// It smokes.
+hazard smokes(h: Heater) when h.target > 150 degC \"less\"
+fn harm(s: Species) -> MassFraction = s.toxicity
+/// It is much.
+caution much(v: Vessel) of v.contents.volume when sum(s in having(v.contents.species, \"toxicity\"): s.toxicity) > 0 %w/w \"less\"
+allow much \"in a hood\"
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    cup = Beaker50mL on plate holding 10 g of water at 40 degC
+}
+workflow warm in bench {
+    sequence { heat plate to 40 degC } on smokes { note \"smoke\" }
+    stop heating plate
+}
+";
+    let (analysis, index) = analysed("a.mtx", text, &Files::default());
+    let cases: &[(&str, &[&str])] = &[
+        ("1 g/mL, specific_heat: 2 J/(g*K), |toxicity", &["param toxicity", "Of a rat."]),
+        ("%w/w, |melting_point", &["param melting_point", "std::chemistry"]),
+        ("= s.|toxicity", &["param toxicity", "Of a rat."]),
+        ("allow |much", &["caution much", "It is much."]),
+        ("on |smokes", &["hazard smokes", "It smokes."]),
+        ("water at 40 deg|C", &["Temperature"]),
+    ];
+    for (what, parts) in cases {
+        let said = index.about(analysis.root, place(text, what)).map(|s| s.text).unwrap_or_default();
+        for part in *parts {
+            assert!(said.contains(part), "`{what}` lacks `{part}`:\n{said}");
+        }
+    }
+}
+
+#[test]
 fn skills_are_called_and_call() {
     let (analysis, index) = lab();
     let bring = index.caller_at(analysis.root, place(LAB, "skill |bring")).expect("a skill");

@@ -9,7 +9,7 @@
 enum Token {
     NEWLINE, BLANK_LINE, NL_CLAUSE, NL_MORE,
     UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_ARGUMENT, SPECIES_INDEX, LESS,
-    TIGHT, SAME_LINE, ERROR_SENTINEL,
+    TIGHT, SAME_LINE, BESIDE, ERROR_SENTINEL,
 };
 
 // With these a line goes on, wherever they are no names of fields: nothing begins with them.
@@ -27,6 +27,10 @@ static const char RESERVED[] =
     " after and as ask asks at await by claim effect else every expect expects fail fails finally for from hold holding if in into is keep let"
     " needs not note of on onto or parallel presumes record repeat retry return sends sequence start step takes through timeout to try until"
     " using wait while with within ";
+
+// With these a step may begin behind a closing brace on its line. `for` also stands in `hold c for 1 min`.
+static const char STEPS[] =
+    " let wait step if repeat for within hold keep try retry claim sequence parallel start await fail expect record note ask return ";
 
 // Words after a number that are no units.
 static const char NOT_UNITS[] = " log times pitch also noise labelled symmetric per prefixes where when over ";
@@ -317,10 +321,24 @@ static bool scan_species(TSLexer *lexer, const bool *valid) {
     return false;
 }
 
+// Whether the word that has been read begins a step: after `for` a name and `in`.
+static bool begins_step(TSLexer *lexer, const Word *word) {
+    if (!is_one_of(word, STEPS)) return false;
+    if (strcmp(word->text, " for ") != 0) return true;
+    Word after;
+    for (int i = 0; i < 2; i++) {
+        while (is_blank(next(lexer))) advance(lexer);
+        read_word(lexer, &after);
+    }
+    return strcmp(after.text, " in ") == 0;
+}
+
 static bool scan_word(TSLexer *lexer, const bool *valid) {
     bool letter = is_letter(next(lexer));
     Word word;
+    lexer->mark_end(lexer);
     read_word(lexer, &word);
+    if (valid[BESIDE] && begins_step(lexer, &word)) return found(lexer, BESIDE);
     lexer->mark_end(lexer);
     if (valid[FIRST_WORD] || valid[NEXT_WORD]) {
         bool first = valid[FIRST_WORD];

@@ -100,13 +100,13 @@ codes! {
     ABOVE_BOILING_POINT "above-boiling-point" "H2" "a set point above the boiling point of what is heated";
     CLOSED_VESSEL_HEATED "closed-vessel-heated" "H2" "a closed vessel is heated";
     ABOVE_FLASH_POINT "above-flash-point" "H2" "a set point that brings a liquid to its flash point";
-    WEAK_ACID_LEFT_OUT "weak-acid-left-out" "H3" "the pH of a weak acid is used, of which the model knows nothing";
-    WEAK_BASE_LEFT_OUT "weak-base-left-out" "H3" "the pH of a weak base is used, of which the model knows nothing";
+    WEAK_ACID_LEFT_OUT "weak-acid-left-out" "H3" "a pH is used, and the model leaves out a weak acid there";
+    WEAK_BASE_LEFT_OUT "weak-base-left-out" "H3" "a pH is used, and the model leaves out a weak base there";
     PH_OF_STRONG_SOLUTION "ph-of-strong-solution" "H3" "a pH is used where activities are far from concentrations";
     UNDISSOLVED "undissolved" "H3" "a mixture holds more of a salt than dissolves";
     GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
     VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume";
-    HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used behind a step whose heat the model leaves out";
+    HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used after a step whose heat the model leaves out";
     HOT_MIXING "hot-mixing" "H3" "a step dissolves, dilutes or neutralises so much that it gets hot";
     WELLS_STAY_COLD "wells-stay-cold" "H3" "a heater warms labware whose wells take no heat in the model";
     NEED_UNMET "need-unmet" "P1" "a step cannot begin because what it needs does not hold";
@@ -127,6 +127,13 @@ codes! {
     TIP_OVERFLOW "tip-overflow" "V3" "a tip takes up more than it holds";
     NEVER_FILLED "never-filled" "V2" "a liquid is taken from where there is none";
     OUT_OF_TIPS "out-of-tips" "V4" "a rack has no fresh tip left";
+    NO_RACK "no-rack" "T1" "a transfer takes tips, and no rack is named";
+    NO_MIX_VOLUME "no-mix-volume" "V3" "a transfer mixes, and no volume is given";
+    LEFT_IN_TIP "left-in-tip" "T2" "a liquid hangs in a tip until it drips or dries";
+    OVERLOAD "overload" "V3" "a balance bears more than its range";
+    BELOW_READABILITY "below-readability" "V3" "less is weighed in than a balance can show";
+    NOT_PIPED "not-piped" "T1" "a pump draws or pushes where no tube leads";
+    TOO_STIFF "too-stiff" "G3" "a button takes more force than an arm pushes with";
     NO_TIP "no-tip" "T1" "a pipette has no tip for what it does";
     TIP_ON_TIP "tip-on-tip" "T2" "a pipette that has a tip takes another one";
     UNFINISHED "unfinished" "P1" "a workflow ends while a device is on or something is in hand";
@@ -174,7 +181,7 @@ codes! {
     DIVERGED "diverged" "W2" "a device tells something else than it was told, or than its twin";
     JOURNAL_MISMATCH "journal-mismatch" "W2" "a deployment cannot go on from its journal";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";
-    NONPHYSICAL_TEMPERATURE "nonphysical-temperature" "X0" "a law brings a mixture to a temperature that cannot be";
+    NONPHYSICAL_TEMPERATURE "nonphysical-temperature" "X0" "a law brings a mixture to an impossible temperature";
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";
     INTEGRATION_FAILED "integration-failed" "X0" "a quantity changes faster than any step can follow";
@@ -190,7 +197,7 @@ codes! {
     PROMISE_BROKEN "promise-broken" "X0" "a skill ended without what it promises";
     NOT_EXPRESSIBLE "not-expressible" "W0" "a workflow does what the kind of file it is written as cannot say";
     WRONG_MESSAGE "wrong-message" "W0" "a driver says something that its wire does not know";
-    NOT_ANALYSED "not-analysed" "L1" "a limit of an analysis is reached, and what lies beyond it is not looked at";
+    NOT_ANALYSED "not-analysed" "L1" "an analysis reaches its limit and leaves the rest unchecked";
     UNUSABLE_NUMBER "unusable-number" "X0" "a duration, an interval or a count is not one";
 }
 

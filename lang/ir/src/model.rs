@@ -282,6 +282,9 @@ pub struct Incompatible {
 /// A hazard or caution of a library or file, on its instances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Danger {
+    /// What it is declared as, by which handlers take it.
+    #[serde(default)]
+    pub name: String,
     /// The kind of finding.
     pub code: Code,
     /// How bad it is.

@@ -94,6 +94,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
         .collect();
     let declared = tables.failures();
     let flowing = flowing(plan, lab);
+    let dangers = tables.dangers();
     let mut out: Vec<Diagnostic> = Vec::new();
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
@@ -111,7 +112,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
                 continue;
             }
             let Caught::Named(name) = caught else { continue };
-            if raised.contains(name) || told.contains(name.as_str()) {
+            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
                 let headline = format!("nothing before it fails with `{name}`");

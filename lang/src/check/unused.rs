@@ -7,7 +7,7 @@ use std::sync::Arc;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Argument, Plan, Step};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Sources, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Op, Sources, Span, codes};
 
 use crate::ast::{Item, ItemKind, LabLineKind};
 use crate::elaborate::{Elaborator, Tables};
@@ -94,6 +94,7 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
     };
     let things = tops().filter(own).map(|id| (lab.instances[id.0 as usize].span, used.contains(&id))).collect();
     let touched = touched(lab, plan);
+    let mut idle = Vec::new();
     let mut reagents: BTreeMap<(Span, String), (String, bool)> = BTreeMap::new();
     for i in 0..lab.instances.len() as u32 {
         let (id, inst) = (InstanceId(i), &lab.instances[i as usize]);
@@ -112,8 +113,18 @@ pub fn uses(lab: &Elaborator<'_>, sources: &Sources, lab_id: DeclId, plan: &Plan
             || label.is_some_and(|label| spoken.contains(&label));
         let name = lab.instances[vessel.0 as usize].name.clone();
         let span = lab.instances[thing.0 as usize].span;
-        let told = reagents.entry((span, origin)).or_insert((name, false));
+        let told = reagents.entry((span, origin.clone())).or_insert((name, false));
         told.1 |= is_used;
+        if !is_used {
+            idle.push((id, (span, origin)));
+        }
+    }
+    idle.retain(|(_, key)| reagents.get(key).is_some_and(|told| !told.1));
+    if !idle.is_empty() {
+        let read = read(lab, plan, &used);
+        for (_, key) in idle.into_iter().filter(|(id, _)| read.contains(id)) {
+            reagents.get_mut(&key).into_iter().for_each(|told| told.1 = true);
+        }
     }
     Some(Uses { things, reagents, said, module: decl.module })
 }
@@ -139,6 +150,82 @@ fn touched(lab: &Elaborator<'_>, plan: &Plan) -> BTreeSet<InstanceId> {
         }
     }
     out.extend(lab.streams.keys().flat_map(|(_, from, to)| [*from, *to]));
+    out
+}
+
+/// What conditions and values of a plan read, and laws that change only other things, which the plan uses: a counterweight is
+/// used by whatever asks for balance.
+fn read(lab: &Elaborator<'_>, plan: &Plan, used: &BTreeSet<InstanceId>) -> BTreeSet<InstanceId> {
+    let mut nodes: Vec<NodeId> = Vec::new();
+    for step in &plan.steps {
+        match &step.step {
+            Step::Operation(o) => {
+                nodes.extend(o.needs.iter().map(|need| need.node));
+                nodes.extend(o.limits.iter().filter_map(|i| plan.limits.get(*i as usize)).map(|l| l.condition.node));
+                nodes.extend(o.until.iter().map(|until| until.node));
+                nodes.extend(o.at_start.iter().chain(&o.at_end).map(Action::source));
+            }
+            Step::Skill { needs, invariants, .. } => {
+                nodes.extend(needs.iter().map(|need| need.node).chain(invariants.iter().map(|c| c.node)));
+            }
+            Step::During { invariants, .. } => nodes.extend(invariants.iter().map(|c| c.node)),
+            Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } => nodes.push(condition.node),
+            Step::Keep { condition, .. } | Step::If { condition, .. } => nodes.push(condition.node),
+            Step::RepeatWhile { condition, .. } => nodes.push(condition.node),
+            Step::Let { value, .. } => nodes.push(*value),
+            Step::Expect(conditions) => nodes.extend(conditions.iter().map(|c| c.node)),
+            _ => {}
+        }
+    }
+    let mut out = owners_read(lab, nodes);
+    let mut laws: BTreeMap<usize, (BTreeSet<InstanceId>, Vec<NodeId>)> = BTreeMap::new();
+    let flows = lab.flows.iter().map(|((id, ..), parts)| (*id, parts));
+    let rates = lab.rates.iter().map(|(state, parts)| (lab.state_owner[*state as usize], parts));
+    for (id, parts) in flows.chain(rates) {
+        for part in parts {
+            let law = laws.entry(part.process).or_default();
+            law.0.insert(top(lab, id));
+            law.1.push(part.node);
+        }
+    }
+    for (changed, nodes) in laws.into_values().filter(|(changed, _)| !changed.is_disjoint(used)) {
+        out.extend(owners_read(lab, nodes).into_iter().filter(|id| !changed.contains(&top(lab, *id))));
+    }
+    out
+}
+
+/// The things whose states nodes depend on. What a choice leaves out as things stand at first does not count: whatever is moved is
+/// named where that is done.
+fn owners_read(lab: &Elaborator<'_>, mut todo: Vec<NodeId>) -> BTreeSet<InstanceId> {
+    let at_first = |state: u32| lab.states.get(state as usize).and_then(|s| lab.graph.constant(s.initial));
+    let known = |condition: NodeId| {
+        let is_open = |op: &Op| match op {
+            Op::State(state) => at_first(*state).is_none(),
+            Op::Const(_) => false,
+            op => op.operands().next().is_none(),
+        };
+        let value = |op: Op| match op {
+            Op::Const(value) => value,
+            Op::State(state) => at_first(state).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        };
+        (!lab.graph.depends(condition, is_open)).then(|| lab.graph.eval_on(condition, value) != 0.0)
+    };
+    let (mut seen, mut out) = (BTreeSet::new(), BTreeSet::new());
+    while let Some(node) = todo.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        match lab.graph.op(node) {
+            Op::State(state) => out.extend(lab.state_owner.get(state as usize)),
+            Op::Reading(reading) => todo.extend(lab.readings.get(reading as usize).map(|r| r.value)),
+            Op::Select(condition, a, b) => match known(condition) {
+                Some(holds) => todo.extend([condition, if holds { a } else { b }]),
+                None => todo.extend([condition, a, b]),
+            },
+            op => todo.extend(op.operands()),
+        }
+    }
     out
 }
 

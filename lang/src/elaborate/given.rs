@@ -62,7 +62,7 @@ fn reason(m: &MemberRef<'_>) -> Option<&'static str> {
     match &m.member.kind {
         MemberKind::Value { role: Role::Derived, .. } => Some("follows from other members"),
         MemberKind::Value { role: Role::Reading, .. } => Some("is what the device reports"),
-        MemberKind::Value { role: Role::Flow, .. } => Some("is a sum that laws make"),
+        MemberKind::Value { role: Role::Flow, .. } => Some("is summed up by laws"),
         MemberKind::Value { role: Role::Extensive, per: Some(_), .. } => Some("is what `holding` says"),
         MemberKind::Frame { .. } => Some("is a frame"),
         MemberKind::Process(_) => Some("is a process"),
@@ -89,7 +89,7 @@ impl<'a> Elaborator<'a> {
             let why = reason(m).unwrap_or_default();
             let owner = tables.kind_name(m.owner);
             let headline = format!("`{key}` of `{}` {why} and cannot be given", tables.kind_name(kind));
-            let d = Diagnostic::error(codes::DERIVED_MEMBER, f.span, headline, "would hold for ever");
+            let d = Diagnostic::error(codes::DERIVED_MEMBER, f.span, headline, "would never change");
             let d = d.because(m.member.span, format!("`{owner}` declares it here"));
             let help = self.instead(kind, m);
             self.report(d.help(help));
@@ -193,7 +193,7 @@ impl<'a> Elaborator<'a> {
             return;
         }
         let headline = format!("`{}` changes with the state of the thing and cannot be given as a constant", name.text);
-        let d = Diagnostic::error(codes::DERIVED_MEMBER, line.span, headline, "would hold for ever");
+        let d = Diagnostic::error(codes::DERIVED_MEMBER, line.span, headline, "would never change");
         let d = d.because(m.member.span, format!("`{}` declares it here", self.tables.kind_name(m.owner)));
         let kind = self.instances[this.0 as usize].kinds[0];
         let help = self.instead(kind, &m);
@@ -232,7 +232,7 @@ impl<'a> Elaborator<'a> {
             _ => None,
         });
         if let Some(rival) = rival {
-            let headline = format!("`at` and `{}` both say how the contents begin", rival.key.text);
+            let headline = format!("`at` and `{}` both give the initial temperature of the contents", rival.key.text);
             let d = Diagnostic::error(codes::DUPLICATE_NAME, at.span, headline, "given again here");
             self.report(d.because(rival.span, "first given here").help("leave one of them out"));
             return;
@@ -298,7 +298,7 @@ impl<'a> Elaborator<'a> {
         let instance = &self.instances[id.0 as usize];
         let Some(given) = instance.setting(with).filter(|_| instance.contents.is_empty()) else { return };
         let headline = format!("`{with}` is given for contents, and `{}` holds nothing at the start", instance.name);
-        let d = Diagnostic::error(codes::MISPLACED, given.field.span, headline, "nothing it could be about");
+        let d = Diagnostic::error(codes::MISPLACED, given.field.span, headline, "there are no contents to give it for");
         self.report(d.help("give it with what the vessel is `holding`, or leave it out"));
     }
 }

@@ -81,6 +81,7 @@ impl Hazard {
 pub fn dangers(hazards: &[Hazard]) -> Vec<Danger> {
     let all = hazards.iter().filter(|h| h.watched == Watched::Steps && !h.states.is_empty());
     let danger = |h: &Hazard| Danger {
+        name: h.name.clone(),
         code: h.code(),
         severity: h.severity(),
         when: h.when,

@@ -181,7 +181,7 @@ impl<'a> Elaborator<'a> {
                     let what = self.describe(&n);
                     let headline = format!("`at` expects a position `(x, y, z) mm`, found {what}");
                     let d = Diagnostic::error(codes::TYPE_MISMATCH, operand.span, headline, format!("this is {what}"));
-                    self.report(d.help("how warm the contents are stands once, after the whole `holding ...`"));
+                    self.report(d.help("give the initial temperature once, after the whole `holding ...`"));
                 }
                 ("at", other) => {
                     self.expected("a position `(x, y, z) mm`", &other, operand.span);

@@ -12,7 +12,7 @@ use super::species::SpeciesTable;
 use super::{Elaborator, units};
 use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
 use crate::budget::Stop;
-use crate::lower::declared_failures;
+use crate::lower::{dangers, declared_failures};
 use crate::names::{DeclId, Names, verb_text};
 use crate::screen::Screen;
 use crate::units::text::UnitError;
@@ -97,6 +97,7 @@ pub struct Tables<'a> {
     pub spoken: RwLock<BTreeMap<usize, Arc<HashSet<String>>>>,
     /// Failures that something declares, once they were asked for.
     failures: OnceLock<Arc<BTreeSet<String>>>,
+    dangers: OnceLock<BTreeSet<String>>,
     /// Capabilities and assets.
     pub kinds: BTreeMap<DeclId, Kind<'a>>,
     /// Commands by the words of their verbs, in order of capability.
@@ -127,6 +128,7 @@ impl<'a> Tables<'a> {
             si: RwLock::default(),
             spoken: RwLock::default(),
             failures: OnceLock::new(),
+            dangers: OnceLock::new(),
             kinds: BTreeMap::new(),
             commands: BTreeMap::new(),
             properties: Properties::new(),
@@ -262,6 +264,11 @@ impl<'a> Tables<'a> {
             }
         }
         kind.lines.extend(base.lines.iter().copied());
+    }
+
+    /// What a run may fail with at any step: what must not meet, and hazards.
+    pub fn dangers(&self) -> &BTreeSet<String> {
+        self.dangers.get_or_init(|| dangers(self.names))
     }
 
     /// Failures that something declares.

@@ -17,9 +17,22 @@ use crate::names::{Names, near, verb_text};
 const BUILT_IN: &[&str] =
     &["timeout", "broken", "late", "max", "need", "promise", "claimed", "job", "wrong_reagent", "failure"];
 
-/// Every failure that a `fails` clause declares.
+/// The failure of a run in which substances meet that must not.
+const MIX: &str = "incompatible_mix";
+
+/// What a run may fail with at any step: what must not meet, and hazards.
+pub fn dangers(names: &Names<'_>) -> BTreeSet<String> {
+    let hazards = names.decls.iter().filter_map(|decl| match &decl.item.kind {
+        ItemKind::Hazard { grave: true, name, .. } => Some(name.text.clone()),
+        _ => None,
+    });
+    hazards.chain([MIX.to_string()]).collect()
+}
+
+/// Every failure that something declares or the executor raises.
 pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BUILT_IN.iter().map(|s| (*s).to_string()).collect();
+    out.extend(dangers(names));
     let add = |clauses: &[Clause], out: &mut BTreeSet<String>| {
         for c in clauses {
             match &c.kind {

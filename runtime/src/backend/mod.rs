@@ -11,14 +11,14 @@ mod unknown;
 mod watch;
 
 use matterix_ir::NodeId;
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Operation, StepId};
 
 pub use dry::Dry;
 pub use moments::Moments;
 pub use sim::{Moves, Sim};
 pub use watch::Prepared;
 
-use crate::exec::Listener;
+use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
 use crate::process::{Advance, Watch};
 
@@ -98,6 +98,11 @@ pub trait Backend {
 
     /// Sets a value that the plan keeps; `None` if it is not known.
     fn set_local(&mut self, local: u32, value: Option<f64>);
+
+    /// What an operation that is about to begin would bring about and must not, by what is known of the world here.
+    fn foresee(&mut self, _step: StepId, _operation: &Operation, _out: &mut dyn Listener) -> Option<Alarm> {
+        None
+    }
 
     /// Starts an operation.
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault>;

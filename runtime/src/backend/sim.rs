@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use matterix_ir::codes;
 use matterix_ir::model::{Action, Model};
-use matterix_ir::plan::{Motion, Operation};
+use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{Leaves, NodeId};
 
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
-use crate::exec::Listener;
+use crate::exec::{Alarm, Listener};
 use crate::fault::Fault;
 use crate::motion::{Refused, Stage, supported};
 use crate::process::{Advance, Engine, Watch};
@@ -361,6 +361,10 @@ impl Backend for Sim<'_> {
 
     fn set_local(&mut self, local: u32, value: Option<f64>) {
         self.engine.set_local(local, value.unwrap_or(f64::NAN));
+    }
+
+    fn foresee(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Option<Alarm> {
+        out.foreseen(&self.engine, step, operation)
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {

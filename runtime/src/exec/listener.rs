@@ -1,7 +1,7 @@
 //! What a run tells the outside while it goes on.
 
 use matterix_ir::plan::{Condition, Operation, StepId};
-use matterix_ir::{NodeId, Span, Unit};
+use matterix_ir::{Diagnostic, NodeId, Span, Unit};
 use serde::{Deserialize, Serialize};
 
 use crate::motion::Moment;
@@ -92,6 +92,17 @@ pub struct Asked {
     pub locals: Vec<(u32, f64)>,
 }
 
+/// What must not be and has come about, or would by an operation: a failure that handlers take by its name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alarm {
+    /// What handlers know it by: `incompatible_mix`, or the name of a hazard.
+    pub name: String,
+    /// The finding: what came about, and how to mend it.
+    pub found: Diagnostic,
+    /// The operation that brought it about, and the steps around it, innermost first.
+    pub around: Vec<StepId>,
+}
+
 /// Receives what happens, in order; times are seconds since the run began. Every method may be left out.
 #[expect(unused_variables, reason = "the defaults ignore their arguments")]
 pub trait Listener: Observer {
@@ -124,6 +135,14 @@ pub trait Listener: Observer {
     /// Steps that are asked for now: each is done beside the plan, and its failure is told but ends nothing else.
     fn asked(&mut self, time: f64) -> Vec<Asked> {
         Vec::new()
+    }
+    /// What an operation that is about to begin would bring about and must not.
+    fn foreseen(&mut self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
+        None
+    }
+    /// What has come about that must not be, once each, in order.
+    fn alarm(&mut self) -> Option<Alarm> {
+        None
     }
     /// A remark.
     fn note(&mut self, time: f64, step: StepId, text: &str) {}

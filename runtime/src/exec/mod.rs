@@ -12,6 +12,7 @@
 //! **Jobs** belong to the innermost block that handles failures or holds something (guarded block, alternative, skill,
 //! `keep`, `claim`, the run): they have ended before it goes on. The failure of a job that nobody awaits is the block's.
 
+mod alarm;
 mod claims;
 mod end;
 mod ends;
@@ -39,7 +40,7 @@ use matterix_ir::{NodeId, Unit};
 use serde::{Deserialize, Serialize};
 
 pub use failure::{FailureTrace, Measured, TraceStep, diagnostic, expectation_diagnostic};
-pub use listener::{Asked, Assumption, ExpectationResult, Listener, OperationState, StepState, Verdict};
+pub use listener::{Alarm, Asked, Assumption, ExpectationResult, Listener, OperationState, StepState, Verdict};
 pub use tee::Tee;
 
 use crate::backend::Backend;
@@ -254,6 +255,7 @@ impl<'p, 'b> Executor<'p, 'b> {
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);
+        self.alarmed();
         self.drain();
         while self.end.is_none() {
             if self.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {

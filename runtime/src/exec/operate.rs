@@ -101,6 +101,10 @@ impl<'p> Executor<'p, '_> {
         if !self.needs_met(id, step, &operation.needs)? {
             return Ok(());
         }
+        if let Some(alarm) = self.backend.foresee(step, operation, self.out) {
+            self.sound(id, alarm);
+            return Ok(());
+        }
         if let Some(until) = &operation.until
             && self.backend.follow(until.node) == Follow::Assumed
         {
@@ -129,12 +133,15 @@ impl<'p> Executor<'p, '_> {
         let Step::Operation(operation) = &plan.get(step).step else { return Ok(()) };
         let ticket = *ticket;
         match self.backend.poll(ticket, self.out)? {
-            Status::Running { until, watch } => self.set_kind(id, Kind::Operation { ticket, until, watch }),
+            Status::Running { until, watch } => {
+                self.set_kind(id, Kind::Operation { ticket, until, watch });
+                self.alarmed_by(id);
+            }
             Status::Done => {
                 self.set_kind(id, Kind::Pass);
                 self.out.operation(self.now, step, operation, OperationState::Ended);
                 self.changed();
-                if self.within_limits(id, operation)? {
+                if !self.alarmed_by(id) && self.within_limits(id, operation)? {
                     self.push_end(id, End::Done);
                 }
             }

@@ -4,7 +4,7 @@ use matterix_ir::plan::{Condition, Operation, StepId};
 use matterix_ir::{NodeId, Unit};
 
 use super::failure::FailureTrace;
-use super::listener::{Asked, ExpectationResult, Listener, OperationState, StepState};
+use super::listener::{Alarm, Asked, ExpectationResult, Listener, OperationState, StepState};
 use crate::motion::Moment;
 use crate::process::{Engine, Observer};
 
@@ -27,6 +27,10 @@ impl Observer for Tee<'_> {
         process(time: f64, process: usize, running: bool);
         moved(time: f64, from: u32, to: u32, fraction: f64);
     }
+
+    fn stops(&self) -> bool {
+        self.0.stops() || self.1.stops()
+    }
 }
 
 impl Listener for Tee<'_> {
@@ -40,6 +44,14 @@ impl Listener for Tee<'_> {
         let mut asked = self.0.asked(time);
         asked.extend(self.1.asked(time));
         asked
+    }
+
+    fn foreseen(&mut self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
+        self.0.foreseen(engine, step, operation).or_else(|| self.1.foreseen(engine, step, operation))
+    }
+
+    fn alarm(&mut self) -> Option<Alarm> {
+        self.0.alarm().or_else(|| self.1.alarm())
     }
 
     fn begins(&mut self, time: f64, step: StepId, values: &[Option<f64>]) {

@@ -54,7 +54,10 @@ impl Executor<'_, '_> {
         let fired = if !agenda.progress { self.unblock() } else { self.advance(&agenda) };
         let looked = fired.and_then(|fired| self.sample().map(|()| fired));
         match looked {
-            Ok(fired) => self.look_at_all(&fired),
+            Ok(fired) => {
+                self.alarmed();
+                self.look_at_all(&fired);
+            }
             Err(fault) => {
                 self.fault_everywhere(fault);
                 self.drain();

@@ -71,9 +71,12 @@ impl Stage<'_> {
         let level = now[..last].iter().zip(&there[..last]).all(|(a, b)| (a - b).abs() < 1e-6);
         let others: Vec<usize> = (0..actor.joints.len()).filter(|i| !actor.arm.contains(i)).collect();
         let home: Vec<f64> = others.iter().filter_map(|i| actor.assembly.home.get(*i)).copied().collect();
+        // It crosses and lowers with the rest at home already.
+        let mut raised = actor.clone();
+        raised.set_some(&others, &home);
         let mut stops = vec![now.clone()];
         if !level {
-            let height = self.height(robot, actor, &now, &there, hanging)?;
+            let height = self.height(robot, &raised, &now, &there, hanging)?;
             for from in [&now, &there] {
                 let mut above = from.clone();
                 above[last] = height;
@@ -81,7 +84,7 @@ impl Stage<'_> {
             }
         }
         stops.push(there.clone());
-        self.lowers_freely(robot, actor, goal, &stops)?;
+        self.lowers_freely(robot, &raised, goal, &stops)?;
         let mut parts = Vec::new();
         let away = actor.positions(&others);
         if away.iter().zip(&home).any(|(a, b)| (a - b).abs() > 1e-6) {

@@ -18,7 +18,7 @@ const LOOK: f64 = 1.0;
 enum Stretch {
     /// At the end of what is known of the solution.
     On,
-    /// At the time asked for.
+    /// At the time asked for, or where the observer stops.
     Target,
     /// Where a comparison changed.
     Crossed(Crossing),
@@ -52,6 +52,10 @@ impl Engine<'_> {
             self.release(observer);
             self.prepare()?;
             self.segment(until, &nodes, observer)?;
+            if observer.stops() {
+                self.check_suspects()?;
+                return Ok(Advance::Watch(Vec::new()));
+            }
         }
     }
 
@@ -213,7 +217,7 @@ impl Engine<'_> {
         }
         Ok(match crossing {
             Some(crossing) => Stretch::Crossed(crossing),
-            None if on_target => Stretch::Target,
+            None if on_target || observer.stops() => Stretch::Target,
             None => Stretch::On,
         })
     }

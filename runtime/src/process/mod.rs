@@ -76,6 +76,10 @@ pub trait Observer {
     fn process(&mut self, time: f64, process: usize, running: bool);
     /// A fraction of one mixture, by its index in the model, has moved into another within an instant.
     fn moved(&mut self, _time: f64, _from: u32, _to: u32, _fraction: f64) {}
+    /// Whether time is to stop after the present step, as something has come about that is to be answered first.
+    fn stops(&self) -> bool {
+        false
+    }
 }
 
 /// Observes nothing.

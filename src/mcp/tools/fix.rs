@@ -103,7 +103,7 @@ impl Task for FixTask {
             _ => return Err("give either `ids` or `which`".to_string()),
         };
         if stop.load(Ordering::SeqCst) {
-            return Err("the time was over before all corrections were looked at; nothing was written".to_string());
+            return Err("the time ran out before all corrections were checked; nothing was written".to_string());
         }
         let (left, found) = told(&sources, &judged(named(&sources, found), false));
         let text = String::from_utf8(mended.bytes).map_err(|_| "the file is not text in UTF-8".to_string())?;

@@ -29,7 +29,10 @@ impl Walk<'_> {
 
     pub(super) fn species_fields(&mut self, fields: &[Field]) {
         for f in fields {
-            self.key(f);
+            match self.index.property(&f.key.text) {
+                Some(def) => self.known(f.key.span, def),
+                None => self.key(f),
+            }
             match &f.value {
                 FieldValue::Expr(e) => self.classes(e),
                 other => self.value(other),

@@ -87,7 +87,7 @@ impl Walk<'_> {
 
     /// The name of a failure.
     pub(super) fn failure(&mut self, name: &Name) {
-        match self.index.failure(&name.text) {
+        match self.index.failure(&name.text).or_else(|| self.index.hazard(&name.text)) {
             Some(def) => self.known(name.span, def),
             None => self.language(name.span, "a failure that the language raises itself"),
         }

@@ -318,7 +318,7 @@ impl Flow<'_, '_> {
             due = next;
         }
         let headline = format!("events set each other off more than {MOST_EVENTS} times");
-        self.not_analysed(Severity::Advice, headline, "what they change is not known from here on");
+        self.not_analysed(Severity::Advice, headline, "what they change is unknown from here on");
         let mixtures = &self.mixtures;
         let states = |action: &Action| -> Vec<u32> {
             match action {

@@ -111,7 +111,7 @@ impl<'p> Flow<'p, '_> {
         let label = self.label_at(span);
         let headline = format!("`{label}` stops what another branch or job waits for: `{}`", condition.text);
         let said = match after > 0.0 {
-            true => format!("{} after the wait begins, which is too early for it", show_duration(after)),
+            true => format!("{} after the wait begins, before it can be over", show_duration(after)),
             false => "as the wait begins".to_string(),
         };
         let mut d = Diagnostic::error(codes::STOPPED_MEANWHILE, span, headline, said);

@@ -42,7 +42,7 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
     let most = (MOST_STEPS / flow.steps.max(1)).max(FEWEST_VALUES);
     if out.len() > most {
         let headline = format!("{most} of {} other values of the parameters are tried", out.len());
-        let text = "what is used after its disposal is not looked for with the others".to_owned();
+        let text = "use after disposal is not checked for the others".to_owned();
         let span = flow.plan.get(flow.plan.root).span;
         flow.found(Diagnostic::warning(codes::NOT_ANALYSED, span, headline, text), span);
     }

@@ -11,9 +11,12 @@ use super::{Flow, Raised};
 impl Flow<'_, '_> {
     /// Notes what is known where a device may report a failure: as before the operation.
     pub fn may_report(&mut self, operation: &Operation, facts: &Facts) {
-        if let Some(open) = self.reported.last_mut() {
-            open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
-        }
+        let Some(open) = self.reported.last_mut() else { return };
+        open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
+        // What must not be may come about at any step: it is followed where somebody has thought of it.
+        let named = self.caught.iter().flatten().flatten();
+        let dangers = named.filter(|name| self.lab.tables.dangers().contains(*name));
+        open.extend(dangers.map(|name| (name.clone(), facts.clone())));
     }
 
     /// Follows the handlers of what devices may have reported in a body, then its `finally`; what nothing takes goes on

@@ -363,7 +363,7 @@ impl Flow<'_, '_> {
     /// Says that more turns of a loop are not followed one by one.
     fn turns_not_followed(&mut self) {
         let headline = format!("the turns of this loop are followed one by one up to {MOST_TURNS} of them");
-        self.not_analysed(Severity::Advice, headline, "what further turns change is not known behind it");
+        self.not_analysed(Severity::Advice, headline, "what further turns change is unknown after it");
     }
 
     /// A turn of a loop.

@@ -62,12 +62,14 @@ type Raised = (String, usize);
 pub(super) fn lines(
     plan: &Plan,
     library: &BTreeSet<FileId>,
+    dangers: &BTreeSet<String>,
     times: &dyn Fn(NodeId) -> f64,
     most: usize,
 ) -> Option<Lines> {
     let mut build = Build {
         plan,
         library,
+        dangers,
         times,
         most,
         lines: Lines { count: 1, ..Lines::default() },
@@ -87,6 +89,8 @@ pub(super) fn lines(
 struct Build<'b> {
     plan: &'b Plan,
     library: &'b BTreeSet<FileId>,
+    /// Failures that may come at any step.
+    dangers: &'b BTreeSet<String>,
     times: &'b dyn Fn(NodeId) -> f64,
     /// Points at most.
     most: usize,
@@ -300,6 +304,13 @@ impl Build<'_> {
         let inside: Rc<BTreeSet<usize>> = Rc::new((first..self.lines.count).collect());
         let mut raised = std::mem::take(&mut self.raised);
         let end = self.after(done, Edge::Pass);
+        let named = handlers.iter().filter_map(|(caught, _)| match caught {
+            Caught::Named(name) => self.dangers.get(name),
+            Caught::Any => None,
+        });
+        for name in named {
+            raised.extend((begin..end).map(|point| (name.clone(), point)));
+        }
         for (caught, handler) in handlers {
             let takes = |name: &str| matches!(caught, Caught::Any) || *caught == Caught::Named(name.to_owned());
             let (taken, rest): (Vec<Raised>, Vec<Raised>) = raised.into_iter().partition(|(name, _)| takes(name));

@@ -168,7 +168,7 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnO
     let begin = World::clone(world);
     let eyes = walk.eyes;
     let number = |node: NodeId| eyes.value(node, &begin);
-    let Some(lines) = lines(plan, &walk.library, &number, MOST_POINTS) else {
+    let Some(lines) = lines(plan, &walk.library, walk.eyes.lab.tables.dangers(), &number, MOST_POINTS) else {
         return walk.found.push(not_followed(span));
     };
     let hot = operations
@@ -185,8 +185,8 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnO
 }
 
 fn not_followed(span: Span) -> Diagnostic {
-    let headline = "not every order of the steps that run beside each other is followed: there are too many";
-    Diagnostic::warning(codes::NOT_ANALYSED, span, headline, "what meets in other orders is not looked for")
+    let headline = "concurrent steps can run in too many orders to follow them all";
+    Diagnostic::warning(codes::NOT_ANALYSED, span, headline, "other orders are not screened")
         .help("let steps that bring something into one vessel and take it out again wait for each other")
 }
 
@@ -530,6 +530,6 @@ fn in_some_order(d: &mut Diagnostic) {
     d.severity = Severity::Warning;
     let headline = d.headline.replacen(" may come together", " come together", 1);
     d.headline = format!("in some order of the steps, {headline}");
-    let help = "steps that run beside each other come in any order: let one wait for the other, or claim what both use";
+    let help = "concurrent steps run in any order: let one wait for the other, or claim what both use";
     d.help.insert(0, help.to_owned());
 }

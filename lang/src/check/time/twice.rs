@@ -43,7 +43,7 @@ pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -
     found.extend(unfinished.map(|at| {
         let own = times.plan.get(show::own(times.plan, &times.timing, at.step));
         let headline = format!("not all uses of `{}` are compared with each other", name(at.instance));
-        spent(own.span, &headline, "the search for what is used twice at the same time ends here")
+        spent(own.span, &headline, "the search for simultaneous uses ends here")
     }));
     found
 }

@@ -308,7 +308,7 @@ impl<'l, 'a> Judge<'l, 'a> {
         let said = format!("for 1 {unit} of `{}` in `{place}` it {}", def.name, each.join(" and "));
         let d = Diagnostic::error(codes::BALANCE_BREACH, law.span, headline, said)
             .help("let one mixture gain what another loses, or write a `reaction`, whose equation is checked")
-            .help("what leaves for the air needs a vessel to go to");
+            .help("matter that leaves for the air needs a vessel to go to");
         self.found.push(d);
         true
     }

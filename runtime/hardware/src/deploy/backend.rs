@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use matterix_ir::model::Action;
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::{Leaves, NodeId, Op, Span, codes};
 use matterix_runtime::backend::{Backend, Follow, Status, Ticket};
-use matterix_runtime::exec::Listener;
+use matterix_runtime::exec::{Alarm, Listener};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Advance, Watch};
 
@@ -63,6 +63,10 @@ impl Backend for Hardware<'_, '_> {
 
     fn set_local(&mut self, local: u32, value: Option<f64>) {
         self.twin.set_local(local, value);
+    }
+
+    fn foresee(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Option<Alarm> {
+        self.twin.foresee(step, operation, out)
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {

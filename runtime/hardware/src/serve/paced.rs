@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use matterix_ir::NodeId;
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Operation, StepId};
 use matterix_runtime::backend::{Backend, Follow, Status, Ticket};
-use matterix_runtime::exec::Listener;
+use matterix_runtime::exec::{Alarm, Listener};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Advance, Watch};
 
@@ -80,6 +80,10 @@ impl Backend for Paced<'_, '_, '_> {
 
     fn set_local(&mut self, local: u32, value: Option<f64>) {
         self.inner.set_local(local, value);
+    }
+
+    fn foresee(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Option<Alarm> {
+        self.inner.foresee(step, operation, out)
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {

@@ -102,10 +102,10 @@ impl<'p> Walk<'p, '_> {
         }
         let span = self.program.plan.get(id).span;
         let site = if self.is_own(span) { span } else { self.sites.last().copied().unwrap_or(span) };
-        let headline = "the motions of this workflow are looked at up to here: there are too many of them";
-        let label = "from here on it is not known what is out of reach or in the way";
+        let headline = "the motions of this workflow are checked up to here: there are too many";
+        let label = "reach and collisions of later motions are not checked";
         let finding = Diagnostic::warning(codes::NOT_ANALYSED, site, headline, label)
-            .help("divide the workflow into several, each of which is looked at whole");
+            .help("divide the workflow into several: each is checked in full");
         self.found.push(Found { site, call: None, finding });
     }
 
