@@ -115,7 +115,8 @@ fn widened(low: f64, high: f64) -> Interval {
     if low.is_nan() || high.is_nan() {
         return ALL;
     }
-    (low - ROUNDING * low.abs(), high + ROUNDING * high.abs())
+    let out = |bound: f64, side: f64| if bound.is_finite() { bound + side * ROUNDING * bound.abs() } else { bound };
+    (out(low, -1.0), out(high, 1.0))
 }
 
 /// A product of bounds, where nothing times without bound is nothing.

@@ -55,7 +55,7 @@ fn all_of_it_leaves_nothing() {
 
 #[test]
 fn a_fraction_outside_is_a_fault() {
-    for fraction in [-1e-12, 1.0 + 1e-12, f64::NAN, f64::INFINITY] {
+    for fraction in [-1e-12, 1.0 + 1e-6, f64::NAN, f64::INFINITY] {
         let mut b = two_mixtures([0.1, 5.5, 2e4, 0.0, 1.0, 3e3]);
         let action = pour(&mut b, fraction, 0, 1);
         let mut engine = engine(&b.model);
@@ -63,6 +63,15 @@ fn a_fraction_outside_is_a_fault() {
         assert_eq!(fault.code, codes::TRANSFER_FRACTION, "{fault}");
         assert_eq!(engine.states(), [0.1, 5.5, 2e4, 0.0, 1.0, 3e3], "nothing has moved");
     }
+}
+
+#[test]
+fn a_rest_that_is_known_to_rounding_is_taken_whole() {
+    let mut b = two_mixtures([0.1, 5.5, 2e4, 0.0, 1.0, 3e3]);
+    let action = pour(&mut b, 1.0 + 1e-12, 0, 1);
+    let mut engine = engine(&b.model);
+    engine.apply(&[action], &mut ()).expect("everything");
+    assert_eq!(engine.states(), [0.0, 0.0, 0.0, 0.1, 6.5, 2.3e4]);
 }
 
 #[test]
