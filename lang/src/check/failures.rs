@@ -92,7 +92,7 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
         let Step::Guarded { body, handlers, .. } = &step.step else { continue };
-        let raised = raised(plan, *body);
+        let raised = raised(plan, *body, true);
         for (caught, handler) in handlers {
             let (Caught::Named(name), at) = (caught, plan.get(*handler).span) else { continue };
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
@@ -110,8 +110,8 @@ pub fn idle(plan: &Plan, within: Span, tables: &Tables<'_>) -> Vec<Diagnostic> {
     out
 }
 
-/// All that a step may fail with.
-fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
+/// All that a step may fail with; without what only devices report, where those do what they are told.
+pub(super) fn raised(plan: &Plan, root: StepId, devices: bool) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BTreeSet::new();
     let mut todo = vec![root];
     while let Some(id) = todo.pop() {
@@ -121,7 +121,7 @@ fn raised(plan: &Plan, root: StepId) -> BTreeSet<String> {
         };
         match step {
             Step::Operation(o) => {
-                o.fails.iter().for_each(|name| add(name));
+                o.fails.iter().filter(|_| devices).for_each(|name| add(name));
                 o.needs.iter().for_each(|need| add(need.failure()));
                 o.limits.iter().filter_map(|i| plan.limits.get(*i as usize)).for_each(|l| add(l.condition.failure()));
                 add("claimed");
