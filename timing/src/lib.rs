@@ -4,6 +4,7 @@
 //! ([`value`]), which differences of times must hold ([`network`]), what follows for every step ([`walk`]), who uses
 //! and who claims which instance ([`usage`]).
 
+mod counted;
 pub mod interval;
 pub mod network;
 pub mod usage;

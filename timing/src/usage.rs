@@ -27,8 +27,8 @@ pub fn uses(plan: &Plan, timing: &Timing) -> Vec<Use> {
         let aside = timing.visit(step).is_none_or(|v| v.aside);
         let Some(instances) = below.get(&step).filter(|_| !aside) else { continue };
         let node = &plan.get(step).step;
-        let whole =
-            |i: &InstanceId| !matches!(node, Step::Sequence(_) | Step::Parallel(_)) && all_along(plan, step, *i);
+        let block = matches!(node, Step::Sequence(_) | Step::Parallel(_));
+        let whole = |i: &InstanceId| !block && all_along(plan, step, *i) && surely(plan, timing, step, *i);
         let (own, other): (BTreeSet<InstanceId>, BTreeSet<InstanceId>) =
             instances.difference(&covered).partition(|i| whole(i));
         out.extend(own.iter().map(|&instance| Use { instance, step }));
@@ -64,6 +64,23 @@ fn all_along(plan: &Plan, step: StepId, instance: InstanceId) -> bool {
         Step::Claim { .. } | Step::Start { .. } | Step::Parallel(_) => false,
         Step::Guarded { body, .. } => all_along(plan, *body, instance),
         _ => node.children().iter().all(|c| all_along(plan, *c, instance)),
+    }
+}
+
+/// Whether a step uses an instance whenever it is done: not where it does so in a branch or in turns that may not come.
+fn surely(plan: &Plan, timing: &Timing, step: StepId, instance: InstanceId) -> bool {
+    let below = |child: &StepId| surely(plan, timing, *child, instance);
+    match &plan.get(step).step {
+        Step::Operation(operation) => operation.claims.contains(&instance),
+        Step::If { then, otherwise, .. } => below(then) && otherwise.as_ref().is_some_and(below),
+        // Turns that may not come are a scope of their own.
+        Step::Repeat { body, .. } | Step::RepeatWhile { body, .. } => {
+            let scope = |s: StepId| timing.visit(s).map(|v| v.scope);
+            scope(step) == scope(*body) && below(body)
+        }
+        Step::Guarded { body, .. } => below(body),
+        Step::Try(alternatives) => alternatives.first().is_some_and(below),
+        step => step.children().iter().any(below),
     }
 }
 

@@ -72,9 +72,11 @@ impl Linear {
 /// What is known before a run.
 #[derive(Clone, Debug)]
 pub struct Known<'g> {
-    graph: &'g Graph,
+    pub(crate) graph: &'g Graph,
     params: Vec<f64>,
-    states: Vec<Option<f64>>,
+    pub(crate) states: Vec<Option<f64>>,
+    pub(crate) derivatives: &'g [Derivative],
+    pub(crate) events: &'g [Event],
 }
 
 impl<'g> Known<'g> {
@@ -83,8 +85,8 @@ impl<'g> Known<'g> {
         graph: &'g Graph,
         params: Vec<f64>,
         states: &[State],
-        derivatives: &[Derivative],
-        events: &[Event],
+        derivatives: &'g [Derivative],
+        events: &'g [Event],
         plan: &Plan,
     ) -> Self {
         let mut moving: BTreeSet<u32> = derivatives.iter().map(|d| d.state).collect();
@@ -101,7 +103,7 @@ impl<'g> Known<'g> {
                 _ => mixed = true,
             }
         }
-        let mut known = Known { graph, params, states: vec![None; states.len()] };
+        let mut known = Known { graph, params, states: vec![None; states.len()], derivatives, events };
         let initial: Vec<Option<f64>> = states
             .iter()
             .enumerate()
@@ -153,6 +155,20 @@ impl<'g> Known<'g> {
     /// Whether a node names values that the plan keeps.
     pub fn names_locals(&self, node: NodeId) -> bool {
         self.graph.depends(node, |op| matches!(op, Op::Local(_)))
+    }
+
+    /// Whether a condition comes out alike all through a run: it depends on nothing but parameters.
+    pub fn is_fixed(&self, condition: NodeId) -> bool {
+        let changes = |op: &Op| matches!(op, Op::State(_) | Op::Reading(_) | Op::Local(_) | Op::Time);
+        !self.graph.depends(condition, changes)
+    }
+
+    /// A condition without the `not` before it, and how it comes out where the whole comes out like this.
+    pub fn without_not(&self, condition: NodeId, holds: bool) -> (NodeId, bool) {
+        match self.graph.op(condition) {
+            Op::Unary(UnaryOp::Not, inner) => self.without_not(inner, !holds),
+            _ => (condition, holds),
+        }
     }
 
     /// Declared bounds of a duration, s; none where there are none or where they contradict themselves.

@@ -3,7 +3,7 @@
 //! The network describes the run in which nothing fails: handlers are parts that may be done, the first alternative of a
 //! `try` is the one that is done. A branch of an `if` is a scope of its own. A loop's body stands for its last turn.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::NodeId;
 use matterix_ir::plan::{Operation, Plan, Step, StepId, Takes};
@@ -63,15 +63,57 @@ pub struct Timing {
     pub visits: Vec<Option<Visit>>,
     /// Lines of steps.
     pub threads: Vec<Thread>,
+    /// By scope: the outcome of a choice that it stands for, if it is one.
+    outcomes: Vec<Option<Outcome>>,
+    /// By loop: the place among the visits where a turn ends.
+    turns: BTreeMap<StepId, usize>,
+}
+
+/// One outcome of a choice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Outcome {
+    choice: Choice,
+    holds: bool,
+}
+
+/// What is chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Choice {
+    /// An `if`, each time anew.
+    Step(StepId),
+    /// A condition that comes out alike all through a run.
+    Fixed(NodeId),
+    /// What a constant decides: it is done, or never.
+    Constant,
+}
+
+impl Known<'_> {
+    /// How a condition comes out that nothing changes during a run.
+    fn decided(&self, condition: NodeId, holds: bool) -> Option<Outcome> {
+        if !self.is_fixed(condition) {
+            return None;
+        }
+        if let Some(value) = self.number(condition).exact() {
+            return Some(Outcome { choice: Choice::Constant, holds: (value != 0.0) == holds });
+        }
+        let (condition, holds) = self.without_not(condition, holds);
+        Some(Outcome { choice: Choice::Fixed(condition), holds })
+    }
 }
 
 impl Timing {
     /// Walks through a plan.
     pub fn of(plan: &Plan, known: &Known<'_>, durations: Durations) -> Timing {
+        Timing::with_waits(plan, known, durations, &BTreeSet::new())
+    }
+
+    /// Walks through a plan in which these blocks with `claim` may have to wait for what they claim.
+    pub fn with_waits(plan: &Plan, known: &Known<'_>, durations: Durations, waits: &BTreeSet<StepId>) -> Timing {
         let mut walk = Walk {
             plan,
             known,
             durations,
+            waits,
             network: Network::default(),
             visits: vec![None; plan.steps.len()],
             threads: vec![Thread { outer: None, from: None, job: None }],
@@ -79,11 +121,21 @@ impl Timing {
             jobs: vec![Vec::new()],
             order: 0,
             claimed: claimed(plan),
+            outcomes: Vec::new(),
+            decided: BTreeMap::new(),
+            turns: BTreeMap::new(),
         };
         let root = Place { at: BEGIN, scope: WHOLE, thread: 0, outer: None, aside: false };
         let end = walk.step(plan.root, root);
         walk.close(plan.root, end, root);
-        Timing { network: walk.network, visits: walk.visits, threads: walk.threads }
+        walk.outcomes.resize(walk.network.scopes.len(), None);
+        Timing {
+            network: walk.network,
+            visits: walk.visits,
+            threads: walk.threads,
+            outcomes: walk.outcomes,
+            turns: walk.turns,
+        }
     }
 
     /// One step's visit.
@@ -98,20 +150,67 @@ impl Timing {
 
     /// Whether two steps may run at the same time, as far as the shape of the plan tells.
     pub fn beside(&self, a: &Visit, b: &Visit) -> bool {
+        self.in_lines_beside(a, b) && !self.exclude_each_other(a, b)
+    }
+
+    /// Whether a loop around a step comes to its next turn while a job of this line may go on.
+    pub fn outlasts_turn(&self, thread: u32, turns: StepId) -> bool {
+        let until = self.threads.get(thread as usize).and_then(|t| t.job).map_or(0, |job| job.1);
+        self.turns.get(&turns).is_some_and(|end| until > *end)
+    }
+
+    /// Whether two steps stand in different branches of one choice, of which a run takes one.
+    fn exclude_each_other(&self, a: &Visit, b: &Visit) -> bool {
+        self.parted(a, b).is_some_and(|jobs| jobs.iter().all(|(job, turns)| !self.outlasts_turn(*job, *turns)))
+    }
+
+    /// For steps in different branches of one choice: the jobs of either that go on when a loop makes that choice anew, each with the loop,
+    /// unless they are over by then.
+    pub fn parted(&self, a: &Visit, b: &Visit) -> Option<Vec<(u32, StepId)>> {
+        if a.scope == b.scope {
+            return None;
+        }
+        let outcome = |s: &Scope| self.outcomes.get(s.0 as usize).copied().flatten();
+        let others: Vec<Outcome> = self.network.around(b.scope).iter().filter_map(outcome).collect();
+        let own = self.network.around(a.scope).into_iter().filter_map(|s| outcome(&s));
+        let choice = |own: Outcome| {
+            others.iter().any(|other| own.choice == other.choice && own.holds != other.holds).then_some(own.choice)
+        };
+        match own.filter_map(choice).last()? {
+            Choice::Step(step) => Some(self.beyond_turns(step, [a, b])),
+            Choice::Fixed(_) | Choice::Constant => Some(Vec::new()),
+        }
+    }
+
+    /// The jobs that a choice begins, on the way to these steps, each with the loops around the choice.
+    fn beyond_turns(&self, choice: StepId, visits: [&Visit; 2]) -> Vec<(u32, StepId)> {
+        let Some(thread) = self.visit(choice).map(|v| v.thread) else { return Vec::new() };
+        let begun = |v: &Visit| {
+            let line = self.line(v.thread).into_iter();
+            line.skip_while(|t| *t != thread).skip(1).filter(|t| self.is_job(*t)).collect::<Vec<u32>>()
+        };
+        let inside = |s: &StepId| self.visit(*s).is_some_and(|v| v.thread == thread);
+        let loops: Vec<StepId> =
+            self.around(choice).take_while(inside).filter(|s| self.turns.contains_key(s)).collect();
+        let jobs = visits.into_iter().flat_map(begun);
+        jobs.flat_map(|job| loops.iter().map(move |turns| (job, *turns)).collect::<Vec<_>>()).collect()
+    }
+
+    fn is_job(&self, thread: u32) -> bool {
+        self.threads.get(thread as usize).is_some_and(|t| t.job.is_some())
+    }
+
+    fn in_lines_beside(&self, a: &Visit, b: &Visit) -> bool {
         let (a_line, b_line) = (self.line(a.thread), self.line(b.thread));
         let common = a_line.iter().zip(&b_line).take_while(|(x, y)| x == y).count();
-        let (first, second) = (a_line.get(common), b_line.get(common));
-        let thread = |t: Option<&u32>| t.and_then(|t| self.threads.get(*t as usize));
-        let live = |job: Option<&Thread>, order: usize| {
-            job.and_then(|t| t.job).is_some_and(|(after, until)| (after..until).contains(&order))
+        let (a_line, b_line) = (&a_line[common..], &b_line[common..]);
+        let thread = |t: &u32| self.threads.get(*t as usize);
+        let branch = |line: &[u32]| line.first().and_then(thread).filter(|t| t.job.is_none()).map(|t| t.from);
+        let live = |line: &[u32], order: usize| {
+            line.iter().filter_map(thread).filter_map(|t| t.job).any(|(after, until)| (after..until).contains(&order))
         };
-        match (thread(first), thread(second)) {
-            (Some(x), Some(y)) if x.job.is_none() && y.job.is_none() => x.from == y.from,
-            (Some(x), Some(y)) => live(Some(x), b.order) || live(Some(y), a.order),
-            (Some(x), None) => live(Some(x), b.order),
-            (None, Some(y)) => live(Some(y), a.order),
-            (None, None) => false,
-        }
+        let branches = branch(a_line).is_some() && branch(a_line) == branch(b_line);
+        branches || live(a_line, b.order) || live(b_line, a.order)
     }
 
     /// The lines around a line, outermost first, itself last.
@@ -165,6 +264,14 @@ struct Walk<'w, 'g> {
     order: usize,
     /// How many blocks claim each instance.
     claimed: BTreeMap<InstanceId, usize>,
+    /// Blocks that may have to wait for what they claim.
+    waits: &'w BTreeSet<StepId>,
+    /// By scope: the outcome it stands for.
+    outcomes: Vec<Option<Outcome>>,
+    /// Scopes of conditions that come out alike all through a run, by the scope around.
+    decided: BTreeMap<(Scope, Outcome), Scope>,
+    /// By loop: the place among the visits where a turn ends.
+    turns: BTreeMap<StepId, usize>,
 }
 
 impl Walk<'_, '_> {
@@ -235,7 +342,7 @@ impl Walk<'_, '_> {
                     None => end,
                 }
             }
-            Step::Keep { body, .. } => self.scoped(id, *body, place),
+            Step::Keep { body, .. } | Step::During { body, .. } => self.scoped(id, *body, place),
             Step::Named { start, end, body, .. } => {
                 self.set(*start, place.scope, Linear::at(at));
                 let last = self.step(*body, place);
@@ -266,7 +373,7 @@ impl Walk<'_, '_> {
                 }
                 self.step(*body, place)
             }
-            Step::If { then, otherwise, .. } => self.branches(id, *then, *otherwise, place),
+            Step::If { condition, then, otherwise } => self.branches(id, condition.node, *then, *otherwise, place),
             Step::Repeat { times, body } => {
                 let times = self.linear(*times, place.scope).bounds().unwrap_or(Interval::ANY);
                 self.turns(id, times.as_duration(), *body, place)
@@ -278,7 +385,8 @@ impl Walk<'_, '_> {
             Step::Claim { claims, body } => {
                 // Whether others have what it claims is not followed: it may wait where others claim the same.
                 let alone = place.thread == 0 && self.jobs.iter().all(Vec::is_empty);
-                if alone || claims.iter().all(|i| self.claimed.get(i) == Some(&1)) {
+                let free = alone || claims.iter().all(|i| self.claimed.get(i) == Some(&1));
+                if free && !self.waits.contains(&id) {
                     return self.scoped(id, *body, place);
                 }
                 let granted = self.network.point();
@@ -359,20 +467,16 @@ impl Walk<'_, '_> {
         let mut lasts = end.lasts;
         for job in self.jobs.pop().unwrap_or_default() {
             self.joined(job.thread);
-            if !self.network.holds_in(job.scope, place.scope) {
-                continue;
-            }
-            ends.push(job.end);
+            ends.push((job.end, job.scope));
             // It began somewhere in the body.
             lasts.max += job.lasts.max;
         }
-        ends.retain(|p| *p != end.at);
-        let at = if ends.is_empty() {
-            end.at
-        } else {
-            ends.push(end.at);
-            self.join(id, place, &ends, lasts.max)
-        };
+        ends.retain(|(p, _)| *p != end.at);
+        if ends.is_empty() {
+            return End { lasts, ..end };
+        }
+        ends.push((end.at, place.scope));
+        let at = self.join_in(id, place, &ends, lasts.max);
         End { at, lasts, dead: end.dead }
     }
 
@@ -384,26 +488,56 @@ impl Walk<'_, '_> {
         }
     }
 
+    /// Waits for the job of this name in the innermost block that has one: after it, none of them goes on.
     fn wait_for_job(&mut self, id: StepId, name: &str, place: Place) -> End {
-        let job = self.jobs.iter().rev().flatten().rev().find(|j| j.name == name);
-        let Some((end, longest, thread, scope)) = job.map(|j| (j.end, j.lasts.max, j.thread, j.scope)) else {
-            return End { at: place.at, lasts: Interval::SOME_TIME, dead: false };
-        };
-        if !self.network.holds_in(scope, place.scope) {
+        let block = self.jobs.iter().rev().find(|block| block.iter().any(|j| j.name == name));
+        let jobs: Vec<(Point, Interval, u32, Scope)> = block
+            .into_iter()
+            .flatten()
+            .filter(|j| j.name == name)
+            .map(|j| (j.end, j.lasts, j.thread, j.scope))
+            .collect();
+        let mut ends = vec![(place.at, place.scope)];
+        let mut longest: f64 = 0.0;
+        for (end, lasts, thread, scope) in &jobs {
+            // Where the job has begun, it is waited for.
+            if self.network.holds_in(place.scope, *scope) {
+                self.joined(*thread);
+                ends.push((*end, *scope));
+            } else if self.network.holds_in(*scope, place.scope) {
+                ends.push((*end, place.scope));
+            }
+            longest = longest.max(lasts.max);
+        }
+        if ends.len() == 1 {
             return End { at: place.at, lasts: Interval::SOME_TIME, dead: false };
         }
-        if scope == place.scope {
-            self.joined(thread);
-        }
-        let at = self.join(id, place, &[place.at, end], longest);
+        let at = self.join_in(id, place, &ends, longest);
         End { at, lasts: Interval { min: 0.0, max: longest }, dead: false }
     }
 
-    fn branches(&mut self, id: StepId, then: StepId, otherwise: Option<StepId>, place: Place) -> End {
+    /// The point at which all of `ends` have come that hold, each in its scope, at most `longest` s after the place.
+    fn join_in(&mut self, id: StepId, place: Place, ends: &[(Point, Scope)], longest: f64) -> Point {
+        let end = self.network.point();
+        let order = Reason { step: id, why: Why::Order };
+        ends.iter().for_each(|(p, scope)| self.network.least(*p, end, 0.0, *scope, order));
+        self.network.most(place.at, end, longest, place.scope, order);
+        end
+    }
+
+    fn branches(
+        &mut self,
+        id: StepId,
+        condition: NodeId,
+        then: StepId,
+        otherwise: Option<StepId>,
+        place: Place,
+    ) -> End {
         let mut lasts: Option<Interval> = None;
         let mut ends = Vec::new();
-        for branch in [Some(then), otherwise].into_iter().flatten() {
-            let scope = self.network.scope(place.scope);
+        let branches = [(true, Some(then)), (false, otherwise)];
+        for (holds, branch) in branches.into_iter().filter_map(|(holds, branch)| Some((holds, branch?))) {
+            let scope = self.outcome(id, condition, holds, place.scope);
             let end = self.step(branch, Place { scope, ..place });
             if !end.dead {
                 ends.push((scope, end.at));
@@ -417,6 +551,21 @@ impl Walk<'_, '_> {
         let end = self.lasting(id, place, lasts);
         self.reaches(id, &ends, end.at);
         end
+    }
+
+    /// The scope of a branch; one for all branches that a condition which cannot change decides alike.
+    fn outcome(&mut self, id: StepId, condition: NodeId, holds: bool, outer: Scope) -> Scope {
+        let outcome = self.known.decided(condition, holds).unwrap_or(Outcome { choice: Choice::Step(id), holds });
+        if let Some(scope) = self.decided.get(&(outer, outcome)) {
+            return *scope;
+        }
+        let scope = self.network.scope(outer);
+        self.outcomes.resize(scope.0 as usize, None);
+        self.outcomes.push(Some(outcome));
+        if !matches!(outcome.choice, Choice::Step(_)) {
+            self.decided.insert((outer, outcome), scope);
+        }
+        scope
     }
 
     /// In its own scope, each branch ends when the whole does.
@@ -435,6 +584,7 @@ impl Walk<'_, '_> {
         let only = times.exact() == Some(1.0);
         let start = if only { place.at } else { self.network.point() };
         let turn = self.step(body, Place { at: start, scope, ..place });
+        self.turns.insert(id, self.order);
         let before = |n: f64, one: f64| if n <= 1.0 { 0.0 } else { (n - 1.0) * one };
         let reason =
             |t: f64, least: bool| Reason { step: id, why: if least { Why::AtLeast(t) } else { Why::AtMost(t) } };
@@ -503,8 +653,10 @@ impl Walk<'_, '_> {
 
     fn operation(&self, operation: &Operation) -> Interval {
         match (&operation.takes, &operation.until) {
-            (Some(takes), Some(_)) => self.bounds(*takes).unwrap_or(Interval::SOME_TIME),
-            (None, Some(_)) => Interval::SOME_TIME,
+            (takes, Some(_)) => takes.and_then(|takes| self.bounds(takes)).unwrap_or_else(|| {
+                let max = self.known.counted(operation).unwrap_or(f64::INFINITY);
+                Interval { max, ..Interval::SOME_TIME }
+            }),
             (Some(takes), None) => {
                 let bounds = if self.durations == Durations::Bounds { self.bounds(*takes) } else { None };
                 bounds.unwrap_or_else(|| self.known.number(takes.nominal).as_duration())

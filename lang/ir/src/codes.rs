@@ -115,6 +115,7 @@ codes! {
     WRONG_TIP "wrong-tip" "T1" "a tip that does not fit the pipette";
     DEAD_BRANCH "dead-branch" "F2" "a part of the plan is never done: constants decide a branch, a `fail` stands before it, or nothing raises what a handler is for";
     JOB_NOT_BEGUN "job-not-begun" "F2" "a job is waited for that has not begun";
+    JOB_STILL_RUNNING "job-still-running" "F2" "a job is begun again while it still runs";
     STOPPED_MEANWHILE "stopped-meanwhile" "F2" "a branch or job stops what another one waits for";
     UNDECLARED_FAILURE "undeclared-failure" "F1" "a skill fails with what its `fails` does not name";
     UNHANDLED_FAILURE "unhandled-failure" "F1" "a workflow has no handler for what a device may report";

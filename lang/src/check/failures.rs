@@ -99,7 +99,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
         let Step::Guarded { body, handlers, .. } = &step.step else { continue };
-        let raised = raised(plan, *body, &flowing);
+        let raised = raised(plan, *body, true, &flowing);
         for (place, (caught, handler)) in handlers.iter().enumerate() {
             let at = plan.get(*handler).span;
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
@@ -133,8 +133,9 @@ fn flowing(plan: &Plan, lab: &Elaborator<'_>) -> BTreeSet<String> {
     limits.map(|l| l.condition.failure().to_string()).collect()
 }
 
-/// All that a step may fail with, where time may bring about some of it.
-fn raised(plan: &Plan, root: StepId, flowing: &BTreeSet<String>) -> BTreeSet<String> {
+/// All that a step may fail with, where time may bring about what is `flowing`; without what only devices report, where those do
+/// what they are told.
+pub(super) fn raised(plan: &Plan, root: StepId, devices: bool, flowing: &BTreeSet<String>) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BTreeSet::new();
     let mut awaited: BTreeSet<StepId> = BTreeSet::new();
     let mut todo = vec![root];
@@ -150,7 +151,7 @@ fn raised(plan: &Plan, root: StepId, flowing: &BTreeSet<String>) -> BTreeSet<Str
         }
         match step {
             Step::Operation(o) => {
-                o.fails.iter().for_each(|name| add(name));
+                o.fails.iter().filter(|_| devices).for_each(|name| add(name));
                 o.needs.iter().for_each(|need| add(need.failure()));
                 o.limits.iter().filter_map(|i| plan.limits.get(*i as usize)).for_each(|l| add(l.condition.failure()));
                 add("claimed");

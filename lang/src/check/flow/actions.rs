@@ -110,7 +110,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes that a state has changed.
-    fn touch(&self, state: u32, facts: &mut Facts) {
+    pub(super) fn touch(&self, state: u32, facts: &mut Facts) {
         facts.reopen(|s| s == state);
         if let Some(rates) = self.rates_of.get(&state) {
             facts.unsettled.extend(rates);
@@ -348,6 +348,7 @@ impl Flow<'_, '_> {
     pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Facts {
         self.presumptions(label, &operation.presumes, &mut facts);
         let met = self.needs(label, &operation.needs, &mut facts);
+        let began = facts.time.clone();
         if !met {
             // Said already: what it would have done is not known.
             let written = self.written(operation);
@@ -375,6 +376,7 @@ impl Flow<'_, '_> {
         }
         if met {
             self.perform(&operation.at_end, &mut facts);
+            self.note_change(operation, &began, &facts);
             self.still_kept(label, &facts);
         }
         facts

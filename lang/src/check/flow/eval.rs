@@ -388,7 +388,9 @@ impl Flow<'_, '_> {
     /// Notes a failure that the text writes at a place of the user's.
     pub fn raise_written(&mut self, name: &str, span: Span, mut facts: Facts) {
         facts.written = Some(span).filter(|span| !self.in_library(*span));
-        self.raise(name, facts);
+        for (name, facts) in self.stop_jobs(vec![(name.to_owned(), facts)], self.guards.len()) {
+            self.raise(&name, facts);
+        }
     }
 
     /// Notes a failure for the handlers around.

@@ -41,6 +41,12 @@ const NARROWINGS: usize = 6;
 /// A face that came in by no more than this share of its distance has come to rest.
 const AT_REST: f64 = 1e-6;
 
+/// Steps into which a time is divided that is followed closely.
+const CLOSE_STEPS: usize = 16;
+
+/// So often the rates of such a step are taken within the bounds that the last ones gave.
+const REFINEMENTS: usize = 4;
+
 /// So many moving states are bounded; more are only known to move.
 const MOST_MOVING: usize = 48;
 
@@ -200,6 +206,34 @@ impl Flow<'_, '_> {
         }
         within.bonds.clone_from(&barrier.bonds);
         let (bonds, amounts) = self.go_on(longest, &barrier, &within, facts);
+        let mut moved = self.moved(longest, &barrier, &within, facts, (&bonds, &amounts));
+        for _ in 0..self.refinements {
+            // Until then nothing leaves these bounds, so rates within them bound it further.
+            for (state, now) in &moved {
+                within.states[*state as usize] = now.clone();
+            }
+            moved = self.moved(longest, &barrier, &within, facts, (&bonds, &amounts));
+        }
+        let states = moved.iter().map(|(s, _)| *s).collect();
+        for (state, now) in moved {
+            facts.states[state as usize] = now;
+        }
+        facts.bonds = bonds.map(|mut bonds| {
+            bonds.stamp(facts);
+            Rc::new(bonds)
+        });
+        states
+    }
+
+    /// The states that change within `longest` s, each with its bounds, by the rates that states `within` bounds give.
+    fn moved(
+        &mut self,
+        longest: f64,
+        barrier: &Barrier,
+        within: &Facts,
+        facts: &Facts,
+        (bonds, amounts): (&Option<Bonds>, &BTreeMap<u32, (f64, f64)>),
+    ) -> Vec<(u32, Known)> {
         let mut moved: Vec<(u32, Known)> = Vec::new();
         for i in facts.moving.clone() {
             let derivative = &self.derivatives[i as usize];
@@ -208,7 +242,7 @@ impl Flow<'_, '_> {
             let (low, high) = match amounts.get(&state) {
                 Some(bounds) => *bounds,
                 None => {
-                    let (slowest, fastest) = self.eval(derivative.rate, &within).bounds();
+                    let (slowest, fastest) = self.eval(derivative.rate, within).bounds();
                     let (from, to) = facts.states[state as usize].bounds();
                     let low = low.max(from + (slowest * longest).min(0.0)).min(from);
                     let high = high.min(to + (fastest * longest).max(0.0)).max(to);
@@ -221,15 +255,19 @@ impl Flow<'_, '_> {
                 moved.push((state, now));
             }
         }
-        let states = moved.iter().map(|(s, _)| *s).collect();
-        for (state, now) in moved {
-            facts.states[state as usize] = now;
+        moved
+    }
+
+    /// Time passes in small steps, and what moves is bounded more closely.
+    pub(super) fn pass_closely(&mut self, duration: f64, facts: &mut Facts) {
+        self.refinements = REFINEMENTS;
+        let step = duration / CLOSE_STEPS as f64;
+        for _ in 0..CLOSE_STEPS {
+            let before = facts.clone();
+            self.pass(&Known::Point(step), facts);
+            self.by_totals(step, &before, facts);
         }
-        facts.bonds = bonds.map(|mut bonds| {
-            bonds.stamp(facts);
-            Rc::new(bonds)
-        });
-        states
+        self.refinements = 0;
     }
 
     /// How far what changes matter goes on for at most `longest` s, with what states are without it, and the bounds of amounts.

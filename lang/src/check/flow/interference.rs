@@ -86,7 +86,7 @@ impl<'p> Flow<'p, '_> {
         let mut at = now;
         let mut open = true;
         for effect in effects {
-            self.pass_by_totals(&Known::Point(effect.at.0 - at), &mut facts);
+            self.pass_closely(effect.at.0 - at, &mut facts);
             open &= self.eval(condition.node, &facts).truth() == Some(false);
             at = effect.at.0;
             facts.time = Known::Point(at);

@@ -2,6 +2,7 @@
 //! one order only may be right in the order of the run.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::{BinaryOp, codes};
@@ -10,6 +11,7 @@ use super::Flow;
 use super::facts::Facts;
 use super::interference::Rival;
 use super::report::Finding;
+use super::stopped::{Beside, Course};
 use super::value::Known;
 use super::{left, parted};
 
@@ -23,12 +25,29 @@ pub(super) struct Job {
     end: Option<Known>,
     /// The states that it changes.
     writes: BTreeSet<u32>,
+    /// What it changes that should be in order at the end, as far as that was asked for.
+    course: Rc<Course>,
+    /// What was known when it began.
+    base: Option<Rc<Facts>>,
+    /// How many bodies with handlers were around its `start`.
+    depth: usize,
+    /// How many blocks that wait for jobs were around it.
+    blocks: usize,
+    /// In how many jobs it was started.
+    within: usize,
 }
 
 impl Job {
     /// Its steps.
     pub(super) fn body(&self) -> StepId {
         self.body
+    }
+
+    /// What it does beside a failure that stops jobs begun at this depth of handlers.
+    pub(super) fn beside(&self, depth: usize, within: usize) -> Option<Beside> {
+        let stopped = self.depth >= depth && self.within == within && !self.course.is_empty();
+        let base = self.base.clone().filter(|_| stopped)?;
+        Some(Beside { course: self.course.clone(), base, first: true })
     }
 
     /// When it began, s.
@@ -51,7 +70,11 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         late.follow();
         left::on_some_way(&mut late, &begin);
         let first = std::mem::take(&mut flow.findings);
+        let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));
+        let (cut, other): (Vec<Finding>, Vec<Finding>) = late.findings.into_iter().partition(unsearched);
+        late.findings = other;
         flow.findings = in_both(first, &late.findings);
+        flow.findings.extend(cut);
         // What was not looked at for a mistake that is none after all.
         if !flow.ended && late.ended {
             flow.findings.extend(late.findings.into_iter().filter(|f| f.is(codes::UNFINISHED)));
@@ -64,17 +87,32 @@ impl Flow<'_, '_> {
     /// Starts a job.
     pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: Facts) -> Option<Facts> {
         let (start, writes) = (facts.time.clone(), self.sets_going(self.writes(body)));
+        let (depth, blocks) = (self.guards.len(), self.blocks);
+        let base = self.stops_jobs.then(|| Rc::new(facts.clone()));
+        let mut course = Rc::default();
         let end = match self.late {
-            true => None,
+            true => {
+                if let Some(base) = &base {
+                    course = self.course_aside(body, Facts::clone(base));
+                }
+                None
+            }
             false => {
+                let courses = std::mem::take(&mut self.courses);
+                self.begin_course();
                 let after = self.job(body, facts);
+                course = self.end_course();
+                self.courses = courses;
                 self.begun_job(name, body);
                 facts = after?;
                 Some(std::mem::replace(&mut facts.time, start.clone()))
             }
         };
         facts.begun.insert(name.to_owned(), true);
-        self.jobs.insert(name.to_owned(), Job { body, start, end, writes });
+        self.jobs.insert(
+            name.to_owned(),
+            Job { body, start, end, writes, course, base, depth, blocks, within: self.in_jobs },
+        );
         Some(facts)
     }
 
@@ -126,9 +164,33 @@ impl Flow<'_, '_> {
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
+        self.in_jobs += 1;
         let after = self.walk(body, facts);
+        self.in_jobs -= 1;
         self.rivals.pop();
         self.shared.pop();
+        after
+    }
+
+    /// Whether the plan starts jobs that a written failure may stop.
+    pub(super) fn may_stop_jobs(&self) -> bool {
+        self.plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. })) && self.is_stopped_by(&[self.plan.root])
+    }
+
+    /// A block ends: it waits for the jobs begun in it, or a failure has stopped them.
+    pub(super) fn end_block(&mut self, mut after: Option<Facts>) -> Option<Facts> {
+        let (depth, blocks) = (self.guards.len(), self.blocks);
+        while let Some((name, _)) = self.jobs.iter().find(|(_, job)| job.depth > depth || job.blocks > blocks) {
+            let name = name.clone();
+            after = match after {
+                Some(facts) => self.end_of_job(&name, facts),
+                None => {
+                    self.end_job(&name);
+                    self.jobs.remove(&name);
+                    None
+                }
+            };
+        }
         after
     }
 
@@ -144,6 +206,7 @@ pub(super) fn in_both(first: Vec<Finding>, second: &[Finding]) -> Vec<Finding> {
     let both = first.iter().any(|f| second.iter().any(|o| o.is_like(f)));
     let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && !f.in_turn());
     let either = !both && wrong(&first) && wrong(second);
-    let stays = |f: &Finding| (either && !f.in_turn()) || second.iter().any(|o| o.is_like(f));
+    let stays =
+        |f: &Finding| f.is(codes::NOT_ANALYSED) || (either && !f.in_turn()) || second.iter().any(|o| o.is_like(f));
     first.into_iter().filter(stays).collect()
 }

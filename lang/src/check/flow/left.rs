@@ -8,16 +8,19 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::plan::{Limit, StepId};
-use matterix_ir::{Diagnostic, Span};
+use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Flow;
 use super::facts::Facts;
 
-/// So many meetings of one way are followed before it is taken for one that can be gone.
+/// So many meetings of one way are followed before it is left open.
 const DEEPEST: usize = 12;
 
 /// So many steps are followed again in all for ways that leave something on.
 const MOST_STEPS: usize = 400_000;
+
+/// So many things are named in one finding.
+const MOST_NAMED: usize = 8;
 
 /// Meetings of ways that differ in what should hold at the end.
 #[derive(Clone, Debug, Default)]
@@ -118,19 +121,108 @@ impl Flow<'_, '_> {
 
 /// Finds the ways that leave something as it should not be; `begin` gives a flow that was not followed yet.
 pub(super) fn on_some_way<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>) {
-    let mut left = MOST_STEPS;
-    for end in std::mem::take(&mut flow.forks.open) {
-        let about = flow.plan.ends[end].condition.span;
-        let Some((mut d, way)) = way_to(flow, begin, end, &mut left) else { continue };
-        d.headline = d.headline.replacen(" ends, and", " can end, and", 1);
-        for span in way.into_iter().filter(|span| !flow.in_library(*span)) {
-            if !d.labels.iter().any(|l| l.span == span) {
-                d = d.because(span, "one of the ways through this leads there");
-            }
+    let mut search = Search { left: MOST_STEPS, cut: false };
+    let mut unsearched: Vec<usize> = Vec::new();
+    let mut open = std::mem::take(&mut flow.forks.open);
+    // One way may leave several things so.
+    while open.len() > 1 {
+        let found = way_to_all(flow, begin, &open, &mut search);
+        if found.is_empty() {
+            break;
         }
-        flow.forks.left.insert(end, d.clone());
-        flow.found(d, about);
+        open.retain(|end| !found.iter().any(|(other, ..)| other == end));
+        found.into_iter().for_each(|(end, d, way)| tell(flow, end, d, way));
     }
+    for end in open {
+        search.cut = false;
+        match way_to(flow, begin, end, &mut search) {
+            Some((d, way)) => tell(flow, end, d, way),
+            None => unsearched.extend(search.cut.then_some(end)),
+        }
+    }
+    if !unsearched.is_empty() {
+        not_searched(flow, &unsearched);
+    }
+}
+
+/// Reports a thing that is left so, with the statements at which the way there parts from others.
+fn tell(flow: &mut Flow<'_, '_>, end: usize, mut d: Diagnostic, way: Vec<Span>) {
+    let about = flow.plan.ends[end].condition.span;
+    d.headline = d.headline.replacen(" ends, and", " can end, and", 1);
+    for span in way.into_iter().filter(|span| !flow.in_library(*span)) {
+        if !d.labels.iter().any(|l| l.span == span) {
+            d = d.because(span, "one of the ways through this leads there");
+        }
+    }
+    flow.forks.left.insert(end, d.clone());
+    flow.found(d, about);
+}
+
+/// What is left so on the way that takes, at each meeting, a way on which one of these things is left so.
+fn way_to_all<'l, 'a>(
+    flow: &Flow<'l, 'a>,
+    begin: &impl Fn() -> Flow<'l, 'a>,
+    ends: &[usize],
+    search: &mut Search,
+) -> Vec<(usize, Diagnostic, Vec<Span>)> {
+    if search.left < flow.steps {
+        return Vec::new();
+    }
+    search.left -= flow.steps;
+    let mut chosen: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut spans: BTreeMap<usize, Span> = BTreeMap::new();
+    for end in ends {
+        let ways = flow.forks.off.iter().filter(|f| f.end == *end && f.sure);
+        let fits = |f: &&Fork| chosen.get(&f.number).is_none_or(|way| *way == f.way);
+        let best = ways.filter(fits).min_by_key(|f| (std::cmp::Reverse(f.number), f.way)).copied();
+        if let Some(fork) = best {
+            chosen.insert(fork.number, fork.way);
+            spans.insert(*end, fork.span);
+        }
+    }
+    let mut one = follow_chosen(flow, begin, chosen);
+    let left = ends.iter().filter_map(|end| Some((*end, one.forks.left.remove(end)?)));
+    left.map(|(end, d)| (end, d, spans.get(&end).copied().into_iter().collect())).collect()
+}
+
+/// A flow that has followed these ways alone.
+fn follow_chosen<'l, 'a>(
+    flow: &Flow<'l, 'a>,
+    begin: &impl Fn() -> Flow<'l, 'a>,
+    chosen: BTreeMap<usize, usize>,
+) -> Flow<'l, 'a> {
+    let mut one = begin();
+    one.notes = None;
+    one.late = flow.late;
+    one.ways = flow.ways.clone().again();
+    one.forks.chosen = chosen;
+    one.follow();
+    one
+}
+
+/// What a search may still do.
+struct Search {
+    /// Steps that are left.
+    left: usize,
+    /// Whether a way was not followed for want of them.
+    cut: bool,
+}
+
+/// Says which things may be left so on ways that were not followed.
+fn not_searched(flow: &mut Flow<'_, '_>, unsearched: &[usize]) {
+    let ends = flow.plan.ends.iter().enumerate().filter(|(index, _)| unsearched.contains(index));
+    let mut names: Vec<String> = ends.map(|(_, end)| format!("`{}`", flow.lab.spoken_name(end.instance))).collect();
+    names.sort();
+    names.dedup();
+    let more = names.len().saturating_sub(MOST_NAMED);
+    names.truncate(MOST_NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let headline = format!("not every way to the end of `{}` is followed", flow.plan.workflow);
+    let said = format!("on one of them {}{more} may be left as it should not be", names.join(", "));
+    let span = flow.plan.get(flow.plan.root).span;
+    let d = Diagnostic::warning(codes::NOT_ANALYSED, span, headline, said)
+        .help("switch it off in a `finally` around the workflow, which every way leads through");
+    flow.found(d, span);
 }
 
 /// A way on which something is left so, with the statements at which it parts from others.
@@ -138,7 +230,7 @@ fn way_to<'l, 'a>(
     flow: &Flow<'l, 'a>,
     begin: &impl Fn() -> Flow<'l, 'a>,
     end: usize,
-    left: &mut usize,
+    search: &mut Search,
 ) -> Option<(Diagnostic, Vec<Span>)> {
     let chosen = &flow.forks.chosen;
     let after = chosen.keys().next_back().map_or(0, |last| last + 1);
@@ -146,20 +238,17 @@ fn way_to<'l, 'a>(
     // The latest meeting decides what is known at the end, and a way that is known to leave it so is the shortest proof.
     ways.sort_by_key(|f| (!f.sure, std::cmp::Reverse(f.number), f.way));
     for fork in ways {
-        if chosen.len() >= DEEPEST || *left < flow.steps {
+        if chosen.len() >= DEEPEST || search.left < flow.steps {
+            search.cut = true;
             return None;
         }
-        *left -= flow.steps;
-        let mut one = begin();
-        one.notes = None;
-        one.late = flow.late;
-        one.ways = flow.ways.clone().again();
-        one.forks.chosen.clone_from(chosen);
-        one.forks.chosen.insert(fork.number, fork.way);
-        one.follow();
+        search.left -= flow.steps;
+        let mut chosen = chosen.clone();
+        chosen.insert(fork.number, fork.way);
+        let mut one = follow_chosen(flow, begin, chosen);
         let found = match one.forks.left.remove(&end) {
             Some(d) => Some((d, Vec::new())),
-            None if one.forks.open.contains(&end) => way_to(&one, begin, end, left),
+            None if one.forks.open.contains(&end) => way_to(&one, begin, end, search),
             None => None,
         };
         if let Some((d, mut spans)) = found {

@@ -28,6 +28,7 @@ mod points;
 mod polytope;
 mod report;
 mod reported;
+mod stopped;
 mod totals;
 mod value;
 mod walk;
@@ -37,7 +38,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
-use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::plan::{Condition, Plan, Step, StepId};
 use matterix_ir::values::Formulas;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 use rustc_hash::FxHashMap;
@@ -145,6 +146,20 @@ struct Flow<'l, 'a> {
     ways: parted::Ways,
     /// Meetings of ways that differ in what should hold at the end.
     forks: left::Forks,
+    /// What should be in order at the end by the states it depends on, where that was asked for.
+    ends_of: Option<Rc<BTreeMap<u32, Vec<usize>>>>,
+    /// What branches and jobs change that are followed, the outermost first.
+    courses: Vec<stopped::Course>,
+    /// What is done however the blocks around end, the outermost first.
+    finally: Vec<StepId>,
+    /// How often bounds of what moves are brought closer.
+    refinements: usize,
+    /// Blocks around that wait for the jobs begun in them.
+    blocks: usize,
+    /// Whether the plan starts jobs that a written failure may stop.
+    stops_jobs: bool,
+    /// Jobs whose steps are followed, each within the one before.
+    in_jobs: usize,
     /// Whether the plan was followed to its end, and that looked at.
     ended: bool,
     steps: usize,
@@ -250,6 +265,13 @@ impl<'l, 'a> Flow<'l, 'a> {
             turning: 0,
             ways: parted::Ways::default(),
             forks: left::Forks::default(),
+            ends_of: None,
+            courses: Vec::new(),
+            finally: Vec::new(),
+            refinements: 0,
+            blocks: 0,
+            stops_jobs: false,
+            in_jobs: 0,
             ended: false,
             steps: 0,
             notes: None,
@@ -289,6 +311,10 @@ impl<'l, 'a> Flow<'l, 'a> {
         self.note_start(&begun);
         // What a mistake cut short is not finished for another reason.
         self.guards.push(Vec::new());
+        self.stops_jobs = self.may_stop_jobs();
+        if self.stops_jobs {
+            self.begin_course();
+        }
         let ended = self.walk(self.plan.root, facts).and_then(|facts| self.await_all(facts));
         let raised = self.guards.pop().unwrap_or_default();
         if !self.findings.iter().any(report::Finding::is_error) {

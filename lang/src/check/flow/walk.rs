@@ -13,6 +13,7 @@ use super::jobs::in_both;
 use super::parted::MOST_WAYS;
 use super::points::at_least;
 use super::report::Finding;
+use super::stopped::Lines;
 use super::value::{Known, Why};
 use super::{Flow, MOST_STEPS, Raised, Site};
 use crate::elaborate::mixtures::written;
@@ -42,7 +43,13 @@ impl Flow<'_, '_> {
         }
         let noted = self.begin(id, node, &facts);
         let (began, _) = facts.time.bounds();
-        let after = self.step(id, facts);
+        let waits = waits_for_jobs(&node.step);
+        self.blocks += usize::from(waits);
+        let mut after = self.step(id, facts);
+        self.blocks -= usize::from(waits);
+        if waits && !self.jobs.is_empty() {
+            after = self.end_block(after);
+        }
         if let Some(after) = after.as_ref().filter(|_| own) {
             self.outlasts(began, after);
         }
@@ -124,7 +131,10 @@ impl Flow<'_, '_> {
                     self.unexpected(condition, &facts);
                 }
                 self.kept.push(condition);
-                let after = self.walk(*body, facts);
+                let after = match self.is_taken("broken") && !plan.ends.is_empty() {
+                    true => self.may_break(condition, *body, facts),
+                    false => self.walk(*body, facts),
+                };
                 self.kept.pop();
                 after
             }
@@ -401,14 +411,17 @@ impl Flow<'_, '_> {
         let forward: Vec<usize> = (0..branches.len()).collect();
         let backward: Vec<usize> = forward.iter().rev().copied().collect();
         let mark = self.findings.len();
-        let first = self.in_order(branches, &forward, &writes, facts.clone());
+        let mut lines = (branches.len() > 1 && self.is_stopped_by(branches)).then(Lines::default);
+        let first = self.in_order(branches, &forward, &writes, facts.clone(), lines.as_mut());
         if branches.len() < 2 || self.shared.len() >= MOST_PARALLEL {
+            lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
             return first;
         }
         let one: Vec<Finding> = self.findings.split_off(mark);
         self.once_more(true);
-        let second = self.in_order(branches, &backward, &writes, facts.clone());
+        let second = self.in_order(branches, &backward, &writes, facts.clone(), lines.as_mut());
         self.once_more(false);
+        lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
         let other: Vec<Finding> = self.findings.split_off(mark);
         self.findings.extend(in_both(one, &other));
         match (first, second) {
@@ -423,6 +436,7 @@ impl Flow<'_, '_> {
         order: &[usize],
         writes: &[BTreeSet<u32>],
         mut facts: Facts,
+        mut lines: Option<&mut Lines>,
     ) -> Option<Facts> {
         let start = facts.time.clone();
         let mut longest = start.clone();
@@ -434,7 +448,10 @@ impl Flow<'_, '_> {
             facts.time = start.clone();
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
-            let after = self.walk(branches[*i], facts);
+            let after = match &mut lines {
+                Some(lines) => self.follow_line(*i, facts, branches[*i], lines),
+                None => self.walk(branches[*i], facts),
+            };
             self.rivals.pop();
             self.shared.pop();
             self.end_branch();
@@ -462,8 +479,10 @@ impl Flow<'_, '_> {
         self.caught.push(if library { Vec::new() } else { names.collect() });
         self.guards.push(Vec::new());
         self.reported.push(Vec::new());
+        self.finally.extend(finally);
         let mut after = self.walk(body, facts.clone());
         let mut raised = self.guards.pop().unwrap_or_default();
+        after = self.end_block(after);
         let reported = self.reported.pop().unwrap_or_default();
         self.caught.pop();
         // What handlers raise leaves as well.
@@ -484,9 +503,11 @@ impl Flow<'_, '_> {
         }
         raised.extend(self.guards.pop().unwrap_or_default());
         if let Some(finally) = finally {
+            self.finally.pop();
             (after, raised) = self.leaving(id, finally, &facts, after, raised);
         }
         self.after_report(&facts, reported, handlers, finally);
+        raised = self.stop_jobs(raised, self.guards.len());
         if let Some(outer) = self.guards.last_mut() {
             outer.extend(raised);
         }
@@ -569,6 +590,19 @@ impl Flow<'_, '_> {
         }
         self.meet(id, &facts, ends)
     }
+}
+
+/// Whether a step waits for the jobs that begin in it.
+fn waits_for_jobs(step: &Step) -> bool {
+    matches!(
+        step,
+        Step::Guarded { .. }
+            | Step::Try(_)
+            | Step::Skill { .. }
+            | Step::Keep { .. }
+            | Step::During { .. }
+            | Step::Claim { .. }
+    )
 }
 
 /// What tells turns of a loop apart that leave all states as they were.

@@ -1,20 +1,24 @@
 //! S1, D3, R1, R2: what no order and no patience mends. All of it is about the run in which nothing fails.
 
+mod again;
 mod components;
 mod deadlock;
+mod handled;
+mod held;
 mod show;
 mod takes;
 mod twice;
 mod windows;
 
 use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
+use matterix_timing::network::WHOLE;
 use matterix_timing::walk::Durations;
-use matterix_timing::{Known, Point, ROUNDING, Scope, Timing};
+use matterix_timing::{Known, Point, ROUNDING, Scope, Timing, Visit};
 
 use crate::elaborate::Elaborator;
 
@@ -28,24 +32,40 @@ const MOST_WORK: usize = 2_000_000_000;
 pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
     let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
-    let timing = Timing::of(plan, &known, Durations::Bounds);
-    let mut found = takes::findings(plan, &known, &timing);
-    let (late, network) = windows::findings(plan, &timing);
+    let (late, times) = timed(plan, &known);
+    let mut found = takes::findings(plan, &known, &times.timing);
     let told = |d: &Diagnostic| found.iter().any(|f: &Diagnostic| f.code == d.code && f.span() == d.span());
     let late: Vec<Diagnostic> = late.into_iter().filter(|d| !told(d)).collect();
     found.extend(late);
-    // What is contradicted says nothing about who meets whom.
-    let times = Times::new(plan, Timing { network, ..timing });
     let name = |i: matterix_ir::scene::InstanceId| {
         lab.instances.get(i.0 as usize).map_or_else(String::new, |i| i.name.clone())
     };
     found.extend(twice::findings(&times, &name));
+    found.extend(again::findings(&times, &known));
     found.extend(deadlock::findings(&times, &name));
     if times.work.get() > MOST_WORK {
         let text = "its steps are compared with each other up to a limit";
         found.push(spent(plan.get(plan.root).span, "not all times of this workflow are compared", text));
     }
     found
+}
+
+/// The times of a plan, and what contradicts itself in them. A `claim` waits for what others use: where that may be, it has no time of
+/// its own.
+fn timed<'p>(plan: &'p Plan, known: &Known<'_>) -> (Vec<Diagnostic>, Times<'p>) {
+    let mut waits: BTreeSet<StepId> = BTreeSet::new();
+    loop {
+        let mut timing = Timing::with_waits(plan, known, Durations::Bounds, &waits);
+        // What is contradicted says nothing about who meets whom.
+        let (late, network) = windows::findings(plan, &timing);
+        timing.network = network;
+        let times = Times::new(plan, timing);
+        let before = waits.len();
+        waits.extend(held::waiting(&times));
+        if waits.len() == before {
+            return (late, times);
+        }
+    }
 }
 
 /// The finding that a limit of an analysis was reached.
@@ -71,9 +91,7 @@ impl<'p> Times<'p> {
     pub fn of(lab: &Elaborator<'_>, plan: &'p Plan, derivatives: &[Derivative], events: &[Event]) -> Self {
         let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
         let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
-        let timing = Timing::of(plan, &known, Durations::Bounds);
-        let (_, network) = windows::findings(plan, &timing);
-        Times::new(plan, Timing { network, ..timing })
+        timed(plan, &known).1
     }
 
     fn new(plan: &'p Plan, timing: Timing) -> Self {
@@ -105,9 +123,24 @@ impl<'p> Times<'p> {
     /// Whether the plan lets two steps run at the same time, as far as its shape tells.
     pub fn beside(&self, a: StepId, b: StepId) -> bool {
         match (self.timing.visit(a), self.timing.visit(b)) {
-            (Some(a), Some(b)) => self.timing.beside(a, b),
+            (Some(a), Some(b)) => self.timing.beside(a, b) && !self.excluded(a, b),
             _ => false,
         }
+    }
+
+    /// Whether steps stand in different branches of a choice, and the jobs begun there are over before it is made anew.
+    fn excluded(&self, a: &Visit, b: &Visit) -> bool {
+        let over = |(job, turns): &(u32, StepId)| {
+            let (Some(begun), Step::Repeat { body, .. } | Step::RepeatWhile { body, .. }) =
+                (self.timing.threads.get(*job as usize).and_then(|t| t.from), &self.plan.get(*turns).step)
+            else {
+                return false;
+            };
+            let Step::Start { body: job, .. } = &self.plan.get(begun).step else { return false };
+            let (Some(job), Some(turn)) = (self.timing.visit(*job), self.timing.visit(*body)) else { return false };
+            self.least(job.end, turn.end, &[job.scope]).is_some_and(|t| t > -ROUNDING)
+        };
+        self.timing.parted(a, b).is_some_and(|jobs| jobs.iter().all(over))
     }
 
     /// Whether one step is over before the other begins in every run, whichever comes first. Where the search was cut short they
@@ -126,16 +159,21 @@ impl<'p> Times<'p> {
         self.least(a.end, b.start, &[a.scope, b.scope]).is_some_and(|t| t > gap)
     }
 
-    /// Whether the steps run at the same time in every run.
+    /// Whether every run comes to a step, and ends if that fails with `failure`.
+    fn must_fail(&self, step: StepId, failure: &str) -> bool {
+        let whole = self.timing.visit(step).is_some_and(|v| v.scope == WHOLE);
+        whole && !handled::handled(self.plan, &self.timing, step, failure)
+    }
+
+    /// Whether the steps run at the same time in every run that comes to both.
     fn together(&self, a: StepId, b: StepId) -> bool {
         let (Some(a), Some(b)) = (self.timing.visit(a), self.timing.visit(b)) else { return false };
         let scopes = [a.scope, b.scope];
-        let sure = scopes.iter().all(|s| *s == matterix_timing::network::WHOLE);
         let at_least = |from: Point, to: Point, lasts: f64| {
             let least = self.least(from, to, &scopes);
             least.is_some_and(|t| if lasts > 0.0 { t > ROUNDING } else { t >= -ROUNDING })
         };
-        sure && at_least(a.start, b.end, b.lasts.min) && at_least(b.start, a.end, a.lasts.min)
+        at_least(a.start, b.end, b.lasts.min) && at_least(b.start, a.end, a.lasts.min)
     }
 
     /// The outermost loop around a step that is not around the other, else the step itself: what is known of times in

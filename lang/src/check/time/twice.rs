@@ -8,7 +8,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, codes};
 use matterix_timing::usage::{self, Use};
 
-use super::{Times, expected, show, spent};
+use super::{Times, expected, held, show, spent};
 
 /// Pairs of uses that are compared at most; a plan that needs more is told that it was not searched to the end.
 const MOST: usize = 2_000_000;
@@ -16,7 +16,9 @@ const MOST: usize = 2_000_000;
 /// Uses that overlap, or may, where nothing makes them take turns. Between two lines of steps one clash over an instance is said,
 /// a certain one before one that may be.
 pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
-    let uses = usage::uses(times.plan, &times.timing);
+    let mut uses = usage::uses(times.plan, &times.timing);
+    uses.extend(held::holds(times));
+    uses.sort_unstable();
     let mut clashes: Vec<(&Use, &Use, bool)> = Vec::new();
     let mut unfinished: Option<&Use> = None;
     let mut left = MOST;
@@ -63,8 +65,14 @@ fn between<'u>(
             if !mine.is_disjoint(others) {
                 continue;
             }
+            let one_claims = |used: &Use| mine.contains(&used.instance) != others.contains(&used.instance);
             for first in a {
                 for second in b {
+                    // Where one of them claims it, the whole block counts in place of what it uses.
+                    let blocks = [first, second].iter().filter(|used| held::is_hold(times, used)).count();
+                    if one_claims(first) != (blocks == 1) {
+                        continue;
+                    }
                     if *left == 0 {
                         return maybe.map_or(Err(*first), |found| Ok(Some(found)));
                     }
@@ -89,7 +97,9 @@ fn classes<'u>(times: &Times<'_>, one: &[&'u Use], other: &[&Use]) -> BTreeMap<B
     for used in one {
         let around = times.timing.around(used.step);
         // One line may have begun inside of a claim of the other, which is around some of the other's steps only.
-        let own = around.filter(|s| !beyond.contains(s) && Some(thread(times, *s)) != other_line);
+        let block = Some(used.step).filter(|_| held::is_hold(times, used));
+        let own = block.into_iter().chain(around);
+        let own = own.filter(|s| !beyond.contains(s) && Some(thread(times, *s)) != other_line);
         let claims = own.filter_map(|s| match &times.plan.get(s).step {
             Step::Claim { claims, .. } => Some(claims.as_slice()),
             _ => None,
@@ -117,15 +127,20 @@ fn line(times: &Times<'_>, step: StepId) -> StepId {
 
 /// Whether two uses overlap: certainly, perhaps, or (none) never.
 fn clash(times: &Times<'_>, a: &Use, b: &Use) -> Option<bool> {
+    match [a, b].map(|used| held::is_hold(times, used)) {
+        [true, _] => return held::clash(times, a, b),
+        [_, true] => return held::clash(times, b, a),
+        _ => {}
+    }
     if !times.beside(a.step, b.step)
         || take_turns(times, a, b)
         || independent(times, a.step, b.step)
-        || expected(times.plan, &times.timing, a.step, "claimed")
+        || [a, b].iter().any(|used| expected(times.plan, &times.timing, used.step, "claimed"))
     {
         return None;
     }
     if times.together(a.step, b.step) {
-        return Some(true);
+        return Some([a, b].iter().all(|used| times.must_fail(used.step, "claimed")));
     }
     if times.apart(a.step, b.step) || harmless(times, a.step, b.step) {
         return None;
@@ -190,6 +205,11 @@ fn operations(plan: &Plan, step: StepId) -> Vec<&Operation> {
 }
 
 fn finding(times: &Times<'_>, a: &Use, b: &Use, sure: bool, name: &str) -> Diagnostic {
+    match [a, b].map(|used| held::is_hold(times, used)) {
+        [true, _] => return held::finding(times, a, b, sure, name),
+        [_, true] => return held::finding(times, b, a, sure, name),
+        _ => {}
+    }
     let own = |u: &Use| times.plan.get(show::own(times.plan, &times.timing, u.step));
     let (mut first, mut second) = (own(a), own(b));
     if first.span > second.span {

@@ -1,0 +1,111 @@
+//! R1: what a `claim` holds while a step outside of any `claim` uses it. Such a step fails from the moment the block has what it claims
+//! until its end; one that began before makes the block wait instead.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use matterix_ir::plan::{Step, StepId};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_timing::usage::{self, Use};
+use matterix_timing::{ROUNDING, Visit};
+
+use super::{Times, expected, show};
+
+/// Blocks that claim, each with each of its instances.
+pub(super) fn holds(times: &Times<'_>) -> Vec<Use> {
+    let steps = (0..times.plan.steps.len() as u32).map(StepId);
+    let blocks = steps.filter_map(|step| match &times.plan.get(step).step {
+        Step::Claim { claims, .. } if times.timing.visit(step).is_some_and(|v| !v.aside) => Some((step, claims)),
+        _ => None,
+    });
+    blocks.flat_map(|(step, claims)| claims.iter().map(move |&instance| Use { instance, step })).collect()
+}
+
+/// Whether a use is a block that claims.
+pub(super) fn is_hold(times: &Times<'_>, used: &Use) -> bool {
+    matches!(times.plan.get(used.step).step, Step::Claim { .. })
+}
+
+/// Blocks that may have to wait for a step which uses what they claim without a `claim` of its own.
+pub(super) fn waiting(times: &Times<'_>) -> BTreeSet<StepId> {
+    let holds = holds(times);
+    if holds.is_empty() {
+        return BTreeSet::new();
+    }
+    let mut uses: BTreeMap<InstanceId, Vec<Use>> = BTreeMap::new();
+    for used in usage::uses(times.plan, &times.timing) {
+        uses.entry(used.instance).or_default().push(used);
+    }
+    let waits = |hold: &&Use| uses.get(&hold.instance).into_iter().flatten().any(|used| may_delay(times, hold, used));
+    holds.iter().filter(waits).map(|hold| hold.step).collect()
+}
+
+fn may_delay(times: &Times<'_>, hold: &Use, used: &Use) -> bool {
+    if claims(times, used) || !times.beside(hold.step, used.step) {
+        return false;
+    }
+    let (Some(block), Some(step)) = (times.timing.visit(hold.step), times.timing.visit(used.step)) else {
+        return false;
+    };
+    let begins_later = begins_after(times, block, step) || (step.start == block.start && step.order > block.order);
+    !begins_later && !times.before(used.step, hold.step)
+}
+
+/// Whether a step stands in a block that claims what it uses, or that holds it.
+fn claims(times: &Times<'_>, used: &Use) -> bool {
+    times.timing.around(used.step).any(|s| match &times.plan.get(s).step {
+        Step::Claim { claims, .. } => claims.contains(&used.instance),
+        _ => false,
+    })
+}
+
+/// Whether a step begins after a block has what it claims, in every run.
+fn begins_after(times: &Times<'_>, block: &Visit, step: &Visit) -> bool {
+    times.least(block.start, step.start, &[block.scope, step.scope]).is_some_and(|t| t > ROUNDING)
+}
+
+/// Whether a step uses what a block holds: certainly, perhaps, or (none) never.
+pub(super) fn clash(times: &Times<'_>, hold: &Use, used: &Use) -> Option<bool> {
+    if !times.beside(hold.step, used.step)
+        || times.timing.around(used.step).any(|s| s == hold.step)
+        || expected(times.plan, &times.timing, used.step, "claimed")
+        || times.before(hold.step, used.step)
+        || times.before(used.step, hold.step)
+    {
+        return None;
+    }
+    let (block, step) = (times.timing.visit(hold.step)?, times.timing.visit(used.step)?);
+    let begun = granted(times, hold.step)?;
+    let scopes = [block.scope, step.scope];
+    let after = |a, b| times.least(a, b, &scopes).is_some_and(|t| t > ROUNDING);
+    let together = step.start == begun.start;
+    // What begins before the block makes it wait.
+    let turns = times.all_turns(used.step, hold.step) != used.step;
+    if !turns && (after(step.start, block.start) || (step.start == block.start && step.order < block.order)) {
+        return None;
+    }
+    let within = (together || after(begun.start, step.start)) && after(step.start, block.end);
+    Some(within && times.must_fail(used.step, "claimed") && times.must_fail(hold.step, "claimed"))
+}
+
+/// The body of a block that claims: it begins when the block has what it claims.
+fn granted<'t>(times: &'t Times<'_>, step: StepId) -> Option<&'t Visit> {
+    match &times.plan.get(step).step {
+        Step::Claim { body, .. } => times.timing.visit(*body),
+        _ => None,
+    }
+}
+
+/// The finding that a step uses what a block holds.
+pub(super) fn finding(times: &Times<'_>, hold: &Use, used: &Use, sure: bool, name: &str) -> Diagnostic {
+    let own = |u: &Use| times.plan.get(show::own(times.plan, &times.timing, u.step));
+    let (block, step) = (own(hold), own(used));
+    let may = if sure { "uses" } else { "may use" };
+    let headline = format!("`{}` {may} `{name}` while another branch or job has claimed it", step.label);
+    let mut d = Diagnostic::error(codes::CLAIMED_TWICE, step.span, headline, format!("uses `{name}`"))
+        .because(block.span, format!("holds `{name}` to the end of this block"));
+    if !sure {
+        d.severity = Severity::Warning;
+    }
+    d.help(format!("put it into `claim {name} {{ }}` as well, so that they take turns, or do one after the other"))
+}
