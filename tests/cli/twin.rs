@@ -125,3 +125,16 @@ fn a_stroke_gives_off_what_it_took() {
     assert_eq!(code, 1);
     assert!(text.contains("volume_underflow") || text.contains("volume-underflow"), "{text}");
 }
+
+#[test]
+fn a_limit_that_a_flow_breaks_is_a_failure_at_its_moment() {
+    pass("limits.mtx", &["overfills", "goes_on", "runs_dry", "overloads", "overloads_in_a_job"]);
+}
+
+#[test]
+fn a_vessel_that_runs_dry_ends_the_run_at_that_moment() {
+    let (code, text) = run("runs_dry.mtx", "circulate");
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("error[transfer-fraction]: `leave(loop)` takes more than there is"), "{text}");
+    assert!(text.contains("at 11.2702 s"), "{text}");
+}

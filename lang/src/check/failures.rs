@@ -93,13 +93,12 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
         })
         .collect();
     let declared = tables.failures();
-    let flowing = flowing(plan, lab);
     let dangers = tables.dangers();
     let mut out: Vec<Diagnostic> = Vec::new();
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
         let Step::Guarded { body, handlers, .. } = &step.step else { continue };
-        let raised = raised(plan, *body, true, &flowing);
+        let raised = raised(plan, *body, true);
         for (place, (caught, handler)) in handlers.iter().enumerate() {
             let at = plan.get(*handler).span;
             let own = at.file == within.file && within.start <= at.start && at.end <= within.end;
@@ -112,7 +111,9 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
                 continue;
             }
             let Caught::Named(name) = caught else { continue };
-            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) {
+            let by_time = || takes_time(plan, *body) && may_flow(plan, lab, name);
+            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) || by_time()
+            {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
                 let headline = format!("nothing before it fails with `{name}`");
@@ -126,16 +127,29 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
     out
 }
 
-/// The failures of limits that laws may break while time passes.
-fn flowing(plan: &Plan, lab: &Elaborator<'_>) -> BTreeSet<String> {
+/// Whether laws may break a limit of this failure while time passes.
+fn may_flow(plan: &Plan, lab: &Elaborator<'_>, failure: &str) -> bool {
     let moves = |op: &Op| matches!(op, Op::Time) || matches!(op, Op::State(s) if lab.rates.contains_key(s));
-    let limits = plan.limits.iter().filter(|l| lab.graph.depends(l.condition.node, moves));
-    limits.map(|l| l.condition.failure().to_string()).collect()
+    let mut limits = plan.limits.iter().map(|l| &l.condition).filter(|c| c.failure() == failure);
+    limits.any(|condition| lab.graph.depends(condition.node, moves))
 }
 
-/// All that a step may fail with, where time may bring about what is `flowing`; without what only devices report, where those do
-/// what they are told.
-pub(super) fn raised(plan: &Plan, root: StepId, devices: bool, flowing: &BTreeSet<String>) -> BTreeSet<String> {
+/// Whether time may pass in a step.
+fn takes_time(plan: &Plan, root: StepId) -> bool {
+    let mut todo = vec![root];
+    while let Some(id) = todo.pop() {
+        let step = &plan.get(id).step;
+        match step {
+            Step::Wait { .. } | Step::WaitUntil { .. } | Step::Hold { .. } | Step::Await { .. } => return true,
+            Step::Operation(operation) if !operation.is_at_once() => return true,
+            _ => todo.extend(step.children()),
+        }
+    }
+    false
+}
+
+/// All that a step may fail with; without what only devices report, where those do what they are told.
+pub(super) fn raised(plan: &Plan, root: StepId, devices: bool) -> BTreeSet<String> {
     let mut out: BTreeSet<String> = BTreeSet::new();
     let mut awaited: BTreeSet<StepId> = BTreeSet::new();
     let mut todo = vec![root];
@@ -144,11 +158,6 @@ pub(super) fn raised(plan: &Plan, root: StepId, devices: bool, flowing: &BTreeSe
         let mut add = |name: &str| {
             out.insert(name.to_string());
         };
-        if matches!(step, Step::Wait { .. } | Step::WaitUntil { .. } | Step::Hold { .. } | Step::Await { .. })
-            || matches!(step, Step::Operation(o) if !o.is_at_once())
-        {
-            flowing.iter().for_each(|name| add(name));
-        }
         match step {
             Step::Operation(o) => {
                 o.fails.iter().filter(|_| devices).for_each(|name| add(name));

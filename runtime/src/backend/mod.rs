@@ -93,6 +93,11 @@ pub trait Backend {
         Vec::new()
     }
 
+    /// The limits of the plan that are known to be broken, by their index.
+    fn broken(&self) -> Vec<u32> {
+        Vec::new()
+    }
+
     /// How to follow a condition from now on.
     fn follow(&mut self, condition: NodeId) -> Follow;
 

@@ -347,6 +347,10 @@ impl Backend for Sim<'_> {
         Ok(Some(holds))
     }
 
+    fn broken(&self) -> Vec<u32> {
+        self.engine.broken_limits()
+    }
+
     fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
         self.prepared.keeps.decide(&self.prepared.model, limit)
     }

@@ -13,15 +13,32 @@ impl Executor<'_, '_> {
     /// Raises the failures of limits that have just been broken, each in the step in hand that it comes from.
     pub(super) fn limits_broken(&mut self, limits: &[u32]) {
         for &index in limits {
-            let Some(limit) = self.plan.limits.get(index as usize) else { continue };
             let Some(id) = self.in_hand(index) else { continue };
-            let (condition, thing) = (&limit.condition, self.instance(limit.instance).to_owned());
-            let label = self.label(id).to_owned();
-            let text = format!("`{}` of `{thing}` is broken during `{label}`", condition.text);
-            let raised = self.unmet(condition, condition.failure(), condition.code(), text);
-            self.fail(id, Raised { help: condition.advice(), ..raised });
+            self.limit_fails(id, index);
             self.drain();
         }
+    }
+
+    /// An operation that took its time has ended: it fails where it has gone on to pass a limit that was broken before, and taken
+    /// by the handler of another step. Whether it did.
+    pub(super) fn went_beyond(&mut self, id: FrameId, operation: &Operation) -> bool {
+        if operation.is_at_once() {
+            return false;
+        }
+        let broken = self.backend.broken();
+        let passed = broken
+            .into_iter()
+            .find(|limit| self.backend.decide(*limit).first().is_some_and(|states| sets(operation, states)));
+        passed.inspect(|limit| self.limit_fails(id, *limit)).is_some()
+    }
+
+    fn limit_fails(&mut self, id: FrameId, index: u32) {
+        let Some(limit) = self.plan.limits.get(index as usize) else { return };
+        let (condition, thing) = (&limit.condition, self.instance(limit.instance).to_owned());
+        let label = self.label(id).to_owned();
+        let text = format!("`{}` of `{thing}` is broken during `{label}`", condition.text);
+        let raised = self.unmet(condition, condition.failure(), condition.code(), text);
+        self.fail(id, Raised { help: condition.advice(), ..raised });
     }
 
     /// The step in hand that a broken limit comes from: the operation that set going what broke it, or what is done now nearest
@@ -46,12 +63,8 @@ impl Executor<'_, '_> {
     /// The operation that last set what decides how the states of a limit change; one that goes on before others.
     fn cause(&self, limit: u32) -> Option<StepId> {
         self.backend.decide(limit).iter().find_map(|states| {
-            let sets = |o: &Operation| {
-                let mut actions = o.at_start.iter().chain(&o.at_end);
-                actions.any(|a| matches!(a, Action::Assign { state, .. } if states.contains(state)))
-            };
             let begun = (0..self.plan.steps.len() as u32).map(StepId).filter_map(|id| match &self.plan.get(id).step {
-                Step::Operation(o) if sets(o) => Some((id, self.steps[id.0 as usize].started?)),
+                Step::Operation(o) if sets(o, states) => Some((id, self.steps[id.0 as usize].started?)),
                 _ => None,
             });
             let runs = |id: StepId| {
@@ -67,4 +80,10 @@ impl Executor<'_, '_> {
         let all = self.plan.steps.iter().enumerate();
         all.flat_map(|(i, s)| s.step.children().into_iter().map(move |child| (child, StepId(i as u32)))).collect()
     }
+}
+
+/// Whether an operation sets one of these states.
+fn sets(operation: &Operation, states: &[u32]) -> bool {
+    let mut actions = operation.at_start.iter().chain(&operation.at_end);
+    actions.any(|a| matches!(a, Action::Assign { state, .. } if states.contains(state)))
 }

@@ -141,7 +141,7 @@ impl<'p> Executor<'p, '_> {
                 self.set_kind(id, Kind::Pass);
                 self.out.operation(self.now, step, operation, OperationState::Ended);
                 self.changed();
-                if !self.alarmed_by(id) && self.within_limits(id, operation)? {
+                if !self.alarmed_by(id) && self.within_limits(id, operation)? && !self.went_beyond(id, operation) {
                     self.push_end(id, End::Done);
                 }
             }

@@ -144,6 +144,12 @@ impl<'m> Engine<'m> {
         }
     }
 
+    /// The limits that did not hold when they were last looked at.
+    pub fn broken_limits(&self) -> Vec<u32> {
+        let all = self.limits.broken.iter().enumerate();
+        all.filter(|(_, broken)| **broken).map(|(i, _)| i as u32).collect()
+    }
+
     /// The limits that have been broken since they were last looked at.
     pub(super) fn newly_broken(&mut self) -> Vec<u32> {
         let due = std::mem::take(&mut self.limits.due);

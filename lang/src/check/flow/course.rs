@@ -10,7 +10,7 @@ use super::dual::{Along, Dual};
 use super::eval::Exact;
 use super::even::{Even, Tracks};
 use super::facts::Facts;
-use super::value::{CLOSE, Known};
+use super::value::{CLOSE, Known, Why};
 
 /// Changes of conditions within one step before the rest of it is followed in bounds.
 const MOST_CHANGES: usize = 64;
@@ -150,11 +150,26 @@ impl Flow<'_, '_> {
             let (now, _, size) = self.difference(side, even, 0.0, facts)?;
             let (half, ..) = self.difference(side, even, 0.5 * end, facts)?;
             let (then, _, far) = self.difference(side, even, end, facts)?;
-            if (half - 0.5 * (now + then)).abs() > STRAIGHT * size.max(far) {
+            let bends = (half - 0.5 * (now + then)).abs() > STRAIGHT * size.max(far);
+            if bends && !self.stays_apart(side, even, end, facts) {
                 return None;
             }
         }
         Some(next)
+    }
+
+    /// Whether two sides are apart all the time.
+    fn stays_apart(&mut self, (a, b): Sides, even: &Even, time: f64, facts: &Facts) -> bool {
+        let mut within = facts.clone();
+        even.open.iter().for_each(|s| within.states[*s as usize] = Known::nothing());
+        for (state, value, slope) in &even.slopes {
+            let end = value + slope * time;
+            within.states[*state as usize] = Known::Range(value.min(end), value.max(end), Why::Unknown);
+        }
+        within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(0.0, time, Why::Unknown));
+        let (low, high) = self.eval(a, &within).bounds();
+        let (least, most) = b.map_or((0.0, 0.0), |b| self.eval(b, &within).bounds());
+        low > most || high < least
     }
 
     /// The difference of two sides after a time, how fast it changes, and the size of the larger one.

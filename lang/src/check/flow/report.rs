@@ -1,7 +1,9 @@
 //! Findings with their history.
 
-use matterix_ir::model::Domain;
-use matterix_ir::plan::{Condition, Limit};
+use std::collections::BTreeSet;
+
+use matterix_ir::model::{Action, Domain};
+use matterix_ir::plan::{Condition, Limit, Step};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, Severity, Span, codes};
 
@@ -18,7 +20,7 @@ pub struct Finding {
     count: usize,
     /// How many ways had met before it, where it was made on some of them.
     some: Option<usize>,
-    /// It was made in a turn of a loop.
+    /// It was made in a turn of a loop, and other branches or jobs may undo what it comes of.
     turn: bool,
 }
 
@@ -47,7 +49,7 @@ impl Finding {
         Some((self.place(), self.some?))
     }
 
-    /// Whether it was made in a turn of a loop.
+    /// Whether it was made in a turn of a loop, and other branches or jobs may undo what it comes of.
     pub(super) fn in_turn(&self) -> bool {
         self.turn
     }
@@ -81,15 +83,16 @@ impl Flow<'_, '_> {
 
     /// Adds a finding, or counts it if it was made before.
     pub fn found(&mut self, diagnostic: Diagnostic, about: Span) {
-        self.found_on(diagnostic, about, None);
+        let turn = self.turning > 0;
+        self.found_on(diagnostic, about, None, turn);
     }
 
     /// Adds a finding that is made on some ways, of which so many had met before.
-    fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>) {
+    fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>, turn: bool) {
         if self.quiet > 0 {
             return;
         }
-        let new = Finding { diagnostic, about, count: 1, some, turn: self.turning > 0 };
+        let new = Finding { diagnostic, about, count: 1, some, turn };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
                 old.count += 1;
@@ -151,7 +154,38 @@ impl Flow<'_, '_> {
         }
         d = self.history_of(d, asked, facts, !words.is_empty());
         d.help.extend(need.advice());
-        self.found_on(d, need.span, open);
+        let turn = self.turning > 0 && !self.goes_one_way(need);
+        self.found_on(d, need.span, open, turn);
+    }
+
+    /// Whether a condition is about what vessels hold that the whole plan only fills, or only empties: what is too much or too
+    /// little there in one order of the steps is so in every order.
+    fn goes_one_way(&mut self, condition: &Condition) -> bool {
+        let states = self.parts(condition.node).states.clone();
+        let amounts: Vec<u32> = states.into_iter().filter(|s| self.amounts.contains(s)).collect();
+        let held = |m: &usize| self.mixtures[*m].iter().any(|(_, s)| amounts.contains(s));
+        let mut held: Vec<usize> = (0..self.mixtures.len()).filter(held).collect();
+        let (mut gives, mut gains) = (BTreeSet::new(), BTreeSet::new());
+        let index = |id: InstanceId| self.lab.mixtures.binary_search(&id).ok();
+        for (_, from, to) in self.lab.streams.keys() {
+            gives.extend(index(*from));
+            gains.extend(index(*to));
+        }
+        for step in &self.plan.steps {
+            let Step::Operation(operation) = &step.step else { continue };
+            for action in operation.at_start.iter().chain(&operation.at_end) {
+                match action {
+                    Action::Move { from, to, .. } => {
+                        gives.insert(*from as usize);
+                        gains.insert(*to as usize);
+                    }
+                    Action::Assign { state, .. } if amounts.contains(state) => return false,
+                    Action::Assign { .. } => {}
+                }
+            }
+        }
+        held.retain(|m| gives.contains(m) || gains.contains(m));
+        !held.is_empty() && held.iter().all(|m| gives.contains(m) != gains.contains(m))
     }
 
     /// Of several things of which the same is asked, those for which it does not hold, or may not.
@@ -268,7 +302,8 @@ impl Flow<'_, '_> {
         let d = self.at_site(codes::JOB_NOT_BEGUN, headline, "nothing to wait for: fails with `job`".to_string(), some);
         let about = d.span();
         let d = d.help(format!("start `{job}` on every way that leads here, or wait for it where it was started"));
-        self.found_on(d, about, open);
+        let turn = self.turning > 0;
+        self.found_on(d, about, open, turn);
     }
 
     /// Which species a condition wants more of than none, where nothing brings or makes any.

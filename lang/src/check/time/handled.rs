@@ -20,7 +20,7 @@ fn handled_but<'p>(plan: &'p Plan, timing: &Timing, step: StepId, failure: &str,
             Step::Guarded { body, handlers, .. } if *body == inner => {
                 let mut lasting = handlers.iter().filter(|(_, handler)| !leaves(plan, *handler)).peekable();
                 lasting.peek().is_some() && {
-                    let raised = raised(plan, *body, false, &BTreeSet::new());
+                    let raised = raised(plan, *body, false);
                     lasting.any(|(caught, _)| match caught {
                         Caught::Any => true,
                         Caught::Named(name) => name == failure || raised.contains(name),

@@ -44,6 +44,10 @@ impl Backend for Hardware<'_, '_> {
         self.twin.limit(limit, condition, out)
     }
 
+    fn broken(&self) -> Vec<u32> {
+        self.twin.broken()
+    }
+
     fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
         self.twin.decide(limit)
     }

@@ -70,6 +70,10 @@ impl Backend for Paced<'_, '_, '_> {
         self.inner.limit(limit, condition, out)
     }
 
+    fn broken(&self) -> Vec<u32> {
+        self.inner.broken()
+    }
+
     fn decide(&self, limit: u32) -> Vec<Vec<u32>> {
         self.inner.decide(limit)
     }
