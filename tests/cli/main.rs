@@ -32,6 +32,7 @@ mod meshes;
 mod motion;
 mod mutants;
 mod new;
+mod numerics;
 mod offers;
 mod open;
 mod orders;

@@ -116,12 +116,14 @@ impl Flow<'_, '_> {
     /// Time passes; what moves is known within bounds, whether it moves evenly or not.
     pub(super) fn drift(&mut self, duration: &Known, facts: &mut Facts) {
         let (_, longest) = duration.bounds();
-        facts.time = Known::binary(BinaryOp::Add, &facts.time, duration);
+        let before = facts.time.clone();
+        facts.time = Known::binary(BinaryOp::Add, &before, duration);
+        let span = Known::Range(before.bounds().0, facts.time.bounds().1, Why::Unknown);
         facts.reopen(|s| self.lab.rates.contains_key(&s));
         let mut timed = self.timed.clone();
         for _ in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();
-            let moved = self.flow_on(longest, facts);
+            let moved = self.flow_through(longest, &span, facts);
             if changed || !moved.is_empty() {
                 self.note_processes(facts);
             }
@@ -129,6 +131,7 @@ impl Flow<'_, '_> {
             due.append(&mut timed);
             let mut recurring = due.clone();
             self.fire(due, facts);
+            self.fire_between(&span, facts);
             recurring.sort_unstable();
             recurring.dedup();
             self.recur(&recurring, facts);
@@ -181,6 +184,38 @@ impl Flow<'_, '_> {
         };
         let states: Vec<u32> = changed.into_iter().filter(grows).collect();
         Some(states).filter(|states| !states.is_empty())
+    }
+
+    /// The same while the time itself, which some laws follow, lies within `span`.
+    fn flow_through(&mut self, longest: f64, span: &Known, facts: &mut Facts) -> Vec<u32> {
+        if self.clocked.is_empty() {
+            return self.flow_on(longest, facts);
+        }
+        // What holds for this span need not hold for the next.
+        facts.barrier = None;
+        facts.unsettled.extend(&self.clocked);
+        let after = std::mem::replace(&mut facts.time, span.clone());
+        let moved = self.flow_on(longest, facts);
+        (facts.time, facts.barrier) = (after, None);
+        moved
+    }
+
+    /// Events of the time that may have come about and be over at the end of `span`.
+    fn fire_between(&mut self, span: &Known, facts: &mut Facts) {
+        for event in self.timed.clone() {
+            let when = self.events[event as usize].when;
+            if self.eval(when, facts).truth() != Some(false) {
+                continue;
+            }
+            let after = std::mem::replace(&mut facts.time, span.clone());
+            let within = self.eval(when, facts).truth();
+            facts.time = after;
+            if within.is_none() {
+                let untouched = facts.clone();
+                self.happen(event, facts);
+                *facts = untouched.clone().join(facts.clone(), &untouched, self.site(), Why::Unknown);
+            }
+        }
     }
 
     /// Lets the laws act for at most `longest` s; the states that are no longer what they were.

@@ -109,6 +109,8 @@ struct Flow<'l, 'a> {
     presumed_of: BTreeMap<u32, Vec<NodeId>>,
     /// Events that depend on time.
     timed: Vec<u32>,
+    /// Derivatives that depend on the time itself.
+    clocked: Vec<u32>,
     /// States that are amounts of species.
     amounts: BTreeSet<u32>,
     /// What is known of the conditions of reactions.
@@ -246,6 +248,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             limits_of: BTreeMap::new(),
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
+            clocked: Vec::new(),
             amounts: lab.extensive.iter().filter(|(k, _)| k.species.is_some()).map(|(_, s)| *s).collect(),
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
@@ -277,6 +280,9 @@ impl<'l, 'a> Flow<'l, 'a> {
             notes: None,
         };
         for (i, d) in derivatives.iter().enumerate() {
+            if lab.graph.leaves(d.rate).meets(matterix_ir::Leaves::TIME) {
+                flow.clocked.push(i as u32);
+            }
             for state in flow.parts(d.rate).states.clone() {
                 flow.rates_of.entry(state).or_default().push(i as u32);
             }

@@ -1,0 +1,51 @@
+//! Numbers of the twin that are known in closed form, at every size and however short a time they last.
+
+use crate::harness::{matterixc, root};
+
+fn run(case: &str, workflow: &str) -> (i32, String) {
+    let file = root().join("tests/cases/numerics").join(case);
+    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow]);
+    (ran.code, format!("{}{}", ran.out, ran.err))
+}
+
+fn pass(case: &str, workflows: &[&str]) {
+    for workflow in workflows {
+        let (code, text) = run(case, workflow);
+        assert_eq!(code, 0, "{case} {workflow}: {text}");
+    }
+}
+
+#[test]
+fn states_of_any_size_are_followed() {
+    pass("sizes.mtx", &["decays_and_feeds", "swings", "grows", "reacts_in_femtomoles"]);
+}
+
+#[test]
+fn what_lasts_a_moment_is_not_stepped_over() {
+    pass("moments.mtx", &["counts_crests", "sees_a_pulse"]);
+}
+
+#[test]
+fn short_waits_add_up_exactly() {
+    pass("moments.mtx", &["adds_up_waits"]);
+}
+
+#[test]
+fn a_salt_of_the_library_precipitates_and_dissolves() {
+    pass("precipitation.mtx", &["precipitates", "dissolves"]);
+}
+
+#[test]
+fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
+    let (code, text) = run("runs_dry.mtx", "w");
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("error[transfer-fraction]: `flow(f)` takes more than there is"), "{text}");
+    assert!(text.contains("at 12.0"), "{text}");
+}
+
+#[test]
+fn what_a_feed_of_microlitres_comes_to_is_known_beforehand() {
+    let file = root().join("tests/cases/numerics/sizes.mtx");
+    let checked = matterixc(&["check", "--contents", file.to_str().expect("text")]);
+    assert!(checked.out.contains("fed 0 .. 30.5 uL"), "{}{}", checked.out, checked.err);
+}
