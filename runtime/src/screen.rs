@@ -68,6 +68,8 @@ pub struct Screen<'p> {
     met: BTreeSet<(usize, &'p str)>,
     /// Which dangers were there when last looked at.
     there: Vec<bool>,
+    /// Whether anything it watches for is an error.
+    is_grave: bool,
     /// The states that each danger depends on.
     read: OnceCell<Vec<BTreeSet<u32>>>,
     /// Steps around each step.
@@ -100,6 +102,9 @@ impl<'p> Screen<'p> {
                 pairs.push((index, found));
             }
         }
+        let mut severities = pairs.iter().flat_map(|(_, p)| p).map(|p| p.incompatible.severity);
+        let is_grave = severities.any(|s| s == Severity::Error)
+            || model.dangers.iter().any(|danger| danger.severity == Severity::Error);
         let mut above = BTreeMap::new();
         for (id, step) in program.plan.steps.iter().enumerate() {
             above.extend(step.step.children().into_iter().map(|child| (child, StepId(id as u32))));
@@ -109,6 +114,7 @@ impl<'p> Screen<'p> {
             pairs,
             met: BTreeSet::new(),
             there: vec![false; model.dangers.len()],
+            is_grave,
             read: OnceCell::new(),
             above,
             going: Vec::new(),
@@ -233,6 +239,9 @@ impl<'p> Screen<'p> {
 
     /// The first error that an operation would bring about.
     fn would(&self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
+        if !self.is_grave {
+            return None;
+        }
         let (states, changed) = Self::after(engine, operation)?;
         let model = &self.program.model;
         let label = &self.program.plan.get(step).label;
