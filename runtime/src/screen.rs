@@ -1,15 +1,19 @@
 //! What a run watches its mixtures and devices for: species that should not meet, hazards and cautions, on actual contents and
 //! temperatures. A screen looks on; it changes nothing of the run.
 
+mod condition;
+
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Action, Incompatible};
+use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::values::Formulas;
 use matterix_ir::{Diagnostic, Program, Severity, Span, codes};
 use serde::Serialize;
 
 use crate::exec::{Listener, OperationState, StepState};
 use crate::process::{Engine, Observer};
+use condition::Condition;
 
 /// Less of a species, mol per kg of mixture, is what equilibria and rounding leave, and counts as none.
 const TRACE: f64 = 1e-6;
@@ -60,8 +64,10 @@ pub(crate) struct Screen<'p> {
     pairs: Vec<(usize, Vec<Pair<'p>>)>,
     /// What is told already, by mixture and consequence.
     told: BTreeSet<(usize, &'p str)>,
-    /// Which dangers were there when last looked at.
-    there: Vec<bool>,
+    /// The conditions of dangers, and whether each held when last looked at.
+    dangers: Vec<(Condition, bool)>,
+    /// Room for values.
+    room: Vec<f64>,
     /// Steps around each step.
     above: BTreeMap<StepId, StepId>,
     /// Operations that go on, the latest last.
@@ -89,6 +95,9 @@ impl<'p> Screen<'p> {
                 pairs.push((index, found));
             }
         }
+        let mut formulas = Formulas::default();
+        let condition = |danger: &Danger| (Condition::new(&model.graph, &mut formulas, danger.when), false);
+        let dangers = model.dangers.iter().map(condition).collect();
         let mut above = BTreeMap::new();
         for (id, step) in program.plan.steps.iter().enumerate() {
             above.extend(step.step.children().into_iter().map(|child| (child, StepId(id as u32))));
@@ -97,7 +106,8 @@ impl<'p> Screen<'p> {
             program,
             pairs,
             told: BTreeSet::new(),
-            there: vec![false; model.dangers.len()],
+            dangers,
+            room: Vec::new(),
             above,
             going: Vec::new(),
             last: None,
@@ -107,7 +117,7 @@ impl<'p> Screen<'p> {
 
     /// Whether there is nothing to watch for.
     pub(crate) fn is_idle(&self) -> bool {
-        self.pairs.is_empty() && self.there.is_empty()
+        self.pairs.is_empty() && self.dangers.is_empty()
     }
 
     /// The statement of the user's that has to do with a mixture now, or with anything.
@@ -151,10 +161,10 @@ impl<'p> Screen<'p> {
             let diagnostic = self.incompatible(*mixture, pair.incompatible, place);
             self.found.push(Finding { time, diagnostic });
         }
-        for index in 0..self.there.len() {
-            let danger = &self.program.model.dangers[index];
-            let now = engine.truth(danger.when);
-            let before = std::mem::replace(&mut self.there[index], now);
+        for (index, danger) in self.program.model.dangers.iter().enumerate() {
+            let (condition, there) = &mut self.dangers[index];
+            let now = condition.holds(engine, &mut self.room);
+            let before = std::mem::replace(there, now);
             let known = || self.found.iter().any(|f| f.diagnostic.headline == danger.headline);
             if !now || before || known() {
                 continue;
