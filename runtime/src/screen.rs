@@ -2,17 +2,21 @@
 //! temperatures. A warning is kept as a finding, an error raises an alarm: before an operation that would bring it about at one
 //! stroke, or as soon as it is there.
 
+mod condition;
+
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::values::Formulas;
 use matterix_ir::{Diagnostic, Op, Program, Severity, Span, codes};
 use serde::Serialize;
 
 use crate::exec::{Alarm, Listener, OperationState, StepState};
 use crate::ledger::transfer;
 use crate::process::{Engine, Observer};
+use condition::Condition;
 
 /// Less of a species, mol per kg of mixture, is what equilibria and rounding leave, and counts as none.
 const TRACE: f64 = 1e-6;
@@ -66,12 +70,16 @@ pub struct Screen<'p> {
     pairs: Vec<(usize, Vec<Pair<'p>>)>,
     /// Which of them have met, by mixture and consequence.
     met: BTreeSet<(usize, &'p str)>,
-    /// Which dangers were there when last looked at.
+    /// The conditions of dangers.
+    conditions: Vec<Condition>,
+    /// Which of them held when last looked at.
     there: Vec<bool>,
     /// Whether anything it watches for is an error.
     is_grave: bool,
     /// The states that each danger depends on.
     read: OnceCell<Vec<BTreeSet<u32>>>,
+    /// Room for values.
+    room: Vec<f64>,
     /// Steps around each step.
     above: BTreeMap<StepId, StepId>,
     /// Operations that go on, the latest last.
@@ -105,6 +113,9 @@ impl<'p> Screen<'p> {
         let mut severities = pairs.iter().flat_map(|(_, p)| p).map(|p| p.incompatible.severity);
         let is_grave = severities.any(|s| s == Severity::Error)
             || model.dangers.iter().any(|danger| danger.severity == Severity::Error);
+        let mut formulas = Formulas::default();
+        let condition = |danger: &Danger| Condition::new(&model.graph, &mut formulas, danger.when);
+        let conditions = model.dangers.iter().map(condition).collect();
         let mut above = BTreeMap::new();
         for (id, step) in program.plan.steps.iter().enumerate() {
             above.extend(step.step.children().into_iter().map(|child| (child, StepId(id as u32))));
@@ -113,9 +124,11 @@ impl<'p> Screen<'p> {
             program,
             pairs,
             met: BTreeSet::new(),
+            conditions,
             there: vec![false; model.dangers.len()],
             is_grave,
             read: OnceCell::new(),
+            room: Vec::new(),
             above,
             going: Vec::new(),
             last: None,
@@ -205,7 +218,7 @@ impl<'p> Screen<'p> {
         self.pairs = pairs;
         let program = self.program;
         for (index, danger) in program.model.dangers.iter().enumerate() {
-            let now = engine.truth(danger.when);
+            let now = self.conditions[index].holds(engine, &mut self.room);
             if !std::mem::replace(&mut self.there[index], now) && now {
                 let step = self.operation_at(None);
                 let found = self.danger(danger, step);

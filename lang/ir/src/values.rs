@@ -77,6 +77,11 @@ impl Formulas {
 }
 
 impl Formula {
+    /// Its operations, operands first.
+    pub fn ops(&self) -> &[Op] {
+        &self.0
+    }
+
     /// Its value by some rules; `room` is for values in between, and may be kept from one question to the next.
     pub fn value<R: Rules>(&self, rules: &R, room: &mut Vec<R::Value>) -> Option<R::Value> {
         room.clear();

@@ -215,13 +215,16 @@ impl<'a> Tables<'a> {
 
     /// The members that no more derived capability declares again.
     pub fn visible(&self, members: Vec<MemberRef<'a>>) -> Vec<MemberRef<'a>> {
+        let mut alike: FxHashMap<&str, Vec<DeclId>> = FxHashMap::default();
+        for member in &members {
+            if let Some(name) = member_name(member.member) {
+                alike.entry(&name.text).or_default().push(member.owner);
+            }
+        }
         let hidden = |m: &MemberRef<'a>| {
-            let Some(name) = member_name(m.member) else { return false };
-            members.iter().any(|o| {
-                o.owner != m.owner
-                    && member_name(o.member).is_some_and(|n| n.text == name.text)
-                    && self.kinds.get(&o.owner).is_some_and(|k| k.has(m.owner))
-            })
+            let others = member_name(m.member).and_then(|name| alike.get(name.text.as_str()));
+            let hides = |o: &DeclId| *o != m.owner && self.kinds.get(o).is_some_and(|k| k.has(m.owner));
+            others.is_some_and(|owners| owners.iter().any(hides))
         };
         members.iter().filter(|m| !hidden(m)).copied().collect()
     }

@@ -3,7 +3,7 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
-use super::{Num, Scope, Type, Value};
+use super::{Num, ReactionId, Scope, SpeciesId, Type, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
 use crate::elaborate::{Elaborator, Pair};
 use crate::names::{DeclId, near};
@@ -17,6 +17,10 @@ pub type KnownCall = (DeclId, Vec<KnownArgument>, usize, bool, bool);
 pub enum KnownArgument {
     /// An instance.
     Instance(InstanceId),
+    /// A species.
+    Species(SpeciesId),
+    /// A reaction.
+    Reaction(ReactionId),
     /// A list of so many, which follow.
     List(usize),
     /// A number that the run does not change, with its dimension, whether it is a point or one literal, and the unit it is shown in.
@@ -146,8 +150,8 @@ impl<'a> Elaborator<'a> {
         known(false) || known(true)
     }
 
-    /// What a call is remembered by: a function of instances and lists of them alone always gives the same node, and so does one of
-    /// numbers that the run does not change.
+    /// What a call is remembered by: a function of instances, species, reactions and lists of them always gives the same node, and so
+    /// does one of numbers that the run does not change.
     fn remembered_call(&self, id: DeclId, values: &[Value]) -> Option<KnownCall> {
         if self.rate_prefix.is_some() {
             return None;
@@ -156,9 +160,24 @@ impl<'a> Elaborator<'a> {
         let all = match values.first() {
             None => !self.prototype,
             Some(Value::Num(_)) => values.iter().all(|value| self.steady_number(value, &mut known)),
-            _ => !self.prototype && values.iter().all(|value| only_instances(value, &mut known)),
+            _ => !self.prototype && values.iter().all(|value| self.is_steady(value, &mut known)),
         };
         all.then_some((id, known, self.instances.len(), self.initial_mode, self.readings_live))
+    }
+
+    /// Notes something that the run does not change; false for anything else.
+    fn is_steady(&self, value: &Value, out: &mut Vec<KnownArgument>) -> bool {
+        match value {
+            Value::Instance(id) => out.push(KnownArgument::Instance(*id)),
+            Value::Species(id) => out.push(KnownArgument::Species(*id)),
+            Value::Reaction(id) => out.push(KnownArgument::Reaction(*id)),
+            Value::List(items) => {
+                out.push(KnownArgument::List(items.len()));
+                return items.iter().all(|item| self.is_steady(item, out));
+            }
+            other => return self.steady_number(other, out),
+        }
+        true
     }
 
     /// Notes a number that the run does not change; false for anything else.
@@ -396,17 +415,4 @@ impl<'a> Elaborator<'a> {
             Type::Instance { kinds, .. } => Value::Instance(self.prototype_of(kinds.to_vec(), name)),
         }
     }
-}
-
-/// Notes the instances that a value is made of; false where it is made of anything else too.
-fn only_instances(value: &Value, out: &mut Vec<KnownArgument>) -> bool {
-    match value {
-        Value::Instance(id) => out.push(KnownArgument::Instance(*id)),
-        Value::List(items) => {
-            out.push(KnownArgument::List(items.len()));
-            return items.iter().all(|item| only_instances(item, out));
-        }
-        _ => return false,
-    }
-    true
 }

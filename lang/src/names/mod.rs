@@ -55,6 +55,7 @@ pub struct Names<'a> {
     pub decls: Vec<Decl<'a>>,
     /// What every module sees without an import.
     prelude: BTreeMap<Arc<str>, DeclId>,
+    /// What each module sees besides.
     scopes: Vec<BTreeMap<Arc<str>, DeclId>>,
     own: Vec<BTreeMap<Arc<str>, DeclId>>,
 }
@@ -236,10 +237,9 @@ impl<'a> Names<'a> {
             let own = names.collect(index, module, &mut diagnostics);
             names.own.push(own);
         }
-        let prelude = names.prelude();
-        names.prelude.clone_from(&prelude);
+        names.prelude = names.prelude();
         for (index, module) in modules.iter().enumerate() {
-            let mut scope = prelude.clone();
+            let mut scope = BTreeMap::new();
             names.import(module, &mut scope, &mut diagnostics);
             scope.extend(names.own[index].iter().map(|(k, v)| (k.clone(), *v)));
             names.scopes.push(scope);
@@ -375,7 +375,7 @@ impl<'a> Names<'a> {
 
     /// What `name` stands for in a module.
     pub fn lookup(&self, module: usize, name: &str) -> Option<DeclId> {
-        self.scopes[module].get(name).copied()
+        self.scopes[module].get(name).or_else(|| self.prelude.get(name)).copied()
     }
 
     /// What `name` of the library stands for where an import hides what every module sees.
@@ -387,12 +387,22 @@ impl<'a> Names<'a> {
 
     /// What the names that each module sees stand for.
     pub fn into_scopes(self) -> Vec<BTreeMap<Arc<str>, DeclId>> {
-        self.scopes
+        let Names { scopes, prelude, .. } = self;
+        let whole = |scope: BTreeMap<Arc<str>, DeclId>| {
+            let mut all = prelude.clone();
+            all.extend(scope);
+            all
+        };
+        scopes.into_iter().map(whole).collect()
     }
 
-    /// Everything a module sees.
+    /// Everything a module sees, in order of name.
     pub fn visible(&self, module: usize) -> impl Iterator<Item = (&str, DeclId)> {
-        self.scopes[module].iter().map(|(k, v)| (&**k, *v))
+        let scope = &self.scopes[module];
+        let shared = self.prelude.iter().filter(|(name, _)| !scope.contains_key(*name));
+        let mut all: Vec<(&str, DeclId)> = scope.iter().chain(shared).map(|(k, v)| (&**k, *v)).collect();
+        all.sort_unstable_by(|a, b| a.0.cmp(b.0));
+        all.into_iter()
     }
 
     /// What a module itself declares, in the order of its text.

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::graph::{Env, eval_op};
+use matterix_ir::graph::{Env, binary, eval_op, unary};
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
 use super::tape::{Step, Tape, Term};
@@ -29,6 +29,15 @@ struct Fact {
     feels_state: bool,
     /// The operation whose value it passes on, itself if none.
     same: u32,
+}
+
+impl Fact {
+    /// Takes in that the operation has this operand.
+    fn rest_on(&mut self, operand: Fact) {
+        self.varies |= operand.varies;
+        self.feels_time |= operand.feels_time;
+        self.feels_state |= operand.feels_state;
+    }
 }
 
 /// A number that follows time and nothing else: `rate * time + offset`.
@@ -62,25 +71,18 @@ impl<'g> Analysis<'g> {
 
     fn look(&self, node: NodeId, env: Env<'_>, moving: &[bool]) -> Fact {
         let op = self.graph.op(node);
-        let mut list = [Fact::default(); 3];
-        let mut count = 0;
-        for operand in op.operands() {
-            list[count] = self.fact(operand);
-            count += 1;
-        }
-        let operands = &list[..count];
-        let mut fact = Fact {
-            now: 0.0,
-            varies: operands.iter().any(|f| f.varies),
-            feels_time: operands.iter().any(|f| f.feels_time),
-            feels_state: operands.iter().any(|f| f.feels_state),
-            same: node.0,
-        };
+        let mut fact = Fact { same: node.0, ..Fact::default() };
         match op {
             Op::Time => (fact.varies, fact.feels_time) = (true, true),
             Op::State(s) if moving[s as usize] => (fact.varies, fact.feels_state) = (true, true),
-            _ if op.is_comparison() => fact.varies = false,
-            Op::Binary(kind, ..) if decided(kind, operands) => fact.varies = false,
+            Op::Unary(_, a) => fact.rest_on(self.fact(a)),
+            Op::Binary(kind, a, b) => {
+                let (a, b) = (self.fact(a), self.fact(b));
+                fact.rest_on(a);
+                fact.rest_on(b);
+                fact.varies &= !op.is_comparison() && !decided(kind, a) && !decided(kind, b);
+            }
+            Op::Select(c, a, b) => [c, a, b].into_iter().for_each(|operand| fact.rest_on(self.fact(operand))),
             _ => {}
         }
         if let Some(other) = self.passes_on(op) {
@@ -88,12 +90,13 @@ impl<'g> Analysis<'g> {
             (fact.now, fact.varies, fact.same) = (other.now, other.varies, other.same);
             return fact;
         }
-        fact.now = match (op, operands) {
-            (Op::Unary(..), [a]) => eval_op(renumbered(op), env, &[a.now]),
-            (Op::Binary(BinaryOp::Mul, ..), list) if !fact.varies && list.iter().any(|f| f.varies) => 0.0,
-            (Op::Binary(..), [a, b]) => eval_op(renumbered(op), env, &[a.now, b.now]),
-            (Op::Select(..), [a, b, c]) => eval_op(renumbered(op), env, &[a.now, b.now, c.now]),
-            _ => eval_op(op, env, &[]),
+        let settled = |a: NodeId, b: NodeId| !fact.varies && (self.fact(a).varies || self.fact(b).varies);
+        fact.now = match op {
+            Op::Unary(kind, a) => unary(kind, self.now(a)),
+            Op::Binary(BinaryOp::Mul, a, b) if settled(a, b) => 0.0,
+            Op::Binary(kind, a, b) => binary(kind, self.now(a), self.now(b)),
+            Op::Select(c, a, b) => self.now(if self.now(c) != 0.0 { a } else { b }),
+            leaf => eval_op(leaf, env, &[]),
         };
         fact
     }
@@ -129,25 +132,26 @@ impl<'g> Analysis<'g> {
     /// The comparisons that may change and whose change `roots` would notice, in order.
     pub(super) fn switches(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
         let mut reached = vec![false; self.facts.len()];
+        let mut found = Vec::new();
         let mut todo: Vec<NodeId> = roots.into_iter().collect();
         while let Some(node) = todo.pop() {
             let fact = self.fact(node);
-            if reached[node.0 as usize] || !(fact.feels_time || fact.feels_state) {
+            if !(fact.feels_time || fact.feels_state) || std::mem::replace(&mut reached[node.0 as usize], true) {
                 continue;
             }
-            reached[node.0 as usize] = true;
+            found.extend(Some(node).filter(|n| self.graph.op(*n).is_comparison()));
             self.influences(node, &mut todo);
         }
-        let found = (0..reached.len()).filter(|&i| reached[i]).map(|i| NodeId(i as u32));
-        found.filter(|&n| self.graph.op(n).is_comparison()).collect()
+        found.sort_unstable();
+        found
     }
 
     /// The operands that can change `node` while the others stay: what a false condition hides is left out.
     fn influences(&self, node: NodeId, out: &mut Vec<NodeId>) {
         match self.graph.op(node) {
             Op::Select(c, a, b) if !self.fact(c).varies => out.extend([c, if self.now(c) != 0.0 { a } else { b }]),
-            Op::Binary(kind, a, _) if decided(kind, &[self.fact(a)]) => out.push(a),
-            Op::Binary(kind, _, b) if decided(kind, &[self.fact(b)]) => out.push(b),
+            Op::Binary(kind, a, _) if decided(kind, self.fact(a)) => out.push(a),
+            Op::Binary(kind, _, b) if decided(kind, self.fact(b)) => out.push(b),
             op => out.extend(op.operands()),
         }
     }
@@ -258,27 +262,17 @@ impl<'g> Analysis<'g> {
     /// The tape that computes `outputs`; `moving` lists the moving states in the order of its inputs.
     pub(super) fn tape(&self, outputs: &[NodeId], moving: &[u32]) -> Tape {
         let same = |n: NodeId| self.fact(n).same as usize;
-        let mut needed = vec![false; self.facts.len()];
-        for &output in outputs {
-            needed[same(output)] = true;
-        }
-        for i in (0..needed.len()).rev() {
-            if needed[i] && self.facts[i].varies {
-                for operand in self.graph.op(NodeId(i as u32)).operands() {
-                    needed[same(operand)] = true;
-                }
-            }
-        }
+        let needed = self.needed(outputs);
         let mut tape = Tape { inputs: moving.len(), ..Tape::default() };
         let mut place = vec![0u32; self.facts.len()];
         let mut known = BTreeMap::new();
-        for i in (0..needed.len()).filter(|&i| needed[i] && !self.facts[i].varies) {
+        for i in needed.iter().copied().filter(|&i| !self.facts[i].varies) {
             place[i] = *known.entry(self.facts[i].now.to_bits()).or_insert_with(|| {
                 tape.constants.push(self.facts[i].now);
                 tape.constants.len() as u32 - 1
             });
         }
-        for i in (0..needed.len()).filter(|&i| needed[i] && self.facts[i].varies) {
+        for i in needed.into_iter().filter(|&i| self.facts[i].varies) {
             let at = |n: NodeId| place[same(n)];
             let step = match self.graph.op(NodeId(i as u32)) {
                 Op::Unary(op, a) => Step::Unary(op, at(a)),
@@ -300,26 +294,33 @@ impl<'g> Analysis<'g> {
         tape.outputs = outputs.iter().map(|&n| place[same(n)]).collect();
         tape
     }
-}
 
-/// Whether one of the operands alone settles the result for the segment.
-fn decided(kind: BinaryOp, operands: &[Fact]) -> bool {
-    operands.iter().any(|f| {
-        !f.varies
-            && match kind {
-                BinaryOp::And | BinaryOp::Mul => f.now == 0.0,
-                BinaryOp::Or => f.now != 0.0,
-                _ => false,
+    /// The operations that `outputs` are computed from, by index, in order.
+    fn needed(&self, outputs: &[NodeId]) -> Vec<usize> {
+        let same = |n: NodeId| self.fact(n).same as usize;
+        let mut marked = vec![false; self.facts.len()];
+        let mut needed = Vec::new();
+        let mut todo: Vec<usize> = outputs.iter().map(|&n| same(n)).collect();
+        while let Some(i) = todo.pop() {
+            if std::mem::replace(&mut marked[i], true) {
+                continue;
             }
-    })
+            needed.push(i);
+            if self.facts[i].varies {
+                todo.extend(self.graph.op(NodeId(i as u32)).operands().map(same));
+            }
+        }
+        needed.sort_unstable();
+        needed
+    }
 }
 
-/// The same operation on operands 0, 1, 2.
-fn renumbered(op: Op) -> Op {
-    match op {
-        Op::Unary(o, _) => Op::Unary(o, NodeId(0)),
-        Op::Binary(o, ..) => Op::Binary(o, NodeId(0), NodeId(1)),
-        Op::Select(..) => Op::Select(NodeId(0), NodeId(1), NodeId(2)),
-        leaf => leaf,
-    }
+/// Whether an operand alone settles the result for the segment.
+fn decided(kind: BinaryOp, operand: Fact) -> bool {
+    !operand.varies
+        && match kind {
+            BinaryOp::And | BinaryOp::Mul => operand.now == 0.0,
+            BinaryOp::Or => operand.now != 0.0,
+            _ => false,
+        }
 }

@@ -2,7 +2,7 @@
 //! deck with hundreds of wells a step changes two.
 
 use matterix_ir::graph::{Env, eval_op};
-use matterix_ir::{Graph, NodeId};
+use matterix_ir::{Graph, NodeId, Op};
 
 /// Remembers values until [`Memo::forget`].
 #[derive(Clone, Debug, Default)]
@@ -10,7 +10,7 @@ pub(super) struct Memo {
     values: Vec<f64>,
     /// Whether the value is that of the present leaves. Whoever uses an unknown value is unknown, or pinned.
     known: Vec<bool>,
-    /// Operations without operands.
+    /// Operations without operands whose value can change.
     leaves: Vec<NodeId>,
     /// Who uses an operation: `users[first[n] .. first[n + 1]]`.
     first: Vec<u32>,
@@ -44,7 +44,8 @@ impl Memo {
                 *slot += 1;
             }
         }
-        let leaves = (0..size as u32).map(NodeId).filter(|n| graph.op(*n).operands().next().is_none()).collect();
+        let changes = |n: &NodeId| matches!(graph.op(*n), Op::Time | Op::State(_) | Op::Local(_) | Op::Reading(_));
+        let leaves = (0..size as u32).map(NodeId).filter(changes).collect();
         let (values, known, is_pinned) = (vec![0.0; size], vec![false; size], vec![false; size]);
         let (pinned, todo) = (Vec::new(), Vec::new());
         Memo { values, known, leaves, first, users, pinned, is_pinned, stale: true, todo }

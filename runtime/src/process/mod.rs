@@ -35,9 +35,9 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use matterix_ir::graph::Env;
+use matterix_ir::graph::{Env, eval_op};
 use matterix_ir::model::{Action, Balance, Doubt, Model};
-use matterix_ir::{NodeId, codes};
+use matterix_ir::{NodeId, Op, codes};
 
 use crate::fault::Fault;
 pub use crate::ledger::BalanceReport;
@@ -246,6 +246,16 @@ impl<'m> Engine<'m> {
     /// The value of `node` now if the values of the plan were these.
     pub fn eval_kept(&self, node: NodeId, locals: &[f64]) -> f64 {
         self.model.graph.eval(node, Env { locals, ..self.env() })
+    }
+
+    /// The value of an operation without operands now.
+    pub(crate) fn leaf(&self, op: Op) -> f64 {
+        eval_op(op, self.env(), &[])
+    }
+
+    /// Whether an equality is true now that is true at this instant only.
+    pub(crate) fn is_touching(&self) -> bool {
+        !self.touches.is_empty()
     }
 
     /// Whether `node` is not 0 now.

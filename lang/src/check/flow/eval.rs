@@ -7,6 +7,7 @@ use matterix_ir::graph::unary;
 use matterix_ir::values::Rules;
 use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 
+use super::bonds::Bonds;
 use super::facts::{Decided, Facts};
 use super::value::{Known, Why};
 use super::{Flow, Raised};
@@ -89,6 +90,15 @@ impl Rules for Supposed<'_> {
     }
 }
 
+/// A sum of states that may hang together, as it was done last.
+#[derive(Debug)]
+pub struct Sum {
+    /// The operations without operands that it rests on.
+    leaves: Rc<[NodeId]>,
+    /// How states hung together then. It is kept, so that no other one is taken for it.
+    bonds: Option<Rc<Bonds>>,
+}
+
 /// Values of operations as they were when they were done last, and when that was.
 #[derive(Debug)]
 pub struct Values {
@@ -111,6 +121,11 @@ impl Values {
         &self.known[node.0 as usize]
     }
 
+    /// Whether an operation was done at all.
+    fn is_done(&self, node: NodeId) -> bool {
+        self.done[node.0 as usize] != 0
+    }
+
     /// Takes in what an operation without operands is.
     fn leaf(&mut self, node: NodeId, value: &Known) {
         let at = node.0 as usize;
@@ -119,15 +134,27 @@ impl Values {
         }
     }
 
-    /// Does an operation if one of its operands has changed since.
-    fn result<const N: usize>(&mut self, node: NodeId, on: [NodeId; N], how: impl FnOnce([&Known; N]) -> Known) {
+    /// Does an operation, by the values of all, if one of its operands has changed since.
+    fn result<const N: usize>(&mut self, node: NodeId, on: [NodeId; N], how: impl FnOnce(&[Known]) -> Known) {
         let at = node.0 as usize;
         let done = self.done[at];
         if done != 0 && on.iter().all(|a| self.changed[a.0 as usize] <= done) {
             return;
         }
-        let value = how(on.map(|a| &self.known[a.0 as usize]));
-        if done != 0 && self.known[at].is(&value) {
+        let value = how(&self.known);
+        self.redo(node, value);
+    }
+
+    /// Whether one of the operations that an operation rests on has become another one since it was done.
+    fn is_stale(&self, node: NodeId, on: &[NodeId]) -> bool {
+        let done = self.done[node.0 as usize];
+        done == 0 || on.iter().any(|a| self.changed[a.0 as usize] > done)
+    }
+
+    /// Takes in the value of an operation that was done again.
+    fn redo(&mut self, node: NodeId, value: Known) {
+        let at = node.0 as usize;
+        if self.done[at] != 0 && self.known[at].is(&value) {
             self.now += 1;
             self.done[at] = self.now;
         } else {
@@ -264,6 +291,7 @@ impl Flow<'_, '_> {
     fn work_out(&mut self, order: &[NodeId], facts: &Facts) {
         for n in order {
             match self.lab.graph.op(*n) {
+                Op::Const(_) if self.values.is_done(*n) => {}
                 Op::Const(v) => self.values.leaf(*n, &Known::point(v)),
                 Op::Time => self.values.leaf(*n, &facts.time),
                 Op::State(i) => self.values.leaf(*n, &facts.states[i as usize]),
@@ -273,18 +301,46 @@ impl Flow<'_, '_> {
                     let value = self.reading(i, facts);
                     self.values.leaf(*n, &value);
                 }
-                Op::Unary(op, a) => self.values.result(*n, [a], |[a]| Known::unary(op, a)),
+                Op::Unary(op, a) => self.values.result(*n, [a], |known| Known::unary(op, &known[a.0 as usize])),
                 Op::Binary(BinaryOp::Eq, a, b) if a == b => self.values.leaf(*n, &Known::Point(1.0)),
                 // What is known of a sum hangs on more than what is known of its parts.
                 Op::Binary(op @ (BinaryOp::Add | BinaryOp::Sub), a, b) if self.is_outer_sum(*n) => {
-                    let apart = Known::binary(op, self.values.of(a), self.values.of(b));
-                    let known = self.together(*n, apart, facts);
-                    self.values.leaf(*n, &known);
+                    self.outer_sum(*n, op, [a, b], facts);
                 }
-                Op::Binary(op, a, b) => self.values.result(*n, [a, b], |[a, b]| Known::binary(op, a, b)),
-                Op::Select(c, a, b) => self.values.result(*n, [c, a, b], |[c, a, b]| Known::select(c, a, b)),
+                Op::Binary(op, a, b) => self
+                    .values
+                    .result(*n, [a, b], |known| Known::binary(op, &known[a.0 as usize], &known[b.0 as usize])),
+                Op::Select(c, a, b) => self.values.result(*n, [c, a, b], |known| {
+                    Known::select(&known[c.0 as usize], &known[a.0 as usize], &known[b.0 as usize])
+                }),
             }
         }
+    }
+
+    /// Does a sum of states that may hang together if one of them or how they hang together has changed since.
+    fn outer_sum(&mut self, node: NodeId, op: BinaryOp, [a, b]: [NodeId; 2], facts: &Facts) {
+        let same = |bonds: &Option<Rc<Bonds>>| match (bonds, &facts.bonds) {
+            (None, None) => true,
+            (Some(one), Some(other)) => Rc::ptr_eq(one, other),
+            _ => false,
+        };
+        let sum = match self.sums.remove(&node) {
+            Some(sum) if same(&sum.bonds) && !self.values.is_stale(node, &sum.leaves) => sum,
+            known => {
+                let apart = Known::binary(op, self.values.of(a), self.values.of(b));
+                let value = self.together(node, apart, facts);
+                self.values.redo(node, value);
+                let leaves = known.map_or_else(|| self.leaves(node), |sum| sum.leaves);
+                Sum { leaves, bonds: facts.bonds.clone() }
+            }
+        };
+        self.sums.insert(node, sum);
+    }
+
+    /// The operations without operands below a node.
+    fn leaves(&mut self, node: NodeId) -> Rc<[NodeId]> {
+        let order = self.order(node);
+        order.iter().copied().filter(|n| self.lab.graph.op(*n).operands().next().is_none()).collect()
     }
 
     /// What a device shows: the true value, give or take its imperfection.

@@ -691,7 +691,7 @@ impl Flow<'_, '_> {
         };
         let before = std::mem::replace(&mut making.within.states[state as usize], there);
         let bounds = match (wall, self.kind(i)) {
-            (Wall::Apart(_), Kind::Mixed(row)) => self.rest(&row, &making.within),
+            (Wall::Apart(_), Kind::Mixed(row)) => self.rest_again(&row, state, &making.within),
             _ => self.enclose_again(derivative.rate, state, &making.within).bounds(),
         };
         making.within.states[state as usize] = before;

@@ -150,22 +150,36 @@ impl Flow<'_, '_> {
 
     /// Bounds of a flux.
     pub fn flux(&mut self, flux: &Flux, within: &Facts) -> (f64, f64) {
+        self.bounded(flux, |flow, node| flow.enclose(node, within))
+    }
+
+    /// Bounds of a flux from those of its rate and its conditions.
+    fn bounded(&mut self, flux: &Flux, mut value: impl FnMut(&mut Self, NodeId) -> Known) -> (f64, f64) {
         let mut certain = true;
         for (condition, holds) in &flux.conditions {
-            match self.enclose(*condition, within).truth() {
+            match value(self, *condition).truth() {
                 Some(truth) if truth != *holds => return (0.0, 0.0),
                 Some(_) => {}
                 None => certain = false,
             }
         }
-        let (low, high) = self.enclose(flux.rate, within).bounds();
+        let (low, high) = value(self, flux.rate).bounds();
         if certain { (low, high) } else { (low.min(0.0), high.max(0.0)) }
     }
 
     /// Bounds of what changes a state besides the fluxes that change matter.
     pub fn rest(&mut self, row: &Row, within: &Facts) -> (f64, f64) {
+        self.added_up(row, |flow, node| flow.enclose(node, within))
+    }
+
+    /// The same where the rate was evaluated just before, now that of what is known one state alone has changed.
+    pub fn rest_again(&mut self, row: &Row, state: u32, within: &Facts) -> (f64, f64) {
+        self.added_up(row, |flow, node| flow.enclose_again(node, state, within))
+    }
+
+    fn added_up(&mut self, row: &Row, mut value: impl FnMut(&mut Self, NodeId) -> Known) -> (f64, f64) {
         row.rest.iter().fold((0.0, 0.0), |(low, high), (flux, c)| {
-            let bounds = self.flux(flux, within);
+            let bounds = self.bounded(flux, &mut value);
             let (a, b) = super::polytope::scaled(*c, bounds);
             (low + a, high + b)
         })

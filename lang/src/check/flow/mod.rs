@@ -99,6 +99,8 @@ struct Flow<'l, 'a> {
     parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
     /// Values of the operations that were evaluated.
     values: eval::Values,
+    /// Sums of states that may hang together, as far as they were evaluated.
+    sums: FxHashMap<NodeId, eval::Sum>,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
@@ -243,6 +245,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
+            sums: FxHashMap::default(),
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
             limits_of: BTreeMap::new(),

@@ -57,7 +57,7 @@ impl Known {
         match (self, other) {
             (Known::Point(a), Known::Point(b)) => a.to_bits() == b.to_bits(),
             (Known::Range(a, b, one), Known::Range(c, d, other)) => {
-                [a, b].map(|v| v.to_bits()) == [c, d].map(|v| v.to_bits()) && one == other
+                a.to_bits() == c.to_bits() && b.to_bits() == d.to_bits() && one == other
             }
             (Known::Few(a, one), Known::Few(b, other)) => {
                 one == other && (Rc::ptr_eq(a, b) || a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits())))

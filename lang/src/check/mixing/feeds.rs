@@ -1,5 +1,6 @@
 //! What laws, events and effects bring into mixtures by writing amounts.
 
+use std::cell::RefCell;
 use std::rc::Rc;
 
 use matterix_ir::model::{Action, Event};
@@ -8,7 +9,7 @@ use matterix_ir::{NodeId, Span};
 
 use super::Walk;
 use super::eyes::Eyes;
-use super::world::{Came, Entry, World};
+use super::world::{Came, Contents, Entry, World};
 use crate::elaborate::SpeciesId;
 use crate::elaborate::writes::vanishes;
 
@@ -22,6 +23,14 @@ pub(super) struct Feed {
     value: NodeId,
     /// The place of the law.
     span: Span,
+    /// What the mixture held when the species was there already, or on its way, the last time.
+    idle: RefCell<Option<Contents>>,
+}
+
+impl Feed {
+    fn new(mixture: InstanceId, species: SpeciesId, condition: Option<NodeId>, value: NodeId, span: Span) -> Feed {
+        Feed { mixture, species, condition, value, span, idle: RefCell::default() }
+    }
 }
 
 /// The amounts that processes and events write. What reactions make, and the ions that a species becomes, is known otherwise.
@@ -39,7 +48,7 @@ pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
             let process = &lab.processes[c.process];
             if process.reaction.is_none() && !streams(c.process) {
                 let (condition, value, span) = (process.guard, c.node, process.span);
-                out.push(Feed { mixture: *mixture, species: *species, condition, value, span });
+                out.push(Feed::new(*mixture, *species, condition, value, span));
             }
         }
     }
@@ -49,18 +58,23 @@ pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
             let Some((mixture, species)) = eyes.amount_of.get(state) else { continue };
             if !is_ion(*mixture, *species) {
                 let (condition, span) = (Some(event.when), event.span);
-                out.push(Feed { mixture: *mixture, species: *species, condition, value: *value, span });
+                out.push(Feed::new(*mixture, *species, condition, *value, span));
             }
         }
     }
     out
 }
 
+/// Whether a mixture holds more of a species than a residue.
+fn holds(world: &World, mixture: InstanceId, species: SpeciesId) -> bool {
+    world.held(mixture).get(&species).is_some_and(|e| !e.residue)
+}
+
 impl Walk<'_, '_> {
     /// What laws may have written by now, with what is there, and what streams carry on of it.
     pub(super) fn fed(&mut self, world: &mut World) {
         for _ in 0..self.feeds.len() {
-            let due = |f: &&Feed| self.brings(f.mixture, f.species, f.condition, f.value, world);
+            let due = |f: &&Feed| self.feeds_now(f, world);
             let due: Vec<(InstanceId, SpeciesId, Span)> =
                 self.feeds.iter().filter(due).map(|f| (f.mixture, f.species, f.span)).collect();
             if due.is_empty() {
@@ -73,29 +87,37 @@ impl Walk<'_, '_> {
         }
     }
 
+    /// Whether a law may write something now that is not there. Contents that are as they were before have the species as before.
+    fn feeds_now(&self, feed: &Feed, world: &World) -> bool {
+        let held = world.held(feed.mixture);
+        if feed.idle.borrow().as_ref().is_some_and(|before| Rc::ptr_eq(before, held)) {
+            return false;
+        }
+        if self.is_there(feed.mixture, feed.species, world) {
+            feed.idle.replace(Some(held.clone()));
+            return false;
+        }
+        self.may_write(feed.condition, feed.value, world)
+    }
+
     /// The species that an effect brings into a mixture that has none of it.
     pub(super) fn effected(&self, action: &Action, world: &World) -> Option<(InstanceId, SpeciesId)> {
         let Action::Assign { state, value, .. } = action else { return None };
         let (mixture, species) = *self.eyes.amount_of.get(state)?;
-        self.brings(mixture, species, None, *value, world).then_some((mixture, species))
+        let brings = !self.is_there(mixture, species, world) && self.may_write(None, *value, world);
+        brings.then_some((mixture, species))
     }
 
-    /// Whether something that is not there may be written now.
-    fn brings(
-        &self,
-        mixture: InstanceId,
-        species: SpeciesId,
-        condition: Option<NodeId>,
-        value: NodeId,
-        world: &World,
-    ) -> bool {
-        let there = |m: InstanceId, s: SpeciesId| world.held(m).get(&s).is_some_and(|e| !e.residue);
+    /// Whether a species is in a mixture, or something that it comes of there.
+    fn is_there(&self, mixture: InstanceId, species: SpeciesId, world: &World) -> bool {
         let splits =
             |have: &SpeciesId| self.eyes.lab.tables.species.get(*have).dissolves.iter().any(|d| d.0 == species);
-        if there(mixture, species) || world.held(mixture).keys().any(splits) {
-            return false;
-        }
-        let absent = |state: u32| self.eyes.amount_of.get(&state).is_some_and(|(m, s)| !there(*m, *s));
+        holds(world, mixture, species) || world.held(mixture).keys().any(splits)
+    }
+
+    /// Whether something may be written now.
+    fn may_write(&self, condition: Option<NodeId>, value: NodeId, world: &World) -> bool {
+        let absent = |state: u32| self.eyes.amount_of.get(&state).is_some_and(|(m, s)| !holds(world, *m, *s));
         condition.is_none_or(|c| self.eyes.truth(c, world) != Some(false))
             && !vanishes(&self.eyes.lab.graph, value, &|c| self.eyes.lab.never(c), &absent)
     }

@@ -8,7 +8,7 @@ use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{FileId, NodeId, Op, Text, TextPart};
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::elaborate::Elaborator;
 use crate::elaborate::hazards::{Hazard, Watched};
@@ -28,7 +28,7 @@ impl Uses {
     /// What a plan uses of what hazards watch.
     pub fn new(lab: &Elaborator<'_>, plan: &Plan, hazards: &[Hazard], library: &BTreeSet<FileId>) -> Uses {
         let mut uses = Uses::default();
-        let mut finder = Finder { lab, watched: FxHashMap::default(), known: FxHashMap::default() };
+        let mut finder = Finder { lab, watched: FxHashMap::default(), above: Vec::new(), known: FxHashMap::default() };
         for (i, hazard) in hazards.iter().enumerate() {
             match hazard.watched {
                 Watched::Steps => {}
@@ -42,6 +42,7 @@ impl Uses {
         if finder.watched.is_empty() {
             return uses;
         }
+        finder.look_up();
         for (i, step) in plan.steps.iter().enumerate() {
             let found = finder.all(used_by(step, library));
             if !found.is_empty() {
@@ -62,6 +63,8 @@ impl Uses {
 struct Finder<'l, 'a> {
     lab: &'l Elaborator<'a>,
     watched: FxHashMap<NodeId, Vec<usize>>,
+    /// By node: whether it may rest on something that is watched.
+    above: Vec<bool>,
     known: FxHashMap<NodeId, Rc<[usize]>>,
 }
 
@@ -74,21 +77,32 @@ impl Finder<'_, '_> {
         found.into_iter().collect()
     }
 
+    /// Marks what rests on something that is watched; readings may.
+    fn look_up(&mut self) {
+        for (i, op) in self.lab.graph.ops().iter().enumerate() {
+            let operands = op.operands().any(|n| self.above[n.0 as usize]);
+            let marked = operands || matches!(op, Op::Reading(_)) || self.watched.contains_key(&NodeId(i as u32));
+            self.above.push(marked);
+        }
+    }
+
     /// The hazards that watch something a value rests on, the true values behind readings included.
     fn below(&mut self, node: NodeId) -> Rc<[usize]> {
         if let Some(known) = self.known.get(&node) {
             return known.clone();
         }
         let mut found = BTreeSet::new();
-        let mut readings = Vec::new();
-        for n in self.lab.graph.schedule([node]) {
-            found.extend(self.watched.get(&n).into_iter().flatten().copied());
-            if let Op::Reading(r) = self.lab.graph.op(n) {
-                readings.push(self.lab.readings[r as usize].value);
+        let mut seen = FxHashSet::default();
+        let mut todo = vec![node];
+        while let Some(next) = todo.pop() {
+            if !self.above[next.0 as usize] || !seen.insert(next) {
+                continue;
             }
-        }
-        for value in readings {
-            found.extend(self.below(value).iter());
+            found.extend(self.watched.get(&next).into_iter().flatten().copied());
+            match self.lab.graph.op(next) {
+                Op::Reading(r) => todo.push(self.lab.readings[r as usize].value),
+                op => todo.extend(op.operands()),
+            }
         }
         let found: Rc<[usize]> = found.into_iter().collect();
         self.known.insert(node, found.clone());
