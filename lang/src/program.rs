@@ -835,7 +835,7 @@ fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
     let mut out = Vec::new();
     for i in 0..lab.instances.len() as u32 {
         let id = InstanceId(i);
-        if lab.per_species(id).is_none() {
+        if !lab.is_mixture(id) {
             continue;
         }
         let mut extensive = Vec::new();
@@ -843,7 +843,9 @@ fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
         for (key, state) in lab.extensive.iter().filter(|(k, _)| k.instance == id) {
             let name = match key.species {
                 Some(s) => {
-                    contents.push(Content { species: s.0, state: *state });
+                    if key.matter {
+                        contents.push(Content { species: s.0, state: *state });
+                    }
                     format!("{}[{}#{}]", key.member, lab.tables.species.get(s).name, s.0)
                 }
                 None => key.member.clone(),

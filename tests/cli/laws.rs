@@ -161,15 +161,22 @@ workflow go in bench {{ spoon 0.1 mol from x into y; spoon 0.05 mol from y into 
 
 #[test]
 fn own_extensive_quantities_per_species_are_written_too() {
-    let text = "mtx 1
-capability Bed { extensive bound: Amount per Species = 0 mol { scale: 1 umol } }
-asset Column: Bed {}
-process binding(b: Bed) while elapsed < 10 s { b.bound[water]' += 1 mmol/s; b.bound[EtOH]' -= 0 mol/s }
-lab bench { ambient: 25 degC, bed = Column }
-workflow go in bench { wait 20 s; expect bed.bound[water] > 9 mmol }
-";
-    let all = found("bed", text);
+    let text = |options: &str| {
+        format!(
+            "mtx 1
+capability Bed {{ extensive bound: Amount per Species = 0 mol {{ {options} }} }}
+asset Column: Bed {{}}
+process binding(b: Bed) while elapsed < 1 h {{ b.bound[water]' += 1 mmol/s; b.bound[EtOH]' -= 0 mol/s }}
+lab bench {{ ambient: 25 degC, bed = Column }}
+workflow go in bench {{ wait 20 s; expect bed.bound[water] > 9 mmol }}
+"
+        )
+    };
+    let all = found("bed", &text("scale: 1 umol, matter: true"));
     assert_eq!(all.first().map(|f| (f.1.as_str(), f.2)), Some(("balance-breach", 4)), "{all:?}");
+    // What is not declared to be matter is a number of each species.
+    assert_eq!(found("bed", &text("scale: 1 umol")), []);
+    passes("bed", &text("scale: 1 umol"));
 }
 
 #[test]

@@ -25,6 +25,7 @@ mod hollow;
 mod joints;
 mod laws;
 mod lsp;
+mod matter;
 mod mcp;
 mod meant;
 mod mend;

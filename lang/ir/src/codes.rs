@@ -101,10 +101,17 @@ codes! {
     CLOSED_VESSEL_HEATED "closed-vessel-heated" "H2" "a closed vessel is heated";
     ABOVE_FLASH_POINT "above-flash-point" "H2" "a set point that brings a liquid to its flash point";
     WEAK_ACID_LEFT_OUT "weak-acid-left-out" "H3" "a pH is used, and the model leaves out a weak acid there";
+    ACID_BESIDE_BASE "acid-beside-base" "H3" "H+ and OH- are used side by side, and no reaction consumes both";
+    RATE_BESIDE_WEAK_ACID "rate-beside-weak-acid" "H3" "a reaction goes by H+ or OH-, and the model leaves out a weak acid or base there";
+    BEGINS_BOILING "begins-boiling" "H2" "contents begin above their boiling point";
+    BEGINS_FROZEN "begins-frozen" "H3" "contents begin below their melting point";
     WEAK_BASE_LEFT_OUT "weak-base-left-out" "H3" "a pH is used, and the model leaves out a weak base there";
     PH_OF_STRONG_SOLUTION "ph-of-strong-solution" "H3" "a pH is used where activities are far from concentrations";
     UNDISSOLVED "undissolved" "H3" "a mixture holds more of a salt than dissolves";
     GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
+    GAS_LEAVES "gas-leaves" "H3" "more of a gas is there than stays dissolved";
+    PH_FAR_FROM_25_DEGC "ph-far-from-25-degc" "H3" "the pH of a warm or cold solution is used";
+    HEAT_OF_STRONG_SOLUTION "heat-of-strong-solution" "H3" "the temperature of a concentrated acid or lye is used";
     VOLUME_OF_STRONG_SOLUTION "volume-of-strong-solution" "H3" "a strong solution is measured out by volume";
     HEAT_LEFT_OUT "heat-left-out" "H3" "a temperature is used after a step whose heat the model leaves out";
     HOT_MIXING "hot-mixing" "H3" "a step dissolves, dilutes or neutralises so much that it gets hot";

@@ -99,6 +99,11 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
                 && !all.iter().zip(places).any(|(o, r)| o.code == d.code && r.line == q.line && r.subject == p.subject)
         });
     }
+    // That weak acids and bases make no ions is said where these are missing.
+    let left_out = |e: &Diagnostic| [codes::WEAK_ACID_LEFT_OUT, codes::WEAK_BASE_LEFT_OUT].contains(&e.code);
+    if d.code == codes::REACTION_NEVER_STARTS && !d.is_error() && all.iter().any(left_out) {
+        return true;
+    }
     // Contents and equations must be right before one can tell what meets.
     if d.code == codes::REACTION_NEVER_STARTS {
         return others().any(|(e, _)| {

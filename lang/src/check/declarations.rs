@@ -162,15 +162,22 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
             continue;
         }
         match &m.member.kind {
-            MemberKind::Value { role, name, ty, options, .. } => {
+            MemberKind::Value { role, name, ty, options, per, value } => {
                 report(lab, ignored::options(*role, options));
                 let ty = lab.resolve_type(ty, module);
+                if let Some(d) = ignored::matter(lab, *role, per.is_some(), &ty, options) {
+                    lab.report(d);
+                }
                 if *role == Role::Flow {
                     continue;
                 }
                 lab.initial_mode = matches!(role, Role::State | Role::Extensive);
                 lab.readings_live = *role == Role::Reading;
-                lab.member_value(this, m, name.span);
+                if *role == Role::Extensive && per.is_some() {
+                    lab.state_value(this, m, &name.text, &ty, value.as_ref());
+                } else {
+                    lab.member_value(this, m, name.span);
+                }
                 lab.initial_mode = false;
                 lab.readings_live = false;
                 let state = matches!(role, Role::State | Role::Extensive);

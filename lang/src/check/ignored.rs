@@ -4,8 +4,12 @@ use matterix_ir::stock::Count;
 use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, NamedExpr, Role};
+use crate::elaborate::Elaborator;
 use crate::elaborate::given::{GIVEN_BY, INSTEAD, ONLY_WITH, word};
 use crate::elaborate::lab::SYMMETRIC;
+use crate::elaborate::properties::{GIVES, GIVES_AT};
+use crate::elaborate::tables::{MATTER, is_true};
+use crate::eval::Type;
 use crate::names::near;
 use crate::stock::{COUNTS_AS, count_of};
 
@@ -13,10 +17,10 @@ use crate::stock::{COUNTS_AS, count_of};
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
         Role::State => ("a state", &["unit", "scale", COUNTS_AS]),
-        Role::Extensive => ("an extensive quantity", &["unit", "scale", ONLY_WITH]),
+        Role::Extensive => ("an extensive quantity", &["unit", "scale", "hidden", ONLY_WITH, MATTER]),
         Role::Derived => ("a derived quantity", &["unit", "hidden", INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
-        Role::Param => ("a parameter", &["above", "at_least", GIVEN_BY]),
+        Role::Param => ("a parameter", &["above", "at_least", GIVEN_BY, GIVES, GIVES_AT]),
         Role::Flow => ("a flow", &[]),
         Role::Part => ("a part", &[]),
     };
@@ -31,10 +35,31 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
     let headline = match o.name.text.as_str() {
         GIVEN_BY if word(given, GIVEN_BY) != Some("at") => "`given_by` is `at`: what stands after `holding ... at`",
         ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` names a parameter",
+        MATTER if !is_true(&o.value) => "`matter` is `true`, or left out",
+        GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` is a range",
+        GIVES if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`gives` is the name of a species in quotes",
         INSTEAD if !matches!(&*o.value.kind, ExprKind::Text(_)) => "`instead` is a text",
         _ => return None,
     };
     Some(Diagnostic::error(codes::TYPE_MISMATCH, o.value.span, headline, "something else"))
+}
+
+/// `matter` where there is no amount of each species.
+pub fn matter(
+    lab: &Elaborator<'_>,
+    role: Role,
+    each_species: bool,
+    ty: &Type,
+    given: &[NamedExpr],
+) -> Option<Diagnostic> {
+    let o = given.iter().find(|o| o.name.text == MATTER).filter(|_| role == Role::Extensive)?;
+    let amount = lab.tables.units.named("Amount");
+    let is_amount = matches!(ty, Type::Quantity { dimension, .. } if dimension.agrees(&amount));
+    if each_species && is_amount {
+        return None;
+    }
+    let headline = "only an `Amount per Species` can be matter";
+    Some(Diagnostic::error(codes::TYPE_MISMATCH, o.name.span, headline, "no amount of each species"))
 }
 
 /// Options of a function that mean nothing: it may be bounded, and one of two things symmetric.

@@ -6,9 +6,12 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::flow::Window;
-use crate::elaborate::tables::ReactionDef;
+use crate::ast::{Expr, ExprKind, Member, MemberKind};
+use crate::elaborate::properties::{GIVES, GIVES_AT};
+use crate::elaborate::reach::Reach;
+use crate::elaborate::tables::{MemberRef, ReactionDef};
 use crate::elaborate::{Elaborator, SpeciesId, Tables};
-use crate::eval::ReactionId;
+use crate::eval::{ReactionId, Scope, Value};
 use crate::names::DeclId;
 use crate::syntax::moved::Moved;
 
@@ -40,12 +43,70 @@ pub fn starts(lab: &Elaborator<'_>, lab_decl: DeclId) -> Starts {
 
 /// By reaction index: whether its reactants meet in a vessel.
 fn meets(lab: &Elaborator<'_>) -> Vec<bool> {
-    let mixtures = (0..lab.instances.len() as u32).map(InstanceId).filter(|i| lab.per_species(*i).is_some());
+    let mixtures = (0..lab.instances.len() as u32).map(InstanceId).filter(|i| lab.is_mixture(*i));
     let none = BTreeSet::new();
     let held: Vec<&BTreeSet<SpeciesId>> =
         mixtures.map(|m| lab.reach.set(&lab.instances[m.0 as usize].name).unwrap_or(&none)).collect();
     let meet = |r: &ReactionDef<'_>| held.iter().any(|held| r.reactants.iter().all(|(s, _)| held.contains(s)));
     lab.tables.reactions.iter().map(meet).collect()
+}
+
+/// Warns of a neutralisation that never starts in the model alone, because what it lacks would come from weak acids or bases there:
+/// these react with a strong partner to the end. Other reactions go by how much of it there is.
+fn left_out(
+    tables: &Tables<'_>,
+    reaction: &ReactionDef<'_>,
+    missing: &[&(SpeciesId, Span)],
+    anywhere: &BTreeSet<SpeciesId>,
+) -> Option<Diagnostic> {
+    if !reaction.reactants.iter().all(|(s, _)| given_by(tables, *s).next().is_some()) {
+        return None;
+    }
+    let sources = missing.iter().map(|(s, _)| Some((*s, weak_source(tables, *s, anywhere)?)));
+    let sources: Vec<(SpeciesId, SpeciesId)> = sources.collect::<Option<_>>()?;
+    let (lacks, from) = *sources.first()?;
+    let name = |s: SpeciesId| tables.species.get(s).name.as_str();
+    let (lacks, from) = (name(lacks), name(from));
+    let headline = format!("`{}` never starts in the model, which gets no `{lacks}` from {from}", reaction.name);
+    let d =
+        Diagnostic::warning(codes::REACTION_NEVER_STARTS, missing[0].1, headline, format!("no `{lacks}` in the model"));
+    Some(d.help(format!("write as a reaction both ways how {from} makes `{lacks}`, `HA <-> H+ + A-`")))
+}
+
+/// The value of an option of a member.
+fn option<'a>(member: &'a Member, name: &str) -> Option<&'a Expr> {
+    let MemberKind::Value { options, .. } = &member.kind else { return None };
+    options.iter().find(|o| o.name.text == name).map(|o| &o.value)
+}
+
+/// The properties that say of a species that it is made in water.
+fn given_by<'t, 'a>(
+    tables: &'t Tables<'a>,
+    s: SpeciesId,
+) -> impl Iterator<Item = (&'a str, MemberRef<'a>)> + use<'t, 'a> {
+    let made = tables.species.get(s).name.clone();
+    let gives = move |m: &MemberRef<'a>| {
+        option(m.member, GIVES).is_some_and(|e| matches!(&*e.kind, ExprKind::Text(name) if *name == made))
+    };
+    tables.properties.iter().map(|(key, m)| (*key, *m)).filter(move |(_, m)| gives(m))
+}
+
+/// A species of the lab of which a property says that it makes another one in water.
+fn weak_source(tables: &Tables<'_>, s: SpeciesId, anywhere: &BTreeSet<SpeciesId>) -> Option<SpeciesId> {
+    let mut lab = Elaborator::new(tables, Reach::default());
+    for (key, m) in given_by(tables, s) {
+        let at = option(m.member, GIVES_AT).and_then(|e| match lab.expr(e, &mut Scope::module(m.module)) {
+            Value::Range(low, high) => Some((lab.graph.constant(low.node)?, lab.graph.constant(high.node)?)),
+            _ => None,
+        });
+        let (low, high) = at.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let mut found = anywhere.iter().copied();
+        let source = found.find(|o| lab.property_value(*o, key).is_some_and(|v| (low..=high).contains(&v)));
+        if source.is_some() {
+            return source;
+        }
+    }
+    None
 }
 
 /// Reports reactions of one module whose reactants meet in no workflow of its file.
@@ -76,6 +137,10 @@ pub fn never_starts(tables: &Tables<'_>, module: usize, workflows: &[Starts]) ->
             continue;
         }
         reported.push(index);
+        if let Some(d) = left_out(tables, r, &missing, &anywhere) {
+            out.push(d);
+            continue;
+        }
         let d = match missing.as_slice() {
             [(s, span), rest @ ..] => {
                 let def = tables.species.get(*s);

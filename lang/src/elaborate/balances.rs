@@ -101,7 +101,7 @@ impl Elaborator<'_> {
     /// Elements, charge and mass: nothing crosses the boundary.
     fn matter_balances(&mut self, balances: &mut Vec<Balance>, derivatives: &mut Vec<Derivative>) {
         let amounts: Vec<(SpeciesId, u32)> =
-            self.extensive.iter().filter_map(|(key, index)| Some((key.species?, *index))).collect();
+            self.extensive.iter().filter_map(|(key, index)| Some((key.matter()?, *index))).collect();
         let of = self.quantities(amounts.iter().map(|a| a.0).collect::<BTreeSet<_>>().into_iter());
         let doubtful = self.doubtful();
         let elements = of.keys().filter(|name| name.starts_with("element"));

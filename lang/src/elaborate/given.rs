@@ -63,7 +63,6 @@ fn reason(m: &MemberRef<'_>) -> Option<&'static str> {
         MemberKind::Value { role: Role::Derived, .. } => Some("follows from other members"),
         MemberKind::Value { role: Role::Reading, .. } => Some("is what the device reports"),
         MemberKind::Value { role: Role::Flow, .. } => Some("is summed up by laws"),
-        MemberKind::Value { role: Role::Extensive, per: Some(_), .. } => Some("is what `holding` says"),
         MemberKind::Frame { .. } => Some("is a frame"),
         MemberKind::Process(_) => Some("is a process"),
         MemberKind::Event(_) => Some("is an event"),
@@ -80,6 +79,11 @@ impl<'a> Elaborator<'a> {
         for f in fields {
             let key = f.key.text.as_str();
             let found: Vec<&MemberRef<'a>> = kinds.iter().flat_map(|k| tables.members(*k, key)).collect();
+            let is_held = |m: &MemberRef<'a>| {
+                let matter = kinds.iter().find_map(|k| tables.kinds.get(k)?.matter);
+                matter.is_some_and(|of| std::ptr::eq(of.member, m.member))
+            };
+            let reason = |m: &MemberRef<'a>| if is_held(m) { Some("is what `holding` says") } else { reason(m) };
             // A capability may also mean its own member of that name: one that can be given is enough.
             let Some(m) = found.first().filter(|_| found.iter().all(|m| reason(m).is_some())) else { continue };
             let derived = matches!(&m.member.kind, MemberKind::Value { role: Role::Derived, .. });

@@ -1,12 +1,12 @@
 //! Hazards on the instances of a lab: conditions that must not come about.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Danger;
 
 use matterix_ir::plan::{Said, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Code, Diagnostic, NodeId, Op, Severity, Sources, Span, codes};
+use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Sources, Span, codes};
 
 use super::{Elaborator, Tables};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
@@ -25,6 +25,8 @@ pub enum Watched {
     Steps,
     /// Where this value is used.
     Value(NodeId),
+    /// Once, at the start, where the text gives a value that nothing changes, if it does.
+    Given(Option<Span>),
     /// Before matter goes from one mixture into another, [`SHARE`] of it; told where a value is used after that, if there is one.
     Transfer(InstanceId, InstanceId, Option<NodeId>),
 }
@@ -118,6 +120,14 @@ pub fn transfer(of: &Expr) -> Option<(&Expr, &Expr, &Expr)> {
     Some((share?, named("from")?, named("to")?)).filter(|_| is_move && args.len() == 3)
 }
 
+/// What a list consists of, or what is none by itself.
+fn several(of: &Expr) -> Vec<&Expr> {
+    match &*of.kind {
+        ExprKind::List(items) => items.iter().collect(),
+        _ => vec![of],
+    }
+}
+
 /// The name that an expression consists of.
 fn bare(e: &Expr) -> Option<&str> {
     match &*e.kind {
@@ -170,18 +180,52 @@ impl<'a> Elaborator<'a> {
         let Declared { params, module, name, .. } = declared;
         let mut tuples = self.tuples(params, module, Some(declared.when), name);
         while let Some((mut scope, shown)) = tuples.next(self) {
-            let (watched, measure) = match declared.of {
-                None => (Watched::Steps, None),
-                Some(of) if !self.is_asked_for(of, &scope) => continue,
-                Some(of) => match self.expr(of, &mut scope) {
-                    Value::Num(Num { node, dimension, .. }) => (Watched::Value(node), Some(dimension)),
-                    Value::Bool(node) => (Watched::Value(node), None),
-                    _ => continue,
-                },
+            let all = match declared.of {
+                None => vec![(Watched::Steps, None)],
+                Some(of) => self.all_watched(of, &mut scope),
             };
-            let hazard = if self.enter(name.span) { self.hazard(declared, watched, shown, &mut scope) } else { None };
+            let Some((first, _)) = all.first() else { continue };
+            self.initial_mode = matches!(first, Watched::Given(_));
+            let hazard = if self.enter(name.span) { self.hazard(declared, *first, shown, &mut scope) } else { None };
             self.leave();
-            out.extend(hazard.map(|h| Hazard { measure, ..h }));
+            self.initial_mode = false;
+            let Some(hazard) = hazard else { continue };
+            out.extend(all.into_iter().map(|(watched, measure)| Hazard { watched, measure, ..hazard.clone() }));
+        }
+    }
+
+    /// What stands after `of`: a value or several, and for a concentration every kind of it that anything asks for.
+    fn all_watched(&mut self, of: &'a Expr, scope: &mut Scope) -> Vec<(Watched, Option<Dimension>)> {
+        let mut out = Vec::new();
+        for e in several(of) {
+            if !self.is_asked_for(e, scope) {
+                continue;
+            }
+            match self.expr(e, scope) {
+                Value::Num(Num { node, dimension, .. }) => out.push((self.watched(e, node), Some(dimension))),
+                Value::Bool(node) => out.push((self.watched(e, node), None)),
+                Value::Concentration(m, s) => {
+                    let kinds = self.view_values.get(&(m, s)).into_iter().flat_map(BTreeMap::values);
+                    out.extend(kinds.filter_map(|kind| match kind {
+                        Value::Num(n) => Some((Watched::Value(n.node), None)),
+                        _ => None,
+                    }));
+                }
+                _ => {}
+            }
+        }
+        out
+    }
+
+    /// Where a value is looked at: one that nothing changes at the start, where it is given.
+    fn watched(&self, of: &Expr, node: NodeId) -> Watched {
+        if !matches!(&*of.kind, ExprKind::Member(..)) {
+            return Watched::Value(node);
+        }
+        match self.graph.op(node) {
+            Op::Param(i) => Watched::Given(Some(self.params[i as usize].span)),
+            _ if self.graph.leaves(node).meets(Leaves::LIVE) => Watched::Value(node),
+            _ => Watched::Given(None),
         }
     }
 
@@ -228,7 +272,7 @@ impl<'a> Elaborator<'a> {
         self.terms.clear();
         let (node, bound) = self.beware(declared.when, scope)?;
         let terms = std::mem::take(&mut self.terms);
-        if self.never(node) {
+        if self.never(node) || self.initial_mode && self.glance(node) == Some(0.0) {
             return None;
         }
         let sources = Sources::default();
@@ -280,10 +324,12 @@ impl<'a> Elaborator<'a> {
             (None, None, None) => {}
         }
         if let Some(of) = of.as_ref().filter(|_| after.is_some() || moved.is_none()) {
-            match self.expr(of, scope) {
-                Value::Num(_) | Value::Bool(_) | Value::Error => {}
-                other => {
-                    self.expected("a quantity or a truth value", &other, of.span);
+            for e in several(of) {
+                match self.expr(e, scope) {
+                    Value::Num(_) | Value::Bool(_) | Value::Error | Value::Concentration(..) => {}
+                    other => {
+                        self.expected("a quantity or a truth value", &other, e.span);
+                    }
                 }
             }
         }

@@ -9,7 +9,7 @@ use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
 use super::grids::Grid;
-use super::tables::{MemberRef, Tables};
+use super::tables::{Kind, MemberRef, Tables, member_name};
 use super::{Elaborator, MemberKey, SpeciesId};
 use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
 use crate::eval::{Scope, Type, Value};
@@ -62,7 +62,7 @@ pub struct Instance<'a> {
     pub grids: Vec<Grid>,
     /// Values of its members, as far as they were asked for.
     pub values: FxHashMap<MemberKey, Value>,
-    /// State of each amount per species.
+    /// States of quantities of each species, by member.
     pub amounts: BTreeMap<String, BTreeMap<SpeciesId, u32>>,
     /// What it holds at the start: mol (or kg where counted by mass).
     pub contents: Vec<(SpeciesId, NodeId)>,
@@ -132,7 +132,7 @@ impl<'a> Elaborator<'a> {
     }
 
     fn count_mixture(&mut self, id: InstanceId) {
-        if self.per_species(id).is_some() {
+        if self.is_mixture(id) {
             self.mixtures.push(id);
         }
     }
@@ -330,10 +330,39 @@ impl<'a> Elaborator<'a> {
         found.then(|| Value::Frame(id, name.to_string()))
     }
 
-    /// The member that counts amounts per species, if the instance has one.
-    pub fn per_species(&self, id: InstanceId) -> Option<MemberRef<'a>> {
-        let kinds = &self.instances[id.0 as usize].kinds;
-        kinds.iter().filter_map(|k| self.tables.kinds.get(k)).find_map(|k| k.per_species)
+    fn kinds_of(&self, id: InstanceId) -> impl Iterator<Item = &'a Kind<'a>> {
+        let tables: &'a Tables<'a> = self.tables;
+        self.instances[id.0 as usize].kinds.iter().filter_map(|k| tables.kinds.get(k))
+    }
+
+    /// Whether an instance has a quantity of each species, matter or not.
+    pub fn per_species(&self, id: InstanceId) -> bool {
+        self.kinds_of(id).any(|k| k.per_species)
+    }
+
+    /// Whether an instance is of matter: it has amounts of species, which `holding` fills and transfers move.
+    pub fn is_mixture(&self, id: InstanceId) -> bool {
+        self.kinds_of(id).any(|k| k.matter.is_some())
+    }
+
+    /// The mixture that an instance is, or its first part that is one.
+    pub fn mixture_of(&self, id: InstanceId) -> Option<InstanceId> {
+        if self.is_mixture(id) {
+            return Some(id);
+        }
+        self.instances[id.0 as usize].parts.values().copied().find(|p| self.is_mixture(*p))
+    }
+
+    /// Whether a member of an instance is its amount of matter.
+    pub fn is_matter(&self, id: InstanceId, m: MemberRef<'a>) -> bool {
+        self.kinds_of(id).find_map(|k| k.matter).is_some_and(|of| std::ptr::eq(of.member, m.member))
+    }
+
+    /// The amounts of matter in a mixture: of which species, and its state.
+    pub fn amounts_in(&self, id: InstanceId) -> impl Iterator<Item = (SpeciesId, u32)> {
+        let member = self.kinds_of(id).find_map(|k| k.matter).and_then(|m| member_name(m.member));
+        let amounts = member.and_then(|name| self.instances[id.0 as usize].amounts.get(&name.text));
+        amounts.into_iter().flatten().map(|(s, state)| (*s, *state))
     }
 
     /// The concentration kinds of an instance, in the order of the library.

@@ -8,8 +8,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::instances::Setting;
 use super::{Elaborator, Pair};
 use crate::ast::{
-    self, AssetLine, AssetLiteral, Contents, Expr, ExprKind, Field, FieldValue, Holding, ItemKind, LabLineKind, Name,
-    Path,
+    self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
 };
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, near};
@@ -266,10 +265,7 @@ impl<'a> Elaborator<'a> {
     fn hold_in(&mut self, id: InstanceId, e: &'a Expr, at: Option<&'a Expr>, module: usize) {
         let inst = &self.instances[id.0 as usize];
         let (name, declared) = (inst.name.clone(), inst.span);
-        let own = self.per_species(id).map(|_| id);
-        let target = own
-            .or_else(|| self.instances[id.0 as usize].parts.values().copied().find(|p| self.per_species(*p).is_some()));
-        let Some(target) = target else {
+        let Some(target) = self.mixture_of(id) else {
             let kind = self.kind_names(id);
             let mut d = Diagnostic::error(
                 codes::TYPE_MISMATCH,
@@ -389,9 +385,9 @@ impl<'a> Elaborator<'a> {
     fn is_symmetric(&self, id: DeclId) -> bool {
         match &self.tables.names.decl(id).item.kind {
             ItemKind::Relation { symmetric, .. } => *symmetric,
-            ItemKind::Fn { options, .. } => options
-                .iter()
-                .any(|o| o.name.text == SYMMETRIC && matches!(&*o.value.kind, ExprKind::Name(n) if n.text == "true")),
+            ItemKind::Fn { options, .. } => {
+                options.iter().any(|o| o.name.text == SYMMETRIC && super::tables::is_true(&o.value))
+            }
             _ => false,
         }
     }

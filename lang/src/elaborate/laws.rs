@@ -421,10 +421,22 @@ impl<'a> Elaborator<'a> {
             let less = self.graph.unary(UnaryOp::Neg, flow);
             out.push((Target::Derivative(index), less));
             let there = super::ExtensiveKey { instance: to, ..key };
-            if let Some(target) = self.extensive.get(&there) {
-                out.push((Target::Derivative(*target), flow));
+            match self.extensive.get(&there) {
+                Some(target) => out.push((Target::Derivative(*target), flow)),
+                None => self.warn_of_loss(from, to, &there.member, call.span),
             }
         }
+    }
+
+    /// Warns of a flow that takes something along which the mixture where it ends has no place for.
+    fn warn_of_loss(&mut self, from: InstanceId, to: InstanceId, member: &str, at: Span) {
+        if self.prototype {
+            return;
+        }
+        let (from, to) = (self.spoken_name(from), self.spoken_name(to));
+        let headline = format!("`{member}` goes with what `{from}` holds, and `{to}` has no place for it");
+        let d = Diagnostic::warning(codes::BALANCE_BREACH, at, headline, "would be lost");
+        self.report(d.help(format!("give `{to}` contents that have `{member}` as well")));
     }
 
     /// `move(...)` or `rinse(...)` as what it does in an instant.
@@ -513,11 +525,7 @@ impl<'a> Elaborator<'a> {
 
     /// What remembers for a thing what it has touched: its contents, or itself where it has none.
     pub fn walls_of(&self, id: InstanceId) -> InstanceId {
-        if self.per_species(id).is_some() {
-            return id;
-        }
-        let parts = &self.instances[id.0 as usize].parts;
-        parts.values().copied().find(|p| self.per_species(*p).is_some()).unwrap_or(id)
+        self.mixture_of(id).unwrap_or(id)
     }
 
     /// A transfer with what it does to the lineage of its destination.
@@ -600,11 +608,8 @@ impl<'a> Elaborator<'a> {
     }
 
     fn mixture_in(&mut self, id: InstanceId, span: Span) -> Option<InstanceId> {
-        if self.per_species(id).is_some() {
-            return Some(id);
-        }
-        let part = self.instances[id.0 as usize].parts.values().copied().find(|p| self.per_species(*p).is_some());
-        if part.is_none() {
+        let mixture = self.mixture_of(id);
+        if mixture.is_none() {
             let name = self.instances[id.0 as usize].name.clone();
             self.report(Diagnostic::error(
                 codes::TYPE_MISMATCH,
@@ -613,7 +618,7 @@ impl<'a> Elaborator<'a> {
                 "nothing to move",
             ));
         }
-        part
+        mixture
     }
 
     /// Writes out every event, in the order of the text.

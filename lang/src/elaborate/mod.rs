@@ -22,7 +22,7 @@ pub mod laws;
 mod lineage;
 mod mended;
 pub mod mixtures;
-mod properties;
+pub mod properties;
 pub mod prune;
 pub mod reach;
 pub mod reactions;
@@ -124,8 +124,17 @@ pub struct ExtensiveKey {
     pub instance: InstanceId,
     /// `enthalpy`, `amount`.
     pub member: String,
-    /// For amounts per species.
+    /// For quantities of each species.
     pub species: Option<SpeciesId>,
+    /// Whether it is matter: an amount of the species.
+    pub matter: bool,
+}
+
+impl ExtensiveKey {
+    /// The species of which it is the amount; nothing where it is no matter.
+    pub fn matter(&self) -> Option<SpeciesId> {
+        self.species.filter(|_| self.matter)
+    }
 }
 
 /// A comparison, not yet in words.
@@ -170,7 +179,7 @@ pub struct Elaborator<'a> {
     pub instances: Vec<Instance<'a>>,
     /// Those without an owner, by name.
     pub top_level: FxHashMap<String, InstanceId>,
-    /// Those of them that count amounts per species, in order.
+    /// Those of them that hold matter, in order.
     pub mixtures: Vec<InstanceId>,
     /// Where the lab's name stands.
     pub lab_name: Span,
@@ -246,7 +255,7 @@ pub struct Elaborator<'a> {
     /// A flow was read while it was not complete.
     pub touched_flow: bool,
     /// Concentrations by mixture, species, capability and kind.
-    pub view_values: BTreeMap<(InstanceId, SpeciesId, DeclId, Dimension), Value>,
+    pub view_values: BTreeMap<(InstanceId, SpeciesId), BTreeMap<(DeclId, Dimension), Value>>,
     /// What the expression evaluated last compared.
     pub comparisons: Vec<Compared>,
     /// The members that the expression evaluated last names.

@@ -15,6 +15,11 @@ use crate::names::DeclId;
 /// The built-in type whose properties are declared by capabilities of this name.
 const OF: &str = "Species";
 
+/// The option of a property of weak acids and bases that names what they make in water.
+pub const GIVES: &str = "gives";
+/// The option that says at which values of the property it does.
+pub const GIVES_AT: &str = "gives_at";
+
 /// How far two ways of saying the same may be apart, as a share.
 const SAME: f64 = 1e-3;
 

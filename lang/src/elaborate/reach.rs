@@ -53,7 +53,7 @@ impl Reach {
         let mut sets: BTreeMap<InstanceId, BTreeSet<SpeciesId>> = BTreeMap::new();
         for i in 0..lab.instances.len() as u32 {
             let id = InstanceId(i);
-            if lab.per_species(id).is_some() {
+            if lab.per_species(id) {
                 let inst = &lab.instances[i as usize];
                 let held = inst.contents.iter().map(|c| c.0);
                 sets.insert(id, held.chain(written.get(&inst.name).into_iter().flatten().copied()).collect());

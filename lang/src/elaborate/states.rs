@@ -1,5 +1,6 @@
 //! States: allocated once all instances exist, before anything reads them.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use matterix_ir::model::{Domain, State};
@@ -23,11 +24,12 @@ impl<'a> Elaborator<'a> {
             let scale = self.scale_of(options, m.module, &ty);
             let full = format!("{}.{}", self.instances[id.0 as usize].name, name.text);
             if per.is_some() {
+                let matter = self.is_matter(id, m);
                 for s in self.mixture_species(id) {
                     let species = self.tables.species.get(s).name.clone();
                     let index = self.allocate(id, format!("{full}[{species}]"), &ty, options, scale, m.member.span);
                     self.instances[id.0 as usize].amounts.entry(name.text.clone()).or_default().insert(s, index);
-                    let key = ExtensiveKey { instance: id, member: name.text.clone(), species: Some(s) };
+                    let key = ExtensiveKey { instance: id, member: name.text.clone(), species: Some(s), matter };
                     self.extensive.insert(key, index);
                 }
                 continue;
@@ -42,7 +44,7 @@ impl<'a> Elaborator<'a> {
             let value = self.state_node(index, &ty);
             self.keep_value(id, m, &[false], &value);
             if *role == Role::Extensive {
-                let key = ExtensiveKey { instance: id, member: name.text.clone(), species: None };
+                let key = ExtensiveKey { instance: id, member: name.text.clone(), species: None, matter: false };
                 self.extensive.insert(key, index);
             }
         }
@@ -216,8 +218,7 @@ impl<'a> Elaborator<'a> {
     /// Evaluates all initial values; what an instance holds goes into its amounts.
     pub fn initialise(&mut self) {
         for i in 0..self.instances.len() as u32 {
-            let amounts: Vec<(SpeciesId, u32)> =
-                self.instances[i as usize].amounts.values().flatten().map(|(s, state)| (*s, *state)).collect();
+            let amounts: Vec<(SpeciesId, u32)> = self.amounts_in(InstanceId(i)).collect();
             for (s, index) in amounts {
                 let held = self.instances[i as usize].contents.iter().find(|(c, _)| *c == s).map(|c| c.1);
                 let node = held.unwrap_or_else(|| self.graph.number(0.0));
@@ -238,6 +239,7 @@ impl<'a> Elaborator<'a> {
         self.initial_mode = true;
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
+            self.initialise_each_species(id);
             for m in self.all_members(id).iter().copied() {
                 let MemberKind::Value { role: Role::State | Role::Extensive, name, per: None, options, .. } =
                     &m.member.kind
@@ -269,6 +271,33 @@ impl<'a> Elaborator<'a> {
             }
         }
         self.initial_mode = false;
+    }
+
+    /// Own quantities of each species begin as their declaration, or what is given for them, says; matter is what is held.
+    fn initialise_each_species(&mut self, id: InstanceId) {
+        for m in self.all_members(id).iter().copied() {
+            let MemberKind::Value { role: Role::Extensive, name, ty, per: Some(_), .. } = &m.member.kind else {
+                continue;
+            };
+            let of = self.instances[id.0 as usize].amounts.get(&name.text);
+            let states: Vec<u32> = of.into_iter().flat_map(BTreeMap::values).copied().collect();
+            if states.is_empty() || self.is_matter(id, m) {
+                continue;
+            }
+            let ty = self.resolve_type(ty, m.module);
+            let value = self.begins_with(id, m, &ty);
+            let Some(node) = self.value_node(&value) else { continue };
+            states.into_iter().for_each(|state| self.states[state as usize].initial = node);
+        }
+    }
+
+    /// The value at the start of a quantity of each species.
+    pub fn begins_with(&mut self, id: InstanceId, m: MemberRef<'a>, ty: &Type) -> Value {
+        let MemberKind::Value { name, value, .. } = &m.member.kind else { return Value::Error };
+        let before = std::mem::replace(&mut self.initial_mode, true);
+        let found = self.state_value(id, m, &name.text, ty, value.as_ref());
+        self.initial_mode = before;
+        found
     }
 
     /// The node of a value that a state can hold.

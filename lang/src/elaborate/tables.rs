@@ -10,7 +10,7 @@ use super::properties::{self, Properties};
 use super::reach::Reach;
 use super::species::SpeciesTable;
 use super::{Elaborator, units};
-use crate::ast::{AssetLine, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
+use crate::ast::{AssetLine, Expr, ExprKind, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
 use crate::budget::Stop;
 use crate::lower::{dangers, declared_failures};
 use crate::names::{DeclId, Names, verb_text};
@@ -44,8 +44,10 @@ pub struct Kind<'a> {
     pub members: Vec<MemberRef<'a>>,
     /// Those of them that no more derived capability declares again.
     pub visible: Vec<MemberRef<'a>>,
-    /// The member that counts amounts per species, if there is one.
-    pub per_species: Option<MemberRef<'a>>,
+    /// The member that is the amount of matter: `holding` fills it, and its atoms, charge and mass are counted.
+    pub matter: Option<MemberRef<'a>>,
+    /// Whether it has a quantity of each species, matter or not.
+    pub per_species: bool,
     /// The visible ones by name; more than one is ambiguous.
     by_name: FxHashMap<&'a str, Vec<MemberRef<'a>>>,
     /// Lines of all its assets, most derived first, with their module.
@@ -181,7 +183,8 @@ impl<'a> Tables<'a> {
             ancestors: vec![id],
             members: Vec::new(),
             visible: Vec::new(),
-            per_species: None,
+            matter: None,
+            per_species: false,
             by_name: FxHashMap::default(),
             lines: Vec::new(),
             span: name.span,
@@ -196,19 +199,28 @@ impl<'a> Tables<'a> {
             kind.members.extend(members.iter().map(|member| MemberRef { owner: id, member, module: decl.module }));
         }
         open.pop();
-        let counts = |m: &&MemberRef<'a>| {
-            matches!(&m.member.kind, MemberKind::Value { role: Role::Extensive, per: Some(_), .. })
-        };
-        kind.per_species = kind.members.iter().find(counts).copied();
         let members = kind.members.clone();
+        let matter: Vec<&Name> =
+            members.iter().filter(|m| is_matter(m.member)).filter_map(|m| member_name(m.member)).collect();
         self.kinds.insert(id, kind);
-        let visible = self.visible(members);
+        let visible = self.visible(members.clone());
         if let Some(kind) = self.kinds.get_mut(&id) {
             for m in &visible {
                 if let Some(name) = member_name(m.member) {
                     kind.by_name.entry(&name.text).or_default().push(*m);
                 }
             }
+            // A member that is declared again stays what it was.
+            let counts = |m: &&MemberRef<'a>| {
+                per_species(m.member)
+                    && member_name(m.member).is_some_and(|n| matter.iter().any(|of| of.text == n.text))
+            };
+            let mut found = visible.iter().filter(counts);
+            kind.matter = found.next().copied();
+            if let (Some(first), Some(second)) = (&kind.matter, found.next()) {
+                diagnostics.push(second_matter(kind, first, second));
+            }
+            kind.per_species = visible.iter().any(|m| per_species(m.member));
             kind.visible = visible;
         }
     }
@@ -317,6 +329,33 @@ impl<'a> Tables<'a> {
     pub fn kind_name(&self, id: DeclId) -> &str {
         self.kinds.get(&id).map_or("", |k| k.name.as_str())
     }
+}
+
+/// Two amounts of matter in one thing: `holding` could not tell which it fills.
+fn second_matter(kind: &Kind<'_>, first: &MemberRef<'_>, second: &MemberRef<'_>) -> Diagnostic {
+    let headline = format!("`{}` has two amounts of matter", kind.name);
+    let d = Diagnostic::error(codes::DUPLICATE_NAME, second.member.span, headline, "the second one");
+    d.because(first.member.span, "the first one")
+        .help("give what is apart from the rest a part of its own: `part bed: Bed`")
+}
+
+/// The option of an extensive quantity per species that says that it is matter.
+pub const MATTER: &str = "matter";
+
+/// Whether a member is an extensive quantity of each species.
+pub fn per_species(member: &Member) -> bool {
+    matches!(&member.kind, MemberKind::Value { role: Role::Extensive, per: Some(_), .. })
+}
+
+/// Whether a member is declared to be matter, of which atoms, charge and mass are counted.
+fn is_matter(member: &Member) -> bool {
+    let MemberKind::Value { options, .. } = &member.kind else { return false };
+    per_species(member) && options.iter().any(|o| o.name.text == MATTER && is_true(&o.value))
+}
+
+/// Whether an expression is the word `true`.
+pub fn is_true(e: &Expr) -> bool {
+    matches!(&*e.kind, ExprKind::Name(n) if n.text == "true")
 }
 
 /// The name of a member that has one.

@@ -1,6 +1,6 @@
 //! Expressions, one construct at a time.
 
-use matterix_ir::{BinaryOp, Diagnostic, Op, Span, UnaryOp, codes};
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 use rustc_hash::FxHashMap;
 
 use super::{Num, ReactionId, Scope, Value};
@@ -413,12 +413,18 @@ impl<'a> Elaborator<'a> {
         }
     }
 
+    /// Whether a part of a hazard's condition does not hold: of one that is judged at the start only, as things are given.
+    fn is_out(&self, part: NodeId) -> bool {
+        let value = if self.initial_mode { self.glance(part) } else { self.graph.constant(part) };
+        value == Some(0.0)
+    }
+
     fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
         match op {
             Binary::And if self.noting_any => {
                 let x = self.truth(a, scope);
                 // There are many mixtures, and what is never so of one need not be written out.
-                if x.is_some_and(|x| self.graph.constant(x) == Some(0.0)) && !self.prototype {
+                if x.is_some_and(|x| self.is_out(x)) && !self.prototype {
                     return x.map_or(Value::Error, Value::Bool);
                 }
                 let (Some(x), Some(y)) = (x, self.truth(b, scope)) else { return Value::Error };

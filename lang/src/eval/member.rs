@@ -116,7 +116,7 @@ impl<'a> Elaborator<'a> {
     }
 
     fn instance_member(&mut self, id: InstanceId, name: &Name) -> Value {
-        if name.text == "species" && self.per_species(id).is_some() {
+        if name.text == "species" && self.per_species(id) {
             let set = self.mixture_species(id);
             return Value::List(set.into_iter().map(Value::Species).collect());
         }
@@ -137,7 +137,7 @@ impl<'a> Elaborator<'a> {
         if let Some(kind) = kind {
             return Value::Qualified(id, kind);
         }
-        if name.text == "basis" && self.per_species(id).is_some() {
+        if name.text == "basis" && self.is_mixture(id) {
             return Value::Method(Box::new(Value::Instance(id)), "basis".into());
         }
         if let Some((id, grid)) = self.grid_of(&Value::Instance(id))
@@ -218,7 +218,8 @@ impl<'a> Elaborator<'a> {
         inst.parts.contains_key(name)
             || inst.grids.iter().any(|g| g.name == name)
             || !self.members_of(id, name).is_empty()
-            || (matches!(name, "species" | "basis") && self.per_species(id).is_some())
+            || (name == "species" && self.per_species(id))
+            || (name == "basis" && self.is_mixture(id))
     }
 
     /// Names of all members, for suggestions.
@@ -674,10 +675,10 @@ impl<'a> Elaborator<'a> {
 
     /// The mixture `x[S]` asks: the instance itself or its one part with contents.
     fn indexed(&self, id: InstanceId) -> Option<InstanceId> {
-        if self.per_species(id).is_some() {
+        if self.is_mixture(id) {
             return Some(id);
         }
-        let mut parts = self.instances[id.0 as usize].parts.values().filter(|p| self.per_species(**p).is_some());
+        let mut parts = self.instances[id.0 as usize].parts.values().filter(|p| self.is_mixture(**p));
         match (parts.next(), parts.next()) {
             (Some(p), None) => Some(*p),
             _ => None,
@@ -715,8 +716,8 @@ impl<'a> Elaborator<'a> {
                 );
                 return None;
             }
-            let key = (id, s, owner, dimension.clone());
-            if let Some(v) = self.view_values.get(&key) {
+            let kind = (owner, dimension.clone());
+            if let Some(v) = self.view_values.get(&(id, s)).and_then(|of| of.get(&kind)) {
                 return Some(v.clone());
             }
             let mut scope = Scope::of(id, module);
@@ -726,7 +727,7 @@ impl<'a> Elaborator<'a> {
             self.comparisons = compared;
             let v = self.coerce(v, &ty, value.span, "view");
             if !self.initial_mode {
-                self.view_values.insert(key, v.clone());
+                self.view_values.entry((id, s)).or_default().insert(kind, v.clone());
             }
             return Some(v);
         }
@@ -744,15 +745,18 @@ impl<'a> Elaborator<'a> {
         None
     }
 
-    /// The amount of a species in a mixture: a state, or zero where it can never get there.
+    /// The amount of a species in a mixture, or another quantity of it: a state; where the species can never get there, zero
+    /// for matter, and for others what they begin with.
     pub fn amount(&mut self, id: InstanceId, member: &str, s: SpeciesId) -> Value {
-        let Some((ty, _)) = self.extensive_type(id, member) else { return Value::Error };
-        let Type::Quantity { dimension, .. } = ty else { return Value::Error };
+        let Some((ty, m)) = self.extensive_type(id, member) else { return Value::Error };
+        let Type::Quantity { dimension, .. } = &ty else { return Value::Error };
+        let dimension = dimension.clone();
         let index = self.instances[id.0 as usize].amounts.get(member).and_then(|of| of.get(&s)).copied();
         let node = match index {
             Some(i) if self.initial_mode => self.states[i as usize].initial,
             Some(i) => self.graph.add(Op::State(i)),
-            None => self.graph.number(0.0),
+            None if self.is_matter(id, m) || self.prototype => self.graph.number(0.0),
+            None => return self.begins_with(id, m, &ty),
         };
         self.num(node, dimension)
     }

@@ -286,7 +286,7 @@ impl<'a> Elaborator<'a> {
             );
             return;
         }
-        let mixture = self.tables.kinds.values().find(|k| k.per_species.is_some()).map(|k| k.id);
+        let mixture = self.tables.kinds.values().find(|k| k.matter.is_some()).map(|k| k.id);
         if let (true, Some(mixture)) = (self.prototype, mixture) {
             let stand_in = self.prototype_of(vec![mixture], "mixture");
             self.requires(r, stand_in);

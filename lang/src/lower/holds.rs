@@ -93,8 +93,7 @@ impl<'a> Planner<'a, '_> {
 
     /// Whether one mixture holds a substance. That it holds anything at all is for the call itself to ask.
     fn holds(&mut self, mixture: InstanceId, what: &Substance, span: Span) -> Condition {
-        let amounts: Vec<(SpeciesId, u32)> =
-            self.lab.instances[mixture.0 as usize].amounts.values().flatten().map(|(s, state)| (*s, *state)).collect();
+        let amounts: Vec<(SpeciesId, u32)> = self.lab.amounts_in(mixture).collect();
         let named: Vec<_> = match what {
             Substance::Species(s) => amounts.iter().filter(|(known, _)| known == s).collect(),
             Substance::Solution(_) => Vec::new(),
@@ -187,7 +186,7 @@ impl<'a> Planner<'a, '_> {
             Value::List(items) | Value::Tuple(items) => items.into_iter().flat_map(|i| self.mixtures_of(i)).collect(),
             Value::Instance(i) | Value::Qualified(i, _) => {
                 let walls = self.lab.walls_of(i);
-                self.lab.per_species(walls).is_some().then_some(walls).into_iter().collect()
+                self.lab.is_mixture(walls).then_some(walls).into_iter().collect()
             }
             _ => BTreeSet::new(),
         }

@@ -70,6 +70,13 @@ impl Questions {
             let Some(species) = key.species else { continue };
             let def = lab.tables.species.get(species);
             let (name, by_mass) = (def.name.clone(), def.by_mass);
+            if !key.matter {
+                if !is_hidden(lab, key.instance, &key.member) {
+                    let asked = ask(lab, format!("{}[{name}]", key.member), state);
+                    things[key.instance.0 as usize].facts.push(asked);
+                }
+                continue;
+            }
             let mut asked = ask(lab, name, state);
             if by_mass {
                 // Its amount is its mass in kg.
@@ -186,11 +193,21 @@ fn head(sources: &Sources, span: Span, block: bool) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// Whether the declaration of a member hides it.
+fn is_hidden(lab: &Elaborator<'_>, id: InstanceId, member: &str) -> bool {
+    lab.members_of(id, member).first().is_some_and(|m| match &m.member.kind {
+        MemberKind::Value { options, .. } => options.iter().any(|o| o.name.text == "hidden"),
+        _ => false,
+    })
+}
+
 /// The states of an instance that are not hidden, by name of the member.
 fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
     let mut out = Vec::new();
     for m in lab.all_members(id).iter().copied() {
-        let MemberKind::Value { role: Role::State, name, options, .. } = &m.member.kind else { continue };
+        let MemberKind::Value { role: Role::State | Role::Extensive, name, options, .. } = &m.member.kind else {
+            continue;
+        };
         if options.iter().any(|o| o.name.text == "hidden") {
             continue;
         }

@@ -194,7 +194,7 @@ impl<'a> Prose<'a, '_> {
     /// Whether a part is the mixture in a vessel.
     fn is_contents(&self, id: matterix_ir::scene::InstanceId, part: &str) -> bool {
         let part = self.lab.instances[id.0 as usize].parts.get(part);
-        part.is_some_and(|p| self.lab.per_species(*p).is_some())
+        part.is_some_and(|p| self.lab.is_mixture(*p))
     }
 
     /// `plate[A1]` is a well, `beaker[EtOH]` a concentration.

@@ -242,7 +242,13 @@ impl Flow<'_, '_> {
         };
         let mut changes = Vec::new();
         for (source, target) in self.passages.between(from, to, &self.mixtures).iter() {
-            let Some(target) = target.filter(|target| target != source) else { continue };
+            let Some(target) = *target else {
+                self.no_place(*source, from, to, &fraction, facts);
+                continue;
+            };
+            if target == *source {
+                continue;
+            }
             let held = &facts.states[*source as usize];
             let (moved, rest) = match ends.filter(|_| self.amounts.contains(source)) {
                 Some([of_least, of_most]) => {

@@ -252,7 +252,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
             clocked: Vec::new(),
-            amounts: lab.extensive.iter().filter(|(k, _)| k.species.is_some()).map(|(_, s)| *s).collect(),
+            amounts: lab.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect(),
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
             findings: Vec::new(),

@@ -374,6 +374,27 @@ impl Flow<'_, '_> {
         self.found(d, about);
     }
 
+    /// A transfer takes something along that the mixture where it ends has no place for. Where there may be none of it, that is
+    /// left to the run.
+    pub fn no_place(&mut self, state: u32, from: u32, to: u32, share: &Known, facts: &Facts) {
+        let there = |k: &Known| {
+            let (low, high) = k.bounds();
+            low > 0.0 || high < 0.0
+        };
+        if !there(share) || !there(&facts.states[state as usize]) {
+            return;
+        }
+        let Some((key, _)) = self.mixtures[from as usize].iter().find(|(_, s)| *s == state) else { return };
+        let Some(id) = self.lab.mixtures.get(to as usize) else { return };
+        let (member, to) = (key.member.clone(), self.lab.spoken_name(*id));
+        let from = self.lab.spoken_name(key.instance);
+        let headline = format!("`{member}` goes with what `{from}` holds, and `{to}` has no place for it");
+        let d = self.at_site(codes::BALANCE_BREACH, headline, "would be lost".to_string(), self.doubt > 0);
+        let d = d.help(format!("give `{to}` contents that have `{member}` as well"));
+        let about = d.span();
+        self.found(d, about);
+    }
+
     pub(super) fn at_site(&self, code: Code, headline: String, said: String, some: bool) -> Diagnostic {
         let mut d = Diagnostic::error(code, self.site(), headline, said);
         d.severity = severity(code, some);

@@ -53,8 +53,7 @@ impl Flow<'_, '_> {
 
     /// Extensive states other than amounts that exchange something now.
     fn groups(&mut self, facts: &Facts) -> Vec<Group> {
-        let scalars: BTreeSet<u32> =
-            self.lab.extensive.iter().filter(|(k, _)| k.species.is_none()).map(|(_, s)| *s).collect();
+        let scalars: BTreeSet<u32> = self.lab.extensive.iter().filter(|(k, _)| !k.matter).map(|(_, s)| *s).collect();
         let stoichiometry = self.stoichiometry();
         let mut rows: Group = Vec::new();
         for i in &facts.moving {

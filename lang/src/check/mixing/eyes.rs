@@ -40,7 +40,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
     pub fn new(lab: &'l Elaborator<'a>) -> Self {
         let mut amounts: BTreeMap<InstanceId, Vec<(SpeciesId, u32)>> = BTreeMap::new();
         for (key, state) in &lab.extensive {
-            if let Some(s) = key.species {
+            if let Some(s) = key.matter() {
                 amounts.entry(key.instance).or_default().push((s, *state));
             }
         }

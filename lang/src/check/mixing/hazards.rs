@@ -67,6 +67,19 @@ impl Walk<'_, '_> {
         thing.map_or(self.place(), |id| lab.instances[id.0 as usize].span)
     }
 
+    /// Judges the hazards of what the text gives for the start, where it is given.
+    pub(super) fn given(&mut self, world: &World) {
+        let all = self.hazards.all.clone();
+        for (i, hazard) in all.iter().enumerate() {
+            let Watched::Given(span) = hazard.watched else { continue };
+            if self.eyes.nominal_truth(hazard.when, world) == Some(true) {
+                let place = span.unwrap_or_else(|| self.declared_at(hazard));
+                let d = self.hazard(hazard, world, place, "given here");
+                self.tell(i, d);
+            }
+        }
+    }
+
     /// Judges the hazards of what the lab itself measures out: contents given in the dimension of a watched value.
     pub(super) fn measured_out(&mut self, world: &World) {
         let lab = self.eyes.lab;
@@ -94,8 +107,10 @@ impl Walk<'_, '_> {
             changed.iter().filter_map(|s| self.hazards.by_state.get(s)).flatten().copied().collect();
         for i in touched {
             let hazard = &self.hazards.all[i];
+            let law = self.uses.by_law.get(&i).copied();
             let since = match hazard.watched {
                 Watched::Steps => None,
+                Watched::Value(_) if law.is_some() => None,
                 _ if self.hazards.standing.contains_key(&i) => self.hazards.standing.get(&i).copied(),
                 _ => continue,
             };
@@ -112,7 +127,12 @@ impl Walk<'_, '_> {
                 1 => (self.declared_at(hazard), "so from the start"),
                 _ => (self.place(), "brings it about"),
             };
-            let mut d = self.hazard(hazard, world, place, said);
+            let law = law.filter(|_| hazard.watched != Watched::Steps);
+            let mut d =
+                self.hazard(hazard, world, law.unwrap_or(place), if law.is_some() { "used here" } else { said });
+            if law.is_some() {
+                d = d.because(place, said);
+            }
             if let Some(since) = since.filter(|since| *since != place) {
                 d = d.because(since, "used from here on");
             }

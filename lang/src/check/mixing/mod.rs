@@ -110,7 +110,7 @@ pub fn mixing(
     let eyes = Eyes::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
-    let uses = Uses::new(lab, plan, &ready.hazards.all, &library);
+    let uses = Uses::new(lab, plan, events, &ready.hazards.all, &library);
     let mut walk = Walk {
         uses,
         by_event: moves_of_events(&eyes, plan),
@@ -138,6 +138,7 @@ pub fn mixing(
     walk.fed(&mut world);
     walk.endangered(&world);
     walk.measured_out(&world);
+    walk.given(&world);
     walk.endanger(&mut world);
     let begun = world.clone();
     walk.step(plan.root, world);
@@ -171,9 +172,7 @@ fn moves_of_events(eyes: &Eyes<'_, '_>, plan: &Plan) -> BTreeSet<(InstanceId, In
 /// What the walls around mixtures are made of: the first parameter that is a material of what holds them.
 fn materials(lab: &mut Elaborator<'_>) -> BTreeMap<InstanceId, DeclId> {
     let mut out = BTreeMap::new();
-    for m in
-        (0..lab.instances.len() as u32).map(InstanceId).filter(|m| lab.per_species(*m).is_some()).collect::<Vec<_>>()
-    {
+    for m in (0..lab.instances.len() as u32).map(InstanceId).filter(|m| lab.is_mixture(*m)).collect::<Vec<_>>() {
         let holders: Vec<InstanceId> = std::iter::successors(Some(m), |i| lab.instances[i.0 as usize].owner).collect();
         let found = holders.into_iter().find_map(|i| material_of(lab, i));
         out.extend(found.map(|material| (m, material)));

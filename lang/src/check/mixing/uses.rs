@@ -4,10 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use matterix_ir::model::Action;
+use matterix_ir::model::{Action, Event};
 use matterix_ir::plan::{Condition, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{FileId, NodeId, Op, Text, TextPart};
+use matterix_ir::{FileId, NodeId, Op, Span, Text, TextPart};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::elaborate::Elaborator;
@@ -22,16 +22,24 @@ pub(super) struct Uses {
     pub by_step: BTreeMap<StepId, Rc<[usize]>>,
     pub by_transfer: BTreeMap<(InstanceId, InstanceId), Vec<usize>>,
     pub by_stream: BTreeMap<Stream, Rc<[usize]>>,
+    /// Those of values that laws and events of the user's own go by, with the place of the first of these.
+    pub by_law: BTreeMap<usize, Span>,
 }
 
 impl Uses {
     /// What a plan uses of what hazards watch.
-    pub fn new(lab: &Elaborator<'_>, plan: &Plan, hazards: &[Hazard], library: &BTreeSet<FileId>) -> Uses {
+    pub fn new(
+        lab: &Elaborator<'_>,
+        plan: &Plan,
+        events: &[Event],
+        hazards: &[Hazard],
+        library: &BTreeSet<FileId>,
+    ) -> Uses {
         let mut uses = Uses::default();
         let mut finder = Finder { lab, watched: FxHashMap::default(), above: Vec::new(), known: FxHashMap::default() };
         for (i, hazard) in hazards.iter().enumerate() {
             match hazard.watched {
-                Watched::Steps => {}
+                Watched::Steps | Watched::Given(_) => {}
                 Watched::Value(node) => finder.watched.entry(node).or_default().push(i),
                 Watched::Transfer(from, to, then) => {
                     uses.by_transfer.entry((from, to)).or_default().push(i);
@@ -49,6 +57,11 @@ impl Uses {
                 uses.by_step.insert(StepId(i as u32), found);
             }
         }
+        for (span, node) in own_laws(lab, events, library) {
+            for i in finder.below(node).iter() {
+                uses.by_law.entry(*i).or_insert(span);
+            }
+        }
         for (stream, flows) in &lab.streams {
             let found = finder.all(vec![*flows]);
             if !found.is_empty() {
@@ -56,6 +69,33 @@ impl Uses {
             }
         }
         uses
+    }
+}
+
+/// The values that laws and events of the user's own go by, with their places. What a reaction requires is its own.
+fn own_laws(lab: &Elaborator<'_>, events: &[Event], library: &BTreeSet<FileId>) -> Vec<(Span, NodeId)> {
+    let own = |span: Span| Some(span).filter(|span| !library.contains(&span.file));
+    let places: Vec<Option<Span>> = lab.processes.iter().map(|p| own(p.span)).collect();
+    let asked = lab.processes.iter().filter_map(|p| {
+        let reaction = p.reaction.and_then(|r| own(lab.tables.reactions[r.0 as usize].span));
+        Some((own(p.span).or(reaction)?, p.guard?))
+    });
+    let mut out: Vec<(Span, NodeId)> = asked.collect();
+    let parts = lab.rates.values().chain(lab.flows.values()).flatten();
+    out.extend(parts.filter_map(|c| Some((places[c.process]?, c.node))));
+    for event in events {
+        let Some(span) = own(event.span) else { continue };
+        out.push((span, event.when));
+        out.extend(event.actions.iter().map(|action| (span, value_of(action))));
+    }
+    out
+}
+
+/// The value that an action goes by.
+fn value_of(action: &Action) -> NodeId {
+    match action {
+        Action::Assign { value, .. } => *value,
+        Action::Move { fraction, .. } => *fraction,
     }
 }
 
@@ -119,10 +159,7 @@ fn used_by(step: &PlanStep, library: &BTreeSet<FileId>) -> Vec<NodeId> {
         Step::Operation(o) => {
             out.extend(o.needs.iter().filter(|c| own(c)).map(|c| c.node));
             out.extend(o.until.iter().filter(|c| own(c)).map(|c| c.node));
-            out.extend(o.at_start.iter().chain(&o.at_end).map(|action| match action {
-                Action::Assign { value, .. } => *value,
-                Action::Move { fraction, .. } => *fraction,
-            }));
+            out.extend(o.at_start.iter().chain(&o.at_end).map(value_of));
         }
         Step::Skill { needs, invariants, promises, .. } => {
             let asked = needs.iter().map(|c| &**c).chain(invariants).chain(promises);

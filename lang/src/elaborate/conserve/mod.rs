@@ -105,7 +105,7 @@ struct Judge<'l, 'a> {
 
 impl<'l, 'a> Judge<'l, 'a> {
     fn new(lab: &'l Elaborator<'a>) -> Self {
-        let amounts = lab.extensive.iter().filter_map(|(k, state)| Some((*state, (k.instance, k.species?))));
+        let amounts = lab.extensive.iter().filter_map(|(k, state)| Some((*state, (k.instance, k.matter()?))));
         Judge { lab, library: library(lab), amounts: amounts.collect(), found: Vec::new() }
     }
 

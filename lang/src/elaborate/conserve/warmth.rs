@@ -93,8 +93,7 @@ impl<'a> Elaborator<'a> {
     fn drained(&self, events: &[Event], plan: &Plan) -> Vec<Drained> {
         let library = library(self);
         let own = |span: &Span| !library.contains(&span.file);
-        let amounts: BTreeSet<u32> =
-            self.extensive.iter().filter(|(k, _)| k.species.is_some()).map(|(_, s)| *s).collect();
+        let amounts: BTreeSet<u32> = self.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect();
         let mut out: BTreeMap<u32, Drained> = BTreeMap::new();
         let mut add = |state: u32, law: &str, span: Span| {
             if amounts.contains(&state) && own(&span) {
