@@ -881,7 +881,7 @@ fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {
         let capabilities = {
             let all = lab.ancestors_of(id);
             all.into_iter()
-                .filter(|k| !lab.tables.kinds[k].is_asset)
+                .filter(|k| lab.tables.kinds.get(k).is_some_and(|kind| !kind.is_asset))
                 .map(|k| lab.tables.kind_name(k).to_string())
                 .collect()
         };

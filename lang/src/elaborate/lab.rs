@@ -6,6 +6,7 @@ use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::instances::Setting;
+use super::tables::Kind;
 use super::{Elaborator, Pair};
 use crate::ast::{
     self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
@@ -92,7 +93,7 @@ impl<'a> Elaborator<'a> {
             return None;
         }
         let kind = self.kind_named(&literal.ty, module)?;
-        if !self.tables.kinds[&kind].is_asset {
+        if !self.tables.kinds.get(&kind).is_some_and(|k| k.is_asset) {
             let names = self.tables.names;
             let fits: Vec<String> = self
                 .tables
@@ -113,7 +114,8 @@ impl<'a> Elaborator<'a> {
             return None;
         }
         // What is wrong with the asset is said where it is declared.
-        if self.tables.kinds[&kind].lines.iter().any(|(_, line)| matches!(line, AssetLine::Error(_))) {
+        let unread = |k: &Kind<'a>| k.lines.iter().any(|(_, line)| matches!(line, AssetLine::Error(_)));
+        if self.tables.kinds.get(&kind).is_some_and(unread) {
             return None;
         }
         self.check_fields(kind, &literal.fields);

@@ -16,6 +16,7 @@ mod inertia;
 pub mod instances;
 mod instants;
 mod joints;
+pub mod kinds;
 pub mod lab;
 mod labels;
 pub mod laws;

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use matterix_ir::{Diagnostic, codes};
 
+use super::kinds::Kinds;
 use super::species::{SpeciesDef, field};
 use super::tables::{Kind, MemberRef, member_name};
 use super::{Elaborator, SpeciesId};
@@ -27,7 +28,7 @@ const SAME: f64 = 1e-3;
 pub type Properties<'a> = BTreeMap<&'a str, MemberRef<'a>>;
 
 /// The properties that capabilities `Species` declare; one declared twice is reported.
-pub fn declared<'a>(kinds: &BTreeMap<DeclId, Kind<'a>>, diagnostics: &mut Vec<Diagnostic>) -> Properties<'a> {
+pub fn declared<'a>(kinds: &Kinds<'a>, diagnostics: &mut Vec<Diagnostic>) -> Properties<'a> {
     let mut out: Properties<'a> = BTreeMap::new();
     let own = |kind: &Kind<'a>| -> Vec<MemberRef<'a>> {
         kind.members.iter().filter(|m| m.owner == kind.id).copied().collect()

@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock, RwLock};
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 use rustc_hash::FxHashMap;
 
+use super::kinds::Kinds;
 use super::properties::{self, Properties};
 use super::reach::Reach;
 use super::species::SpeciesTable;
@@ -101,7 +102,7 @@ pub struct Tables<'a> {
     failures: OnceLock<Arc<BTreeSet<String>>>,
     dangers: OnceLock<BTreeSet<String>>,
     /// Capabilities and assets.
-    pub kinds: BTreeMap<DeclId, Kind<'a>>,
+    pub kinds: Kinds<'a>,
     /// Commands by the words of their verbs, in order of capability.
     commands: BTreeMap<String, Vec<MemberRef<'a>>>,
     /// What may be said of species, with its types.
@@ -131,7 +132,7 @@ impl<'a> Tables<'a> {
             spoken: RwLock::default(),
             failures: OnceLock::new(),
             dangers: OnceLock::new(),
-            kinds: BTreeMap::new(),
+            kinds: Kinds::default(),
             commands: BTreeMap::new(),
             properties: Properties::new(),
             species: SpeciesTable::default(),
@@ -146,8 +147,8 @@ impl<'a> Tables<'a> {
                 tables.processes.push((DeclId(index), p));
             }
         }
-        for (id, kind) in &tables.kinds {
-            for m in kind.members.iter().filter(|m| m.owner == *id) {
+        for kind in tables.kinds.values() {
+            for m in kind.members.iter().filter(|m| m.owner == kind.id) {
                 if let MemberKind::Command { sig, .. } = &m.member.kind {
                     tables.commands.entry(verb_text(&sig.verb)).or_default().push(*m);
                 }

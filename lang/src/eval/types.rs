@@ -160,7 +160,7 @@ impl Tables<'_> {
             Type::Range(inner) => format!("a range of {}", self.type_name(inner)),
             Type::List(inner) => format!("a list of {}", self.type_name(inner)),
             Type::Instance { kinds, .. } => {
-                kinds.iter().map(|k| self.kinds[k].name.clone()).collect::<Vec<_>>().join(" & ")
+                kinds.iter().map(|k| self.kind_name(*k).to_owned()).collect::<Vec<_>>().join(" & ")
             }
         }
     }

@@ -81,7 +81,7 @@ pub struct Around {
 impl Around {
     /// What the tables say; the scopes of the modules are still to come.
     pub fn of(tables: &Tables<'_>) -> Around {
-        let ancestors = tables.kinds.iter().map(|(id, kind)| (*id, kind.ancestors.clone())).collect();
+        let ancestors = tables.kinds.values().map(|kind| (kind.id, kind.ancestors.clone())).collect();
         Around { scopes: Vec::new(), ancestors, units: tables.units.clone() }
     }
 }

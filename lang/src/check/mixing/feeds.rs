@@ -62,7 +62,9 @@ pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
             }
         }
     }
-    out
+    // What is zero whatever is there brings nothing, as where a salt that dissolves is set to none.
+    let lasting = |f: &Feed| !vanishes(&lab.graph, f.value, &|c| lab.never(c), &|_| false);
+    out.into_iter().filter(lasting).collect()
 }
 
 /// Whether a mixture holds more of a species than a residue.
