@@ -70,8 +70,8 @@ impl Executor<'_, '_> {
             let runs = |id: StepId| {
                 self.frames.values().any(|f| f.step == Some(id) && matches!(f.kind, Kind::Operation { .. }))
             };
-            let ranked = begun.map(|(id, time)| (runs(id), time, id));
-            ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))).map(|(_, _, id)| id)
+            let ranked = begun.map(|(id, time)| (runs(id), time, self.plan.get(id).span, id));
+            ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))).map(|(.., id)| id)
         })
     }
 

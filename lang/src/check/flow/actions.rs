@@ -368,7 +368,13 @@ impl Flow<'_, '_> {
                 let value = self.eval(node, &facts);
                 if value.truth() != Some(true) {
                     self.stopped_meanwhile(until, f64::INFINITY, &facts);
-                    if !matches!(self.course(f64::INFINITY, Some(node), &mut facts), Course::Reached) {
+                    let begun = facts.time.bounds().0;
+                    if matches!(self.course(f64::INFINITY, Some(node), &mut facts), Course::Reached) {
+                        // Others that run meanwhile may end it earlier or later.
+                        if self.flows_beside() {
+                            facts.time = Known::Range(begun, f64::INFINITY, Why::Unknown);
+                        }
+                    } else {
                         self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
                         self.assume(node, true, &mut facts);
                     }

@@ -95,6 +95,13 @@ impl Flow<'_, '_> {
         even.chain(states.iter().copied()).collect()
     }
 
+    /// Whether other branches or jobs set going what may move evenly.
+    pub(super) fn flows_beside(&mut self) -> bool {
+        let tracks = self.tracks();
+        let mut beside = self.shared.iter().chain(self.of_jobs());
+        beside.any(|set| tracks.list.iter().any(|t| set.contains(&t.state)))
+    }
+
     fn find_tracks(&mut self) -> Tracks {
         let driven: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).collect();
         let streams = !self.lab.streams.is_empty();

@@ -425,7 +425,15 @@ impl Flow<'_, '_> {
         let other: Vec<Finding> = self.findings.split_off(mark);
         self.findings.extend(in_both(one, &other));
         match (first, second) {
-            (Some(a), Some(b)) => Some(facts.join(a, &b, self.site(), Why::Unknown)),
+            (Some(a), Some(b)) => {
+                // What flows at once comes to something between, or to neither.
+                let tracks = self.tracks();
+                let differ = |s: &u32| a.states[*s as usize] != b.states[*s as usize];
+                let open: Vec<u32> = tracks.list.iter().map(|t| t.state).filter(differ).collect();
+                let mut both = facts.join(a, &b, self.site(), Why::Unknown);
+                self.forget(&open, &mut both);
+                Some(both)
+            }
             (a, b) => a.or(b),
         }
     }
