@@ -176,7 +176,7 @@ impl Timing {
         let choice = |own: Outcome| {
             others.iter().any(|other| own.choice == other.choice && own.holds != other.holds).then_some(own.choice)
         };
-        match own.filter_map(choice).last()? {
+        match own.filter_map(choice).next_back()? {
             Choice::Step(step) => Some(self.beyond_turns(step, [a, b])),
             Choice::Fixed(_) | Choice::Constant => Some(Vec::new()),
         }

@@ -112,8 +112,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
             }
             let Caught::Named(name) = caught else { continue };
             let by_time = || takes_time(plan, *body) && may_flow(plan, lab, name);
-            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) || by_time()
-            {
+            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) || by_time() {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
                 let headline = format!("nothing before it fails with `{name}`");

@@ -45,7 +45,8 @@ impl<'p> Flow<'p, '_> {
         for rival in &rivals {
             let mut time = rival.start.bounds();
             for step in &rival.steps {
-                self.effects(*step, rival.later, &mut time, facts, &mut effects);
+                let place = (Span::default(), rival.later);
+                self.effects(*step, place, &mut time, facts, &mut effects);
             }
         }
         effects.retain(|effect| {
@@ -140,13 +141,23 @@ impl<'p> Flow<'p, '_> {
         actions.iter().flat_map(states).collect()
     }
 
-    /// What a step and those in it do, and when; `time` is when it begins, and then when it ends.
-    fn effects(&mut self, id: StepId, later: bool, time: &mut (f64, f64), facts: &Facts, out: &mut Vec<Effect<'p>>) {
+    /// What a step and those in it do, and when; `time` is when it begins, and then when it ends, and `place` the statement of the
+    /// user's around it, with whether it begins after what goes on beside it.
+    fn effects(
+        &mut self,
+        id: StepId,
+        place: (Span, bool),
+        time: &mut (f64, f64),
+        facts: &Facts,
+        out: &mut Vec<Effect<'p>>,
+    ) {
         let plan = self.plan;
         let node = plan.get(id);
+        let own = !node.span.is_empty() && !self.in_library(node.span);
+        let place = if own { (node.span, place.1) } else { place };
         let open = |time: &mut (f64, f64)| time.1 = f64::INFINITY;
         match &node.step {
-            Step::Operation(operation) => self.effects_of(operation, node.span, later, time, facts, out),
+            Step::Operation(operation) => self.effects_of(operation, place, time, facts, out),
             Step::Wait { duration } => {
                 let (low, high) = self.eval(*duration, facts).bounds();
                 *time = (time.0 + low.max(0.0), time.1 + high.max(0.0));
@@ -158,34 +169,53 @@ impl<'p> Flow<'p, '_> {
             | Step::During { .. }
             | Step::Within { .. } => {
                 for child in node.step.children() {
-                    self.effects(child, later, time, facts, out);
+                    self.effects(child, place, time, facts, out);
                 }
             }
             Step::Guarded { body, handlers, finally } => {
-                self.effects(*body, later, time, facts, out);
+                self.effects(*body, place, time, facts, out);
                 for (_, handler) in handlers {
-                    self.effects(*handler, later, &mut (time.0, f64::INFINITY), facts, out);
+                    self.effects(*handler, place, &mut (time.0, f64::INFINITY), facts, out);
                 }
                 if let Some(finally) = finally {
-                    self.effects(*finally, later, time, facts, out);
+                    self.effects(*finally, place, time, facts, out);
                 }
             }
             Step::Let { .. } | Step::Expect(_) | Step::Record { .. } | Step::Note(_) | Step::Ask(_) => {}
             step => {
+                let decided = match step {
+                    Step::If { condition, then, otherwise } => {
+                        let holds = self.decided_by_now(condition, facts, out);
+                        holds.map(|holds| if holds { Some(*then) } else { *otherwise })
+                    }
+                    _ => None,
+                };
+                if let Some(taken) = decided {
+                    taken.into_iter().for_each(|step| self.effects(step, place, time, facts, out));
+                    return;
+                }
                 open(time);
                 for child in step.children() {
-                    self.effects(child, later, time, facts, out);
+                    self.effects(child, place, time, facts, out);
                     open(time);
                 }
             }
         }
     }
 
+    /// How a condition comes out after these effects, where it is known before them and they do not change it.
+    fn decided_by_now(&mut self, condition: &Condition, facts: &Facts, effects: &[Effect<'p>]) -> Option<bool> {
+        let holds = self.eval(condition.node, facts).truth()?;
+        let parts = self.parts(condition.node);
+        let actions = effects.iter().flat_map(|effect| effect.actions).cloned().collect::<Vec<Action>>();
+        let changed = self.behind(&self.changed_by(&actions));
+        (!parts.timed && parts.states.iter().all(|s| !changed.contains(s))).then_some(holds)
+    }
+
     fn effects_of(
         &mut self,
         operation: &'p Operation,
-        span: Span,
-        later: bool,
+        (span, later): (Span, bool),
         time: &mut (f64, f64),
         facts: &Facts,
         out: &mut Vec<Effect<'p>>,

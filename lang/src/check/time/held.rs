@@ -9,6 +9,7 @@ use matterix_ir::{Diagnostic, Severity, codes};
 use matterix_timing::usage::{self, Use};
 use matterix_timing::{ROUNDING, Visit};
 
+use super::twice::independent;
 use super::{Times, expected, show};
 
 /// Blocks that claim, each with each of its instances.
@@ -71,6 +72,7 @@ pub(super) fn clash(times: &Times<'_>, hold: &Use, used: &Use) -> Option<bool> {
         || expected(times.plan, &times.timing, used.step, "claimed")
         || times.before(hold.step, used.step)
         || times.before(used.step, hold.step)
+        || independent(times, hold.step, used.step)
     {
         return None;
     }
@@ -84,7 +86,9 @@ pub(super) fn clash(times: &Times<'_>, hold: &Use, used: &Use) -> Option<bool> {
     if !turns && (after(step.start, block.start) || (step.start == block.start && step.order < block.order)) {
         return None;
     }
-    let within = (together || after(begun.start, step.start)) && after(step.start, block.end);
+    // Of what is over at once, the moment counts.
+    let moment = together && block.end == step.start;
+    let within = moment || ((together || after(begun.start, step.start)) && after(step.start, block.end));
     Some(within && times.must_fail(used.step, "claimed") && times.must_fail(hold.step, "claimed"))
 }
 

@@ -164,7 +164,7 @@ fn take_turns(times: &Times<'_>, a: &Use, b: &Use) -> bool {
 }
 
 /// Whether all that is done in one step can be done at the moment of all that is done in the other.
-fn independent(times: &Times<'_>, a: StepId, b: StepId) -> bool {
+pub(super) fn independent(times: &Times<'_>, a: StepId, b: StepId) -> bool {
     let others = operations(times.plan, b);
     let own = operations(times.plan, a);
     at_once(times, a) && at_once(times, b) && own.iter().all(|a| others.iter().all(|b| a.is_independent_of(b)))
