@@ -110,7 +110,7 @@ impl Flow<'_, '_> {
         }
     }
 
-    fn below(&self, id: StepId) -> BTreeSet<StepId> {
+    pub(super) fn below(&self, id: StepId) -> BTreeSet<StepId> {
         let mut out = BTreeSet::new();
         let mut todo = vec![id];
         while let Some(id) = todo.pop() {

@@ -64,6 +64,8 @@ pub struct Facts {
     pub decided: Vec<Decided>,
     /// Where the text writes the failure that was raised on this way.
     pub written: Option<Span>,
+    /// Whether only a run can tell that this way is taken.
+    pub unsure: bool,
     /// Jobs that have begun by now, and whether they have on every way.
     pub begun: BTreeMap<String, bool>,
 }
@@ -158,6 +160,8 @@ impl Facts {
     /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
     pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
         let mut out = self.clone();
+        let why = if a.unsure || b.unsure { Why::Unknown } else { why };
+        out.unsure = a.unsure && b.unsure;
         let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
         for (i, (x, y)) in a.states.iter().zip(b.states.iter()).enumerate() {
             let both = x.join(y, why);

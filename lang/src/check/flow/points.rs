@@ -227,6 +227,7 @@ fn bare(facts: &Facts) -> Facts {
         held: BTreeSet::new(),
         decided: Vec::new(),
         written: None,
+        unsure: false,
         begun: BTreeMap::new(),
     }
 }
