@@ -19,6 +19,14 @@ const MOST_EVENTS: usize = 200;
 /// Two mixtures are the same where the shares of their species differ by less than this, relative to the larger.
 const SAME: f64 = 1e-9;
 
+/// A transfer takes more than there is where its share is above 1 by more than this; closer to 1 it takes all.
+const TOO_MUCH: f64 = 1e-9;
+
+/// A share of which rounding alone parts it from all there is, as all.
+fn whole(share: f64) -> f64 {
+    if (share - 1.0).abs() <= TOO_MUCH { 1.0 } else { share }
+}
+
 /// How what a step asks for comes out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
@@ -36,11 +44,14 @@ impl Flow<'_, '_> {
     pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut Facts) -> Asked {
         for need in needs {
             let value = self.eval(need.node, facts);
+            let truth = value.truth();
+            if truth == Some(true) {
+                continue;
+            }
             let taken = self.is_taken(need.failure());
-            match value.truth() {
-                Some(true) => {}
+            match truth {
                 // The step fails here: what it needs beyond does not matter any more.
-                Some(false) => {
+                Some(_) => {
                     if !taken {
                         self.unmet(label, need, facts, false);
                     }
@@ -178,10 +189,13 @@ impl Flow<'_, '_> {
             let limit = &self.plan.limits[i as usize];
             let value = self.eval(limit.condition.node, facts);
             let condition = &limit.condition;
+            let truth = value.truth();
+            if truth == Some(true) {
+                continue;
+            }
             let taken = self.is_taken(condition.failure());
-            match value.truth() {
-                Some(true) => {}
-                Some(false) => {
+            match truth {
+                Some(_) => {
                     if !taken {
                         self.passed(limit, facts, false);
                     }
@@ -246,7 +260,7 @@ impl Flow<'_, '_> {
         let mut share = |end: usize| {
             let mut facts = facts.clone();
             held.iter().for_each(|(state, ends)| facts.states[*state as usize] = Known::Point(ends[end]));
-            self.eval(fraction, &facts).exact().filter(|share| (0.0..=1.0).contains(share))
+            self.eval(fraction, &facts).exact().map(whole).filter(|share| (0.0..=1.0).contains(share))
         };
         Some([share(0)?, share(1)?])
     }
@@ -260,16 +274,17 @@ impl Flow<'_, '_> {
         facts: &mut Facts,
     ) -> Vec<u32> {
         let (low, high) = fraction.bounds();
-        if low > 1.0 + 1e-9 || high < 0.0 {
+        if low > 1.0 + TOO_MUCH || high < 0.0 {
             self.too_much(from as usize, low, false);
-        } else if high > 1.0 + 1e-9 && fraction.why() == Some(Why::Paths) && !self.is_beside(from) {
+        } else if high > 1.0 + TOO_MUCH && fraction.why() == Some(Why::Paths) && !self.is_beside(from) {
             self.too_much(from as usize, high, true);
         }
         let fraction = match fraction.exact() {
-            Some(f) if (0.0..=1.0).contains(&f) => Known::Point(f),
-            Some(f) => Known::Point(f.clamp(0.0, 1.0)),
+            Some(f) => Known::Point(whole(f.clamp(0.0, 1.0))),
             None => match fraction {
-                Known::Few(..) if low >= 0.0 && high <= 1.0 => fraction.clone(),
+                Known::Few(all, why) if low >= 0.0 && high <= 1.0 + TOO_MUCH => {
+                    Known::of(all.iter().map(|f| whole(*f)).collect(), *why)
+                }
                 _ => Known::Range(low.clamp(0.0, 1.0), high.clamp(0.0, 1.0), fraction.why().unwrap_or(Why::Unknown)),
             },
         };

@@ -126,7 +126,9 @@ impl Flow<'_, '_> {
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
+        let raised = self.guards.last().map_or(0, Vec::len);
         let after = self.walk(body, facts);
+        self.blur(raised);
         self.rivals.pop();
         self.shared.pop();
         after

@@ -312,6 +312,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             decided: Vec::new(),
             written: None,
             unsure: false,
+            blurred: None,
             begun: BTreeMap::new(),
         };
         let states = &self.lab.states;

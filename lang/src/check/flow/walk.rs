@@ -434,7 +434,9 @@ impl Flow<'_, '_> {
             facts.time = start.clone();
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
+            let raised = self.guards.last().map_or(0, Vec::len);
             let after = self.walk(branches[*i], facts);
+            self.blur(raised);
             self.rivals.pop();
             self.shared.pop();
             self.end_branch();
