@@ -16,8 +16,9 @@ pub struct Fate {
     pub done: usize,
     /// It failed with these codes, so often.
     pub failed: BTreeMap<&'static str, usize>,
-    /// Of the executions that are certain and in which it ended well: with which codes it also failed there.
-    pub beside: BTreeSet<Vec<&'static str>>,
+    /// Of the executions that are certain and in which it ended well: with which codes it also failed there, and whether nothing
+    /// went wrong there.
+    pub beside: BTreeSet<(Vec<&'static str>, bool)>,
     /// It presumed what was not so, so often.
     pub presumed: usize,
     /// How the lab stood behind it in executions that are certain.
@@ -43,6 +44,8 @@ pub struct Summary {
     pub ends: Vec<World>,
     /// Whether one that is certain did not pass.
     pub fails: bool,
+    /// How often a wait timed out in vain, or a block came too late.
+    vain: BTreeMap<Violation, usize>,
 }
 
 /// Worlds kept behind a statement, at most: enough to try an enclosure with.
@@ -91,17 +94,31 @@ pub fn explore(plan: &Plan, budget: usize, seed: u64) -> Summary {
         last.0 += 1;
         prefix = taken.iter().map(|t| t.0).collect();
     }
+    summary.always_vain();
     summary
 }
 
 impl Fate {
-    /// Whether it ended well in an execution without having failed with this code.
-    pub fn clean_of(&self, code: &str) -> bool {
-        self.beside.iter().any(|codes| !codes.contains(&code))
+    /// Whether it ended well in an execution without having failed with this code; where it has to be so, in one in which nothing
+    /// went wrong.
+    pub fn clean_of(&self, code: &str, all_well: bool) -> bool {
+        self.beside.iter().any(|(codes, well)| !codes.contains(&code) && (*well || !all_well))
     }
 }
 
 impl Summary {
+    /// A wait that times out whenever it is come to is wrong, as is a block that always comes too late.
+    fn always_vain(&mut self) {
+        if !self.complete || !self.certain {
+            return;
+        }
+        let always = |(violation, times): &(&Violation, &usize)| {
+            self.fates.get(&violation.stmt).is_some_and(|fate| fate.began == **times)
+        };
+        let wrong: Vec<Violation> = self.vain.iter().filter(always).map(|(violation, _)| *violation).collect();
+        self.violations.extend(wrong);
+    }
+
     fn take(&mut self, execution: Execution) {
         self.executions += 1;
         self.certain &= execution.certain && execution.end != End::Unfinished;
@@ -116,7 +133,8 @@ impl Summary {
             }
         }
         for id in done {
-            self.fates.entry(id).or_default().beside.insert(failed.remove(&id).unwrap_or_default());
+            let beside = (failed.remove(&id).unwrap_or_default(), execution.violations.is_empty());
+            self.fates.entry(id).or_default().beside.insert(beside);
         }
         for step in execution.steps {
             let (Step::Began(id) | Step::Done(id, _) | Step::Failed(id, _) | Step::Presumed(id)) = step;
@@ -140,6 +158,9 @@ impl Summary {
         self.clean |= execution.end == End::Passed && execution.violations.is_empty();
         self.fails |= execution.end != End::Passed;
         self.violations.extend(execution.violations);
+        for vain in execution.vain {
+            *self.vain.entry(vain).or_default() += 1;
+        }
         if execution.end == End::Passed && self.ends.len() < KEPT {
             self.ends.push(execution.world);
         }

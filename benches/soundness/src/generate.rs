@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::explore::explore;
 use crate::plan::{
-    ACID, Action, Block, CYAN, Condition, Cup, Handler, Id, Kind, Lab, Plan, Remedy, Stmt, THEMES, Theme, Thing, each,
+    ACID, Action, Block, CYAN, Condition, Cup, Declared, Handler, Id, Ill, Kind, Lab, Plan, Remedy, Stmt, THEMES,
+    Theme, Thing, each,
 };
 use crate::random::Random;
 
@@ -36,7 +37,9 @@ pub fn generate(seed: u64) -> Plan {
 
 fn drawn(random: &mut Random) -> Plan {
     let theme = random.pick(THEMES).copied().unwrap_or(Theme::Liquids);
-    let mut draw = Draw { theme, lab: lab(random, theme), random, next: 0, jobs: 0, beside: 0 };
+    // What an arm does takes times that are a matter of its skills: nothing goes on beside it.
+    let beside = if theme == Theme::Arms { 2 } else { 0 };
+    let mut draw = Draw { theme, lab: lab(random, theme), random, next: 0, jobs: 0, steps: 0, beside };
     let statements = draw.random.within(2, 5);
     let mut body = draw.block(0, statements);
     if body.is_empty() {
@@ -44,7 +47,22 @@ fn drawn(random: &mut Random) -> Plan {
     }
     let finally = draw.finally();
     draw.lab.dials = dials(&body);
-    Plan { theme, lab: draw.lab, body, finally }
+    let lab = draw.lab;
+    Plan { theme, lab, declared: declared(random, theme), body, finally }
+}
+
+/// Now and then something is declared that is wrong, or nearly so.
+fn declared(random: &mut Random, theme: Theme) -> Option<Declared> {
+    match theme {
+        Theme::Liquids if random.chance(6) => {
+            let is = random.within(20, 80) as u32;
+            let label = if random.chance(50) { is } else { random.within(20, 80) as u32 };
+            Some(Declared::Label(is, label))
+        }
+        Theme::Heat if random.chance(6) => Some(Declared::Slab(random.within(2, 30) as u32)),
+        Theme::Reaction if random.chance(4) => Some(Declared::Equation(random.within(2, 3) as u32)),
+        _ => None,
+    }
 }
 
 fn dials(body: &Block) -> usize {
@@ -65,6 +83,7 @@ fn lab(random: &mut Random, theme: Theme) -> Lab {
     let cups = match theme {
         Theme::Devices | Theme::Claims => 0,
         Theme::Heat => 2,
+        Theme::Arms => 2,
         Theme::Hazards => random.within(3, 4),
         _ => random.within(2, 4),
     };
@@ -100,12 +119,15 @@ fn cup(random: &mut Random, theme: Theme, number: usize) -> Cup {
     let max = random.within(30, 100) * 10;
     let (most, cap) = match theme {
         Theme::Tips => (300, None),
-        Theme::Heat => (50_000, None),
+        Theme::Heat | Theme::Arms => (50_000, None),
         _ => (max * 4 / 5, random.chance(25).then(|| random.chance(25))),
     };
+    let tin = theme == Theme::Hazards && number > 2 && cap.is_none() && random.chance(70);
+    let piped = random.chance(95);
     let filled = number == 0 || theme == Theme::Hazards && number < 3 || random.chance(65);
     let volume = (random.within(most / 8, most) / 10 * 10) as u32;
-    Cup { max: max as u32, holds: filled.then_some((liquid, volume)), cap }
+    let holds = filled.then_some((if tin { 0 } else { liquid }, volume));
+    Cup { max: max as u32, holds, cap, tin, piped }
 }
 
 /// What is being drawn.
@@ -115,6 +137,7 @@ struct Draw<'r> {
     random: &'r mut Random,
     next: Id,
     jobs: usize,
+    steps: usize,
     /// How many branches, jobs and handlers are around.
     beside: usize,
 }
@@ -144,7 +167,13 @@ impl Draw<'_> {
 
     /// A construct with blocks.
     fn construct(&mut self, depth: usize, into: &mut Block) {
-        let kind = match self.random.below(13) {
+        let kind = match self.random.below(17) {
+            13 => return self.window(depth, into),
+            14 if !self.lab.ovens.is_empty() => self.keep(depth),
+            15 if !self.lab.ovens.is_empty() => self.hold(depth),
+            16 if self.random.chance(4) => {
+                Kind::Ill(*self.random.pick(&[Ill::Mass, Ill::Volume]).unwrap_or(&Ill::Compared))
+            }
             0..=2 => self.branch(depth),
             3 => {
                 let times = self.random.within(2, 3) as u32;
@@ -214,7 +243,12 @@ impl Draw<'_> {
         self.beside += 1;
         let body = self.inner(depth);
         self.beside -= 1;
-        let start = self.stmt(Kind::Start(job, body));
+        let mut start = self.stmt(Kind::Start(job, body));
+        if self.random.chance(8)
+            && let Some(dial) = self.dial()
+        {
+            start = self.stmt(Kind::If(dial, vec![start], Vec::new()));
+        }
         into.push(start);
         let beside = self.random.within(0, 2);
         let mut block = self.block(depth + 1, beside);
@@ -223,6 +257,38 @@ impl Draw<'_> {
             let wait = self.stmt(Kind::Await(job));
             into.push(wait);
         }
+    }
+
+    /// A step with a name, something behind it, and what must begin soon after it.
+    fn window(&mut self, depth: usize, into: &mut Block) {
+        let name = self.steps;
+        self.steps += 1;
+        let body = self.inner(depth);
+        let step = self.stmt(Kind::Step(name, body));
+        into.push(step);
+        let between = self.random.within(0, 2);
+        let mut block = self.block(DEEPEST, between);
+        into.append(&mut block);
+        let limit = self.random.within(100, 12_000) as u32;
+        let body = self.inner(depth);
+        let handler = self.random.chance(40).then(|| self.handler(depth));
+        let within = self.stmt(Kind::Within(name, limit, body, handler));
+        into.push(within);
+    }
+
+    /// A device that is switched on, as a rule, and has to stay so.
+    fn keep(&mut self, depth: usize) -> Kind {
+        let oven = self.random.below(self.lab.ovens.len());
+        let body = self.inner(depth);
+        let handler = self.random.chance(50).then(|| self.handler(depth));
+        Kind::Keep(Condition::On(oven), body, handler)
+    }
+
+    fn hold(&mut self, depth: usize) -> Kind {
+        let oven = self.random.below(self.lab.ovens.len());
+        let (span, limit) = (self.time(), self.time() * 3);
+        let handler = self.random.chance(60).then(|| self.handler(depth));
+        Kind::Hold(Condition::On(oven), span, limit, handler)
     }
 
     fn guarded(&mut self, depth: usize) -> Kind {
@@ -251,7 +317,7 @@ impl Draw<'_> {
     }
 
     fn things(&self) -> Vec<Thing> {
-        let cups = if self.theme == Theme::Tips { 0 } else { self.lab.cups.len() };
+        let cups = if matches!(self.theme, Theme::Tips | Theme::Arms) { 0 } else { self.lab.cups.len() };
         let cups = (0..cups).map(Thing::Cup);
         let ovens = (0..self.lab.ovens.len()).map(Thing::Oven);
         cups.chain(ovens).chain((0..self.lab.tokens).map(Thing::Token)).collect()
@@ -273,6 +339,10 @@ impl Draw<'_> {
             Theme::Heat if self.random.chance(60) => {
                 let cup = self.random.below(self.lab.plates);
                 (Condition::Warm(cup, self.random.within(23, 45) as u32), self.random.within(60, 500) as u32 * 1_003)
+            }
+            Theme::Reaction if self.random.chance(50) => {
+                let cup = self.random.below(self.lab.cups.len());
+                (Condition::Made(cup, self.random.within(10, 3_000) as u32), self.random.within(2, 60) as u32 * 1_003)
             }
             Theme::Devices if self.random.chance(40) => {
                 let oven = self.random.below(self.lab.ovens.len());
@@ -296,11 +366,14 @@ impl Draw<'_> {
         let known = self.random.chance(30);
         match self.dial().filter(|_| !known) {
             Some(dial) => dial,
+            None if self.theme == Theme::Arms && self.random.chance(50) => {
+                Condition::Heavy(self.random.within(1, 60) as u32)
+            }
             None if !self.lab.ovens.is_empty() && (self.lab.cups.is_empty() || self.random.chance(30)) => {
                 Condition::On(self.random.below(self.lab.ovens.len()))
             }
             None if !self.lab.cups.is_empty() => {
-                let most = if self.theme == Theme::Heat { 40_000 } else { 500 };
+                let most = if matches!(self.theme, Theme::Heat | Theme::Arms) { 40_000 } else { 500 };
                 Condition::Fuller(self.random.below(self.lab.cups.len()), self.random.within(0, most) as u32)
             }
             None => Condition::Dial(self.random.below(self.lab.dials.max(1))),
@@ -328,6 +401,16 @@ impl Draw<'_> {
                 self.call(action, into);
             }
             Theme::Tips => self.pipetting(into),
+            Theme::Pump if self.random.chance(75) => self.pumping(into),
+            Theme::Arms if self.random.chance(70) => {
+                let cup = self.random.below(self.lab.cups.len());
+                let action = match self.random.below(10) {
+                    0..=5 => Action::Place(cup, self.random.below(2)),
+                    6 | 7 => Action::Pick(cup),
+                    _ => Action::PutBack(cup),
+                };
+                self.call(action, into);
+            }
             Theme::Heat if self.random.chance(70) => {
                 let plate = self.random.below(self.lab.plates);
                 let goal = self.random.within(25, 90) as u32;
@@ -369,7 +452,7 @@ impl Draw<'_> {
         }
         let from = self.random.below(self.lab.cups.len());
         let to = (from + self.random.within(1, self.lab.cups.len() - 1)) % self.lab.cups.len();
-        let scale = if self.theme == Theme::Heat { 500 } else { 10 };
+        let scale = if matches!(self.theme, Theme::Heat | Theme::Arms) { 500 } else { 10 };
         let volume = (self.random.within(1, 25) * scale) as u32;
         match self.random.below(10) {
             0..=5 => Action::Drip(volume, from, to),
@@ -400,6 +483,18 @@ impl Draw<'_> {
         }
     }
 
+    /// As a rule something is drawn and pushed out elsewhere.
+    fn pumping(&mut self, into: &mut Block) {
+        let from = self.random.below(self.lab.cups.len());
+        let to = (from + self.random.within(1, self.lab.cups.len() - 1)) % self.lab.cups.len();
+        let volume = if self.random.chance(4) { 5 } else { self.random.within(2, 20) as u32 * 10 };
+        self.call(Action::Draw(volume, from), into);
+        if self.random.chance(90) {
+            let less = if self.random.chance(20) { 10 } else { 0 };
+            self.call(Action::Push(volume.saturating_sub(less).max(5), to), into);
+        }
+    }
+
     fn finally(&mut self) -> Block {
         let mut block = Vec::new();
         for oven in 0..self.lab.ovens.len() {
@@ -424,6 +519,9 @@ fn raises(block: &Block) -> BTreeSet<&'static str> {
         Kind::Until(_, _, None) => drop(names.insert("timeout")),
         Kind::While(..) => drop(names.insert("max")),
         Kind::Fail(name) => drop(names.insert(name)),
+        Kind::Hold(_, _, _, None) => drop(names.insert("timeout")),
+        Kind::Within(_, _, _, None) => drop(names.insert("late")),
+        Kind::Keep(_, _, None) => drop(names.insert("broken")),
         _ => {}
     });
     names
@@ -440,6 +538,11 @@ fn refusals(action: &Action) -> &'static [&'static str] {
         Action::Aspirate(..) => &["no_tip", "volume_underflow", "contamination"],
         Action::Dispense(..) => &["no_tip", "volume_underflow", "volume_overflow"],
         Action::BlowOut(_) => &["no_tip", "volume_overflow"],
+        Action::Pick(_) => &["hand_full"],
+        Action::Place(..) => &["hand_full", "occupied", "overload"],
+        Action::PutBack(_) => &["not_in_hand"],
+        Action::Draw(..) => &["not_piped", "out_of_range", "volume_underflow", "contamination"],
+        Action::Push(..) => &["volume_underflow", "volume_overflow", "contamination"],
         _ => &[],
     }
 }

@@ -71,6 +71,8 @@ pub struct Execution {
     pub end: End,
     /// What went wrong and had no handler.
     pub violations: Vec<Violation>,
+    /// Waits that timed out and blocks that came too late, where no handler took that: wrong if it is so in every execution.
+    pub vain: Vec<Violation>,
     /// What happened, in order.
     pub steps: Vec<Step>,
     /// How the lab stands at the end.
@@ -91,6 +93,9 @@ enum Frame<'p> {
     Claim { stmt: Id, things: &'p [Thing], jobs: Vec<usize> },
     Double { stmt: Id, volume: u32, from: usize, to: usize, part: usize },
     After { stmt: Id },
+    Named { stmt: Id, name: usize },
+    Window { stmt: Id, late: bool, handler: Option<&'p Block>, jobs: Vec<usize> },
+    Keep { stmt: Id, condition: Condition, handler: Option<&'p Block>, handling: bool, jobs: Vec<usize> },
     Root { jobs: Vec<usize>, finally: bool, failed: Option<Failure> },
 }
 
@@ -101,6 +106,7 @@ enum State<'p> {
     Waits { until: f64, stmt: Id },
     Acts { until: f64, action: Action, stmt: Id, whole: bool },
     Until { condition: Condition, deadline: f64, stmt: Id, handler: Option<&'p Block>, passes: usize },
+    Holds { condition: Condition, since: Option<f64>, span: f64, deadline: f64, stmt: Id, handler: Option<&'p Block> },
     Claims { things: &'p [Thing], stmt: Id, body: &'p Block, order: usize },
     Joins,
     Awaits { job: usize, stmt: Id },
@@ -114,6 +120,8 @@ struct Thread<'p> {
     state: State<'p>,
     stopped: bool,
     failed: Option<Failure>,
+    /// The block that keeps something which does not hold any more.
+    breaks: Option<Id>,
     /// By thread: how many of its touches come before what this one does now.
     knows: BTreeMap<usize, usize>,
     touches: usize,
@@ -140,10 +148,15 @@ struct Machine<'p, 'o> {
     now: f64,
     world: World,
     dangers: Vec<bool>,
+    /// By vessel: whether its wall was found to be attacked.
+    walls: Vec<bool>,
     out: Vec<Step>,
     violations: Vec<Violation>,
+    vain: Vec<Violation>,
     certain: bool,
     last_on: BTreeMap<Thing, Id>,
+    /// When steps with a name ended, s.
+    ended: BTreeMap<usize, f64>,
 }
 
 /// Follows a plan once.
@@ -160,19 +173,27 @@ pub fn execute(plan: &Plan, oracle: &mut dyn Oracle) -> Execution {
         queue: 0,
         now: 0.0,
         dangers: vec![false; world.cups.len()],
+        walls: vec![false; world.cups.len()],
         world,
         out: Vec::new(),
         violations: Vec::new(),
+        vain: Vec::new(),
         certain: true,
         last_on: BTreeMap::new(),
+        ended: BTreeMap::new(),
     };
     let root = Frame::Root { jobs: Vec::new(), finally: false, failed: None };
     machine.spawn(None, vec![root, Frame::Block { stmts: &plan.body, next: 0 }]);
+    if let Some(code) = plan.declared.and_then(|declared| declared.wrong()) {
+        let stmt = plan.body.first().map_or(0, |stmt| stmt.id);
+        machine.violations.push(Violation { code, stmt });
+    }
     let end = machine.run();
     machine.leave(&end);
     Execution {
         end,
         violations: machine.violations,
+        vain: machine.vain,
         steps: machine.out,
         world: machine.world,
         certain: machine.certain,
@@ -215,6 +236,9 @@ impl<'p> Machine<'p, '_> {
         for (t, thread) in self.threads.iter().enumerate() {
             match thread.state {
                 State::Waits { until, .. } | State::Acts { until, .. } => next = next.min(until),
+                State::Holds { since, span, deadline, .. } => {
+                    next = next.min(deadline).min(since.map_or(f64::INFINITY, |since| since + span));
+                }
                 State::Until { deadline, condition, passes, .. } => {
                     next = next.min(deadline);
                     if matches!(condition, Condition::Dial(_)) && passes == 0 {
@@ -249,7 +273,7 @@ impl<'p> Machine<'p, '_> {
             .threads
             .iter()
             .filter_map(|t| match t.state {
-                State::Until { condition: c @ Condition::Warm(..), .. } => Some(c),
+                State::Until { condition: c @ (Condition::Warm(..) | Condition::Made(..)), .. } => Some(c),
                 _ => None,
             })
             .collect();
@@ -272,7 +296,16 @@ impl<'p> Machine<'p, '_> {
             knows.insert(p, self.threads[p].touches);
         }
         let state = State::Ready;
-        self.threads.push(Thread { parent, frames, state, stopped: false, failed: None, knows, touches: 0 });
+        self.threads.push(Thread {
+            parent,
+            frames,
+            state,
+            stopped: false,
+            failed: None,
+            breaks: None,
+            knows,
+            touches: 0,
+        });
         self.threads.len() - 1
     }
 
@@ -311,12 +344,19 @@ impl<'p> Machine<'p, '_> {
     }
 
     fn done(&mut self, stmt: Id) {
+        self.look_at_keeps();
         self.out.push(Step::Done(stmt, self.world.clone()));
     }
 
     /// One step of a thread; false where it cannot go on now.
     fn advance(&mut self, t: usize) -> bool {
         if self.threads[t].stopped
+            && !matches!(self.threads[t].state, State::Acts { .. } | State::Unwinds { .. } | State::Ended)
+        {
+            self.threads[t].state = State::Unwinds { failure: None };
+            return true;
+        }
+        if self.threads[t].breaks.is_some()
             && !matches!(self.threads[t].state, State::Acts { .. } | State::Unwinds { .. } | State::Ended)
         {
             self.threads[t].state = State::Unwinds { failure: None };
@@ -345,6 +385,18 @@ impl<'p> Machine<'p, '_> {
             }
             State::Until { condition, deadline, stmt, handler, .. } => {
                 self.waited(t, &condition, deadline, stmt, handler)
+            }
+            State::Holds { condition, since, span, deadline, stmt, handler } => {
+                let since = self.held(t, &condition, since);
+                self.threads[t].state = State::Holds { condition, since, span, deadline, stmt, handler };
+                match since.is_some_and(|since| self.now >= since + span) {
+                    true => {
+                        self.done(stmt);
+                        self.threads[t].state = State::Ready;
+                        true
+                    }
+                    false => self.now >= deadline && self.timed_out(t, stmt, handler),
+                }
             }
             State::Claims { things, stmt, body, order } => self.claim(t, things, stmt, body, order),
             State::Joins => self.join(t),
@@ -416,8 +468,16 @@ impl<'p> Machine<'p, '_> {
                 self.threads[t].frames.pop();
                 self.done(stmt);
             }
+            Frame::Named { stmt, name } => {
+                let (stmt, name) = (*stmt, *name);
+                self.threads[t].frames.pop();
+                self.ended.insert(name, self.now);
+                self.done(stmt);
+            }
             Frame::Parallel { .. } => self.threads[t].state = State::Joins,
             Frame::Guard { jobs, .. }
+            | Frame::Window { jobs, .. }
+            | Frame::Keep { jobs, .. }
             | Frame::Try { jobs, .. }
             | Frame::Claim { jobs, .. }
             | Frame::Root { jobs, .. } => {
@@ -469,7 +529,12 @@ impl<'p> Machine<'p, '_> {
                 self.let_go(t, things);
                 self.done(stmt);
             }
-            Some(Frame::Guard { stmt, .. } | Frame::Try { stmt, .. }) => self.done(stmt),
+            Some(
+                Frame::Guard { stmt, .. }
+                | Frame::Try { stmt, .. }
+                | Frame::Window { stmt, .. }
+                | Frame::Keep { stmt, .. },
+            ) => self.done(stmt),
             _ => {}
         }
     }
@@ -499,7 +564,9 @@ impl<'p> Machine<'p, '_> {
     fn look(&mut self, t: usize, condition: &Condition) -> bool {
         match *condition {
             Condition::Fuller(c, _) | Condition::Warm(c, _) => self.touch(t, Thing::Cup(c), false),
+            Condition::Made(c, _) => self.touch(t, Thing::Cup(c), false),
             Condition::On(o) => self.touch(t, Thing::Oven(o), false),
+            Condition::Heavy(_) => self.touch(t, Thing::Place(0), false),
             Condition::Dial(_) => {}
         }
         if self.world.close(condition) {
@@ -551,6 +618,11 @@ impl<'p> Machine<'p, '_> {
                 self.threads[t].frames.push(Frame::Parallel { stmt: id, children });
                 self.threads[t].state = State::Joins;
             }
+            Kind::Start(job, _)
+                if self.jobs.get(job).is_some_and(|t| !matches!(self.threads[*t].state, State::Ended)) =>
+            {
+                self.fail(t, Failure { name: "job", stmt: id, meant: false });
+            }
             Kind::Start(job, body) => {
                 let thread = self.spawn(Some(t), vec![Frame::Block { stmts: body, next: 0 }]);
                 self.own(t, thread);
@@ -572,11 +644,112 @@ impl<'p> Machine<'p, '_> {
                 self.push(t, body);
             }
             Kind::Fail(name) => self.fail(t, Failure { name, stmt: id, meant: true }),
+            Kind::Step(name, body) => {
+                self.threads[t].frames.push(Frame::Named { stmt: id, name: *name });
+                self.push(t, body);
+            }
+            Kind::Within(name, ms, body, handler) => {
+                let limit = self.ended.get(name).map_or(f64::INFINITY, |end| end + f64::from(*ms) / 1000.0);
+                self.certain &= limit.is_finite() && (self.now - limit).abs() > 1e-6;
+                let late = self.now > limit;
+                let handler = handler.as_ref();
+                self.threads[t].frames.push(Frame::Window { stmt: id, late, handler, jobs: Vec::new() });
+                match late {
+                    true => self.fail(t, Failure { name: "late", stmt: id, meant: true }),
+                    false => self.push(t, body),
+                }
+            }
+            Kind::Keep(condition, body, handler) => {
+                let (condition, handler) = (*condition, handler.as_ref());
+                let frame = Frame::Keep { stmt: id, condition, handler, handling: false, jobs: Vec::new() };
+                self.threads[t].frames.push(frame);
+                self.push(t, body);
+                if !self.look(t, &condition) {
+                    self.break_keep(t, id);
+                }
+            }
+            Kind::Hold(condition, span, ms, handler) => {
+                let [span, limit] = [*span, *ms].map(|ms| f64::from(ms) / 1000.0);
+                let (deadline, handler) = (self.now + limit, handler.as_ref());
+                let condition = *condition;
+                self.threads[t].state = State::Holds { condition, since: None, span, deadline, stmt: id, handler };
+            }
+            Kind::Ill(_) => {
+                self.out.push(Step::Failed(id, "unit-mismatch"));
+                self.violations.push(Violation { code: "unit-mismatch", stmt: id });
+            }
             Kind::Claim(things, body) => {
                 self.queue += 1;
                 self.threads[t].state = State::Claims { things, stmt: id, body, order: self.queue };
             }
         }
+    }
+
+    /// Since when a condition that has to hold for a while has held.
+    fn held(&mut self, t: usize, condition: &Condition, since: Option<f64>) -> Option<f64> {
+        match (self.world.holds(condition) == Some(true), since) {
+            (true, Some(since)) => Some(since),
+            (holds, _) => {
+                self.look(t, condition);
+                holds.then_some(self.now)
+            }
+        }
+    }
+
+    /// A wait has timed out.
+    fn timed_out(&mut self, t: usize, stmt: Id, handler: Option<&'p Block>) -> bool {
+        match handler {
+            Some(block) => {
+                self.out.push(Step::Failed(stmt, "timeout"));
+                self.threads[t].frames.push(Frame::After { stmt });
+                self.push(t, block);
+            }
+            None => self.fail(t, Failure { name: "timeout", stmt, meant: true }),
+        }
+        true
+    }
+
+    /// What blocks keep is looked at after each change.
+    fn look_at_keeps(&mut self) {
+        for t in 0..self.threads.len() {
+            if self.threads[t].breaks.is_some() || matches!(self.threads[t].state, State::Ended | State::Unwinds { .. })
+            {
+                continue;
+            }
+            let broken = self.threads[t].frames.iter().find_map(|frame| match frame {
+                Frame::Keep { stmt, condition, handling: false, .. } => {
+                    (self.world.holds(condition) == Some(false)).then_some(*stmt)
+                }
+                _ => None,
+            });
+            if let Some(stmt) = broken {
+                self.break_keep(t, stmt);
+            }
+        }
+    }
+
+    /// A block that keeps something is left. Whether a step that goes on beside it comes to its end is not said.
+    fn break_keep(&mut self, t: usize, stmt: Id) {
+        let alive = self.threads.iter().filter(|x| !matches!(x.state, State::Ended | State::Joins)).count();
+        self.certain &= alive < 2;
+        self.threads[t].breaks = Some(stmt);
+        let failure = Failure { name: "broken", stmt, meant: false };
+        let taken = self.threads[t].frames.iter().any(|frame| match frame {
+            Frame::Keep { stmt: s, handler: Some(_), .. } => *s == stmt,
+            _ => false,
+        });
+        self.out.push(Step::Failed(stmt, code(failure.name)));
+        if !taken && !self.thought_of_around(t, stmt, failure.name) {
+            self.violations.push(Violation { code: code(failure.name), stmt });
+        }
+    }
+
+    /// Whether a handler around a block takes a failure of it.
+    fn thought_of_around(&self, t: usize, stmt: Id, name: &str) -> bool {
+        let thread = &self.threads[t];
+        let at = thread.frames.iter().position(|f| matches!(f, Frame::Keep { stmt: s, .. } if *s == stmt));
+        let around = &thread.frames[..at.unwrap_or(0)];
+        around.iter().any(|frame| takes(frame, name)) || thread.parent.is_some_and(|p| self.thought_of(p, name))
     }
 
     /// A job belongs to the innermost block that handles failures or holds something.
@@ -585,6 +758,8 @@ impl<'p> Machine<'p, '_> {
         while let Some(thread) = at {
             for frame in self.threads[thread].frames.iter_mut().rev() {
                 if let Frame::Guard { jobs, .. }
+                | Frame::Window { jobs, .. }
+                | Frame::Keep { jobs, .. }
                 | Frame::Try { jobs, .. }
                 | Frame::Claim { jobs, .. }
                 | Frame::Root { jobs, .. } = frame
@@ -613,6 +788,10 @@ impl<'p> Machine<'p, '_> {
                 return;
             }
         }
+        // Which steps fail while a limit is passed is not said step by step.
+        if self.world.hangs_on_rounding(&action) || self.world.is_overloaded() {
+            self.certain = false;
+        }
         if self.world.presumes_wrongly(&action) {
             self.out.push(Step::Presumed(stmt));
         }
@@ -639,6 +818,7 @@ impl<'p> Machine<'p, '_> {
             Action::Fire(o) => drop(self.last_on.insert(Thing::Oven(o), stmt)),
             Action::Heat(p, _) => drop(self.last_on.insert(Thing::Plate(p), stmt)),
             Action::TakeTip => drop(self.last_on.insert(Thing::Pipette, stmt)),
+            Action::Pick(_) => drop(self.last_on.insert(Thing::Arm, stmt)),
             _ => {}
         }
     }
@@ -658,11 +838,16 @@ impl<'p> Machine<'p, '_> {
     }
 
     fn look_for_danger(&mut self, stmt: Id) {
-        if let Some(cup) = self.world.danger()
-            && !std::mem::replace(&mut self.dangers[cup], true)
-        {
-            self.out.push(Step::Failed(stmt, "incompatible-mix"));
-            self.violations.push(Violation { code: "incompatible-mix", stmt });
+        self.look_at_keeps();
+        for cup in 0..self.world.cups.len() {
+            if self.world.is_attacked(cup) && !std::mem::replace(&mut self.walls[cup], true) {
+                self.out.push(Step::Failed(stmt, "material-attacked"));
+                self.violations.push(Violation { code: "material-attacked", stmt });
+            }
+            if self.world.is_dangerous(cup) && !std::mem::replace(&mut self.dangers[cup], true) {
+                self.out.push(Step::Failed(stmt, "incompatible-mix"));
+                self.violations.push(Violation { code: "incompatible-mix", stmt });
+            }
         }
     }
 
@@ -678,8 +863,13 @@ impl<'p> Machine<'p, '_> {
     fn fail(&mut self, t: usize, failure: Failure) {
         let code = code(failure.name);
         self.out.push(Step::Failed(failure.stmt, code));
-        if !failure.meant && !self.thought_of(t, failure.name) {
-            self.violations.push(Violation { code, stmt: failure.stmt });
+        if !self.thought_of(t, failure.name) {
+            let violation = Violation { code, stmt: failure.stmt };
+            match failure.meant {
+                false => self.violations.push(violation),
+                true if ["timeout", "late"].contains(&failure.name) => self.vain.push(violation),
+                true => {}
+            }
         }
         self.threads[t].state = State::Unwinds { failure: Some(failure) };
     }
@@ -687,14 +877,8 @@ impl<'p> Machine<'p, '_> {
     /// Whether a block around has a handler for it, or another block to try.
     fn thought_of(&self, t: usize, name: &str) -> bool {
         let thread = &self.threads[t];
-        let takes = |f: &Frame<'_>| match f {
-            Frame::Guard { handlers, handling: false, .. } => {
-                handlers.iter().any(|h| h.on == name || h.on == "failure")
-            }
-            Frame::Try { second: false, .. } => true,
-            _ => false,
-        };
-        !name.is_empty() && (thread.frames.iter().any(takes) || thread.parent.is_some_and(|p| self.thought_of(p, name)))
+        let taken = thread.frames.iter().any(|frame| takes(frame, name));
+        !name.is_empty() && (taken || thread.parent.is_some_and(|p| self.thought_of(p, name)))
     }
 
     /// A wait for a condition.
@@ -709,22 +893,15 @@ impl<'p> Machine<'p, '_> {
             return false;
         }
         self.look(t, c);
-        match handler {
-            Some(block) => {
-                self.out.push(Step::Failed(stmt, "timeout"));
-                self.threads[t].frames.push(Frame::After { stmt });
-                self.push(t, block);
-            }
-            None => self.fail(t, Failure { name: "timeout", stmt, meant: true }),
-        }
-        true
+        self.timed_out(t, stmt, handler)
     }
 
     /// What made a condition true comes before what follows the wait for it.
     fn learn_all(&mut self, t: usize, c: &Condition) {
         let thing = match *c {
-            Condition::Fuller(c, _) | Condition::Warm(c, _) => Thing::Cup(c),
+            Condition::Fuller(c, _) | Condition::Warm(c, _) | Condition::Made(c, _) => Thing::Cup(c),
             Condition::On(o) => Thing::Oven(o),
+            Condition::Heavy(_) => Thing::Place(0),
             Condition::Dial(_) => return,
         };
         let writers: Vec<usize> =
@@ -771,6 +948,8 @@ impl<'p> Machine<'p, '_> {
             Some(Frame::Parallel { stmt, children }) => (Some(*stmt), children.clone()),
             Some(
                 Frame::Guard { jobs, .. }
+                | Frame::Window { jobs, .. }
+                | Frame::Keep { jobs, .. }
                 | Frame::Try { jobs, .. }
                 | Frame::Claim { jobs, .. }
                 | Frame::Root { jobs, .. },
@@ -836,6 +1015,8 @@ impl<'p> Machine<'p, '_> {
             Some(Frame::Parallel { children: inside, .. }) => inside.clone(),
             Some(
                 Frame::Guard { jobs, .. }
+                | Frame::Window { jobs, .. }
+                | Frame::Keep { jobs, .. }
                 | Frame::Try { jobs, .. }
                 | Frame::Claim { jobs, .. }
                 | Frame::Root { jobs, .. },
@@ -862,7 +1043,30 @@ impl<'p> Machine<'p, '_> {
     /// The innermost block has failed: handlers and other blocks have their turn.
     fn leave_failed(&mut self, t: usize, failure: Option<Failure>) {
         let named = failure.filter(|f| !f.name.is_empty()).map(|f| f.name);
+        let breaks = self.threads[t].breaks;
         match self.threads[t].frames.last_mut() {
+            Some(Frame::Window { late, handler, jobs, .. }) if *late && named == Some("late") => {
+                jobs.clear();
+                *late = false;
+                match handler.take() {
+                    Some(block) => self.push(t, block),
+                    None => drop(self.threads[t].frames.pop()),
+                }
+            }
+            Some(Frame::Keep { stmt, handler, handling, jobs, .. }) if breaks == Some(*stmt) => {
+                jobs.clear();
+                let stmt = *stmt;
+                let handler = handler.filter(|_| !std::mem::replace(handling, true));
+                self.threads[t].breaks = None;
+                match handler {
+                    Some(block) => self.push(t, block),
+                    None => {
+                        self.threads[t].frames.pop();
+                        let failure = Failure { name: "broken", stmt, meant: false };
+                        self.threads[t].state = State::Unwinds { failure: Some(failure) };
+                    }
+                }
+            }
             Some(Frame::Guard { body, handlers, tries, handling, jobs, .. }) if !*handling && named.is_some() => {
                 jobs.clear();
                 let fits = |h: &&Handler| Some(h.on) == named || h.on == "failure";
@@ -927,13 +1131,28 @@ impl<'p> Machine<'p, '_> {
                 let ovens = self.world.ovens.iter().enumerate().filter(|(_, o)| o.burning).map(|(i, _)| Thing::Oven(i));
                 let plates = self.world.plates.iter().enumerate().filter(|(_, p)| p.hot).map(|(i, _)| Thing::Plate(i));
                 let tip = self.world.tip.iter().map(|_| Thing::Pipette);
-                let left: Vec<Thing> = ovens.chain(plates).chain(tip).collect();
+                let arm = self.world.holding.iter().map(|_| Thing::Arm);
+                let left: Vec<Thing> = ovens.chain(plates).chain(tip).chain(arm).collect();
                 for thing in left {
                     let stmt = self.last_on.get(&thing).copied().unwrap_or_default();
                     self.violations.push(Violation { code: "unfinished", stmt });
                 }
             }
         }
+    }
+}
+
+/// Whether a block takes a failure of what is in it.
+fn takes(frame: &Frame<'_>, name: &str) -> bool {
+    match frame {
+        Frame::Guard { handlers, tries, handling: false, .. } => {
+            // Another go is no answer where there is none left.
+            let first = handlers.iter().position(|h| h.on == name || h.on == "failure");
+            first.is_some_and(|i| !matches!(handlers[i].what, Remedy::Retry(n) if tries[i] >= n))
+        }
+        Frame::Try { second: false, .. } => true,
+        Frame::Window { late: true, handler: Some(_), .. } => name == "late",
+        _ => false,
     }
 }
 
@@ -954,6 +1173,13 @@ fn code(name: &'static str) -> &'static str {
         "never_filled" => "never-filled",
         "contamination" => "contamination",
         "claimed" => "claimed-twice",
+        "late" => "window-unmeetable",
+        "job" => "job-not-begun",
+        "broken" => "expectation-failed",
+        "hand_full" => "hand-full",
+        "not_in_hand" => "not-in-hand",
+        "not_piped" => "not-piped",
+        "out_of_range" => "out-of-range",
         other => other,
     }
 }

@@ -13,7 +13,7 @@ use matterix_runtime::run::{RunOptions, run};
 
 use crate::explore::{Summary, explore};
 use crate::interpret::Violation;
-use crate::plan::{Id, Kind, LIQUIDS, Plan, Remedy, Stmt, Theme};
+use crate::plan::{Id, LIQUIDS, Plan, Stmt, Theme};
 use crate::print::{Text, print, well};
 use crate::world::World;
 
@@ -90,7 +90,10 @@ pub struct Verdict {
 impl Verdict {
     /// Whether `check --strict` ends without an error once findings of some families are left out.
     pub fn clean_without(&self, families: &str) -> bool {
-        let counts = |f: &&Finding| f.severity != Severity::Advice && !families.contains(initial(f.family));
+        // What is not used goes wrong in no execution.
+        let counts = |f: &&Finding| {
+            f.severity != Severity::Advice && f.code != "unused" && !families.contains(initial(f.family))
+        };
         !self.findings.iter().any(|f| counts(&f))
     }
 }
@@ -166,7 +169,8 @@ impl<'t> Lines<'t> {
         let (from, to) = self.text.spans[number];
         let about = |l: &&matterix_ir::diagnostic::Label| self.line(l.span).is_some_and(|n| n >= from && n < to);
         d.labels.iter().find(about)?;
-        let stmts = d.labels.iter().filter_map(|l| self.stmt(number, l.span)).collect();
+        let spans = std::iter::once(d.span()).chain(d.labels.iter().map(|l| l.span));
+        let stmts = spans.filter_map(|span| self.stmt(number, span)).collect();
         let (code, family) = (d.code.name, d.code.family);
         Some(Finding { code, family, severity: d.severity, stmts, headline: d.headline.clone() })
     }
@@ -177,13 +181,12 @@ struct Places<'p> {
     names: BTreeMap<Id, String>,
     /// The statement before each in its block.
     before: BTreeMap<Id, Id>,
-    again: bool,
     plan: &'p Plan,
 }
 
 impl<'p> Places<'p> {
     fn new(plan: &'p Plan) -> Self {
-        let mut places = Places { names: BTreeMap::new(), before: BTreeMap::new(), again: false, plan };
+        let mut places = Places { names: BTreeMap::new(), before: BTreeMap::new(), plan };
         places.walk(&plan.body, "");
         places.walk(&plan.finally, "finally > ");
         places
@@ -196,9 +199,6 @@ impl<'p> Places<'p> {
         for stmt in block {
             let construct = stmt.kind.construct();
             self.names.insert(stmt.id, format!("{around}{construct}"));
-            if let Kind::Guard(_, handlers) = &stmt.kind {
-                self.again |= handlers.iter().any(|h| matches!(h.what, Remedy::Retry(_)));
-            }
             for inner in stmt.kind.blocks() {
                 self.walk(inner, &format!("{around}{construct} > "));
             }
@@ -234,16 +234,24 @@ impl Verdict {
                 continue;
             }
             // Who of two that meet is in fault is a matter of words.
-            let between = ["claimed-twice", "deadlock"].contains(&finding.code);
+            let between = ["claimed-twice", "deadlock", "stopped-meanwhile"].contains(&finding.code);
             let first = finding.stmts.first().filter(|_| !between);
-            let done = |id: &Id| self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code));
+            // It stands in a skill: which call it is about is not known.
+            if first.is_none() && !between {
+                continue;
+            }
+            // Some ways are enough.
+            if finding.family == "T2" && self.goes_wrong(finding.code) {
+                continue;
+            }
+            let done = |id: &Id, well| self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code, well));
             // Behind another error nothing is certain.
             let alone = self.findings.iter().filter(|f| f.severity == Severity::Error).count() == 1;
             // Where it goes wrong in the same way in every order, the place is a matter of which order is told of.
             let elsewhere = !self.summary.certain || self.goes_wrong(finding.code);
             let clean = match first {
                 None => self.summary.clean,
-                Some(id) => done(id) && (self.summary.clean || !elsewhere && alone),
+                Some(id) => done(id, true) || done(id, false) && !elsewhere && alone,
             };
             if clean {
                 let place = finding.stmts.first().map(|id| places.of(*id)).unwrap_or_default();
@@ -269,9 +277,8 @@ impl Verdict {
 
     /// Executions against what is known at every statement.
     fn enclosures(&mut self, plan: &Plan, known: &Points, at: &Lines<'_>, places: &Places<'_>) {
-        // What a `retry` does once more is not followed, after a finding what it is about counts as not known, and what was missed
-        // is told of as that.
-        if places.again || !self.clean_without("") || !self.summary.violations.is_empty() {
+        // After a finding what it is about counts as not known, and what was missed is told of as that.
+        if !self.clean_without("") || !self.summary.violations.is_empty() {
             return;
         }
         let number = known.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
@@ -326,7 +333,7 @@ impl Verdict {
         let outcome = run(program, &RunOptions::default(), &mut watch);
         self.ran = true;
         let number = program.plan.workflow.trim_start_matches("flow").parse().unwrap_or(usize::MAX);
-        let followed = !places.again && self.clean_without("") && self.summary.violations.is_empty();
+        let followed = self.clean_without("") && self.summary.violations.is_empty();
         for (span, values) in std::mem::take(&mut watch.begun) {
             let Some(id) = at.stmt(number, span) else { continue };
             let Some(point) = places

@@ -50,11 +50,24 @@ pub enum Theme {
     Heat,
     /// A reaction of first order.
     Reaction,
+    /// A robot arm, with a stand and a balance to put beakers on.
+    Arms,
+    /// A syringe pump.
+    Pump,
 }
 
 /// All of them.
-pub const THEMES: &[Theme] =
-    &[Theme::Liquids, Theme::Hazards, Theme::Tips, Theme::Devices, Theme::Claims, Theme::Heat, Theme::Reaction];
+pub const THEMES: &[Theme] = &[
+    Theme::Liquids,
+    Theme::Hazards,
+    Theme::Tips,
+    Theme::Devices,
+    Theme::Claims,
+    Theme::Heat,
+    Theme::Reaction,
+    Theme::Arms,
+    Theme::Pump,
+];
 
 /// A vessel.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +78,10 @@ pub struct Cup {
     pub holds: Option<(Liquid, u32)>,
     /// Whether it has a cap, and whether that is on at the start.
     pub cap: Option<bool>,
+    /// Whether it is made of what [`ACID`] dissolves.
+    pub tin: bool,
+    /// Whether a tube leads to it from the pump.
+    pub piped: bool,
 }
 
 /// A lab.
@@ -82,6 +99,31 @@ pub struct Lab {
     pub plates: usize,
 }
 
+/// A declaration beside the lab that may be wrong, in whole percent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Declared {
+    /// A solution with so much red by mass, and the label that it has.
+    Label(u32, u32),
+    /// A body that gives off heat to the air by so much of what its inside conducts.
+    Slab(u32),
+    /// A reaction of so many red to one blue.
+    Equation(u32),
+}
+
+impl Declared {
+    /// The code of the finding that should tell what is wrong with it.
+    pub fn wrong(&self) -> Option<&'static str> {
+        match *self {
+            // More than 5 % off.
+            Declared::Label(is, label) => (20 * is.abs_diff(label) > is).then_some("label-mismatch"),
+            // A Biot number above 0.1.
+            Declared::Slab(share) => (share > 10).then_some("not-lumped"),
+            // Both sides are of the same formula.
+            Declared::Equation(n) => (n != 1).then_some("unbalanced"),
+        }
+    }
+}
+
 /// A workflow in a lab.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -89,6 +131,8 @@ pub struct Plan {
     pub theme: Theme,
     /// Where.
     pub lab: Lab,
+    /// What is declared besides.
+    pub declared: Option<Declared>,
     /// What is done.
     pub body: Block,
     /// What is done in the end.
@@ -133,6 +177,27 @@ pub enum Kind {
     Fail(&'static str),
     /// `claim a, b { }`.
     Claim(Vec<Thing>, Block),
+    /// `step phaseN { }`.
+    Step(usize, Block),
+    /// `within t after phaseN.end { }`, with a time in ms and what is done on `late`.
+    Within(usize, u32, Block, Option<Block>),
+    /// `keep c { }`, with what is done on `broken`.
+    Keep(Condition, Block, Option<Block>),
+    /// `hold c for t timeout t`, with times in ms and what is done on `timeout`.
+    Hold(Condition, u32, u32, Option<Block>),
+    /// A statement that no program can have: a mass for a volume, a difference of temperatures for a temperature.
+    Ill(Ill),
+}
+
+/// What is wrong with a statement that no program can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ill {
+    /// A mass is waited for.
+    Mass,
+    /// A volume is waited for.
+    Volume,
+    /// A time is compared with a mass.
+    Compared,
 }
 
 /// `on NAME { }`.
@@ -166,6 +231,12 @@ pub enum Thing {
     Plate(usize),
     /// The pipette.
     Pipette,
+    /// The robot arm.
+    Arm,
+    /// What the arm puts things on: the balance, the stand.
+    Place(usize),
+    /// The syringe pump.
+    Pump,
 }
 
 /// A condition.
@@ -179,6 +250,10 @@ pub enum Condition {
     On(usize),
     /// What a vessel holds is at least this warm, degC.
     Warm(usize, u32),
+    /// A vessel holds at least so many umol of what the reaction makes.
+    Made(usize, u32),
+    /// The balance shows more than so many g.
+    Heavy(u32),
 }
 
 /// A call.
@@ -216,6 +291,16 @@ pub enum Action {
     Dispense(u32, usize),
     /// Gives off everything.
     BlowOut(usize),
+    /// Takes a beaker in hand.
+    Pick(usize),
+    /// Puts a beaker on the balance, 0, or the stand, 1; picks it up first if the hand is empty.
+    Place(usize, usize),
+    /// Puts a beaker back to where it was taken from.
+    PutBack(usize),
+    /// Draws uL into the syringe.
+    Draw(u32, usize),
+    /// Pushes uL out of the syringe.
+    Push(u32, usize),
 }
 
 impl Plan {
@@ -247,10 +332,15 @@ impl Kind {
     /// The blocks in it, in the order of the text.
     pub fn blocks(&self) -> Vec<&Block> {
         match self {
-            Kind::Do(_) | Kind::Wait(_) | Kind::Await(_) | Kind::Fail(_) => Vec::new(),
-            Kind::Until(_, _, handler) => handler.iter().collect(),
+            Kind::Do(_) | Kind::Wait(_) | Kind::Await(_) | Kind::Fail(_) | Kind::Ill(_) => Vec::new(),
+            Kind::Until(_, _, handler) | Kind::Hold(_, _, _, handler) => handler.iter().collect(),
             Kind::If(_, a, b) | Kind::Try(a, b) => vec![a, b],
-            Kind::Repeat(_, b) | Kind::While(_, _, b) | Kind::Start(_, b) | Kind::Claim(_, b) => vec![b],
+            Kind::Repeat(_, b) | Kind::While(_, _, b) | Kind::Start(_, b) | Kind::Claim(_, b) | Kind::Step(_, b) => {
+                vec![b]
+            }
+            Kind::Within(_, _, b, handler) | Kind::Keep(_, b, handler) => {
+                std::iter::once(b).chain(handler.iter()).collect()
+            }
             Kind::Parallel(branches) => branches.iter().collect(),
             Kind::Guard(body, handlers) => std::iter::once(body)
                 .chain(handlers.iter().filter_map(|h| match &h.what {
@@ -264,10 +354,15 @@ impl Kind {
     /// The same, to change.
     pub fn blocks_mut(&mut self) -> Vec<&mut Block> {
         match self {
-            Kind::Do(_) | Kind::Wait(_) | Kind::Await(_) | Kind::Fail(_) => Vec::new(),
-            Kind::Until(_, _, handler) => handler.iter_mut().collect(),
+            Kind::Do(_) | Kind::Wait(_) | Kind::Await(_) | Kind::Fail(_) | Kind::Ill(_) => Vec::new(),
+            Kind::Until(_, _, handler) | Kind::Hold(_, _, _, handler) => handler.iter_mut().collect(),
             Kind::If(_, a, b) | Kind::Try(a, b) => vec![a, b],
-            Kind::Repeat(_, b) | Kind::While(_, _, b) | Kind::Start(_, b) | Kind::Claim(_, b) => vec![b],
+            Kind::Repeat(_, b) | Kind::While(_, _, b) | Kind::Start(_, b) | Kind::Claim(_, b) | Kind::Step(_, b) => {
+                vec![b]
+            }
+            Kind::Within(_, _, b, handler) | Kind::Keep(_, b, handler) => {
+                std::iter::once(b).chain(handler.iter_mut()).collect()
+            }
             Kind::Parallel(branches) => branches.iter_mut().collect(),
             Kind::Guard(body, handlers) => std::iter::once(body)
                 .chain(handlers.iter_mut().filter_map(|h| match &mut h.what {
@@ -296,6 +391,11 @@ impl Kind {
             Kind::Try(..) => "try",
             Kind::Fail(_) => "fail",
             Kind::Claim(..) => "claim",
+            Kind::Step(..) => "step",
+            Kind::Within(..) => "within",
+            Kind::Keep(..) => "keep",
+            Kind::Hold(..) => "hold",
+            Kind::Ill(_) => "wrong dimension",
         }
     }
 }
@@ -313,6 +413,8 @@ impl Action {
             Action::Heat(..) | Action::Cool(_) => "heat",
             Action::TakeTip | Action::DropTip => "tip",
             Action::Aspirate(..) | Action::Dispense(..) | Action::BlowOut(_) => "pipetting",
+            Action::Pick(_) | Action::Place(..) | Action::PutBack(_) => "arm",
+            Action::Draw(..) | Action::Push(..) => "pump",
         }
     }
 
@@ -326,6 +428,9 @@ impl Action {
             Action::Heat(p, _) | Action::Cool(p) => vec![Thing::Plate(p)],
             Action::TakeTip | Action::DropTip => vec![Thing::Pipette],
             Action::Aspirate(_, c) | Action::Dispense(_, c) | Action::BlowOut(c) => vec![Thing::Pipette, Thing::Cup(c)],
+            Action::Pick(c) | Action::PutBack(c) => vec![Thing::Arm, Thing::Cup(c)],
+            Action::Place(c, p) => vec![Thing::Arm, Thing::Cup(c), Thing::Place(p)],
+            Action::Draw(_, c) | Action::Push(_, c) => vec![Thing::Pump, Thing::Cup(c)],
         }
     }
 }

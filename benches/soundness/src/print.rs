@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use crate::plan::{ACID, Action, Block, Condition, Handler, Id, Kind, LIQUIDS, Lab, Plan, Remedy, Stmt, Theme, Thing};
+use crate::plan::{
+    ACID, Action, Block, Condition, Declared, Handler, Id, Ill, Kind, LIQUIDS, Lab, Plan, Remedy, Stmt, Theme, Thing,
+};
 
 /// A file with several plans.
 #[derive(Debug, Default)]
@@ -21,6 +23,8 @@ const HEADER: &str = r#"
 reactive_group house_sour { title: "acids of the house", members: { acid: any }, source: "house rule 1" }
 reactive_group house_bitter { title: "cyanides of the house", members: { cyan: any }, source: "house rule 2" }
 incompatible house_sour with house_bitter { consequence: [toxic_gas], source: "house rule 3" }
+material house_tin { }
+incompatible house_sour with house_tin { consequence: [dissolving], source: "house rule 4" }
 
 capability Dial: Body {
     state level: Ratio = 0.5
@@ -30,6 +34,9 @@ asset Meter: Dial { mass: 1 kg }
 asset Token: Body { mass: 1 kg }
 asset Cup: Vessel, Body { mass: 10 g }
 asset Phial: Vessel, Capped { mass: 10 g, cap_time: 2.3 s }
+asset Tin: Vessel, Body { mass: 10 g, material: house_tin }
+asset Stand: Surface, Body { mass: 1 kg }
+asset Pan: Balance { mass: 1 kg, range: 60 g, settling: 1.5 s, resolution: 10 mg, noise: 5 mg }
 
 capability Burning: Body {
     state lid: open | closed = closed
@@ -93,6 +100,8 @@ pub fn print(plans: &[Plan]) -> Text {
     out.line("mtx 1", None);
     out.line("use std::glassware::Beaker50mL", None);
     out.line("use std::opentrons::{Corning96, OT2, P300Single, TipRack300}", None);
+    out.line("use std::pumps::{CavroXlp6000, draw, piped, push}", None);
+    out.line("use std::robots::{FrankaPanda, Robotiq2F85}", None);
     for (i, l) in LIQUIDS.iter().enumerate() {
         let text = match reaction && i < ACID {
             true => format!(
@@ -130,8 +139,36 @@ impl Text {
 
     fn lab(&mut self, number: usize, plan: &Plan) {
         let lab = &plan.lab;
+        match plan.declared {
+            None => {}
+            Some(Declared::Label(is, label)) => {
+                let rest = 100 - is;
+                let text =
+                    format!("solution mixed{number} {{ red: {is} g, blue: {rest} g }} labelled {label} %w/w of red");
+                self.line(&text, None);
+            }
+            Some(Declared::Slab(share)) => {
+                let air = f64::from(share) / 100.0;
+                let text = format!(
+                    "asset Slab{number}: Thermal, Surface {{ mass: 2 kg, capacity: 2 kJ/K, air: {air} W/K, inner: 1 W/K }}"
+                );
+                self.line(&text, None);
+            }
+            Some(Declared::Equation(n)) => {
+                let text = format!("reaction odd{number}: {n} red -> blue {{ rate: 1e-9 1/s, order: {{ red: 1 }} }}");
+                self.line(&text, None);
+            }
+        }
         self.line(&format!("lab lab{number} {{"), None);
         self.line("    ambient: 22 degC", None);
+        match plan.declared {
+            Some(Declared::Label(..)) => {
+                let text = format!("    flask = Beaker50mL at (0, 6, 0) m holding 10 mL of mixed{number}");
+                self.line(&text, None);
+            }
+            Some(Declared::Slab(_)) => self.line(&format!("    slab = Slab{number} at (0, 6, 0) m"), None),
+            _ => {}
+        }
         if plan.theme == Theme::Tips {
             self.line("    ot2 = OT2 { left: P300Single } at (0, 0, 0) m", None);
             self.line("    tips = TipRack300 on ot2.slot[1]", None);
@@ -141,8 +178,16 @@ impl Text {
             });
             let wells: Vec<String> = wells.collect();
             self.line(&format!("    plate = Corning96 on ot2.slot[2] holding {{ {} }}", wells.join(", ")), None);
+        } else if plan.theme == Theme::Arms {
+            self.table(lab);
         } else {
             self.things(lab);
+        }
+        if plan.theme == Theme::Pump {
+            self.line("    pump = CavroXlp6000 at (0, 5, 0) m", None);
+            for (i, _) in lab.cups.iter().enumerate().filter(|(_, cup)| cup.piped) {
+                self.line(&format!("    between pump and c{i} {{ piped: true }}"), None);
+            }
         }
         for d in 0..lab.dials {
             self.line(&format!("    d{d} = Meter at ({d}, 3, 0) m"), None);
@@ -155,6 +200,19 @@ impl Text {
             self.line(&format!("    t{t} = Token at ({t}, 4, 0) m"), None);
         }
         self.line("}", None);
+    }
+
+    /// A table with an arm, beakers and what they are put on.
+    fn table(&mut self, lab: &Lab) {
+        self.line("    table = OpticalTable at (0, 0, 0) m", None);
+        self.line("    arm = FrankaPanda { gripper: Robotiq2F85 } on table at (0, 0) mm", None);
+        for (i, cup) in lab.cups.iter().enumerate() {
+            let holding = cup.holds.and_then(|(l, v)| Some(format!(" holding {v} uL of {}", LIQUIDS.get(l)?.name)));
+            let holding = holding.unwrap_or_default();
+            self.line(&format!("    c{i} = Beaker50mL on table at (450, {}) mm{holding}", 250 - 200 * i as i64), None);
+        }
+        self.line("    s0 = Pan on table at (550, 100) mm", None);
+        self.line("    s1 = Stand on table at (550, -100) mm", None);
     }
 
     /// Hot plates with beakers, or cups.
@@ -171,6 +229,9 @@ impl Text {
                 (false, Some(on)) => {
                     let cap = if on { "on" } else { "off" };
                     format!("    c{i} = Phial {{ max_volume: {} uL, cap: {cap} }} at ({i}, 1, 0) m{holding}", cup.max)
+                }
+                (false, None) if cup.tin => {
+                    format!("    c{i} = Tin {{ max_volume: {} uL }} at ({i}, 1, 0) m{holding}", cup.max)
                 }
                 (false, None) => format!("    c{i} = Cup {{ max_volume: {} uL }} at ({i}, 1, 0) m{holding}", cup.max),
             };
@@ -274,6 +335,35 @@ impl Text {
                 self.inner(at, other);
                 self.line(&close, None);
             }
+            Kind::Step(name, body) => {
+                open(self, format!("step phase{name} {{"));
+                self.inner(at, body);
+                self.line(&close, None);
+            }
+            Kind::Within(name, ms, body, handler) => {
+                open(self, format!("within {} after phase{name}.end {{", seconds(*ms)));
+                self.inner(at, body);
+                self.answered(at, &pad, "late", handler.as_ref());
+            }
+            Kind::Keep(c, body, handler) => {
+                open(self, format!("keep {} {{", at.condition(c)));
+                self.inner(at, body);
+                self.answered(at, &pad, "broken", handler.as_ref());
+            }
+            Kind::Hold(c, span, ms, handler) => {
+                let head = format!("hold {} for {} timeout {}", at.condition(c), seconds(*span), seconds(*ms));
+                match handler {
+                    None => open(self, head),
+                    Some(block) => {
+                        open(self, format!("{head} on timeout {{"));
+                        self.inner(at, block);
+                        self.line(&close, None);
+                    }
+                }
+            }
+            Kind::Ill(Ill::Mass) => open(self, "wait 3 g".to_string()),
+            Kind::Ill(Ill::Volume) => open(self, "wait 20 uL".to_string()),
+            Kind::Ill(Ill::Compared) => open(self, "wait until elapsed > 5 mg timeout 3 s".to_string()),
             Kind::Fail(name) => open(self, format!("fail {name} \"meant\"")),
             Kind::Claim(things, body) => {
                 let names: Vec<String> = things.iter().map(|t| at.thing(*t)).collect();
@@ -282,6 +372,15 @@ impl Text {
                 self.line(&close, None);
             }
         }
+    }
+
+    /// The end of a block that may have one handler of its own.
+    fn answered(&mut self, at: &mut At<'_>, pad: &str, on: &str, handler: Option<&Block>) {
+        if let Some(block) = handler {
+            self.line(&format!("{pad}}} on {on} {{"), None);
+            self.inner(at, block);
+        }
+        self.line(&format!("{pad}}}"), None);
     }
 
     fn handler(&mut self, at: &mut At<'_>, pad: &str, handler: &Handler) {
@@ -312,6 +411,9 @@ impl At<'_> {
             Thing::Token(i) => format!("t{i}"),
             Thing::Plate(i) => format!("p{i}"),
             Thing::Pipette => "ot2.left".to_string(),
+            Thing::Arm => "arm".to_string(),
+            Thing::Place(p) => format!("s{p}"),
+            Thing::Pump => "pump".to_string(),
         }
     }
 
@@ -321,6 +423,8 @@ impl At<'_> {
             Condition::Fuller(c, v) => format!("{}.contents.volume > {v} uL", self.cup(c)),
             Condition::On(o) => format!("o{o}.burning"),
             Condition::Warm(c, t) => format!("{}.contents.temperature >= {t} degC", self.cup(c)),
+            Condition::Made(c, umol) => format!("{}.contents.amount[blue] >= {umol} umol", self.cup(c)),
+            Condition::Heavy(grams) => format!("s0.weight > {grams} g"),
         }
     }
 
@@ -342,6 +446,11 @@ impl At<'_> {
             Action::Aspirate(v, c) => format!("aspirate {v} uL from {} by ot2.left", self.cup(c)),
             Action::Dispense(v, c) => format!("dispense {v} uL into {} by ot2.left", self.cup(c)),
             Action::BlowOut(c) => format!("blow out into {} by ot2.left", self.cup(c)),
+            Action::Pick(c) => format!("pick c{c} by arm"),
+            Action::Place(c, s) => format!("place c{c} on s{s} by arm"),
+            Action::PutBack(c) => format!("put back c{c} by arm"),
+            Action::Draw(v, c) => format!("draw {v} uL from c{c} by pump"),
+            Action::Push(v, c) => format!("push {v} uL into c{c} by pump"),
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::judge::initial;
 use crate::survey::Judged;
 
 /// Letters of the families of checks, as docs/checks.md has them.
-const FAMILIES: &[char] = &['V', 'T', 'P', 'C', 'H', 'R', 'D', 'K', 'F', 'S', 'X'];
+const FAMILIES: &[char] = &['V', 'T', 'P', 'C', 'H', 'M', 'R', 'D', 'K', 'E', 'F', 'S', 'U', 'X'];
 
 /// What was counted.
 #[derive(Debug, Default)]
@@ -23,7 +23,10 @@ pub struct Tally {
     constructs: BTreeMap<&'static str, usize>,
     codes: BTreeMap<&'static str, usize>,
     violations: BTreeMap<&'static str, usize>,
-    noticed: BTreeMap<char, usize>,
+    /// How many plans, and the first of their seeds.
+    noticed: BTreeMap<char, (usize, u64)>,
+    /// The first seed of all.
+    from: Option<u64>,
     /// By signature, how many plans and one seed.
     disagreements: BTreeMap<String, (usize, u64)>,
 }
@@ -33,6 +36,7 @@ impl Tally {
     pub fn add(&mut self, judged: &Judged) {
         let Judged { seed, plan, verdict } = judged;
         self.plans += 1;
+        self.from = Some(self.from.map_or(*seed, |from| from.min(*seed)));
         self.executions += verdict.summary.executions;
         self.exhausted += usize::from(verdict.summary.complete);
         self.clean += usize::from(verdict.clean_without(""));
@@ -50,7 +54,8 @@ impl Tally {
         for family in FAMILIES {
             let told = verdict.findings.iter().any(|f| initial(f.family) == *family);
             if told && verdict.clean_without(&family.to_string()) && !verdict.summary.violations.is_empty() {
-                *self.noticed.entry(*family).or_default() += 1;
+                let noticed = self.noticed.entry(*family).or_insert((0, *seed));
+                *noticed = (noticed.0 + 1, noticed.1.min(*seed));
             }
         }
         for d in &verdict.disagreements {
@@ -60,9 +65,9 @@ impl Tally {
         }
     }
 
-    /// Families of checks that are missed when they are switched off, and how many plans show it.
-    pub fn noticed(&self) -> &BTreeMap<char, usize> {
-        &self.noticed
+    /// Whether a family of checks is missed when it is switched off.
+    pub fn notices(&self, family: char) -> bool {
+        self.noticed.contains_key(&family)
     }
 
     /// All of it as tables.
@@ -77,8 +82,16 @@ impl Tally {
         table(&mut out, "construct", "plans", &self.constructs);
         table(&mut out, "code found by `check`", "plans", &self.codes);
         table(&mut out, "violation seen by the interpreter", "plans", &self.violations);
-        let noticed = FAMILIES.iter().map(|f| (*f, self.noticed.get(f).copied().unwrap_or(0))).collect();
-        table(&mut out, "family switched off", "plans that show it", &noticed);
+        let _ = writeln!(out, "| family switched off | plans that show it | noticed after |\n| --- | --- | --- |");
+        for family in FAMILIES {
+            let _ = match self.noticed.get(family) {
+                Some((plans, seed)) => {
+                    writeln!(out, "| {family} | {plans} | {} plans |", seed - self.from.unwrap_or(0) + 1)
+                }
+                None => writeln!(out, "| {family} | 0 | not noticed |"),
+            };
+        }
+        out.push('\n');
         let _ = writeln!(out, "| disagreement | plans | seed |\n| --- | --- | --- |");
         for (signature, (plans, seed)) in &self.disagreements {
             let _ = writeln!(out, "| {signature} | {plans} | {seed} |");

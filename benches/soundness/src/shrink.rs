@@ -36,7 +36,7 @@ fn candidate(plan: &Plan, number: usize) -> Option<Plan> {
         0 if !lab.ovens.is_empty() && !names(plan, "o") => lab.ovens.clear(),
         1 if lab.tokens > 0 => lab.tokens = 0,
         2 if lab.dials > 0 => lab.dials -= 1,
-        3 if lab.cups.len() > 1 => drop(lab.cups.pop()),
+        3 if lab.cups.len() > 1 && !names_cup(plan, lab.cups.len() - 1) => drop(lab.cups.pop()),
         4..=9 => {
             let cup = lab.cups.get_mut(left - 4)?;
             cup.holds = None;
@@ -52,6 +52,13 @@ fn names(plan: &Plan, kind: &str) -> bool {
     let text = crate::print::print(std::slice::from_ref(plan)).text;
     let workflow = text.split("workflow flow0").nth(1).unwrap_or_default();
     (0..9).any(|i| workflow.contains(&format!("{kind}{i}")))
+}
+
+/// Whether the workflow uses a vessel.
+fn names_cup(plan: &Plan, cup: usize) -> bool {
+    let text = crate::print::print(std::slice::from_ref(plan)).text;
+    let workflow = text.split("workflow flow0").nth(1).unwrap_or_default();
+    workflow.contains(&format!("c{cup}")) || workflow.contains(&format!("[{}]", crate::print::well(cup)))
 }
 
 /// Makes the change with this number in a block, or counts down by how many it has.

@@ -30,14 +30,13 @@ pub struct Judged {
     pub verdict: Verdict,
 }
 
-/// Draws and judges the plans of so many seeds; `each` gets them as they come, in no particular order. `Err` names the first seed of
+/// Draws and judges the plans of so many seeds on so many threads; `each` gets them as they come, in no particular order. `Err` names the first seed of
 /// plans with which something broke down.
-pub fn survey(from: u64, plans: u64, each: &(dyn Fn(Judged) + Sync)) -> Result<(), String> {
+pub fn survey(from: u64, plans: u64, threads: usize, each: &(dyn Fn(Judged) + Sync)) -> Result<(), String> {
     let next = AtomicU64::new(0);
     let broken = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        for _ in 0..threads {
+        for _ in 0..threads.max(1) {
             let work = || {
                 let mut session = Session::default();
                 loop {
@@ -67,11 +66,13 @@ pub fn survey(from: u64, plans: u64, each: &(dyn Fn(Judged) + Sync)) -> Result<(
     }
 }
 
-/// Judges the plans of some seeds: those with a reaction in one file, the others in another one.
+/// Judges the plans of some seeds: those with a reaction in one file, those that declare more in one each, the others in another one.
 fn file(seeds: std::ops::Range<u64>, session: &mut Session, each: &(dyn Fn(Judged) + Sync)) {
     let drawn: Vec<(u64, Plan)> = seeds.map(|seed| (seed, generate(seed))).collect();
+    // What is declared holds for a whole file.
+    let (apart, drawn): (Vec<_>, Vec<_>) = drawn.into_iter().partition(|(_, p)| p.declared.is_some());
     let (reacting, others): (Vec<_>, Vec<_>) = drawn.into_iter().partition(|(_, p)| p.theme == Theme::Reaction);
-    for part in [reacting, others] {
+    for part in apart.into_iter().map(|one| vec![one]).chain([reacting, others]) {
         let Some(first) = part.first().map(|p| p.0) else { continue };
         let plans: Vec<Plan> = part.iter().map(|p| p.1.clone()).collect();
         let verdicts = judge(&plans, first, BUDGET, session);

@@ -20,6 +20,21 @@ const STROKES: (f64, f64) = (20.0, 300.0);
 /// So many tips a rack has.
 const TIPS: usize = 96;
 
+/// g of an empty beaker.
+const BEAKER: f64 = 28.0;
+
+/// g that the balance bears.
+const RANGE: f64 = 60.0;
+
+/// uL that the syringe holds.
+const SYRINGE: f64 = 5_000.0;
+
+/// uL that its pump moves at least.
+const LEAST: f64 = 10.0;
+
+/// g/mol of the species of the reaction.
+const MOLAR_MASS: f64 = 46.069;
+
 /// A mixture: mg of each liquid, its heat in J above 0 degC, and which liquids it has met.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mixture {
@@ -78,6 +93,8 @@ pub struct Vessel {
     pub max: f64,
     /// Whether its cap is on; none where it has none.
     pub cap: Option<bool>,
+    /// Whether it is made of what acid dissolves.
+    pub tin: bool,
     /// Temperature of its glass, degC.
     pub glass: f64,
 }
@@ -115,6 +132,37 @@ pub struct World {
     pub tip: Option<Mixture>,
     tips: usize,
     reacts: bool,
+    /// The beaker in hand.
+    pub holding: Option<usize>,
+    /// Where beakers stand that the arm moves: on the balance, 0, the stand, 1, or the table; by beaker, with where each was taken from.
+    places: Vec<(Option<usize>, Option<usize>)>,
+    /// The syringe pump.
+    pump: Syringe,
+}
+
+/// A syringe that a pump drives.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Syringe {
+    holds: Mixture,
+    /// uL.
+    drawn: f64,
+    soiled: bool,
+    rinsed: bool,
+    /// By cup.
+    piped: Vec<bool>,
+}
+
+impl Syringe {
+    /// Whether what it holds, or has touched, was never in another mixture.
+    fn soils(&self, other: &Mixture) -> bool {
+        self.holds.seen & !other.seen != 0
+    }
+
+    /// Whether it holds a single substance.
+    fn pure(&self) -> bool {
+        let all: f64 = self.holds.mass.iter().sum();
+        self.holds.mass.iter().any(|m| *m >= 0.999 * all)
+    }
 }
 
 /// Why a step does not go on.
@@ -137,12 +185,14 @@ impl World {
                 contents.heat = contents.capacity() * AMBIENT;
                 contents.seen = 1 << liquid;
             }
-            let max = match (tips, plan.lab.plates > 0) {
+            let beakers = plan.lab.plates > 0 || plan.theme == Theme::Arms;
+            let max = match (tips, beakers) {
                 (true, _) => 360.0,
                 (_, true) => 70_000.0,
                 _ => f64::from(cup.max),
             };
-            Vessel { contents, max, cap: if tips || plan.lab.plates > 0 { None } else { cup.cap }, glass: AMBIENT }
+            let cap = if tips || beakers { None } else { cup.cap };
+            Vessel { contents, max, cap, tin: cup.tin, glass: AMBIENT }
         });
         World {
             cups: cups.collect(),
@@ -151,7 +201,39 @@ impl World {
             tip: None,
             tips: TIPS,
             reacts: plan.theme == Theme::Reaction,
+            holding: None,
+            places: vec![(None, None); plan.lab.cups.len()],
+            pump: Syringe { piped: plan.lab.cups.iter().map(|c| c.piped).collect(), ..Syringe::default() },
         }
+    }
+
+    /// g on the balance.
+    fn load(&self) -> f64 {
+        let there =
+            self.places.iter().enumerate().filter(|(cup, (on, _))| *on == Some(0) && self.holding != Some(*cup));
+        there.map(|(cup, _)| BEAKER + self.cups[cup].contents.mass.iter().sum::<f64>() / 1000.0).sum()
+    }
+
+    /// Whether something stands at a place.
+    fn taken(&self, place: usize) -> bool {
+        self.places.iter().enumerate().any(|(cup, (on, _))| *on == Some(place) && self.holding != Some(cup))
+    }
+
+    /// Takes a beaker in hand. What stood on the balance was taken from where it stood before.
+    fn pick(&mut self, cup: usize) {
+        let (on, home) = self.places[cup];
+        self.places[cup].1 = if on == Some(0) { home } else { on };
+        self.holding = Some(cup);
+    }
+
+    /// Whether there is more on the balance than it bears.
+    pub fn is_overloaded(&self) -> bool {
+        self.load() > RANGE
+    }
+
+    /// Whether the balance bears what is on it.
+    fn borne(&self) -> Result<(), Refusal> {
+        if self.is_overloaded() { Err(Refusal::Failure("overload")) } else { Ok(()) }
     }
 
     /// How long an action lasts, s.
@@ -170,6 +252,9 @@ impl World {
             Action::TakeTip | Action::DropTip => 4.0,
             Action::Aspirate(v, _) | Action::Dispense(v, _) => 1.5 + f64::from(v) / 92.86,
             Action::BlowOut(_) => 1.5,
+            // Nothing goes on beside an arm: its times do not matter.
+            Action::Pick(_) | Action::Place(..) | Action::PutBack(_) => 5.0,
+            Action::Draw(v, _) | Action::Push(v, _) => 0.25 + f64::from(v) / 2500.0,
         }
     }
 
@@ -180,6 +265,8 @@ impl World {
             Condition::Fuller(c, v) => Some(self.cups[c].contents.volume() > f64::from(v)),
             Condition::On(o) => Some(self.ovens[o].burning),
             Condition::Warm(c, t) => Some(self.cups[c].contents.temperature() >= f64::from(t)),
+            Condition::Made(c, umol) => Some(self.made(c) >= f64::from(umol)),
+            Condition::Heavy(grams) => Some(self.load() > f64::from(grams)),
         }
     }
 
@@ -188,8 +275,16 @@ impl World {
         match *condition {
             Condition::Fuller(c, v) => (self.cups[c].contents.volume() - f64::from(v)).abs() < 1e-3,
             Condition::Warm(c, t) => (self.cups[c].contents.temperature() - f64::from(t)).abs() < 1e-3,
+            Condition::Made(c, umol) => (self.made(c) - f64::from(umol)).abs() < 1e-3,
+            // Noise of 5 mg, shown in steps of 10 mg.
+            Condition::Heavy(grams) => (self.load() - f64::from(grams)).abs() < 0.1,
             _ => false,
         }
+    }
+
+    /// umol of what the reaction makes.
+    fn made(&self, cup: usize) -> f64 {
+        self.cups[cup].contents.mass[1] / MOLAR_MASS * 1000.0
     }
 
     /// What an action needs when it begins.
@@ -230,8 +325,40 @@ impl World {
                 let Some(tip) = self.tip else { return Err(Refusal::Failure("no_tip")) };
                 need(volume(c) + tip.volume() <= self.cups[c].max + NOTHING, "volume_overflow")
             }
+            Action::Pick(_) => need(self.holding.is_none(), "hand_full"),
+            Action::Place(c, place) => {
+                need(self.holding.is_none_or(|held| held == c), "hand_full")?;
+                need(!self.taken(place), "occupied")
+            }
+            Action::PutBack(c) => need(self.holding == Some(c), "not_in_hand"),
+            Action::Draw(v, c) => {
+                let v = f64::from(v);
+                need(self.pump.piped[c], "not_piped")?;
+                need(uncapped(c), "capped")?;
+                need(v >= LEAST, "out_of_range")?;
+                need(volume(c) >= v - NOTHING, "volume_underflow")?;
+                need(self.pump.drawn + v <= SYRINGE + NOTHING, "volume_overflow")?;
+                let empty = self.pump.holds.volume() <= NOTHING;
+                need(empty || !self.pump.soils(&self.cups[c].contents), "contamination")
+            }
+            Action::Push(v, c) => {
+                let v = f64::from(v);
+                need(self.pump.piped[c], "not_piped")?;
+                need(uncapped(c), "capped")?;
+                need(v >= LEAST, "out_of_range")?;
+                need(self.pump.drawn >= v - NOTHING, "volume_underflow")?;
+                need(self.cups[c].max - volume(c) >= v - NOTHING, "volume_overflow")?;
+                need(!self.pump.soiled || self.pump.pure(), "contamination")
+            }
             _ => Ok(()),
         }
+    }
+
+    /// Whether rounding decides whether an action gets what it needs: the pipettes of the library leave room for that, `drip` does not.
+    pub fn hangs_on_rounding(&self, action: &Action) -> bool {
+        let Action::Drip(v, a, b) = *action else { return false };
+        let [there, room] = [self.cups[a].contents.volume(), self.cups[b].max - self.cups[b].contents.volume()];
+        [there, room].iter().any(|limit| (limit - f64::from(v)).abs() < 1e-3)
     }
 
     /// Whether an action presumes what is not so.
@@ -245,7 +372,16 @@ impl World {
 
     /// Whether the effects of an action come at its end: those of an `extern skill` do, those of a command at its start.
     pub fn at_end(action: &Action) -> bool {
-        matches!(action, Action::Drip(..) | Action::Tip(..))
+        matches!(
+            action,
+            Action::Drip(..)
+                | Action::Tip(..)
+                | Action::Pick(_)
+                | Action::Place(..)
+                | Action::PutBack(_)
+                | Action::Draw(..)
+                | Action::Push(..)
+        )
     }
 
     /// What an action does.
@@ -280,6 +416,40 @@ impl World {
                 }
             }
             Action::Double(..) => {}
+            Action::Pick(c) => self.pick(c),
+            Action::Place(c, place) => {
+                if self.holding.is_none() {
+                    self.pick(c);
+                }
+                self.holding = None;
+                self.places[c].0 = Some(place);
+                return self.borne();
+            }
+            Action::PutBack(c) => {
+                self.holding = None;
+                self.places[c].0 = self.places[c].1;
+                if let Some(place) = self.places[c].0
+                    && self.places.iter().filter(|(on, _)| *on == Some(place)).count() > 1
+                {
+                    return Err(Refusal::Failure("occupied"));
+                }
+                return self.borne();
+            }
+            Action::Draw(v, c) => {
+                let volume = self.cups[c].contents.volume();
+                let soils = self.pump.soils(&self.cups[c].contents);
+                (self.pump.soiled, self.pump.rinsed) = (!self.pump.rinsed && soils, false);
+                self.pump.holds.seen = 0;
+                let taken = self.cups[c].contents.take((f64::from(v) / volume).min(1.0));
+                self.pump.holds.add(taken);
+                self.pump.drawn += f64::from(v);
+            }
+            Action::Push(v, c) => {
+                (self.pump.rinsed, self.pump.soiled) = (self.pump.pure(), false);
+                let given = self.pump.holds.take((f64::from(v) / self.pump.drawn).min(1.0));
+                self.cups[c].contents.add(given);
+                self.pump.drawn = (self.pump.drawn - f64::from(v)).max(0.0);
+            }
         }
         Ok(())
     }
@@ -294,20 +464,25 @@ impl World {
         self.cups[to].contents.add(moved);
         match self.cups[to].contents.volume() > self.cups[to].max + 0.001 {
             true => Err(Refusal::Failure("volume_overflow")),
-            false => Ok(()),
+            false => self.borne(),
         }
     }
 
-    /// The first vessel in which something dangerous has come together.
-    pub fn danger(&self) -> Option<usize> {
-        let both = |m: &Mixture| m.mass[ACID] > NOTHING && m.mass[CYAN] > NOTHING;
-        self.cups.iter().position(|c| both(&c.contents))
+    /// Whether acid is in a vessel that it dissolves.
+    pub fn is_attacked(&self, cup: usize) -> bool {
+        self.cups[cup].tin && self.cups[cup].contents.mass[ACID] > NOTHING
+    }
+
+    /// Whether something dangerous has come together in a vessel.
+    pub fn is_dangerous(&self, cup: usize) -> bool {
+        let contents = &self.cups[cup].contents;
+        contents.mass[ACID] > NOTHING && contents.mass[CYAN] > NOTHING
     }
 
     /// Lets time pass, s; `until` stops it when a condition comes true. Says how much has passed.
     pub fn pass(&mut self, time: f64, until: &[Condition]) -> f64 {
         if self.reacts {
-            self.react(time);
+            return self.react_until(time, until);
         }
         if self.plates.is_empty() {
             return time;
@@ -333,6 +508,28 @@ impl World {
             passed += step;
         }
         time
+    }
+
+    /// Lets the reaction go on up to when a condition comes true.
+    fn react_until(&mut self, time: f64, until: &[Condition]) -> f64 {
+        let before = self.clone();
+        let after = |time: f64| {
+            let mut world = before.clone();
+            world.react(time);
+            world
+        };
+        let holds = |world: &World| until.iter().any(|c| world.holds(c) == Some(true));
+        *self = after(time);
+        if !holds(self) {
+            return time;
+        }
+        let (mut low, mut high) = (0.0, time);
+        for _ in 0..60 {
+            let middle = (low + high) / 2.0;
+            if holds(&after(middle)) { high = middle } else { low = middle }
+        }
+        *self = after(high);
+        high
     }
 
     /// The reaction of first order in closed form.

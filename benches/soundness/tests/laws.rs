@@ -11,10 +11,10 @@ fn block(kinds: Vec<Kind>, from: usize) -> Block {
 
 /// Three cups of 1 mL with 500 uL of red, acid and cyan, an oven, two tokens and two dials.
 fn plan(body: Vec<Kind>) -> Plan {
-    let cup = |liquid| Cup { max: 1_000, holds: Some((liquid, 500)), cap: None };
+    let cup = |liquid| Cup { max: 1_000, holds: Some((liquid, 500)), cap: None, tin: false, piped: true };
     let cups = vec![cup(0), cup(ACID), cup(CYAN)];
     let lab = Lab { cups, dials: 2, ovens: vec![false], tokens: 2, plates: 0 };
-    Plan { theme: Theme::Hazards, lab, body: block(body, 0), finally: Vec::new() }
+    Plan { theme: Theme::Hazards, lab, declared: None, body: block(body, 0), finally: Vec::new() }
 }
 
 fn of(body: Vec<Kind>) -> Summary {

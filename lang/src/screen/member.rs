@@ -1,7 +1,7 @@
 //! What a species belongs to.
 
 use super::{Group, Least, Party, Screen};
-use crate::chem::Pattern;
+use crate::chem::{Element, Formula, Pattern, Rational};
 use crate::elaborate::SpeciesId;
 use crate::elaborate::species::SpeciesTable;
 
@@ -57,13 +57,19 @@ impl Group {
     }
 }
 
-/// Whether two entries of the table are one substance: the same structure, or, where one has none, the same formula.
+/// Whether two entries of the table are one substance: the same structure, or, where one has none, the same formula, if that has no
+/// isomers.
 fn same(species: &SpeciesTable<'_>, a: SpeciesId, b: SpeciesId) -> bool {
     let (a, b) = (species.get(a), species.get(b));
     match (&a.structure, &b.structure) {
         (Some(x), Some(y)) => x == y,
-        _ => a.formula.is_some() && a.formula == b.formula,
+        _ => a.formula.as_ref().is_some_and(|formula| Some(formula) == b.formula.as_ref() && !has_isomers(formula)),
     }
+}
+
+/// Whether a formula is that of many substances: those of compounds with hydrogen and several carbon atoms are.
+fn has_isomers(formula: &Formula) -> bool {
+    formula.count(Element::C) > Rational::ONE && formula.count(Element::H) > Rational::ZERO
 }
 
 impl Screen {

@@ -20,43 +20,92 @@ const MOST_EVENTS: usize = 200;
 /// Two mixtures are the same where the shares of their species differ by less than this, relative to the larger.
 const SAME: f64 = 1e-9;
 
+/// A transfer takes more than there is where its share is above 1 by more than this; closer to 1 it takes all.
+const TOO_MUCH: f64 = 1e-9;
+
+/// A share of which rounding alone parts it from all there is, as all.
+fn whole(share: f64) -> f64 {
+    if (share - 1.0).abs() <= TOO_MUCH { 1.0 } else { share }
+}
+
+/// How what a step asks for comes out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// It holds, or may hold.
+    Met,
+    /// It fails for certain, which was reported.
+    Unmet,
+    /// It fails for certain, and a handler takes the failure: no way goes on here.
+    Handled,
+}
+
 impl Flow<'_, '_> {
-    /// Looks at needs; whether none fails for certain. What a failed need looks at counts as unknown from here on, so
-    /// that one mistake is one message.
-    pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut Facts) -> bool {
-        let mut met = true;
+    /// Looks at needs. What a failed need that no handler takes looks at counts as unknown from here on, so that one mistake is
+    /// one message.
+    pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut Facts) -> Asked {
         for need in needs {
             let value = self.eval(need.node, facts);
-            match value.truth() {
-                Some(true) => continue,
-                Some(false) => {
-                    let name = need.failure();
-                    if !self.is_taken(name) {
+            let truth = value.truth();
+            if truth == Some(true) {
+                continue;
+            }
+            let taken = self.is_taken(need.failure());
+            match truth {
+                // The step fails here: what it needs beyond does not matter any more.
+                Some(_) => {
+                    if !taken {
                         self.unmet(label, need, facts, false);
                     }
-                    self.raise(name, facts.clone());
-                    let states = self.parts(need.node).states.clone();
-                    self.forget(&states, facts);
-                    met = false;
-                    // The step fails here: what it needs beyond does not matter any more.
-                    break;
+                    return self.failed(need, facts, taken);
                 }
                 None => {
-                    let fails = self.fails_on_a_way(need.node, facts);
-                    if fails && self.is_cleared(need.span) {
+                    let paths = self.fails_on_a_way(need.node, facts);
+                    let shared = self.is_shared(need.node);
+                    if paths && self.is_cleared(need.span) {
                         self.assume(need.node, true, facts);
-                    } else if fails && !self.is_shared(need.node) {
-                        let name = need.failure();
-                        if !self.is_taken(name) {
+                    } else {
+                        self.may_fail(need, paths && !shared, facts);
+                        if paths && !shared && !taken {
                             self.unmet(label, need, facts, true);
+                            let states = self.parts(need.node).states.clone();
+                            self.forget(&states, facts);
+                        } else if taken && !shared {
+                            self.assume(need.node, true, facts);
                         }
-                        let states = self.parts(need.node).states.clone();
-                        self.forget(&states, facts);
                     }
                 }
             }
         }
-        met
+        Asked::Met
+    }
+
+    /// A condition fails for certain: its failure goes to the handlers. What another branch changes may still make it hold.
+    fn failed(&mut self, condition: &Condition, facts: &mut Facts, taken: bool) -> Asked {
+        let shared = self.is_shared(condition.node);
+        let mut failed = facts.clone();
+        failed.unsure |= shared;
+        self.raise(condition.failure(), failed);
+        if taken && !shared {
+            return Asked::Handled;
+        }
+        let states = self.parts(condition.node).states.clone();
+        self.forget(&states, facts);
+        Asked::Unmet
+    }
+
+    /// A condition fails on some ways, or perhaps: where something takes the failure, or what holds there is asked for, it goes there
+    /// beside the way on which the condition holds.
+    fn may_fail(&mut self, condition: &Condition, on_some: bool, facts: &Facts) {
+        let name = condition.failure();
+        if !self.is_taken(name) && self.notes.is_none() {
+            return;
+        }
+        let mut facts = facts.clone();
+        if !self.is_shared(condition.node) {
+            self.assume(condition.node, false, &mut facts);
+        }
+        facts.unsure |= !on_some;
+        self.raise(name, facts);
     }
 
     /// Whether a condition that may hold is false on some way that leads here. Of an `and` one part decides, whatever is
@@ -131,49 +180,62 @@ impl Flow<'_, '_> {
         changed
     }
 
-    /// Performs actions in order, and the events they set off.
-    pub fn perform(&mut self, actions: &[Action], facts: &mut Facts) {
+    /// Performs actions in order, and the events they set off; how the limits of things come out then.
+    pub fn perform(&mut self, actions: &[Action], facts: &mut Facts) -> Asked {
         let mut changed = Vec::new();
         for action in actions {
             changed.extend(self.act(action, facts));
         }
         let due = self.events_on(&changed);
         self.fire(due, facts);
-        self.limits_on(&changed, facts);
+        self.limits_on(&changed, facts)
     }
 
     /// Looks at the limits that depend on these states.
-    pub(super) fn limits_on(&mut self, states: &[u32], facts: &mut Facts) {
+    pub(super) fn limits_on(&mut self, states: &[u32], facts: &mut Facts) -> Asked {
         let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
-        self.limits(limits, facts);
+        self.limits(limits, facts)
     }
 
     /// Looks at limits after what they depend on has changed.
-    pub fn limits(&mut self, mut due: Vec<u32>, facts: &mut Facts) {
+    pub fn limits(&mut self, mut due: Vec<u32>, facts: &mut Facts) -> Asked {
+        let mut out = Asked::Met;
         due.sort_unstable();
         due.dedup();
         for i in due {
             let limit = &self.plan.limits[i as usize];
             let value = self.eval(limit.condition.node, facts);
-            let some = match value.truth() {
-                Some(true) => continue,
-                Some(false) => false,
-                None if self.is_cleared(limit.condition.span) => continue,
-                None if self.fails_on_a_way(limit.condition.node, facts) && !self.is_shared(limit.condition.node) => {
-                    true
+            let condition = &limit.condition;
+            let truth = value.truth();
+            if truth == Some(true) {
+                continue;
+            }
+            let taken = self.is_taken(condition.failure());
+            match truth {
+                Some(_) => {
+                    if !taken {
+                        self.passed(limit, facts, false);
+                    }
+                    out = self.failed(condition, facts, taken);
+                    if out == Asked::Handled {
+                        return out;
+                    }
                 }
-                None => continue,
-            };
-            let name = limit.condition.failure();
-            if !self.is_taken(name) {
-                self.passed(limit, facts, some);
+                None if self.is_cleared(condition.span) => {}
+                None => {
+                    let on_some = self.fails_on_a_way(condition.node, facts) && !self.is_shared(condition.node);
+                    self.may_fail(condition, on_some, facts);
+                    if on_some && !taken {
+                        self.passed(limit, facts, true);
+                        let states = self.parts(condition.node).states.clone();
+                        self.forget(&states, facts);
+                    } else if on_some {
+                        self.assume(condition.node, true, facts);
+                    }
+                }
             }
-            if !some {
-                self.raise(name, facts.clone());
-            }
-            let states = self.parts(limit.condition.node).states.clone();
-            self.forget(&states, facts);
         }
+        out
     }
 
     fn act(&mut self, action: &Action, facts: &mut Facts) -> Vec<u32> {
@@ -215,7 +277,7 @@ impl Flow<'_, '_> {
         let mut share = |end: usize| {
             let mut facts = facts.clone();
             held.iter().for_each(|(state, ends)| facts.states[*state as usize] = Known::Point(ends[end]));
-            self.eval(fraction, &facts).exact().filter(|share| (0.0..=1.0).contains(share))
+            self.eval(fraction, &facts).exact().map(whole).filter(|share| (0.0..=1.0).contains(share))
         };
         Some([share(0)?, share(1)?])
     }
@@ -229,14 +291,17 @@ impl Flow<'_, '_> {
         facts: &mut Facts,
     ) -> Vec<u32> {
         let (low, high) = fraction.bounds();
-        if low > 1.0 + 1e-9 || high < 0.0 {
-            self.too_much(from as usize, low);
+        if low > 1.0 + TOO_MUCH || high < 0.0 {
+            self.too_much(from as usize, low, false);
+        } else if high > 1.0 + TOO_MUCH && fraction.why() == Some(Why::Paths) && !self.is_beside(from) {
+            self.too_much(from as usize, high, true);
         }
         let fraction = match fraction.exact() {
-            Some(f) if (0.0..=1.0).contains(&f) => Known::Point(f),
-            Some(f) => Known::Point(f.clamp(0.0, 1.0)),
+            Some(f) => Known::Point(whole(f.clamp(0.0, 1.0))),
             None => match fraction {
-                Known::Few(..) if low >= 0.0 && high <= 1.0 => fraction.clone(),
+                Known::Few(all, why) if low >= 0.0 && high <= 1.0 + TOO_MUCH => {
+                    Known::of(all.iter().map(|f| whole(*f)).collect(), *why)
+                }
                 _ => Known::Range(low.clamp(0.0, 1.0), high.clamp(0.0, 1.0), fraction.why().unwrap_or(Why::Unknown)),
             },
         };
@@ -276,6 +341,12 @@ impl Flow<'_, '_> {
         let changed = self.write(changes, facts);
         self.bind(bonds, facts);
         changed
+    }
+
+    /// Whether what goes on beside changes what a mixture holds.
+    fn is_beside(&self, mixture: u32) -> bool {
+        let changes = |set: &BTreeSet<u32>| self.mixtures[mixture as usize].iter().any(|(_, s)| set.contains(s));
+        self.shared.iter().chain(self.of_jobs()).any(changes)
     }
 
     /// A node as a sum of states, where some states hang together.
@@ -350,17 +421,20 @@ impl Flow<'_, '_> {
         states.iter().filter_map(|s| self.events_of.get(s)).flatten().copied().collect()
     }
 
-    /// Follows a command or a primitive skill.
-    pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Facts {
+    /// Follows a command or a primitive skill; nothing where it fails for certain and a handler takes that.
+    pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
         self.presumptions(label, &operation.presumes, &mut facts);
-        let met = self.needs(label, &operation.needs, &mut facts);
+        let met = match self.needs(label, &operation.needs, &mut facts) {
+            Asked::Handled => return None,
+            asked => asked == Asked::Met,
+        };
         let began = facts.time.clone();
         if !met {
             // Said already: what it would have done is not known.
             let written = self.written(operation);
             self.forget(&written, &mut facts);
-        } else {
-            self.perform(&operation.at_start, &mut facts);
+        } else if self.perform(&operation.at_start, &mut facts) == Asked::Handled {
+            return None;
         }
         match (&operation.takes, &operation.until) {
             (_, Some(until)) => {
@@ -387,11 +461,13 @@ impl Flow<'_, '_> {
             (None, None) => {}
         }
         if met {
-            self.perform(&operation.at_end, &mut facts);
+            if self.perform(&operation.at_end, &mut facts) == Asked::Handled {
+                return None;
+            }
             self.note_change(operation, &began, &facts);
             self.still_kept(label, &facts);
         }
-        facts
+        Some(facts)
     }
 
     /// The states that an operation writes.

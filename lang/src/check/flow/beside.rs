@@ -1,6 +1,7 @@
 //! What notes leave open: what happens beside a statement, and in turns of a loop that are not followed.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use matterix_ir::Span;
 use matterix_ir::model::Action;
@@ -35,6 +36,18 @@ impl Flow<'_, '_> {
             let states = self.behind(others);
             self.notes.iter_mut().for_each(|n| n.busy.push((None, states.clone())));
         }
+    }
+
+    /// Where a branch has raised failures, how far the others had got is not known; `from` counts those that were raised before.
+    pub(super) fn blur(&mut self, from: usize) {
+        let Some(others) = self.shared.last().filter(|_| self.notes.is_some()).cloned() else { return };
+        let others = Rc::new(self.behind(&others));
+        let raised = self.guards.last_mut().into_iter().flatten().skip(from);
+        raised.for_each(|(_, facts)| {
+            let before = facts.blurred.take();
+            facts.blurred =
+                Some(before.map_or_else(|| others.clone(), |b| Rc::new(b.union(&others).copied().collect())));
+        });
     }
 
     /// The branch ends.

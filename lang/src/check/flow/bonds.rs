@@ -9,6 +9,7 @@ use matterix_ir::BinaryOp;
 use super::facts::Facts;
 use super::polytope::{self, Face, range_of, scaled};
 use super::value::{Known, Why};
+use crate::chem::Element;
 
 /// A sum of coefficients below this share of its terms is zero: what goes on does not change it.
 const CANCELS: f64 = 1e-12;
@@ -166,8 +167,13 @@ impl Bonds {
         self.extents.iter().find(|e| alike(&e.direction, direction)).map(|e| e.range)
     }
 
-    /// Brings extents in as far as no amount falls below nothing; the bounds of each amount.
-    pub fn tighten(&mut self, is_amount: impl Fn(u32) -> bool) -> Vec<(u32, (f64, f64))> {
+    /// Brings extents in as far as no amount falls below nothing; the bounds of each amount. Where too many hang together for the
+    /// corners of what extents can be, the atoms that are there bound the amounts.
+    pub fn tighten(
+        &mut self,
+        is_amount: impl Fn(u32) -> bool,
+        atoms: impl Fn(u32) -> Vec<(Element, f64)>,
+    ) -> Vec<(u32, (f64, f64))> {
         let mut places: BTreeMap<u32, Vec<(usize, f64)>> = BTreeMap::new();
         for (i, extent) in self.extents.iter().enumerate() {
             for (state, c) in extent.direction.iter().filter(|(s, _)| is_amount(*s)) {
@@ -176,9 +182,46 @@ impl Bonds {
         }
         let mut out = Vec::new();
         for part in parts(self.extents.len(), &places) {
-            out.extend(self.tighten_part(&part, &places));
+            let mut bounds = self.tighten_part(&part, &places);
+            if polytope::is_large(part.len(), bounds.len()) {
+                self.bound_by_atoms(&part, &mut bounds, &atoms);
+            }
+            out.extend(bounds);
         }
         out
+    }
+
+    /// Bounds amounts by the atoms of each element that all of them have, if what goes on leaves these as they are.
+    fn bound_by_atoms(
+        &self,
+        part: &[usize],
+        bounds: &mut [(u32, (f64, f64))],
+        atoms: &impl Fn(u32) -> Vec<(Element, f64)>,
+    ) {
+        let mut counts: BTreeMap<Element, BTreeMap<u32, f64>> = BTreeMap::new();
+        for (state, _) in bounds.iter() {
+            for (element, count) in atoms(*state) {
+                counts.entry(element).or_default().insert(*state, count);
+            }
+        }
+        for count in counts.into_values() {
+            let kept = |extent: &usize| {
+                let terms = self.extents[*extent].direction.iter();
+                let terms = terms.filter_map(|(state, c)| Some(c * count.get(state)?));
+                let (sum, size) = terms.fold((0.0, 0.0), |(sum, size): (f64, f64), t| (sum + t, size.max(t.abs())));
+                sum.abs() <= SAME * size
+            };
+            if !part.iter().all(kept) {
+                continue;
+            }
+            let base = |state: &u32| self.states.get(state).map_or(f64::INFINITY, |bond| bond.base.bounds().1);
+            let there: f64 = count.iter().map(|(state, n)| n * base(state).max(0.0)).sum();
+            for (state, (_, high)) in bounds.iter_mut() {
+                if let Some(n) = count.get(state) {
+                    *high = high.min(there / n * (1.0 + SAME));
+                }
+            }
+        }
     }
 
     /// The same of extents that hang together.
@@ -364,4 +407,40 @@ fn parts(count: usize, places: &BTreeMap<u32, Vec<(usize, f64)>>) -> Vec<Vec<usi
     let mut out: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     (0..count).for_each(|i| out.entry(find(&root, i)).or_default().push(i));
     out.into_values().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Isomers that turn into each other in a circle, with 3 of the first one.
+    fn circle(isomers: u32) -> Bonds {
+        let mut bonds = Bonds::default();
+        for state in 0..isomers {
+            let base = Known::Point(if state == 0 { 3.0 } else { 0.0 });
+            bonds.states.insert(state, Bond { base, known: Known::nothing() });
+            let to = (state + 1) % isomers;
+            let direction: Direction = Rc::new([(state.min(to), -1.0), (state.max(to), 1.0)]);
+            let range = if state < to { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };
+            bonds.extents.push(Extent { direction, range });
+        }
+        bonds
+    }
+
+    #[test]
+    fn atoms_bound_what_is_too_large_for_corners() {
+        for isomers in [4, 20, 60] {
+            let carbon = |_| vec![(Element::C, 2.0)];
+            for (state, (low, high)) in circle(isomers).tighten(|_| true, carbon) {
+                assert!(low == 0.0 && (high - 3.0).abs() < 1e-6, "{isomers}: {state} in {low} .. {high}");
+            }
+        }
+    }
+
+    #[test]
+    fn atoms_that_are_not_kept_bound_nothing() {
+        let odd = |state: u32| vec![(Element::C, f64::from(state + 1))];
+        let bounds = circle(20).tighten(|_| true, odd);
+        assert!(bounds.iter().all(|(_, (_, high))| high.is_infinite()));
+    }
 }

@@ -16,6 +16,7 @@ use super::facts::Facts;
 use super::fluxes::Row;
 use super::polytope::scaled;
 use super::value::{Known, Why};
+use crate::chem::Element;
 
 /// A rate below this share of a state's scale per second is rounding.
 const STILL: f64 = 1e-13;
@@ -352,7 +353,7 @@ impl Flow<'_, '_> {
                 bond.base = Known::Range(low, high, Why::Unknown);
             }
         }
-        let amounts = bonds.tighten(|state| self.is_amount(state));
+        let amounts = bonds.tighten(|state| self.is_amount(state), |state| self.atoms(state));
         (Some(bonds), amounts.into_iter().collect())
     }
 
@@ -442,7 +443,7 @@ impl Flow<'_, '_> {
             *range = (if *down { f64::NEG_INFINITY } else { range.0 }, if *up { f64::INFINITY } else { range.1 });
         }
         let mut changed = BTreeSet::new();
-        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state)) {
+        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state), |state| self.atoms(state)) {
             let known = Known::Range(low, high, Why::Unknown);
             if making.within.states[state as usize] != known {
                 making.within.states[state as usize] = known;
@@ -713,6 +714,13 @@ impl Flow<'_, '_> {
     /// Whether a state is an amount of a species, which is never less than nothing.
     fn is_amount(&self, state: u32) -> bool {
         self.amounts.contains(&state)
+    }
+
+    /// The atoms of each element in what an amount counts.
+    fn atoms(&self, state: u32) -> Vec<(Element, f64)> {
+        let counted = self.mixtures.iter().flatten().find(|(_, s)| *s == state).and_then(|(key, _)| key.species);
+        let formula = counted.and_then(|species| self.lab.tables.species.get(species).formula.as_ref());
+        formula.map_or(Vec::new(), |f| f.elements.iter().map(|(element, n)| (*element, n.to_f64())).collect())
     }
 
     /// Notes which reactions can go on now, and between which bounds their conditions lie.

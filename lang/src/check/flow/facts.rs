@@ -64,6 +64,10 @@ pub struct Facts {
     pub decided: Vec<Decided>,
     /// Where the text writes the failure that was raised on this way.
     pub written: Option<Span>,
+    /// Whether only a run can tell that this way is taken.
+    pub unsure: bool,
+    /// States that other branches may have changed partway when a failure stopped them.
+    pub blurred: Option<Rc<BTreeSet<u32>>>,
     /// Jobs that have begun by now, and whether they have on every way.
     pub begun: BTreeMap<String, bool>,
 }
@@ -158,6 +162,12 @@ impl Facts {
     /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
     pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
         let mut out = self.clone();
+        let why = if a.unsure || b.unsure { Why::Unknown } else { why };
+        out.unsure = a.unsure && b.unsure;
+        out.blurred = match (&a.blurred, &b.blurred) {
+            (Some(one), Some(other)) if !Rc::ptr_eq(one, other) => Some(Rc::new(one.union(other).copied().collect())),
+            (one, other) => one.clone().or_else(|| other.clone()),
+        };
         let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
         for (i, (x, y)) in a.states.iter().zip(b.states.iter()).enumerate() {
             let both = x.join(y, why);

@@ -165,7 +165,9 @@ impl Flow<'_, '_> {
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
         self.in_jobs += 1;
+        let raised = self.guards.last().map_or(0, Vec::len);
         let after = self.walk(body, facts);
+        self.blur(raised);
         self.in_jobs -= 1;
         self.rivals.pop();
         self.shared.pop();

@@ -17,6 +17,7 @@ mod even;
 mod evolve;
 mod facts;
 mod fluxes;
+mod handled;
 mod history;
 mod interference;
 mod jobs;
@@ -124,6 +125,8 @@ struct Flow<'l, 'a> {
     guards: Vec<Vec<Raised>>,
     /// Failures that devices may report inside each open body with handlers, innermost last.
     reported: Vec<Vec<Raised>>,
+    /// Where handlers that are followed begin their body again: how often, and what is known there; innermost last.
+    again: Vec<Vec<(Known, Facts)>>,
     /// Names of failures that handlers around take; none for every one.
     caught: Vec<Vec<Option<String>>>,
     /// The user's statements around, innermost last.
@@ -258,6 +261,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             findings: Vec::new(),
             guards: Vec::new(),
             reported: Vec::new(),
+            again: Vec::new(),
             caught: Vec::new(),
             sites: Vec::new(),
             quiet: 0,
@@ -351,6 +355,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             held: BTreeSet::new(),
             decided: Vec::new(),
             written: None,
+            unsure: false,
+            blurred: None,
             begun: BTreeMap::new(),
         };
         let states = &self.lab.states;

@@ -214,7 +214,7 @@ pub(super) fn at_least(time: &Known) -> Known {
 
 /// The values alone.
 fn bare(facts: &Facts) -> Facts {
-    Facts {
+    let mut bare = Facts {
         states: facts.states.clone(),
         locals: facts.locals.clone(),
         time: facts.time.clone(),
@@ -227,6 +227,12 @@ fn bare(facts: &Facts) -> Facts {
         held: BTreeSet::new(),
         decided: Vec::new(),
         written: None,
+        unsure: false,
+        blurred: None,
         begun: BTreeMap::new(),
+    };
+    if let Some(blurred) = &facts.blurred {
+        bare.forget(&blurred.iter().copied().collect::<Vec<_>>());
     }
+    bare
 }

@@ -65,9 +65,14 @@ pub fn tighten(faces: &[Face], ranges: &mut [(f64, f64)]) {
     }
 }
 
+/// Whether so many extents and amounts are bounded by propagation alone.
+pub fn is_large(extents: usize, amounts: usize) -> bool {
+    extents > MOST_EXTENTS || amounts > MOST_AMOUNTS
+}
+
 /// The largest value of a sum of extents, where several amounts bound them together.
 pub fn most(goal: &[(usize, f64)], faces: &[Face], ranges: &[(f64, f64)]) -> f64 {
-    if ranges.len() > MOST_EXTENTS || faces.len() > MOST_AMOUNTS {
+    if is_large(ranges.len(), faces.len()) {
         return f64::INFINITY;
     }
     // An extent that goes both ways is the difference of two that do not.

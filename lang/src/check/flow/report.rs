@@ -347,16 +347,24 @@ impl Flow<'_, '_> {
         }
     }
 
-    /// A transfer of more than there is.
-    pub fn too_much(&mut self, from: usize, fraction: f64) {
+    /// A transfer of more than there is, on every way or on some.
+    pub fn too_much(&mut self, from: usize, fraction: f64, some: bool) {
         let name = self.mixtures[from].first().map_or_else(String::new, |(k, _)| self.lab.spoken_name(k.instance));
         let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
-        let times = matterix_ir::quantity::show_number(fraction);
-        let headline = format!("`{label}` takes more from `{name}` than it holds");
-        let d =
-            self.at_site(codes::TRANSFER_FRACTION, headline, format!("{times} times what there is"), self.doubt > 0);
-        let about = d.span();
-        self.found(d, about);
+        let about = self.site();
+        if some && self.is_cleared(about) {
+            return;
+        }
+        let open = some.then(|| self.ways.meetings());
+        let ways = if some { ", on some ways through the plan" } else { "" };
+        let headline = format!("`{label}` takes more from `{name}` than it holds{ways}");
+        let said = match fraction.is_finite() {
+            true => format!("{} times what there is", matterix_ir::quantity::show_number(fraction)),
+            false => "there is nothing".to_owned(),
+        };
+        let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, some || self.doubt > 0);
+        let turn = self.turning > 0;
+        self.found_on(d, about, open, turn);
     }
 
     /// A law takes more of a mixture than there is, within the step that is followed now.

@@ -45,7 +45,9 @@ impl Flow<'_, '_> {
             let (taken, rest): (Vec<_>, Vec<_>) = reported.into_iter().partition(|(name, _)| takes(name));
             reported = rest;
             let Some(entry) = self.joined(base, &taken) else { continue };
+            self.again.push(Vec::new());
             let end = self.walk(*handler, entry);
+            self.again.pop();
             // When its turns are used up, the failure goes on.
             if self.retries(*handler) {
                 reported.extend(taken);
@@ -85,7 +87,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a handler begins its body again.
-    fn retries(&self, handler: StepId) -> bool {
+    pub(super) fn retries(&self, handler: StepId) -> bool {
         let mut todo = vec![handler];
         while let Some(id) = todo.pop() {
             match &self.plan.get(id).step {

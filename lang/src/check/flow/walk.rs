@@ -2,10 +2,12 @@
 //! by itself.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
-use matterix_ir::plan::{Caught, Condition, Step, StepId};
+use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
+use super::actions::Asked;
 use super::course::Course;
 use super::facts::Facts;
 use super::interference::Rival;
@@ -15,7 +17,7 @@ use super::points::at_least;
 use super::report::Finding;
 use super::stopped::Lines;
 use super::value::{Known, Why};
-use super::{Flow, MOST_STEPS, Raised, Site};
+use super::{Flow, MOST_STEPS, Site};
 use crate::elaborate::mixtures::written;
 
 /// Turns of a loop followed one by one.
@@ -75,13 +77,19 @@ impl Flow<'_, '_> {
             Step::Parallel(branches) => self.parallel(branches, facts),
             Step::Operation(operation) => {
                 self.may_report(operation, &facts);
-                Some(self.operation(&node.label, operation, facts))
+                self.operation(&node.label, operation, facts)
             }
             Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
-            Step::Retry { .. } => None,
+            Step::Retry { times } => {
+                self.begins_again(*times, facts);
+                None
+            }
             Step::Try(alternatives) => self.alternatives(id, alternatives, facts),
             Step::Skill { needs, promises, body, .. } => {
-                let met = self.needs(&node.label, needs, &mut facts);
+                let met = match self.needs(&node.label, needs, &mut facts) {
+                    Asked::Handled => return None,
+                    asked => asked == Asked::Met,
+                };
                 self.quiet += usize::from(!met);
                 let mut after = self.walk(*body, facts);
                 self.quiet -= usize::from(!met);
@@ -229,7 +237,12 @@ impl Flow<'_, '_> {
         if value.truth() == Some(false) && !parts.timed && !shared {
             let never = self.eval(condition.node, &facts).truth() == Some(false);
             if never {
-                if !self.is_taken("timeout") {
+                let taken = self.is_taken("timeout");
+                // Only the way of the handler goes on.
+                if timeout.is_some() && taken {
+                    return None;
+                }
+                if !taken {
                     self.never_comes(condition, timeout.is_some(), &before, &facts);
                 }
                 let states = parts.states.clone();
@@ -302,7 +315,7 @@ impl Flow<'_, '_> {
                 }
                 false => after?,
             };
-            if facts.states == before.states {
+            if rests(&mut facts, &before) {
                 self.more_turns(body, true, &facts);
                 let left = (low == high).then_some(high - done - 1.0);
                 return Some(after_turns(left, facts, &Moment::of(&before)));
@@ -355,7 +368,7 @@ impl Flow<'_, '_> {
             self.doubt -= usize::from(open);
             let Some(after) = after else { return self.meet(id, &start, ends) };
             facts = after;
-            if facts.states == before.states {
+            if rests(&mut facts, &before) {
                 self.more_turns(body, true, &facts);
                 self.raise("max", facts.clone());
                 // A loop that changes nothing it looks at ends by what only a run can tell.
@@ -385,7 +398,7 @@ impl Flow<'_, '_> {
     }
 
     /// Forgets what a body changes.
-    fn widen(&mut self, body: StepId, facts: &mut Facts) {
+    pub(super) fn widen(&mut self, body: StepId, facts: &mut Facts) {
         let states: Vec<u32> = self.sets_going(self.writes(body)).into_iter().collect();
         self.forget(&states, facts);
     }
@@ -456,10 +469,12 @@ impl Flow<'_, '_> {
             facts.time = start.clone();
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
+            let raised = self.guards.last().map_or(0, Vec::len);
             let after = match &mut lines {
                 Some(lines) => self.follow_line(*i, facts, branches[*i], lines),
                 None => self.walk(branches[*i], facts),
             };
+            self.blur(raised);
             self.rivals.pop();
             self.shared.pop();
             self.end_branch();
@@ -470,104 +485,35 @@ impl Flow<'_, '_> {
         Some(facts)
     }
 
-    fn guarded(
-        &mut self,
-        id: StepId,
-        body: StepId,
-        handlers: &[(Caught, StepId)],
-        finally: Option<StepId>,
-        facts: Facts,
-    ) -> Option<Facts> {
-        let names = handlers.iter().map(|(c, _)| match c {
-            Caught::Named(name) => Some(name.clone()),
-            Caught::Any => None,
-        });
-        // The library's own handlers are for devices that fail, not for mistakes in the plan.
-        let library = self.in_library(self.plan.get(id).span);
-        self.caught.push(if library { Vec::new() } else { names.collect() });
-        self.guards.push(Vec::new());
-        self.reported.push(Vec::new());
-        self.finally.extend(finally);
-        let mut after = self.walk(body, facts.clone());
-        let mut raised = self.guards.pop().unwrap_or_default();
-        after = self.end_block(after);
-        let reported = self.reported.pop().unwrap_or_default();
-        self.caught.pop();
-        // What handlers raise leaves as well.
-        self.guards.push(Vec::new());
-        for (caught, handler) in handlers {
-            let (taken, rest): (Vec<_>, Vec<_>) = raised.into_iter().partition(|(name, _)| match caught {
-                Caught::Named(n) => n == name,
-                Caught::Any => true,
-            });
-            raised = rest;
-            if let Some(mut entry) = self.entry(id, &facts, taken) {
-                entry.written = None;
-                self.cleaning += 1;
-                let end = self.walk(*handler, entry);
-                self.cleaning -= 1;
-                after = self.meet(id, &facts, after.into_iter().chain(end));
-            }
-        }
-        raised.extend(self.guards.pop().unwrap_or_default());
-        if let Some(finally) = finally {
-            self.finally.pop();
-            (after, raised) = self.leaving(id, finally, &facts, after, raised);
-        }
-        self.after_report(&facts, reported, handlers, finally);
-        raised = self.stop_jobs(raised, self.guards.len());
-        if let Some(outer) = self.guards.last_mut() {
-            outer.extend(raised);
-        }
-        after
+    /// Whether steps may fail by what goes on beside them.
+    fn meets_others(&self, id: StepId) -> bool {
+        let beside = !self.shared.is_empty() || !self.jobs.is_empty();
+        let begins = |step: &Step| matches!(step, Step::Start { .. } | Step::Await { .. } | Step::Parallel(_));
+        beside || self.below(id).into_iter().any(|id| begins(&self.plan.get(id).step))
     }
 
-    /// What is known where failures lead to one place.
-    fn entry(&mut self, id: StepId, base: &Facts, raised: Vec<Raised>) -> Option<Facts> {
-        let mut ways: Vec<Facts> = raised.into_iter().map(|(_, facts)| facts).collect();
-        if let Some(way) = self.fork(id, &ways) {
-            return Some(ways.swap_remove(way));
-        }
-        let site = self.site();
-        ways.into_iter().reduce(|a, b| base.join(a, &b, site, Why::Paths))
+    /// Whether a device may report a failure of steps, or not do what they promise.
+    fn may_be_reported(&self, id: StepId) -> bool {
+        self.below(id).into_iter().any(|id| match &self.plan.get(id).step {
+            Step::Operation(operation) => !operation.fails.is_empty(),
+            Step::Skill { promises, takes, .. } => !promises.is_empty() || takes.is_some(),
+            _ => false,
+        })
     }
 
-    /// What is known behind a `finally`: on the way that goes on, and where failures go on outwards. What goes wrong in it is
-    /// said once.
-    fn leaving(
-        &mut self,
-        id: StepId,
-        finally: StepId,
-        base: &Facts,
-        after: Option<Facts>,
-        raised: Vec<Raised>,
-    ) -> (Option<Facts>, Vec<Raised>) {
+    /// Follows the alternatives behind the first one, to which only a device's failure leads: how far those before got is not known,
+    /// and nothing of it is known afterwards.
+    fn beside_the_way(&mut self, alternatives: &[StepId], mut entry: Facts) {
+        entry.unsure = true;
+        self.doubt += 1;
         self.cleaning += 1;
-        let mut said = after.is_some();
-        let after = after.and_then(|facts| self.walk(finally, facts));
-        let mut names: Vec<&str> = Vec::new();
-        raised.iter().for_each(|(name, _)| {
-            if !names.contains(&name.as_str()) {
-                names.push(name);
-            }
-        });
-        let mut left = Vec::new();
-        for name in names {
-            let alike: Vec<Raised> = raised.iter().filter(|(other, _)| other == name).cloned().collect();
-            let Some(entry) = self.entry(id, base, alike) else { continue };
-            let end = match std::mem::replace(&mut said, true) {
-                false => self.walk(finally, entry),
-                true => {
-                    self.quiet += 1;
-                    let end = self.unnoted(finally, entry);
-                    self.quiet -= 1;
-                    end
-                }
-            };
-            left.extend(end.map(|end| (name.to_owned(), end)));
+        let written: Vec<u32> = alternatives.iter().flat_map(|step| self.writes(*step)).collect();
+        self.forget(&written, &mut entry);
+        for step in alternatives.iter().skip(1) {
+            self.walk(*step, entry.clone());
         }
         self.cleaning -= 1;
-        (after, left)
+        self.doubt -= 1;
     }
 
     fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: Facts) -> Option<Facts> {
@@ -589,10 +535,16 @@ impl Flow<'_, '_> {
             }
             match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
                 Some(next) => entry = next,
-                // Only a device's failure leads to the next one: how far this one got is not known.
-                None => {
+                None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);
+                    entry.unsure = true;
+                }
+                None => {
+                    if self.may_be_reported(*step) {
+                        self.beside_the_way(&alternatives[i..], entry);
+                    }
+                    break;
                 }
             }
         }
@@ -611,6 +563,20 @@ fn waits_for_jobs(step: &Step) -> bool {
             | Step::During { .. }
             | Step::Claim { .. }
     )
+}
+
+/// Whether a further turn changes nothing that is known. Where only how states hang together still changes, that is given up: what a
+/// turn that began without it leads to holds for all further turns.
+fn rests(facts: &mut Facts, before: &Facts) -> bool {
+    let related = match (&facts.bonds, &before.bonds) {
+        (Some(now), Some(then)) => Rc::ptr_eq(now, then) || now == then,
+        (_, then) => then.is_none(),
+    };
+    let same = facts.states == before.states;
+    if same && !related {
+        facts.bonds = None;
+    }
+    same && related
 }
 
 /// What tells turns of a loop apart that leave all states as they were.

@@ -13,6 +13,9 @@ use super::{Times, expected, held, show, spent};
 /// Pairs of uses that are compared at most; a plan that needs more is told that it was not searched to the end.
 const MOST: usize = 2_000_000;
 
+/// So many calls around each of two uses are named.
+const MOST_CALLS: usize = 2;
+
 /// Uses that overlap, or may, where nothing makes them take turns. Between two lines of steps one clash over an instance is said,
 /// a certain one before one that may be.
 pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
@@ -221,6 +224,13 @@ fn finding(times: &Times<'_>, a: &Use, b: &Use, sure: bool, name: &str) -> Diagn
         .because(first.span, format!("`{name}` {} in use here", if sure { "is" } else { "may be" }));
     if !sure {
         d.severity = Severity::Warning;
+    }
+    for used in [a, b] {
+        for call in show::calls(times.plan, &times.timing, used.step).take(MOST_CALLS) {
+            if d.labels.iter().all(|l| l.span != call.span) {
+                d = d.because(call.span, format!("in `{}`", call.label));
+            }
+        }
     }
     d.help(format!("put each into `claim {name} {{ }}`, so that they take turns, or do one after the other"))
 }
