@@ -296,9 +296,8 @@ impl Flow<'_, '_> {
             self.amounts.contains(s) && *slope < 0.0 && value + slope * step <= STRAIGHT * value
         });
         let empty: Vec<u32> = empty.map(|(s, ..)| *s).collect();
-        let from = self.mixtures.iter().position(|m| m.iter().any(|(_, s)| empty.contains(s)));
-        if let Some(from) = from {
-            self.emptied(from, facts);
+        if let Some(amount) = empty.first() {
+            self.used_up(*amount, facts);
         }
         let moved: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         self.forget(&moved, facts);
