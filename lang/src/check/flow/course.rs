@@ -13,7 +13,7 @@ use super::facts::Facts;
 use super::value::{CLOSE, Known, Why};
 
 /// Changes of conditions within one step before the rest of it is followed in bounds.
-const MOST_CHANGES: usize = 64;
+const MOST_CHANGES: usize = 200;
 
 /// A difference that departs from a straight line by less than this share of what is compared is one.
 const STRAIGHT: f64 = 1e-9;
@@ -252,6 +252,7 @@ impl Flow<'_, '_> {
             facts.fired[i as usize] = now;
             if now == Some(true) && before.fired[i as usize] != Some(true) {
                 let changed = self.happen(i, facts);
+                facts.fired[i as usize] = self.truth_beyond(self.events[i as usize].when, even, facts);
                 let on = self.events_on(&changed).into_iter().filter(|e| *e != i).collect();
                 self.fire(on, facts);
             }
@@ -295,9 +296,8 @@ impl Flow<'_, '_> {
             self.amounts.contains(s) && *slope < 0.0 && value + slope * step <= STRAIGHT * value
         });
         let empty: Vec<u32> = empty.map(|(s, ..)| *s).collect();
-        let from = self.mixtures.iter().position(|m| m.iter().any(|(_, s)| empty.contains(s)));
-        if let Some(from) = from {
-            self.emptied(from, facts);
+        if let Some(amount) = empty.first() {
+            self.used_up(*amount, facts);
         }
         let moved: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         self.forget(&moved, facts);

@@ -367,14 +367,14 @@ impl Flow<'_, '_> {
         self.found_on(d, about, open, turn);
     }
 
-    /// A law takes more of a mixture than there is, within the step that is followed now.
-    pub(super) fn emptied(&mut self, from: usize, facts: &Facts) {
-        let name = self.mixtures[from].first().map_or_else(String::new, |(k, _)| self.lab.spoken_name(k.instance));
+    /// A law takes more of an amount than there is, within the step that is followed now.
+    pub(super) fn used_up(&mut self, amount: u32, facts: &Facts) {
+        let name = &self.lab.states[amount as usize].name;
         let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
-        let headline = format!("`{name}` runs dry during `{label}`, and a law goes on taking from it");
+        let headline = format!("`{name}` is used up during `{label}`, and a law goes on taking it");
         let said = match facts.time.exact() {
-            Some(time) => format!("empty after {}", matterix_ir::quantity::show_duration(time)),
-            None => "empty before it ends".to_string(),
+            Some(time) => format!("none is left after {}", matterix_ir::quantity::show_duration(time)),
+            None => "none is left before it ends".to_string(),
         };
         let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, self.doubt > 0);
         let d = d.help("stop it before that, take a larger vessel, or give the law a `while` that ends it");
