@@ -47,5 +47,5 @@ fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
 fn what_a_feed_of_microlitres_comes_to_is_known_beforehand() {
     let file = root().join("tests/cases/numerics/sizes.mtx");
     let checked = matterixc(&["check", "--contents", file.to_str().expect("text")]);
-    assert!(checked.out.contains("fed 0 .. 30.5 uL"), "{}{}", checked.out, checked.err);
+    assert!(checked.out.contains("fed 30.5 uL"), "{}{}", checked.out, checked.err);
 }

@@ -146,6 +146,7 @@ codes! {
     TIP_ON_TIP "tip-on-tip" "T2" "a pipette that has a tip takes another one";
     UNFINISHED "unfinished" "P1" "a workflow ends while a device is on or something is in hand";
     TIP_USED "tip-used" "T2" "a tip is picked up that was taken before";
+    NOT_EMPTY "not-empty" "P1" "a vessel that should be empty holds something";
     TIP_NOT_EMPTY "tip-not-empty" "T1" "a tip goes back to its rack with liquid in it";
     WRONG_COLUMN "wrong-column" "T1" "the channels of a pipette do not stand where they would have to";
     WRONG_SPOT "wrong-spot" "T1" "a tip goes back to another place than it came from";

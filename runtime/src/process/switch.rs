@@ -17,8 +17,11 @@ const LEAST: f64 = 1e-30;
 /// Changes that last no longer than this are not looked for between two points where nothing has changed, s.
 const NARROW: f64 = 1e-6;
 
-/// So many pieces of the way between two points are looked at before it is given up.
+/// So many pieces of the way between two points are looked at before it is given up where a side is a wave.
 const MOST_PIECES: usize = 20_000;
+
+/// The same where a side only may turn round, as a magnitude: sides that go together are never told apart piece by piece.
+const FEW_PIECES: usize = 500;
 
 /// A state may go beyond its values at the ends and in the middle of a piece by this share of their distance.
 const BULGE: f64 = 0.5;
@@ -71,6 +74,8 @@ pub(super) struct Switches {
 struct Folded {
     /// By their place among the comparisons.
     list: Vec<usize>,
+    /// Whether a side is a wave, in the same order.
+    waves: Vec<bool>,
     /// Their sides, in the same order.
     tape: Tape,
     bounds: Vec<Interval>,
@@ -129,12 +134,13 @@ impl Switches {
 
     /// Finds the comparisons that may turn round.
     fn fold(&mut self, analysis: &Analysis<'_>, sides: &[NodeId], moving: &[u32]) {
-        let turns = |i: &usize| analysis.tape(&sides[2 * i..2 * i + 2], moving).steps.iter().any(folds);
-        let list: Vec<usize> = (0..self.list.len()).filter(turns).collect();
+        let of = |i: usize| analysis.tape(&sides[2 * i..2 * i + 2], moving);
+        let list: Vec<usize> = (0..self.list.len()).filter(|i| of(*i).steps.iter().any(folds)).collect();
+        let waves = list.iter().map(|i| of(*i).steps.iter().any(is_wave)).collect();
         let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
         let tape = analysis.tape(&sides, moving);
         let ends = std::array::from_fn(|_| vec![0.0; moving.len()]);
-        self.folded = Folded { bounds: tape.intervals(), list, tape, ends };
+        self.folded = Folded { bounds: tape.intervals(), list, waves, tape, ends };
     }
 
     fn run(&mut self, time: f64, moving: &[f64]) {
@@ -203,8 +209,10 @@ impl Switches {
         let mut pieces = 0;
         while let Some((from, to)) = todo.pop() {
             pieces += 1;
-            if pieces > MOST_PIECES {
-                return Err(Unseen(self.list[i].node));
+            match self.folded.waves[place] {
+                true if pieces > MOST_PIECES => return Err(Unseen(self.list[i].node)),
+                false if pieces > FEW_PIECES => return Ok(None),
+                _ => {}
             }
             if self.stays(place, (from, to), path) {
                 continue;
@@ -224,7 +232,7 @@ impl Switches {
 
     /// Whether a comparison that may turn round has the same truth throughout a piece.
     fn stays(&mut self, place: usize, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) -> bool {
-        let Folded { list, tape, bounds, ends } = &mut self.folded;
+        let Folded { list, tape, bounds, ends, .. } = &mut self.folded;
         if tape.inputs > 0 {
             let times = [from, from + 0.5 * (to - from), to];
             ends.iter_mut().zip(times).for_each(|(values, time)| path(time, values));
@@ -316,6 +324,11 @@ fn stop(analysis: &Analysis<'_>, (a, b): (NodeId, NodeId), switch: &Switch, now:
         }
     }
     Some((time > now && changed(time)).then_some(time))
+}
+
+/// Whether a step is a wave.
+fn is_wave(step: &Step) -> bool {
+    matches!(step, Step::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor, _))
 }
 
 /// Whether a step may turn round: give the same value before and after it gave others.

@@ -82,7 +82,7 @@ impl Flow<'_, '_> {
     /// A condition fails for certain: its failure goes to the handlers. What another branch changes may still make it hold.
     fn failed(&mut self, condition: &Condition, facts: &mut Facts, taken: bool) -> Asked {
         let shared = self.is_shared(condition.node);
-        let mut failed = facts.clone();
+        let mut failed = self.meanwhile_in(facts);
         failed.unsure |= shared;
         self.raise(condition.failure(), failed);
         if taken && !shared {
@@ -93,6 +93,15 @@ impl Flow<'_, '_> {
         Asked::Unmet
     }
 
+    /// What is known at some moment of the time that passes now.
+    fn meanwhile_in(&self, facts: &Facts) -> Facts {
+        let mut facts = facts.clone();
+        if let Some(span) = &self.meanwhile {
+            facts.time = span.clone();
+        }
+        facts
+    }
+
     /// A condition fails on some ways, or perhaps: where something takes the failure, or what holds there is asked for, it goes there
     /// beside the way on which the condition holds.
     fn may_fail(&mut self, condition: &Condition, on_some: bool, facts: &Facts) {
@@ -100,7 +109,7 @@ impl Flow<'_, '_> {
         if !self.is_taken(name) && self.notes.is_none() {
             return;
         }
-        let mut facts = facts.clone();
+        let mut facts = self.meanwhile_in(facts);
         if !self.is_shared(condition.node) {
             self.assume(condition.node, false, &mut facts);
         }
@@ -413,7 +422,12 @@ impl Flow<'_, '_> {
     /// Does what an event does; the states that are no longer what they were.
     pub fn happen(&mut self, event: u32, facts: &mut Facts) -> Vec<u32> {
         let events = self.events;
-        events[event as usize].actions.iter().flat_map(|action| self.act(action, facts)).collect()
+        let after = self.meanwhile.clone().map(|span| std::mem::replace(&mut facts.time, span));
+        let changed = events[event as usize].actions.iter().flat_map(|action| self.act(action, facts)).collect();
+        if let Some(after) = after {
+            facts.time = after;
+        }
+        changed
     }
 
     /// The events that look at any of these states.

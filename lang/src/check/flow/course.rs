@@ -135,7 +135,13 @@ impl Flow<'_, '_> {
         let mut followed = Vec::new();
         for side in sides {
             // What rests on other things as well is looked at when the time has passed.
-            let Some((now, slope, size)) = self.difference(*side, even, 0.0, facts) else { continue };
+            let Some((now, slope, size)) = self.difference(*side, even, 0.0, facts) else {
+                // A wave of the time may come about and be over before that.
+                if self.parts(side.0).timed || side.1.is_some_and(|b| self.parts(b).timed) {
+                    return None;
+                }
+                continue;
+            };
             followed.push(*side);
             let at = -now / slope;
             if slope != 0.0 && now.abs() > CLOSE * size && at > 0.0 {
@@ -285,9 +291,13 @@ impl Flow<'_, '_> {
             let shown = if lasts { facts.clone() } else { there.clone() };
             self.passed(limit, &shown, false);
         }
+        let goes_on = !self.is_taken(name) || self.is_shared(limit.condition.node);
         self.raise(name, there);
-        let states = self.parts(limit.condition.node).states.clone();
-        self.forget(&states, facts);
+        if goes_on {
+            let states = self.parts(limit.condition.node).states.clone();
+            self.forget(&states, facts);
+        }
+        self.stopped |= !goes_on;
     }
 
     /// A stream takes more than there is.

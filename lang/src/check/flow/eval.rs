@@ -443,7 +443,8 @@ impl Flow<'_, '_> {
 
     /// Notes a failure that the text writes at a place of the user's.
     pub fn raise_written(&mut self, name: &str, span: Span, mut facts: Facts) {
-        facts.written = Some(span).filter(|span| !self.in_library(*span));
+        // Not where only what a device reports, or what goes on beside, leads there.
+        facts.written = Some(span).filter(|span| !facts.unsure && !self.in_library(*span));
         for (name, facts) in self.stop_jobs(vec![(name.to_owned(), facts)], self.guards.len()) {
             self.raise(&name, facts);
         }

@@ -7,9 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use matterix_ir::{BinaryOp, Op};
+use matterix_ir::{BinaryOp, Op, UnaryOp};
 
 use super::Flow;
+use super::actions::Asked;
 use super::bonds::Bonds;
 use super::course::Course;
 use super::facts::Facts;
@@ -121,10 +122,16 @@ impl Flow<'_, '_> {
         facts.time = Known::binary(BinaryOp::Add, &before, duration);
         let span = Known::Range(before.bounds().0, facts.time.bounds().1, Why::Unknown);
         facts.reopen(|s| self.lab.rates.contains_key(&s));
+        self.meanwhile = Some(span.clone());
+        self.goes_on(longest, &span, facts);
+        self.meanwhile = None;
+    }
+
+    fn goes_on(&mut self, longest: f64, span: &Known, facts: &mut Facts) {
         let mut timed = self.timed.clone();
         for _ in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();
-            let moved = self.flow_through(longest, &span, facts);
+            let moved = self.flow_through(longest, span, facts);
             if changed || !moved.is_empty() {
                 self.note_processes(facts);
             }
@@ -132,11 +139,16 @@ impl Flow<'_, '_> {
             due.append(&mut timed);
             let mut recurring = due.clone();
             self.fire(due, facts);
-            self.fire_between(&span, facts);
+            self.fire_between(span, facts);
             recurring.sort_unstable();
             recurring.dedup();
-            self.recur(&recurring, facts);
-            self.limits_on(&moved, facts);
+            self.recur(&recurring, span, facts);
+            let moving = facts.moving.iter().map(|i| self.derivatives[*i as usize].state);
+            let touched: Vec<u32> = moved.iter().copied().chain(moving).collect();
+            if self.limits_on(&touched, facts) == Asked::Handled {
+                self.stopped = true;
+                return;
+            }
             if facts.unsettled.is_empty() || moved.is_empty() {
                 return;
             }
@@ -147,13 +159,35 @@ impl Flow<'_, '_> {
     }
 
     /// Events that time may bring about more than once: what they would change further counts as unknown.
-    fn recur(&mut self, due: &[u32], facts: &mut Facts) {
-        let due: Vec<u32> = due.iter().copied().filter(|i| facts.fired[*i as usize].is_none()).collect();
+    fn recur(&mut self, due: &[u32], span: &Known, facts: &mut Facts) {
+        let due: Vec<u32> = due
+            .iter()
+            .copied()
+            .filter(|i| facts.fired[*i as usize].is_none() || self.comes_and_goes(*i, span, facts))
+            .collect();
         let moving: Vec<u32> = facts.moving.iter().map(|i| self.derivatives[*i as usize].state).collect();
         // Each turn forgets a state or ends.
         while let Some(states) = self.further(&due, &moving, facts) {
             self.forget(&states, facts);
         }
+    }
+
+    /// Whether the condition of an event may come true more than once in `span`: it follows the time to and fro, or the event
+    /// itself changes what it asks for, as a timer that it sets anew.
+    fn comes_and_goes(&mut self, event: u32, span: &Known, facts: &Facts) -> bool {
+        if !self.timed.contains(&event) {
+            return false;
+        }
+        let when = self.events[event as usize].when;
+        let mut within = facts.clone();
+        within.time = span.clone();
+        if self.eval(when, &within).truth().is_some() {
+            return false;
+        }
+        let waves = |op: Op| matches!(op, Op::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor | UnaryOp::Abs, _));
+        let changed = self.happen(event, &mut within);
+        self.order(when).iter().any(|n| waves(self.lab.graph.op(*n)))
+            || self.parts(when).states.iter().any(|s| changed.contains(s))
     }
 
     /// States that one of these events would change further if it came about once more; none where each of them comes about no more.
@@ -171,6 +205,9 @@ impl Flow<'_, '_> {
     fn changed_again(&mut self, event: u32, others: &[u32], facts: &Facts) -> Option<Vec<u32>> {
         let when = self.events[event as usize].when;
         let mut again = facts.clone();
+        if let Some(span) = self.meanwhile.as_ref().filter(|_| self.timed.contains(&event)) {
+            again.time = span.clone();
+        }
         self.assume(when, true, &mut again);
         let changed = self.happen(event, &mut again);
         let mut later = again.clone();

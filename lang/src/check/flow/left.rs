@@ -65,7 +65,9 @@ impl Flow<'_, '_> {
                 continue;
             }
             let (number, span) = (self.forks.met, plan.get(id).span);
-            let not_in_order = holds.iter().enumerate().filter(|(_, holds)| **holds != Some(true));
+            // What a device may report, or what goes on beside may bring about, is no way that the text writes.
+            let written = |(way, _): &(usize, &Option<bool>)| !ways[*way].unsure;
+            let not_in_order = holds.iter().enumerate().filter(|(_, holds)| **holds != Some(true)).filter(written);
             off.extend(not_in_order.map(|(way, holds)| Fork { end, number, way, span, sure: holds.is_some() }));
         }
         if off.is_empty() {

@@ -114,6 +114,10 @@ struct Flow<'l, 'a> {
     timed: Vec<u32>,
     /// Derivatives that depend on the time itself.
     clocked: Vec<u32>,
+    /// While time passes: from when to when. An event comes about somewhere in it.
+    meanwhile: Option<Known>,
+    /// A law has broken a limit while time passed, and a handler takes that: the step goes no further.
+    stopped: bool,
     /// States that are amounts of species.
     amounts: BTreeSet<u32>,
     /// What is known of the conditions of reactions.
@@ -255,6 +259,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
             clocked: Vec::new(),
+            meanwhile: None,
+            stopped: false,
             amounts: lab.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect(),
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),

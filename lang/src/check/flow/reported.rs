@@ -44,7 +44,8 @@ impl Flow<'_, '_> {
             };
             let (taken, rest): (Vec<_>, Vec<_>) = reported.into_iter().partition(|(name, _)| takes(name));
             reported = rest;
-            let Some(entry) = self.joined(base, &taken) else { continue };
+            let Some(mut entry) = self.joined(base, &taken) else { continue };
+            entry.unsure = true;
             self.again.push(Vec::new());
             let end = self.walk(*handler, entry);
             self.again.pop();

@@ -49,6 +49,9 @@ impl Flow<'_, '_> {
         self.blocks += usize::from(waits);
         let mut after = self.step(id, facts);
         self.blocks -= usize::from(waits);
+        if std::mem::take(&mut self.stopped) {
+            after = None;
+        }
         if waits && !self.jobs.is_empty() {
             after = self.end_block(after);
         }
