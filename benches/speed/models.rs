@@ -83,7 +83,7 @@ pub fn robertson() -> Model {
     for (name, initial, scale) in [("y1", 1.0, 1e-6), ("y2", 0.0, 1e-10), ("y3", 0.0, 1.0)] {
         let initial = model.graph.number(initial);
         let domain = Domain::Quantity(Unit::one());
-        model.states.push(State { name: name.into(), domain, initial, scale, span: Span::default() });
+        model.states.push(State { name: name.into(), domain, initial, scale: Some(scale), span: Span::default() });
     }
     let graph = &mut model.graph;
     let [x, y, z]: [NodeId; 3] = std::array::from_fn(|i| graph.add(Op::State(i as u32)));

@@ -144,7 +144,7 @@ impl Summary {
                 Step::Done(_, world) if certain => {
                     fate.done += 1;
                     if fate.after.len() < KEPT {
-                        fate.after.push(world);
+                        fate.after.push(*world);
                     }
                 }
                 Step::Done(..) => {}

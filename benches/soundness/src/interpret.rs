@@ -57,7 +57,7 @@ pub enum Step {
     /// It began.
     Began(Id),
     /// It ended well: how the lab stood then.
-    Done(Id, World),
+    Done(Id, Box<World>),
     /// It failed with this code.
     Failed(Id, &'static str),
     /// It presumed what was not so.
@@ -345,7 +345,7 @@ impl<'p> Machine<'p, '_> {
 
     fn done(&mut self, stmt: Id) {
         self.look_at_keeps();
-        self.out.push(Step::Done(stmt, self.world.clone()));
+        self.out.push(Step::Done(stmt, Box::new(self.world.clone())));
     }
 
     /// One step of a thread; false where it cannot go on now.
