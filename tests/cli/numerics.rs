@@ -36,6 +36,16 @@ fn a_salt_of_the_library_precipitates_and_dissolves() {
 }
 
 #[test]
+fn an_acid_that_a_reaction_makes_splits_as_it_is_made() {
+    pass("acid_made.mtx", &["w"]);
+}
+
+#[test]
+fn a_law_whose_rate_follows_what_is_left_takes_nothing_of_nothing() {
+    pass("drains_what_is_left.mtx", &["go"]);
+}
+
+#[test]
 fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
     let (code, text) = run("runs_dry.mtx", "w");
     assert_eq!(code, 1, "{text}");

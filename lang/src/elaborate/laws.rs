@@ -1,6 +1,6 @@
 //! Processes and events over the instances of the lab.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::{Action, Event};
 use matterix_ir::scene::InstanceId;
@@ -594,7 +594,16 @@ impl<'a> Elaborator<'a> {
             let Type::Quantity { dimension, point: false, .. } = &ty else { continue };
             if *dimension == amount {
                 let Value::Num(size) = self.member_value(from, m, at) else { return None };
-                return Some((self.graph.binary(BinaryOp::Div, q.node, size.node), from, to));
+                let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
+                // A law whose rate follows what is left takes nothing of nothing.
+                let left = |(key, _): &(&super::ExtensiveKey, &u32)| key.instance == from;
+                let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
+                if rate && self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s))) {
+                    let zero = self.graph.number(0.0);
+                    let nothing = self.graph.binary(BinaryOp::Le, q.node, zero);
+                    share = self.graph.select(nothing, q.node, share);
+                }
+                return Some((share, from, to));
             }
         }
         let found = self.describe(&q);

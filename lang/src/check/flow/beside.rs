@@ -40,7 +40,7 @@ impl Flow<'_, '_> {
 
     /// Where a branch has raised failures, how far the others had got is not known; `from` counts those that were raised before.
     pub(super) fn blur(&mut self, from: usize) {
-        let Some(others) = self.shared.last().filter(|_| self.notes.is_some()).cloned() else { return };
+        let Some(others) = self.shared.last().cloned() else { return };
         let others = Rc::new(self.behind(&others));
         let raised = self.guards.last_mut().into_iter().flatten().skip(from);
         raised.for_each(|(_, facts)| {
@@ -48,6 +48,18 @@ impl Flow<'_, '_> {
             facts.blurred =
                 Some(before.map_or_else(|| others.clone(), |b| Rc::new(b.union(&others).copied().collect())));
         });
+    }
+
+    /// What others changed beside those failures, and how long they went on with the step at hand, is not known where they are
+    /// taken; what should be in order at the end is followed by itself.
+    pub(super) fn cut_short(&mut self, from: usize) {
+        let kept = self.ends_of();
+        for (_, facts) in self.guards.last_mut().into_iter().flatten().skip(from) {
+            let Some(blurred) = &facts.blurred else { continue };
+            let states: Vec<u32> = blurred.iter().copied().filter(|s| !kept.contains_key(s)).collect();
+            facts.forget(&states);
+            facts.time = at_least(&facts.time);
+        }
     }
 
     /// The branch ends.

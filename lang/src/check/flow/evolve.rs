@@ -129,7 +129,7 @@ impl Flow<'_, '_> {
 
     fn goes_on(&mut self, longest: f64, span: &Known, facts: &mut Facts) {
         let mut timed = self.timed.clone();
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();
             let moved = self.flow_through(longest, span, facts);
             if changed || !moved.is_empty() {
@@ -142,14 +142,15 @@ impl Flow<'_, '_> {
             self.fire_between(span, facts);
             recurring.sort_unstable();
             recurring.dedup();
-            self.recur(&recurring, span, facts);
+            let again = self.recur(&recurring, span, facts);
             let moving = facts.moving.iter().map(|i| self.derivatives[*i as usize].state);
             let touched: Vec<u32> = moved.iter().copied().chain(moving).collect();
             if self.limits_on(&touched, facts) == Asked::Handled {
                 self.stopped = true;
                 return;
             }
-            if facts.unsettled.is_empty() || moved.is_empty() {
+            // What events have changed at once may let laws act.
+            if facts.unsettled.is_empty() || (moved.is_empty() && !again && round > 0) {
                 return;
             }
         }
@@ -158,18 +159,21 @@ impl Flow<'_, '_> {
         facts.barrier = None;
     }
 
-    /// Events that time may bring about more than once: what they would change further counts as unknown.
-    fn recur(&mut self, due: &[u32], span: &Known, facts: &mut Facts) {
+    /// Events that time may bring about more than once: what they would change further counts as unknown. Whether there is any.
+    fn recur(&mut self, due: &[u32], span: &Known, facts: &mut Facts) -> bool {
         let due: Vec<u32> = due
             .iter()
             .copied()
             .filter(|i| facts.fired[*i as usize].is_none() || self.comes_and_goes(*i, span, facts))
             .collect();
         let moving: Vec<u32> = facts.moving.iter().map(|i| self.derivatives[*i as usize].state).collect();
+        let mut any = false;
         // Each turn forgets a state or ends.
         while let Some(states) = self.further(&due, &moving, facts) {
             self.forget(&states, facts);
+            any = true;
         }
+        any
     }
 
     /// Whether the condition of an event may come true more than once in `span`: it follows the time to and fro, or the event

@@ -86,7 +86,7 @@ impl Flow<'_, '_> {
     }
 
     /// What should be in order at the end, by the states it depends on.
-    fn ends_of(&mut self) -> Rc<BTreeMap<u32, Vec<usize>>> {
+    pub(super) fn ends_of(&mut self) -> Rc<BTreeMap<u32, Vec<usize>>> {
         if let Some(known) = &self.ends_of {
             return known.clone();
         }

@@ -427,10 +427,12 @@ impl Flow<'_, '_> {
         let forward: Vec<usize> = (0..branches.len()).collect();
         let backward: Vec<usize> = forward.iter().rev().copied().collect();
         let mark = self.findings.len();
+        let from = self.guards.last().map_or(0, Vec::len);
         let mut lines = (branches.len() > 1 && self.is_stopped_by(branches)).then(Lines::default);
         let first = self.in_order(branches, &forward, &writes, facts.clone(), lines.as_mut());
         if branches.len() < 2 || self.shared.len() >= MOST_PARALLEL {
             lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
+            self.cut_short(from);
             return first;
         }
         let one: Vec<Finding> = self.findings.split_off(mark);
@@ -438,6 +440,7 @@ impl Flow<'_, '_> {
         let second = self.in_order(branches, &backward, &writes, facts.clone(), lines.as_mut());
         self.once_more(false);
         lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
+        self.cut_short(from);
         let other: Vec<Finding> = self.findings.split_off(mark);
         self.findings.extend(in_both(one, &other));
         match (first, second) {
