@@ -134,9 +134,9 @@ impl Switches {
 
     /// Finds the comparisons that may turn round.
     fn fold(&mut self, analysis: &Analysis<'_>, sides: &[NodeId], moving: &[u32]) {
-        let of = |i: usize| analysis.tape(&sides[2 * i..2 * i + 2], moving);
-        let list: Vec<usize> = (0..self.list.len()).filter(|i| of(*i).steps.iter().any(folds)).collect();
-        let waves = list.iter().map(|i| of(*i).steps.iter().any(is_wave)).collect();
+        let (turns, wavy) = (self.tape.rests_on(folds), self.tape.rests_on(is_wave));
+        let list: Vec<usize> = (0..self.list.len()).filter(|i| turns[2 * i] || turns[2 * i + 1]).collect();
+        let waves = list.iter().map(|i| wavy[2 * i] || wavy[2 * i + 1]).collect();
         let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
         let tape = analysis.tape(&sides, moving);
         let ends = std::array::from_fn(|_| vec![0.0; moving.len()]);

@@ -81,6 +81,22 @@ impl Tape {
         }
     }
 
+    /// By output: whether a step that it rests on passes a test.
+    pub(super) fn rests_on(&self, test: fn(&Step) -> bool) -> Vec<bool> {
+        let mut rests = vec![false; self.first_result()];
+        for step in &self.steps {
+            let on = |register: u32| rests[register as usize];
+            let below = match *step {
+                Step::Unary(_, a) => on(a),
+                Step::Binary(_, a, b) => on(a) || on(b),
+                Step::Select(c, a, b) => on(c) || on(a) || on(b),
+                Step::Sum(first, count) => self.summed(first, count).any(|t| on(t.register)),
+            };
+            rests.push(below || test(step));
+        }
+        self.outputs.iter().map(|output| rests[*output as usize]).collect()
+    }
+
     /// Bounds of all registers for [`Tape::enclose`], constants filled in.
     pub(super) fn intervals(&self) -> Vec<Interval> {
         self.registers().into_iter().map(|v| (v, v)).collect()
