@@ -177,7 +177,7 @@ impl Switches {
             for i in changed {
                 located.push((self.locate(i, low, high, moving, path), i));
             }
-            for place in 0..self.folded.list.len() {
+            for place in self.open(low, high, path) {
                 let end = located.iter().fold(high, |end, (time, _)| end.min(*time));
                 if let Some(seen) = self.hidden(place, low, end, moving, path)? {
                     let i = self.folded.list[place];
@@ -192,6 +192,15 @@ impl Switches {
             low = high;
         }
         Ok(None)
+    }
+
+    /// The places of comparisons that may turn round somewhere in a piece.
+    fn open(&mut self, from: f64, to: f64, path: &mut dyn FnMut(f64, &mut [f64])) -> Vec<usize> {
+        if self.folded.list.is_empty() {
+            return Vec::new();
+        }
+        self.enclose((from, to), path);
+        (0..self.folded.list.len()).filter(|place| !self.stays(*place)).collect()
     }
 
     /// An instant between `low` and `high` at which a comparison that may turn round has changed, the first that is found from
@@ -214,7 +223,8 @@ impl Switches {
                 false if pieces > FEW_PIECES => return Ok(None),
                 _ => {}
             }
-            if self.stays(place, (from, to), path) {
+            self.enclose((from, to), path);
+            if self.stays(place) {
                 continue;
             }
             let middle = from + 0.5 * (to - from);
@@ -230,9 +240,9 @@ impl Switches {
         Ok(None)
     }
 
-    /// Whether a comparison that may turn round has the same truth throughout a piece.
-    fn stays(&mut self, place: usize, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) -> bool {
-        let Folded { list, tape, bounds, ends, .. } = &mut self.folded;
+    /// Bounds the sides of all comparisons that may turn round over a piece.
+    fn enclose(&mut self, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
+        let Folded { tape, bounds, ends, .. } = &mut self.folded;
         if tape.inputs > 0 {
             let times = [from, from + 0.5 * (to - from), to];
             ends.iter_mut().zip(times).for_each(|(values, time)| path(time, values));
@@ -244,6 +254,11 @@ impl Switches {
             (low - more, high + more)
         });
         tape.enclose((self.clock.lab(from), self.clock.lab(to)), states, bounds);
+    }
+
+    /// Whether a comparison has the same truth throughout the piece that was bounded last.
+    fn stays(&self, place: usize) -> bool {
+        let Folded { list, tape, bounds, .. } = &self.folded;
         let side = |k: usize| bounds[tape.outputs[k] as usize];
         let ((a, b), (c, d)) = (side(2 * place), side(2 * place + 1));
         let switch = &self.list[list[place]];
