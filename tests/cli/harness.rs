@@ -98,3 +98,21 @@ fn ended(output: Output) -> Ended {
         err: String::from_utf8(output.stderr).expect("standard error is text"),
     }
 }
+
+/// Runs a workflow of a file in `tests/cases`; its status and what it wrote.
+pub fn run_case(case: &str, workflow: &str, more: &[&str]) -> (i32, String) {
+    let file = root().join("tests/cases").join(case);
+    let ran = matterixc(&[&["run", file.to_str().expect("text"), "--workflow", workflow], more].concat());
+    (ran.code, format!("{}{}", ran.out, ran.err))
+}
+
+/// Every one of these workflows passes, with nothing found in it.
+pub fn pass_cases(case: &str, workflows: &[&str]) {
+    for workflow in workflows {
+        let (code, text) = run_case(case, workflow, &[]);
+        assert_eq!(code, 0, "{case} {workflow}: {text}");
+        for word in ["error[", "warning["] {
+            assert!(!text.contains(word), "{case} {workflow}: {text}");
+        }
+    }
+}

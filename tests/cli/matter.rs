@@ -1,28 +1,15 @@
 //! Which quantities of each species are matter, and what becomes of the others.
 
-use crate::harness::{folder, matterixc, root};
-
-/// A workflow of the cases, run; its status and what it wrote.
-fn run(workflow: &str, more: &[&str]) -> (i32, String) {
-    let file = root().join("tests/cases/tags.mtx");
-    let ran = matterixc(&[&["run", file.to_str().expect("text"), "--workflow", workflow], more].concat());
-    (ran.code, format!("{}{}", ran.out, ran.err))
-}
+use crate::harness::{folder, matterixc, pass_cases, root, run_case};
 
 #[test]
 fn what_is_no_matter_begins_as_declared_and_goes_along() {
-    for workflow in ["travel", "written", "labelled", "reacted"] {
-        let (code, text) = run(workflow, &[]);
-        assert_eq!(code, 0, "{workflow}: {text}");
-        for word in ["error[", "warning["] {
-            assert!(!text.contains(word), "{workflow}: {text}");
-        }
-    }
+    pass_cases("tags.mtx", &["travel", "written", "labelled", "reacted"]);
 }
 
 #[test]
 fn balances_count_matter_only() {
-    let (_, text) = run("travel", &[]);
+    let (_, text) = run_case("tags.mtx", "travel", &[]);
     let line = text.lines().find(|l| l.trim_start().starts_with("mass ")).unwrap_or_default();
     let sum: Vec<&str> = line.split_whitespace().collect();
     // 100, 50, 50 and 50, and 101 g.
@@ -39,7 +26,7 @@ fn what_goes_along_is_shown_and_recorded() {
     assert!(!known.out.contains("enthalpy"), "{}", known.out);
     let dir = folder("tags");
     let out = dir.join("out");
-    let (code, text) = run("travel", &["--out", out.to_str().expect("text")]);
+    let (code, text) = run_case("tags.mtx", "travel", &["--out", out.to_str().expect("text")]);
     assert_eq!(code, 0, "{text}");
     let table = std::fs::read_to_string(out.join("states.csv")).expect("the table");
     let header: Vec<&str> = table.lines().next().unwrap_or_default().split(',').collect();

@@ -1,53 +1,40 @@
 //! Numbers of the twin that are known in closed form, at every size and however short a time they last.
 
-use crate::harness::{matterixc, root};
-
-fn run(case: &str, workflow: &str) -> (i32, String) {
-    let file = root().join("tests/cases/numerics").join(case);
-    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow]);
-    (ran.code, format!("{}{}", ran.out, ran.err))
-}
-
-fn pass(case: &str, workflows: &[&str]) {
-    for workflow in workflows {
-        let (code, text) = run(case, workflow);
-        assert_eq!(code, 0, "{case} {workflow}: {text}");
-    }
-}
+use crate::harness::{matterixc, pass_cases, root, run_case};
 
 #[test]
 fn states_of_any_size_are_followed() {
-    pass("sizes.mtx", &["decays_and_feeds", "swings", "grows", "reacts_in_femtomoles"]);
+    pass_cases("numerics/sizes.mtx", &["decays_and_feeds", "swings", "grows", "reacts_in_femtomoles"]);
 }
 
 #[test]
 fn what_lasts_a_moment_is_not_stepped_over() {
-    pass("moments.mtx", &["counts_crests", "sees_a_pulse"]);
+    pass_cases("numerics/moments.mtx", &["counts_crests", "sees_a_pulse"]);
 }
 
 #[test]
 fn short_waits_add_up_exactly() {
-    pass("moments.mtx", &["adds_up_waits"]);
+    pass_cases("numerics/moments.mtx", &["adds_up_waits"]);
 }
 
 #[test]
 fn a_salt_of_the_library_precipitates_and_dissolves() {
-    pass("precipitation.mtx", &["precipitates", "dissolves"]);
+    pass_cases("numerics/precipitation.mtx", &["precipitates", "dissolves"]);
 }
 
 #[test]
 fn an_acid_that_a_reaction_makes_splits_as_it_is_made() {
-    pass("acid_made.mtx", &["w"]);
+    pass_cases("numerics/acid_made.mtx", &["w"]);
 }
 
 #[test]
 fn a_law_whose_rate_follows_what_is_left_takes_nothing_of_nothing() {
-    pass("drains_what_is_left.mtx", &["go"]);
+    pass_cases("numerics/drains_what_is_left.mtx", &["go"]);
 }
 
 #[test]
 fn a_law_that_takes_from_an_empty_vessel_ends_the_run() {
-    let (code, text) = run("runs_dry.mtx", "w");
+    let (code, text) = run_case("numerics/runs_dry.mtx", "w", &[]);
     assert_eq!(code, 1, "{text}");
     assert!(text.contains("error[transfer-fraction]: `flow(f)` takes more than there is"), "{text}");
     assert!(text.contains("at 12.0"), "{text}");

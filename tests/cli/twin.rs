@@ -2,30 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::harness::{folder, matterixc, root};
-
-/// Runs a workflow of a case; its status and what it wrote.
-fn run(case: &str, workflow: &str) -> (i32, String) {
-    let file = root().join("tests/cases").join(case);
-    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow]);
-    (ran.code, format!("{}{}", ran.out, ran.err))
-}
-
-/// Every one of these passes, with nothing found in it.
-fn pass(case: &str, workflows: &[&str]) {
-    for workflow in workflows {
-        let (code, text) = run(case, workflow);
-        assert_eq!(code, 0, "{case} {workflow}: {text}");
-        for word in ["error[", "warning["] {
-            assert!(!text.contains(word), "{case} {workflow}: {text}");
-        }
-    }
-}
+use crate::harness::{folder, matterixc, pass_cases, root, run_case};
 
 #[test]
 fn fast_chemistry_comes_to_its_end() {
-    pass("fast.mtx", &["fades", "dissociates"]);
-    pass("neutralisation.mtx", &["neutralises", "keeps_the_excess"]);
+    pass_cases("fast.mtx", &["fades", "dissociates"]);
+    pass_cases("neutralisation.mtx", &["neutralises", "keeps_the_excess"]);
 }
 
 #[test]
@@ -39,12 +21,12 @@ fn what_runs_out_runs_out_at_its_time() {
         "with_a_catalyst",
         "there_and_back",
     ];
-    pass("runs_out.mtx", &all);
+    pass_cases("runs_out.mtx", &all);
 }
 
 #[test]
 fn what_recurs_what_is_slow_and_what_cools_down_is_followed() {
-    pass("slow.mtx", &["counts", "drips", "reacts_at_nanomolar", "cools_down_to_its_set_point"]);
+    pass_cases("slow.mtx", &["counts", "drips", "reacts_at_nanomolar", "cools_down_to_its_set_point"]);
 }
 
 #[test]
@@ -57,7 +39,7 @@ fn a_reading_is_that_of_the_moment_when_the_step_is_called() {
         "as_it_was_when_called",
         "in_a_skill_and_a_job",
     ];
-    pass("arguments.mtx", &all);
+    pass_cases("arguments.mtx", &all);
 }
 
 /// By name, the times at which a value was recorded.
@@ -120,20 +102,20 @@ fn a_stroke_gives_off_what_it_took() {
         "brings_over_in_strokes",
         "pushes_what_was_drawn",
     ];
-    pass("strokes.mtx", &all);
-    let (code, text) = run("strokes.mtx", "asks_for_more_than_was_taken");
+    pass_cases("strokes.mtx", &all);
+    let (code, text) = run_case("strokes.mtx", "asks_for_more_than_was_taken", &[]);
     assert_eq!(code, 1);
     assert!(text.contains("volume_underflow") || text.contains("volume-underflow"), "{text}");
 }
 
 #[test]
 fn a_limit_that_a_flow_breaks_is_a_failure_at_its_moment() {
-    pass("limits.mtx", &["goes_on", "runs_dry", "overloads", "overloads_in_a_job"]);
+    pass_cases("limits.mtx", &["goes_on", "runs_dry", "overloads", "overloads_in_a_job"]);
 }
 
 #[test]
 fn a_vessel_that_runs_dry_ends_the_run_at_that_moment() {
-    let (code, text) = run("runs_dry.mtx", "circulate");
+    let (code, text) = run_case("runs_dry.mtx", "circulate", &[]);
     assert_eq!(code, 1, "{text}");
     assert!(text.contains("error[transfer-fraction]: `leave(loop)` takes more than there is"), "{text}");
     assert!(text.contains("at 11.2702 s"), "{text}");

@@ -265,6 +265,15 @@ impl Text {
         at.depth -= 1;
     }
 
+    /// A wait of statement `is` that may have a handler for its timeout.
+    fn timed_out(&mut self, at: &mut At<'_>, is: Option<(usize, Id)>, head: String, handler: Option<&Block>) {
+        let pad = "    ".repeat(at.depth);
+        let Some(block) = handler else { return self.line(&format!("{pad}{head}"), is) };
+        self.line(&format!("{pad}{head} on timeout {{"), is);
+        self.inner(at, block);
+        self.line(&format!("{pad}}}"), None);
+    }
+
     fn stmt(&mut self, at: &mut At<'_>, stmt: &Stmt) {
         let pad = "    ".repeat(at.depth);
         let is = Some((at.number, stmt.id));
@@ -275,14 +284,7 @@ impl Text {
             Kind::Wait(ms) => open(self, format!("wait {}", seconds(*ms))),
             Kind::Until(c, ms, handler) => {
                 let head = format!("wait until {} timeout {}", at.condition(c), seconds(*ms));
-                match handler {
-                    None => open(self, head),
-                    Some(block) => {
-                        open(self, format!("{head} on timeout {{"));
-                        self.inner(at, block);
-                        self.line(&close, None);
-                    }
-                }
+                self.timed_out(at, is, head, handler.as_ref());
             }
             Kind::If(c, yes, no) => {
                 open(self, format!("if {} {{", at.condition(c)));
@@ -352,14 +354,7 @@ impl Text {
             }
             Kind::Hold(c, span, ms, handler) => {
                 let head = format!("hold {} for {} timeout {}", at.condition(c), seconds(*span), seconds(*ms));
-                match handler {
-                    None => open(self, head),
-                    Some(block) => {
-                        open(self, format!("{head} on timeout {{"));
-                        self.inner(at, block);
-                        self.line(&close, None);
-                    }
-                }
+                self.timed_out(at, is, head, handler.as_ref());
             }
             Kind::Ill(Ill::Mass) => open(self, "wait 3 g".to_string()),
             Kind::Ill(Ill::Volume) => open(self, "wait 20 uL".to_string()),

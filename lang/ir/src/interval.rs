@@ -120,7 +120,7 @@ fn widened(low: f64, high: f64) -> Interval {
 }
 
 /// A product of bounds, where nothing times without bound is nothing.
-fn times(a: f64, b: f64) -> f64 {
+pub fn times(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }
 

@@ -563,6 +563,19 @@ pub enum Step {
 }
 
 impl Step {
+    /// Whether it waits for the jobs that begin in it.
+    pub fn waits_for_jobs(&self) -> bool {
+        matches!(
+            self,
+            Step::Guarded { .. }
+                | Step::Try(_)
+                | Step::Skill { .. }
+                | Step::Keep { .. }
+                | Step::During { .. }
+                | Step::Claim { .. }
+        )
+    }
+
     /// The nodes directly below one, in order.
     pub fn children(&self) -> Vec<StepId> {
         match self {

@@ -1,6 +1,6 @@
 //! One value of a graph at one point, for those who ask for the same ones again and again.
 
-use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp};
+use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp, binary, unary};
 
 /// How operations come out; none where it cannot be said, which leaves what was asked for open.
 pub trait Rules {
@@ -14,6 +14,29 @@ pub trait Rules {
     fn binary(&self, op: BinaryOp, a: Self::Value, b: Self::Value) -> Option<Self::Value>;
     /// One of two by a condition.
     fn select(&self, condition: Self::Value, a: Self::Value, b: Self::Value) -> Self::Value;
+}
+
+/// Numbers by the reference semantics, with what is known of operations without operands.
+pub struct Numbers<L>(pub L);
+
+impl<L: Fn(Op) -> Option<f64>> Rules for Numbers<L> {
+    type Value = f64;
+
+    fn leaf(&self, op: Op) -> Option<f64> {
+        self.0(op)
+    }
+
+    fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
+        Some(unary(op, a))
+    }
+
+    fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
+        Some(binary(op, a, b))
+    }
+
+    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
+        if condition != 0.0 { a } else { b }
+    }
 }
 
 /// What a node of a graph is made of, by itself: operations, operands first, which name these by their position in it.
@@ -103,29 +126,15 @@ impl Formula {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::graph::{Env, binary, unary};
+    use crate::graph::Env;
 
-    /// Exact numbers; the state 9 is not known.
-    struct Numbers;
-
-    impl Rules for Numbers {
-        type Value = f64;
-        fn leaf(&self, op: Op) -> Option<f64> {
-            match op {
-                Op::Const(v) => Some(v),
-                Op::State(9) => None,
-                Op::State(s) => Some(f64::from(s)),
-                _ => None,
-            }
-        }
-        fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
-            Some(unary(op, a))
-        }
-        fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
-            Some(binary(op, a, b))
-        }
-        fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
-            if condition != 0.0 { a } else { b }
+    /// The state 9 is not known.
+    fn known(op: Op) -> Option<f64> {
+        match op {
+            Op::Const(v) => Some(v),
+            Op::State(9) => None,
+            Op::State(s) => Some(f64::from(s)),
+            _ => None,
         }
     }
 
@@ -142,8 +151,8 @@ mod tests {
         let states = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
         let env = Env { time: 0.0, states: &states, params: &[], locals: &[], readings: &[] };
         let mut formulas = Formulas::default();
-        assert_eq!(formulas.of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
-        assert_eq!(formulas.of(&graph, other).value(&Numbers, &mut room), None);
-        assert_eq!(formulas.of(&graph, sum).value(&Numbers, &mut room), Some(graph.eval(sum, env)));
+        assert_eq!(formulas.of(&graph, sum).value(&Numbers(known), &mut room), Some(graph.eval(sum, env)));
+        assert_eq!(formulas.of(&graph, other).value(&Numbers(known), &mut room), None);
+        assert_eq!(formulas.of(&graph, sum).value(&Numbers(known), &mut room), Some(graph.eval(sum, env)));
     }
 }

@@ -1,8 +1,7 @@
 //! Conditions that are asked for at every moment of a run: worked out again only where something that they rest on has changed.
 
-use matterix_ir::graph::{binary, unary};
-use matterix_ir::values::{Formula, Formulas, Rules};
-use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
+use matterix_ir::values::{Formula, Formulas, Numbers};
+use matterix_ir::{BinaryOp, Graph, NodeId, Op};
 
 use crate::process::Engine;
 
@@ -20,29 +19,6 @@ struct Part {
     leaves: Vec<(Op, f64)>,
     /// None before the first look.
     holds: Option<bool>,
-}
-
-/// Values at one moment of a run.
-struct Now<'e, 'm>(&'e Engine<'m>);
-
-impl Rules for Now<'_, '_> {
-    type Value = f64;
-
-    fn leaf(&self, op: Op) -> Option<f64> {
-        Some(self.0.leaf(op))
-    }
-
-    fn unary(&self, op: UnaryOp, a: f64) -> Option<f64> {
-        Some(unary(op, a))
-    }
-
-    fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
-        Some(binary(op, a, b))
-    }
-
-    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
-        if condition != 0.0 { a } else { b }
-    }
 }
 
 impl Condition {
@@ -86,7 +62,8 @@ impl Part {
         match self.holds.filter(|_| same) {
             Some(holds) => holds,
             None => {
-                let holds = self.formula.value(&Now(engine), room).is_some_and(|value| value != 0.0);
+                let now = Numbers(|leaf| Some(engine.leaf(leaf)));
+                let holds = self.formula.value(&now, room).is_some_and(|value| value != 0.0);
                 *self.holds.insert(holds)
             }
         }

@@ -40,6 +40,9 @@ impl Flow<'_, '_> {
 
     /// Where a branch has raised failures, how far the others had got is not known; `from` counts those that were raised before.
     pub(super) fn blur(&mut self, from: usize) {
+        if self.guards.last().is_none_or(|guard| guard.len() <= from) {
+            return;
+        }
         let Some(others) = self.shared.last().cloned() else { return };
         let others = Rc::new(self.behind(&others));
         let raised = self.guards.last_mut().into_iter().flatten().skip(from);

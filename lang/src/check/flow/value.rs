@@ -3,6 +3,7 @@
 use std::rc::Rc;
 
 use matterix_ir::graph::{binary, unary};
+use matterix_ir::interval::times;
 use matterix_ir::{BinaryOp, UnaryOp};
 
 /// Why a number is not known exactly.
@@ -289,11 +290,6 @@ impl Known {
 fn hangs_on_rounding(op: BinaryOp, a: f64, b: f64) -> bool {
     let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
     compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) && a.is_finite() && b.is_finite()
-}
-
-/// A product of bounds, where nothing times without bound is nothing.
-fn times(a: f64, b: f64) -> f64 {
-    if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }
 
 #[cfg(test)]

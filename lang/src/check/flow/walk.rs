@@ -45,7 +45,7 @@ impl Flow<'_, '_> {
         }
         let noted = self.begin(id, node, &facts);
         let (began, _) = facts.time.bounds();
-        let waits = waits_for_jobs(&node.step);
+        let waits = node.step.waits_for_jobs();
         self.blocks += usize::from(waits);
         let mut after = self.step(id, facts);
         self.blocks -= usize::from(waits);
@@ -556,19 +556,6 @@ impl Flow<'_, '_> {
         }
         self.meet(id, &facts, ends)
     }
-}
-
-/// Whether a step waits for the jobs that begin in it.
-fn waits_for_jobs(step: &Step) -> bool {
-    matches!(
-        step,
-        Step::Guarded { .. }
-            | Step::Try(_)
-            | Step::Skill { .. }
-            | Step::Keep { .. }
-            | Step::During { .. }
-            | Step::Claim { .. }
-    )
 }
 
 /// Whether a further turn changes nothing that is known. Where only how states hang together still changes, that is given up: what a

@@ -27,7 +27,7 @@ pub(super) fn findings(times: &Times<'_>, known: &Known<'_>) -> Vec<Diagnostic> 
             continue;
         };
         if !visit.aside {
-            let block = times.timing.around(step).find(|s| waits_for_jobs(times, *s));
+            let block = times.timing.around(step).find(|s| times.plan.get(*s).step.waits_for_jobs());
             jobs.entry(job).or_default().push(Begun { step, body: *body, order: visit.order, block });
         }
     }
@@ -41,19 +41,6 @@ pub(super) fn findings(times: &Times<'_>, known: &Known<'_>) -> Vec<Diagnostic> 
         found.extend(clashes);
     }
     found
-}
-
-/// Whether a step waits for the jobs that begin in it.
-fn waits_for_jobs(times: &Times<'_>, step: StepId) -> bool {
-    matches!(
-        times.plan.get(step).step,
-        Step::Guarded { .. }
-            | Step::Try(_)
-            | Step::Skill { .. }
-            | Step::Keep { .. }
-            | Step::During { .. }
-            | Step::Claim { .. }
-    )
 }
 
 /// The job that still runs, certainly or perhaps, where one of its name begins.
