@@ -92,8 +92,7 @@ fn with_slack(graph: &mut Graph, node: NodeId) -> NodeId {
             graph.binary(op, a, b)
         }
         Op::Binary(op @ (BinaryOp::Lt | BinaryOp::Le), a, b) => {
-            let (size_a, size_b) = (graph.unary(UnaryOp::Abs, a), graph.unary(UnaryOp::Abs, b));
-            let size = graph.binary(BinaryOp::Max, size_a, size_b);
+            let size = magnitude(graph, a, b);
             let share = graph.number(SLACK);
             let slack = graph.binary(BinaryOp::Mul, share, size);
             let most = graph.binary(BinaryOp::Add, b, slack);
@@ -101,6 +100,20 @@ fn with_slack(graph: &mut Graph, node: NodeId) -> NodeId {
         }
         _ => node,
     }
+}
+
+/// How large two values that are compared are: as large as the one that is fixed, or else the larger of both. Nothing in it turns round as
+/// they move, as an absolute value would.
+fn magnitude(graph: &mut Graph, a: NodeId, b: NodeId) -> NodeId {
+    if let Some(fixed) = graph.constant(a).or(graph.constant(b)) {
+        return graph.number(fixed.abs());
+    }
+    let mut size = |a: NodeId| {
+        let opposite = graph.unary(UnaryOp::Neg, a);
+        graph.binary(BinaryOp::Max, a, opposite)
+    };
+    let (a, b) = (size(a), size(b));
+    graph.binary(BinaryOp::Max, a, b)
 }
 
 /// Where the limits of a run stand.
