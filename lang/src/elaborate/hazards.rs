@@ -179,16 +179,26 @@ impl<'a> Elaborator<'a> {
     fn of_instances(&mut self, declared: Declared<'a>, out: &mut Vec<Hazard>) {
         let Declared { params, module, name, .. } = declared;
         let mut tuples = self.tuples(params, module, Some(declared.when), name);
+        // What can never be is asked first, for that takes less than the value that is watched; not so at the start.
+        let mut at_start = false;
         while let Some((mut scope, shown)) = tuples.next(self) {
+            if declared.of.is_some_and(|of| !several(of).iter().any(|e| self.is_asked_for(e, &scope))) {
+                continue;
+            }
+            let later = if at_start { None } else { self.hazard(declared, false, &shown, &mut scope) };
+            if !at_start && later.is_none() {
+                continue;
+            }
             let all = match declared.of {
                 None => vec![(Watched::Steps, None)],
                 Some(of) => self.all_watched(of, &mut scope),
             };
             let Some((first, _)) = all.first() else { continue };
-            self.initial_mode = matches!(first, Watched::Given(_));
-            let hazard = if self.enter(name.span) { self.hazard(declared, *first, shown, &mut scope) } else { None };
-            self.leave();
-            self.initial_mode = false;
+            at_start = matches!(first, Watched::Given(_));
+            let hazard = match later {
+                Some(hazard) if !at_start => Some(hazard),
+                _ => self.hazard(declared, at_start, &shown, &mut scope),
+            };
             let Some(hazard) = hazard else { continue };
             out.extend(all.into_iter().map(|(watched, measure)| Hazard { watched, measure, ..hazard.clone() }));
         }
@@ -247,9 +257,7 @@ impl<'a> Elaborator<'a> {
             scope.bind(share.to_string(), value);
             scope.bind(from.to_string(), Value::Instance(a));
             scope.bind(to.to_string(), Value::Instance(b));
-            let Some(hazard) = self.hazard(declared, Watched::Transfer(a, b, None), String::new(), &mut scope) else {
-                continue;
-            };
+            let Some(hazard) = self.hazard(declared, false, "", &mut scope) else { continue };
             let then = match declared.of.filter(|_| declared.after.is_some()) {
                 None => None,
                 Some(of) => match self.expr(of, &mut scope) {
@@ -268,7 +276,16 @@ impl<'a> Elaborator<'a> {
         self.num(node, Dimension::one())
     }
 
-    fn hazard(&mut self, declared: Declared<'a>, watched: Watched, shown: String, scope: &mut Scope) -> Option<Hazard> {
+    /// What is dangerous about the things in `scope`; none if it can never come about, or, `at_start`, is not there at the start.
+    fn hazard(&mut self, declared: Declared<'a>, at_start: bool, shown: &str, scope: &mut Scope) -> Option<Hazard> {
+        self.initial_mode = at_start;
+        let hazard = if self.enter(declared.name.span) { self.endangered(declared, shown, scope) } else { None };
+        self.leave();
+        self.initial_mode = false;
+        hazard
+    }
+
+    fn endangered(&mut self, declared: Declared<'a>, shown: &str, scope: &mut Scope) -> Option<Hazard> {
         self.terms.clear();
         let (node, bound) = self.beware(declared.when, scope)?;
         let terms = std::mem::take(&mut self.terms);
@@ -288,7 +305,7 @@ impl<'a> Elaborator<'a> {
             _ => None,
         });
         let (grave, span, help) = (declared.grave, declared.name.span, declared.help.cloned());
-        let name = declared.name.text.clone();
+        let (name, shown, watched) = (declared.name.text.clone(), shown.to_owned(), Watched::Steps);
         Some(Hazard { name, shown, grave, watched, measure: None, about, when: node, states, terms, said, help, span })
     }
 
