@@ -16,7 +16,7 @@ use crate::check as checks;
 use crate::elaborate::geometry::Geometry;
 use crate::elaborate::hazards::dangers;
 use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
+use crate::elaborate::{Elaborator, ExtensiveKey, Tables};
 use crate::eval::{Num, Type, Value};
 use crate::loader::Loader;
 use crate::lower::Wires;
@@ -832,44 +832,44 @@ fn concentration(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::eval::Speci
 }
 
 fn mixtures(lab: &Elaborator<'_>, observables: &[Observed]) -> Vec<Mixture> {
-    let mut out = Vec::new();
-    for i in 0..lab.instances.len() as u32 {
-        let id = InstanceId(i);
-        if !lab.is_mixture(id) {
-            continue;
-        }
-        let mut extensive = Vec::new();
-        let mut contents = Vec::new();
-        for (key, state) in lab.extensive.iter().filter(|(k, _)| k.instance == id) {
-            let name = match key.species {
-                Some(s) => {
-                    if key.matter {
-                        contents.push(Content { species: s.0, state: *state });
-                    }
-                    format!("{}[{}#{}]", key.member, lab.tables.species.get(s).name, s.0)
-                }
-                None => key.member.clone(),
-            };
-            extensive.push((name, *state));
-        }
-        extensive.sort();
-        contents.sort_by_key(|c: &Content| c.species);
-        let about = |wanted: bool| {
-            observables
-                .iter()
-                .enumerate()
-                .filter(move |(_, o)| o.0 == id && o.1.is_some() == wanted)
-                .map(|(i, _)| i as u32)
-        };
-        let concentrations = contents
-            .iter()
-            .filter_map(|c| {
-                observables.iter().position(|o| o.0 == id && o.1.map(|s| s.0) == Some(c.species)).map(|i| i as u32)
-            })
-            .collect();
-        out.push(Mixture { instance: id, extensive, contents, properties: about(false).collect(), concentrations });
+    let mut of: Vec<Vec<u32>> = vec![Vec::new(); lab.instances.len()];
+    for (i, observed) in observables.iter().enumerate() {
+        of[observed.0.0 as usize].push(i as u32);
     }
-    out
+    let by_mixture = lab.extensive_by_mixture();
+    let all = lab.mixtures.iter().zip(&by_mixture);
+    all.map(|(id, states)| mixture(lab, *id, states, observables, &of[id.0 as usize])).collect()
+}
+
+/// A mixture with its extensive states, of all `observables` those at the places `of`.
+fn mixture(
+    lab: &Elaborator<'_>,
+    id: InstanceId,
+    states: &[(ExtensiveKey, u32)],
+    observables: &[Observed],
+    of: &[u32],
+) -> Mixture {
+    let mut extensive = Vec::new();
+    let mut contents = Vec::new();
+    for (key, state) in states {
+        let name = match key.species {
+            Some(s) => {
+                if key.matter {
+                    contents.push(Content { species: s.0, state: *state });
+                }
+                format!("{}[{}#{}]", key.member, lab.tables.species.get(s).name, s.0)
+            }
+            None => key.member.clone(),
+        };
+        extensive.push((name, *state));
+    }
+    extensive.sort();
+    contents.sort_by_key(|c: &Content| c.species);
+    let species = |i: u32| observables[i as usize].1.map(|s| s.0);
+    let properties = of.iter().copied().filter(|i| species(*i).is_none()).collect();
+    let concentration = |c: &Content| of.iter().copied().find(|i| species(*i) == Some(c.species));
+    let concentrations = contents.iter().filter_map(concentration).collect();
+    Mixture { instance: id, extensive, contents, properties, concentrations }
 }
 
 fn scene(lab: &mut Elaborator<'_>, decl: DeclId) -> Scene {

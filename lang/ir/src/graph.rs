@@ -92,19 +92,40 @@ pub enum Op {
 
 impl Op {
     /// The operands, in order.
-    pub fn operands(&self) -> impl Iterator<Item = NodeId> {
-        let list = match *self {
-            Op::Unary(_, a) => [Some(a), None, None],
-            Op::Binary(_, a, b) => [Some(a), Some(b), None],
-            Op::Select(a, b, c) => [Some(a), Some(b), Some(c)],
-            _ => [None; 3],
+    pub fn operands(&self) -> Operands {
+        let (list, count) = match *self {
+            Op::Unary(_, a) => ([a; 3], 1),
+            Op::Binary(_, a, b) => ([a, b, b], 2),
+            Op::Select(a, b, c) => ([a, b, c], 3),
+            _ => ([NodeId(0); 3], 0),
         };
-        list.into_iter().flatten()
+        Operands { list, next: 0, count }
     }
 
     /// Whether this compares two numbers, so that its value jumps where they cross.
     pub fn is_comparison(&self) -> bool {
         matches!(self, Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq, _, _))
+    }
+}
+
+/// The operands of an operation, in order. Every walk over a graph asks for them: this is cheaper than a chain of adapters.
+#[derive(Clone, Debug)]
+pub struct Operands {
+    list: [NodeId; 3],
+    next: u8,
+    count: u8,
+}
+
+impl Iterator for Operands {
+    type Item = NodeId;
+
+    fn next(&mut self) -> Option<NodeId> {
+        if self.next == self.count {
+            return None;
+        }
+        let operand = self.list[self.next as usize];
+        self.next += 1;
+        Some(operand)
     }
 }
 
@@ -301,8 +322,11 @@ impl Graph {
             Op::Local(_) => Leaves::LOCAL,
             Op::Reading(_) => Leaves::READING,
             Op::Unary(..) | Op::Binary(..) | Op::Select(..) => {
-                let below = op.operands().filter_map(|n| self.leaves.get(n.0 as usize));
-                Leaves(below.fold(0, |all, leaves| all | leaves.0))
+                let mut all = 0;
+                for operand in op.operands() {
+                    all |= self.leaves.get(operand.0 as usize).map_or(0, |leaves| leaves.0);
+                }
+                Leaves(all)
             }
         }
     }
@@ -456,7 +480,9 @@ impl Graph {
             if visit(node) {
                 return true;
             }
-            todo.extend(self.op(node).operands());
+            for operand in self.op(node).operands() {
+                todo.push(operand);
+            }
         }
         false
     }

@@ -75,7 +75,11 @@ impl Formulas {
             }
             let before = todo.len();
             let op = graph.op(next);
-            todo.extend(op.operands().filter(|n| self.place(*n).is_none()));
+            for operand in op.operands() {
+                if self.place(operand).is_none() {
+                    todo.push(operand);
+                }
+            }
             if todo.len() > before {
                 continue;
             }

@@ -185,7 +185,7 @@ impl<'a> Elaborator<'a> {
     /// Volume, m^3, of amounts of species together; salts as the ions they become where there is water.
     pub fn volume_of(&mut self, parts: &[(SpeciesId, f64)], at: Span) -> Option<f64> {
         let species = &self.tables.species;
-        let wet = parts.iter().any(|(s, _)| species.get(*s).is_water());
+        let wet = parts.iter().any(|(s, _)| species.get(*s).is_water);
         self.volume_with(parts, wet, at)
     }
 

@@ -167,7 +167,7 @@ impl<'a> Elaborator<'a> {
     /// there is water also what the salts give.
     fn content(&self, parts: &[(SpeciesId, f64)], s: SpeciesId) -> (f64, f64) {
         let species = &self.tables.species;
-        let wet = parts.iter().any(|(part, _)| species.get(*part).is_water());
+        let wet = parts.iter().any(|(part, _)| species.get(*part).is_water);
         let mut content = (0.0, 0.0);
         for (part, amount) in parts {
             let own = if *part == s { 1.0 } else { 0.0 };

@@ -226,7 +226,7 @@ impl<'a> Elaborator<'a> {
     /// The mass of one cubic metre of a recipe that is made up to the mark, and that of its rest, kg. Volumes add up.
     fn made_up(&mut self, lines: &[Line<'a>], shares: f64) -> Option<(f64, f64)> {
         let species = &self.tables.species;
-        let wet = lines.iter().flat_map(|l| &l.of).any(|(s, _)| species.get(*s).is_water());
+        let wet = lines.iter().flat_map(|l| &l.of).any(|(s, _)| species.get(*s).is_water);
         // Masses and volumes that are known, volumes per kg of the whole, volume of a kg of the rest.
         let (mut mass, mut volume, mut shared, mut rest) = (0.0, 0.0, 0.0, (0.0, Span::default()));
         for line in lines {

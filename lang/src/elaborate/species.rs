@@ -22,6 +22,8 @@ pub struct SpeciesDef<'a> {
     pub module: usize,
     /// Composition and charge; absent for an undefined structure.
     pub formula: Option<Formula>,
+    /// Whether it is what `dissolves` is about.
+    pub is_water: bool,
     /// Its structure, where one is declared.
     pub structure: Option<Structure>,
     /// kg/mol; 1 for a species counted by mass.
@@ -37,11 +39,6 @@ pub struct SpeciesDef<'a> {
 }
 
 impl SpeciesDef<'_> {
-    /// Whether it is what `dissolves` is about.
-    pub fn is_water(&self) -> bool {
-        self.formula.as_ref().is_some_and(|formula| formula.to_string() == "H2O")
-    }
-
     /// The phase it states: `solid`, `liquid`, `gas`.
     pub fn phase(&self) -> Option<&str> {
         match &field(self.fields, "phase")?.value {
@@ -260,11 +257,13 @@ fn species<'a>(
         }),
         None => 1.0,
     };
+    let is_water = formula.as_ref().is_some_and(|formula| formula.to_string() == "H2O");
     SpeciesDef {
         decl,
         name: name.text.clone(),
         module,
         formula,
+        is_water,
         structure,
         molar_mass,
         by_mass,

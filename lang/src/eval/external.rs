@@ -170,7 +170,7 @@ impl Elaborator<'_> {
                         _ => None,
                     })
                     .collect();
-                let there = |ion: &SpeciesId| set.contains(ion) || species.get(*ion).is_water();
+                let there = |ion: &SpeciesId| set.contains(ion) || species.get(*ion).is_water;
                 let made = |s: &SpeciesId| species.get(*s).dissolves.iter().all(|(ion, _)| there(ion));
                 Value::List(species.salts().filter(made).map(Value::Species).collect())
             }
