@@ -34,8 +34,11 @@ const SWEEPS: usize = 40;
 /// By this share of its distance a face is moved further than alone it would have to be.
 const OVERSHOOT: f64 = 0.1;
 
-/// Halvings that bring a face back in.
+/// Halvings that find where a face has to stand.
 const HALVINGS: usize = 24;
+
+/// A face is brought back in to within this share of its distance, 2^-24.
+const CLOSE_IN: f64 = 1.0 / (1 << 24) as f64;
 
 /// Times that faces are brought back in.
 const NARROWINGS: usize = 6;
@@ -668,15 +671,11 @@ impl Flow<'_, '_> {
                 self.rate(i, &making.within);
                 for upper in [true, false] {
                     let (low, high) = self.faces(*wall, making);
-                    let (mut near, mut far) = if upper { (inner_high, high) } else { (inner_low, low) };
+                    let (near, mut far) = if upper { (inner_high, high) } else { (inner_low, low) };
                     if !far.is_finite() || near == far {
                         continue;
                     }
-                    for _ in 0..HALVINGS {
-                        let middle = 0.5 * (near + far);
-                        let side = if upper { 1.0 } else { -1.0 };
-                        if self.outwards(*wall, middle, side, making) { near = middle } else { far = middle }
-                    }
+                    far = self.bring_in(*wall, (near, far), if upper { 1.0 } else { -1.0 }, making);
                     let (inner, before) = if upper { (inner_high, high) } else { (inner_low, low) };
                     rests &= (before - far).abs() <= AT_REST * (before - inner).abs();
                     let face = if upper { (low, far) } else { (far, high) };
@@ -687,6 +686,39 @@ impl Flow<'_, '_> {
                 return;
             }
         }
+    }
+
+    /// Where a face between `near` and `far` has to stand at least: rates are mostly straight lines there, so that their zero is
+    /// guessed and then enclosed; where that does not help, halves are taken.
+    fn bring_in(&mut self, wall: Wall, (near, far): (f64, f64), side: f64, making: &mut Making) -> f64 {
+        let mut out = |at: f64| {
+            let (slow, fast) = self.rate_at(wall, at, making);
+            if side > 0.0 { fast } else { -slow }
+        };
+        let mut inner = (near, out(near));
+        if inner.1 <= 0.0 {
+            return near;
+        }
+        let mut outer = (far, out(far));
+        let close = CLOSE_IN * (far - near);
+        let mut tries = 0;
+        while (outer.0 - inner.0).abs() > close.abs() && tries < 2 * HALVINGS {
+            tries += 1;
+            let guess = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
+            let middle = 0.5 * (inner.0 + outer.0);
+            let at = match tries % 4 {
+                1 => guess,
+                // On the other side of what was just found.
+                2 if (guess - inner.0).abs() < (outer.0 - guess).abs() => inner.0 + 0.5 * close,
+                2 => outer.0 - 0.5 * close,
+                _ => middle,
+            };
+            let between = side * inner.0 < side * at && side * at < side * outer.0;
+            let at = if between { at } else { middle };
+            let rate = out(at);
+            if rate > 0.0 { inner = (at, rate) } else { outer = (at, rate) }
+        }
+        outer.0
     }
 
     /// Whether the lower and the upper face of a wall are crossed outwards; the rate was evaluated just before.
