@@ -12,6 +12,7 @@ use matterix_ir::{BinaryOp, Op, UnaryOp};
 use super::Flow;
 use super::actions::Asked;
 use super::bonds::Bonds;
+use super::bracket::last_outwards;
 use super::course::Course;
 use super::facts::Facts;
 use super::fluxes::Row;
@@ -26,7 +27,10 @@ const STILL: f64 = 1e-13;
 const DEPTH: f64 = 1e-3;
 
 /// Doublings of a face's distance before it counts as without bound.
-const DOUBLINGS: usize = 50;
+const DOUBLINGS: f64 = 50.0;
+
+/// A face that moves out goes at most twice so many times further at once.
+const MOST_AT_ONCE: f64 = 512.0;
 
 /// Sweeps over all faces before those that are still crossed count as without bound.
 const SWEEPS: usize = 40;
@@ -34,10 +38,8 @@ const SWEEPS: usize = 40;
 /// By this share of its distance a face is moved further than alone it would have to be.
 const OVERSHOOT: f64 = 0.1;
 
-/// Halvings that find where a face has to stand.
-const HALVINGS: usize = 24;
-
-/// A face is brought back in to within this share of its distance, 2^-24.
+/// A face that moves out is found to within this share of its last step, 2^-12, one that comes in of its distance, 2^-24.
+const CLOSE_OUT: f64 = 1.0 / (1 << 12) as f64;
 const CLOSE_IN: f64 = 1.0 / (1 << 24) as f64;
 
 /// Times that faces are brought back in.
@@ -629,26 +631,32 @@ impl Flow<'_, '_> {
         };
         step = step.max((from - start).abs());
         let (mut near, mut far) = (from, from + side * step);
-        let mut doublings = 0;
-        while self.outwards(wall, far, side, making) {
-            doublings += 1;
+        let mut slower = self.outwards(wall, near, side, making);
+        let mut doublings = 0.0;
+        loop {
+            let out = self.outwards(wall, far, side, making);
+            if out.is_nan() || out <= 0.0 {
+                break;
+            }
+            // Along a straight line it comes to rest at once; else the step is doubled.
+            let further = (1.0 + out / (slower - out)).clamp(1.0, MOST_AT_ONCE);
+            let times = if slower > out { 2.0 * further } else { 2.0 };
+            doublings += times.log2();
             if doublings > DOUBLINGS {
                 return side * f64::INFINITY;
             }
-            step *= 2.0;
-            near = far;
+            step *= times;
+            (near, slower) = (far, out);
             far += side * step;
         }
-        for _ in 0..HALVINGS / 2 {
-            let middle = 0.5 * (near + far);
-            if self.outwards(wall, middle, side, making) { near = middle } else { far = middle }
-        }
+        far = last_outwards(near, far, CLOSE_OUT, |at| self.outwards(wall, at, side, making));
         far + OVERSHOOT * (far - start)
     }
 
-    fn outwards(&mut self, wall: Wall, at: f64, side: f64, making: &mut Making) -> bool {
+    /// How fast a wall is crossed outwards where it has a value; not positive where it is not.
+    fn outwards(&mut self, wall: Wall, at: f64, side: f64, making: &mut Making) -> f64 {
         let (slow, fast) = self.rate_at(wall, at, making);
-        if side > 0.0 { fast > 0.0 } else { slow < 0.0 }
+        if side > 0.0 { fast } else { -slow }
     }
 
     /// Brings faces back in as far as nothing crosses them.
@@ -675,7 +683,8 @@ impl Flow<'_, '_> {
                     if !far.is_finite() || near == far {
                         continue;
                     }
-                    far = self.bring_in(*wall, (near, far), if upper { 1.0 } else { -1.0 }, making);
+                    let side = if upper { 1.0 } else { -1.0 };
+                    far = last_outwards(near, far, CLOSE_IN, |at| self.outwards(*wall, at, side, making));
                     let (inner, before) = if upper { (inner_high, high) } else { (inner_low, low) };
                     rests &= (before - far).abs() <= AT_REST * (before - inner).abs();
                     let face = if upper { (low, far) } else { (far, high) };
@@ -686,39 +695,6 @@ impl Flow<'_, '_> {
                 return;
             }
         }
-    }
-
-    /// Where a face between `near` and `far` has to stand at least: rates are mostly straight lines there, so that their zero is
-    /// guessed and then enclosed; where that does not help, halves are taken.
-    fn bring_in(&mut self, wall: Wall, (near, far): (f64, f64), side: f64, making: &mut Making) -> f64 {
-        let mut out = |at: f64| {
-            let (slow, fast) = self.rate_at(wall, at, making);
-            if side > 0.0 { fast } else { -slow }
-        };
-        let mut inner = (near, out(near));
-        if inner.1 <= 0.0 {
-            return near;
-        }
-        let mut outer = (far, out(far));
-        let close = CLOSE_IN * (far - near);
-        let mut tries = 0;
-        while (outer.0 - inner.0).abs() > close.abs() && tries < 2 * HALVINGS {
-            tries += 1;
-            let guess = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
-            let middle = 0.5 * (inner.0 + outer.0);
-            let at = match tries % 4 {
-                1 => guess,
-                // On the other side of what was just found.
-                2 if (guess - inner.0).abs() < (outer.0 - guess).abs() => inner.0 + 0.5 * close,
-                2 => outer.0 - 0.5 * close,
-                _ => middle,
-            };
-            let between = side * inner.0 < side * at && side * at < side * outer.0;
-            let at = if between { at } else { middle };
-            let rate = out(at);
-            if rate > 0.0 { inner = (at, rate) } else { outer = (at, rate) }
-        }
-        outer.0
     }
 
     /// Whether the lower and the upper face of a wall are crossed outwards; the rate was evaluated just before.

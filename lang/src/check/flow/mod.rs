@@ -9,6 +9,7 @@
 mod actions;
 mod beside;
 mod bonds;
+mod bracket;
 mod course;
 mod demands;
 mod dual;
