@@ -23,6 +23,7 @@ mod interference;
 mod jobs;
 mod lasting;
 mod left;
+mod meantime;
 mod otherwise;
 mod parted;
 mod points;

@@ -91,7 +91,8 @@ impl Flow<'_, '_> {
                 }
                 let parts = self.parts(event.when);
                 let exact = |s: &u32| even.moves(*s) || facts.states[*s as usize].exact().is_some();
-                let at_a_moment = !parts.timed && parts.states.iter().all(|s| !open.contains(s) && exact(s));
+                // Where what it asks for is known, only what happens at a moment brings it about.
+                let at_a_moment = parts.states.iter().all(|s| !open.contains(s) && exact(s));
                 if at_a_moment || self.eval(event.when, &veiled).truth() == Some(false) {
                     continue;
                 }
