@@ -33,6 +33,7 @@ mod reported;
 mod stopped;
 mod timers;
 mod totals;
+mod turns;
 mod value;
 mod walk;
 mod words;
