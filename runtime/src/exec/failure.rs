@@ -41,6 +41,7 @@ impl Measured {
     pub fn show(&self) -> String {
         let Some(value) = self.value else { return String::new() };
         let limits = match (self.low, self.high) {
+            (Some(low), Some(high)) if low == high => format!(", must be {}", self.unit.show(low)),
             (Some(low), Some(high)) => format!(", limits {} .. {}", self.unit.show(low), self.unit.show(high)),
             (Some(low), None) => format!(", lower limit {}", self.unit.show(low)),
             (None, Some(high)) => format!(", upper limit {}", self.unit.show(high)),
