@@ -244,3 +244,31 @@ fn a_word_cut_short_is_completed() {
     let path = write(&folder("findings_short"), "bench.mtx", BENCH.replace("contents.temperature", "contents.temp"));
     assert!(matterixc(&["check", &path]).out.contains("did you mean `temperature`?"));
 }
+
+#[test]
+fn an_argument_that_is_called_like_another_parameter_keeps_its_name() {
+    let bench = "mtx 1
+use std::glassware::Beaker100mL
+extern skill add(v: Volume) from(a: Vessel) into(b: Vessel)
+    needs a.contents.volume >= v else volume_underflow
+    takes 5 s effect move(v, from: a, to: b)
+skill hand(v: Volume) from(b: Vessel) into(a: Vessel) fails volume_underflow { add v from b into a }
+extern skill pool(v: Volume) into(b: Vessel) from(many: List<Vessel>)
+    needs all(x in many: x.contents.volume + b.contents.volume >= v) else volume_underflow
+    takes 5 s
+lab bench {
+    ambient: 25 degC
+    a = Beaker100mL at (0, 0, 0) m holding 10 mL of water
+    b = Beaker100mL at (1, 0, 0) m holding 20 mL of water
+    x = Beaker100mL at (2, 0, 0) m holding 1 mL of water
+}
+";
+    let says = |name: &str, step: &str, said: &str| {
+        let path = write(&folder(name), "bench.mtx", &format!("{bench}workflow w in bench {{ {step} }}\n"));
+        let found = matterixc(&["check", &path]).out;
+        assert!(found.contains(said), "{found}");
+    };
+    says("findings_swapped", "add 30 mL from b into a", "`b.contents.volume` is 20 mL, at least 30 mL");
+    says("findings_handed", "hand 30 mL from a into b", "`a.contents.volume` is 10 mL, at least 30 mL");
+    says("findings_folded", "pool 30 mL into x from [b, a]", "`b.contents.volume + x.contents.volume` is 21 mL");
+}

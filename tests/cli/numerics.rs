@@ -28,6 +28,12 @@ fn an_acid_that_a_reaction_makes_splits_as_it_is_made() {
 }
 
 #[test]
+fn a_reaction_waits_for_a_reactant_that_is_not_there() {
+    let all = ["comes_later", "on_a_plate", "in_a_tip", "one_of_two", "nothing", "turns_back"];
+    pass_cases("numerics/absent.mtx", &all);
+}
+
+#[test]
 fn a_law_whose_rate_follows_what_is_left_takes_nothing_of_nothing() {
     pass_cases("numerics/drains_what_is_left.mtx", &["go"]);
 }

@@ -120,3 +120,11 @@ fn a_vessel_that_runs_dry_ends_the_run_at_that_moment() {
     assert!(text.contains("error[transfer-fraction]: `leave(loop)` takes more than there is"), "{text}");
     assert!(text.contains("at 11.2702 s"), "{text}");
 }
+
+#[test]
+fn an_equality_that_is_missed_shows_what_is_there() {
+    let (code, text) = run_case("equality.mtx", "w", &[]);
+    assert_eq!(code, 1, "{text}");
+    assert!(text.contains("50 degC, off by 5.68434e-14: allow a difference, as in `== 50 degC +- ...`"), "{text}");
+    assert!(text.contains("is 50 degC, 5.684e-14 above"), "{text}");
+}

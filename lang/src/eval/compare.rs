@@ -59,6 +59,9 @@ impl<'a> Elaborator<'a> {
             Binary::Ge => self.graph.binary(BinaryOp::Le, y.node, x.node),
             _ => {
                 let node = self.graph.binary(BinaryOp::Eq, x.node, y.node);
+                if op == Binary::Eq {
+                    self.compared_equal(&x, &y, at_a, at_b);
+                }
                 return self.equality(op, node, at_a);
             }
         };
@@ -76,6 +79,16 @@ impl<'a> Elaborator<'a> {
         let comparison = Comparison { text: String::new(), value, low, high, strict, unit };
         self.comparisons.push(Compared { span, comparison, each: Vec::new() });
         Value::Bool(node)
+    }
+
+    /// Notes that two quantities are compared that should be equal: the side that is a constant is both limits.
+    fn compared_equal(&mut self, x: &Num, y: &Num, at_x: Span, at_y: Span) {
+        let (value, limit, span) =
+            if self.is_fixed(x.node) && !self.is_fixed(y.node) { (y, x, at_y) } else { (x, y, at_x) };
+        let unit = self.unit_between(value, limit);
+        let (low, high) = (Some(limit.node), Some(limit.node));
+        let comparison = Comparison { text: String::new(), value: value.node, low, high, strict: false, unit };
+        self.comparisons.push(Compared { span, comparison, each: Vec::new() });
     }
 
     fn equality(&mut self, op: Binary, node: NodeId, span: Span) -> Value {
@@ -249,12 +262,15 @@ impl<'a> Elaborator<'a> {
             }
             Value::List(items) => {
                 let mut any = self.graph.number(0.0);
+                let compared = self.comparisons.len();
                 for item in items {
                     let Value::Bool(one) = self.compare(Binary::Eq, x.clone(), item, at_x, at_set) else {
                         return Value::Error;
                     };
                     any = self.graph.binary(BinaryOp::Or, any, one);
                 }
+                // None of them alone is a limit.
+                self.comparisons.truncate(compared);
                 Value::Bool(any)
             }
             Value::Error => Value::Error,

@@ -36,7 +36,7 @@ impl Planner<'_, '_> {
 }
 
 /// A text with names in it replaced by what they stand for; members called the same stay, and so do units.
-fn with_names(text: &str, stands_for: impl Fn(&str) -> Option<String>) -> String {
+pub(super) fn with_names(text: &str, stands_for: impl Fn(&str) -> Option<String>) -> String {
     let of_name = |c: char| c.is_alphanumeric() || c == '_';
     let mut out = String::new();
     let mut rest = text;

@@ -8,6 +8,7 @@ use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 
 use super::Planner;
 use super::call::Bound;
+use super::columns::with_names;
 use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
 use crate::elaborate::Compared;
 use crate::eval::{Scope, Type, Value};
@@ -126,6 +127,11 @@ impl<'a> Planner<'a, '_> {
 
     /// A condition with what it compares.
     pub fn condition(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Condition> {
+        self.condition_with(e, scope, false)
+    }
+
+    /// A condition with what it compares, the names of parameters replaced by those of the instances given where that is `named`.
+    fn condition_with(&mut self, e: &'a Expr, scope: &mut Scope, named: bool) -> Option<Condition> {
         self.lab.comparisons.clear();
         self.lab.terms.clear();
         self.lab.asked_of.clear();
@@ -138,13 +144,14 @@ impl<'a> Planner<'a, '_> {
         let compared = std::mem::take(&mut self.lab.comparisons);
         let terms = std::mem::take(&mut self.lab.terms);
         let each = std::mem::take(&mut self.lab.asked_of);
+        let given: &[(String, Value)] = if named { &scope.vars } else { &[] };
         let each = each.into_iter().map(|asked| {
-            let compared = self.in_words(asked.compared);
+            let compared = self.in_words(asked.compared, given);
             let (node, text, terms) = (asked.node, asked.of, asked.terms);
             Condition { node, text, span: e.span, compared, terms, refusal: None, each: Vec::new() }
         });
         let each = each.collect();
-        let compared = self.in_words(compared);
+        let compared = self.in_words(compared, given);
         Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None, each })
     }
 
@@ -165,13 +172,18 @@ impl<'a> Planner<'a, '_> {
         Condition { node, text: self.text(span), span, compared, terms, refusal: None, each }
     }
 
-    /// Comparisons with what is compared as it is written.
-    fn in_words(&self, compared: Vec<Compared>) -> Vec<Comparison> {
+    /// Comparisons with what is compared as it is written, but for names that folds or parameters give: each makes room for that
+    /// of its instance. All do so at once, as an instance may be called as another parameter is.
+    fn in_words(&self, compared: Vec<Compared>, given: &[(String, Value)]) -> Vec<Comparison> {
         let words = |c: &Compared| {
-            let text = self.text(c.span);
-            c.each
-                .iter()
-                .fold(text, |text, (name, id)| with_name(text, self.sources.slice(*name), || self.lab.spoken_name(*id)))
+            with_names(&self.text(c.span), |word| {
+                let of_fold = c.each.iter().find(|(name, _)| self.sources.slice(*name) == word).map(|(_, id)| *id);
+                let instance = of_fold.or_else(|| match given.iter().rev().find(|(name, _)| name == word)?.1 {
+                    Value::Instance(id) => Some(id),
+                    _ => None,
+                })?;
+                Some(self.lab.spoken_name(instance))
+            })
         };
         compared.into_iter().map(|c| Comparison { text: words(&c), ..c.comparison }).collect()
     }
@@ -193,10 +205,9 @@ impl<'a> Planner<'a, '_> {
     ) -> Option<Condition> {
         let words = refusal.and_then(|r| r.because.as_ref()).filter(|_| !self.draft);
         self.lab.noting = words.is_some();
-        let condition = self.condition(cond, scope);
+        let condition = self.condition_with(cond, scope, true);
         self.lab.noting = false;
-        let (mut condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
-        self.name_arguments(&mut condition, scope);
+        let (condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
         let said = words.map(|words| self.said(words, &condition, bound, scope)).unwrap_or_default();
         let refusal = refusal.map(|r| Refusal { failure: r.failure.text.clone(), help: r.help.clone(), said });
         Some(Condition { refusal, ..condition })
@@ -214,18 +225,6 @@ impl<'a> Planner<'a, '_> {
             bound.push((node, scope.vars.clone()));
         }
         self.said_of_each(words, bound, scope)
-    }
-
-    /// In what is compared, the names of parameters make room for those of the instances that were given.
-    fn name_arguments(&self, condition: &mut Condition, scope: &Scope) {
-        let each = condition.each.iter_mut().flat_map(|asked| &mut asked.compared);
-        for one in condition.compared.iter_mut().chain(each) {
-            for (name, value) in &scope.vars {
-                if let Value::Instance(id) = value {
-                    one.text = with_name(std::mem::take(&mut one.text), name, || self.lab.spoken_name(*id));
-                }
-            }
-        }
     }
 
     /// Words for each that a condition asks about; for all of it where it asks about nothing in turn.
@@ -360,24 +359,4 @@ impl<'a> Planner<'a, '_> {
         d = near::proposed(d, &near, name.span);
         self.lab.report(d);
     }
-}
-
-/// An expression with a name in it replaced by what it stands for; members called the same stay.
-fn with_name(text: String, name: &str, stands_for: impl Fn() -> String) -> String {
-    let of_name = |c: char| c.is_alphanumeric() || c == '_';
-    let mut out = String::new();
-    let mut done = 0;
-    for (at, found) in text.match_indices(name) {
-        let before = text[..at].trim_end().chars().next_back();
-        let joined = text[..at].chars().next_back().is_some_and(of_name) || before == Some('.');
-        if !joined && !text[at + found.len()..].starts_with(of_name) {
-            out += &text[done..at];
-            out += &stands_for();
-            done = at + found.len();
-        }
-    }
-    if done == 0 {
-        return text;
-    }
-    out + &text[done..]
 }

@@ -41,12 +41,25 @@ impl Measured {
     pub fn show(&self) -> String {
         let Some(value) = self.value else { return String::new() };
         let limits = match (self.low, self.high) {
+            (Some(low), Some(high)) if low == high => self.equal_to(value, low),
             (Some(low), Some(high)) => format!(", limits {} .. {}", self.unit.show(low), self.unit.show(high)),
             (Some(low), None) => format!(", lower limit {}", self.unit.show(low)),
             (None, Some(high)) => format!(", upper limit {}", self.unit.show(high)),
             (None, None) => String::new(),
         };
         format!("`{}`: {}{limits}", self.text, self.unit.show(value))
+    }
+
+    /// What a value should be; by how much it is off where both are shown alike.
+    fn equal_to(&self, value: f64, wanted: f64) -> String {
+        let shown = self.unit.show(wanted);
+        match value != wanted && self.unit.show(value) == shown {
+            true => {
+                let off = show_number(self.unit.of_si(value) - self.unit.of_si(wanted));
+                format!(", off by {off}: allow a difference, as in `== {shown} +- ...`")
+            }
+            false => format!(", must be {shown}"),
+        }
     }
 }
 

@@ -24,6 +24,7 @@ mod interference;
 mod jobs;
 mod lasting;
 mod left;
+mod meantime;
 mod otherwise;
 mod parted;
 mod points;
@@ -31,7 +32,9 @@ mod polytope;
 mod report;
 mod reported;
 mod stopped;
+mod timers;
 mod totals;
+mod turns;
 mod value;
 mod walk;
 mod words;
@@ -113,6 +116,8 @@ struct Flow<'l, 'a> {
     presumed_of: BTreeMap<u32, Vec<NodeId>>,
     /// Events that depend on time.
     timed: Vec<u32>,
+    /// Those that are followed at their moments now: what bounds the passing of time leaves them out.
+    at_moments: Vec<u32>,
     /// Derivatives that depend on the time itself.
     clocked: Vec<u32>,
     /// While time passes: from when to when. An event comes about somewhere in it.
@@ -259,6 +264,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             limits_of: BTreeMap::new(),
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
+            at_moments: Vec::new(),
             clocked: Vec::new(),
             meanwhile: None,
             stopped: false,

@@ -421,6 +421,7 @@ impl Flow<'_, '_> {
             let high = c.high.map(|n| self.eval(n, facts));
             let show = |k: &Known| shown(k, |v| c.unit.show(v));
             let limits = match (low, high) {
+                (Some(l), Some(_)) if c.low == c.high => format!("must be {}", show(&l)),
                 (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
                 (Some(l), None) => format!("{} {}", if c.strict { "must be more than" } else { "at least" }, show(&l)),
                 (None, Some(h)) => format!("{} {}", if c.strict { "must be less than" } else { "at most" }, show(&h)),

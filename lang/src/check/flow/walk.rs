@@ -2,7 +2,6 @@
 //! by itself.
 
 use std::collections::BTreeSet;
-use std::rc::Rc;
 
 use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
@@ -16,6 +15,7 @@ use super::parted::MOST_WAYS;
 use super::points::at_least;
 use super::report::Finding;
 use super::stopped::Lines;
+use super::turns::{Moment, after_turns, later};
 use super::value::{Known, Why};
 use super::{Flow, MOST_STEPS, Site};
 use crate::elaborate::mixtures::written;
@@ -318,7 +318,7 @@ impl Flow<'_, '_> {
                 }
                 false => after?,
             };
-            if rests(&mut facts, &before) {
+            if self.rests(body, &mut facts, &before) {
                 self.more_turns(body, true, &facts);
                 let left = (low == high).then_some(high - done - 1.0);
                 return Some(after_turns(left, facts, &Moment::of(&before)));
@@ -371,7 +371,7 @@ impl Flow<'_, '_> {
             self.doubt -= usize::from(open);
             let Some(after) = after else { return self.meet(id, &start, ends) };
             facts = after;
-            if rests(&mut facts, &before) {
+            if self.rests(body, &mut facts, &before) {
                 self.more_turns(body, true, &facts);
                 self.raise("max", facts.clone());
                 // A loop that changes nothing it looks at ends by what only a run can tell.
@@ -467,12 +467,18 @@ impl Flow<'_, '_> {
     ) -> Option<Facts> {
         let start = facts.time.clone();
         let mut longest = start.clone();
+        let all: BTreeSet<u32> = writes.iter().flatten().copied().collect();
+        let meantime = if branches.len() > 1 { self.meantime(&all, &facts) } else { None };
+        let mut ends = Vec::new();
         for i in order {
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
             let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
             self.begin_branch(&others);
             self.shared.push(others);
             facts.time = start.clone();
+            if longest != start {
+                self.begin_again(meantime.as_ref(), &mut facts);
+            }
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
             let raised = self.guards.last().map_or(0, Vec::len);
@@ -486,8 +492,12 @@ impl Flow<'_, '_> {
             self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
+            if meantime.is_some() {
+                ends.push(facts.clone());
+            }
         }
         facts.time = longest;
+        self.go_on_from(meantime.as_ref(), &ends, &mut facts);
         Some(facts)
     }
 
@@ -556,51 +566,4 @@ impl Flow<'_, '_> {
         }
         self.meet(id, &facts, ends)
     }
-}
-
-/// Whether a further turn changes nothing that is known. Where only how states hang together still changes, that is given up: what a
-/// turn that began without it leads to holds for all further turns.
-fn rests(facts: &mut Facts, before: &Facts) -> bool {
-    let related = match (&facts.bonds, &before.bonds) {
-        (Some(now), Some(then)) => Rc::ptr_eq(now, then) || now == then,
-        (_, then) => then.is_none(),
-    };
-    let same = facts.states == before.states;
-    if same && !related {
-        facts.bonds = None;
-    }
-    same && related
-}
-
-/// What tells turns of a loop apart that leave all states as they were.
-struct Moment {
-    time: Known,
-    locals: Vec<Known>,
-}
-
-impl Moment {
-    fn of(facts: &Facts) -> Self {
-        Moment { time: facts.time.clone(), locals: facts.locals.clone() }
-    }
-}
-
-/// The same after as many more turns as are `left`, where that is known: each takes as long as the last one.
-fn after_turns(left: Option<f64>, mut facts: Facts, before: &Moment) -> Facts {
-    match (left, facts.time.exact(), before.time.exact()) {
-        (Some(left), Some(now), Some(then)) if left.is_finite() && facts.locals == before.locals => {
-            facts.time = Known::Point(now + left * (now - then));
-            facts
-        }
-        _ => later(facts, before),
-    }
-}
-
-/// The same after more turns, of which only the time is told apart.
-fn later(mut facts: Facts, before: &Moment) -> Facts {
-    if facts.time != before.time || facts.locals != before.locals {
-        let (since, _) = facts.time.bounds();
-        facts.time = Known::Range(since, f64::INFINITY, Why::Unknown);
-        facts.locals.iter_mut().zip(&before.locals).filter(|(a, b)| a != b).for_each(|(a, _)| *a = Known::nothing());
-    }
-    facts
 }

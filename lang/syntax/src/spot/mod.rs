@@ -83,6 +83,7 @@ const RULES: &[fn(&Spot) -> Option<Mistake>] = &[
     signs::equals,
     signs::assignment,
     lines::because,
+    values::fractional_power,
     values::decimal_comma,
     values::bare_point,
     values::range,

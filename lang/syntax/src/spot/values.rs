@@ -11,6 +11,17 @@ pub(super) fn decimal_comma(spot: &Spot) -> Option<Mistake> {
     Some(mistake.guess("write a point", spot.at, spot.at + 1, "."))
 }
 
+/// `mol^0.5`.
+pub(super) fn fractional_power(spot: &Spot) -> Option<Mistake> {
+    let digits = spot.after.strip_prefix('.')?;
+    let base = spot.before.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('-').strip_suffix('^')?;
+    let of_unit = base.ends_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°'));
+    (of_unit && spot.is_tight() && digits.starts_with(|c: char| c.is_ascii_digit())).then(|| {
+        Mistake::new("a unit has whole powers", "this power is none")
+            .help("write a root as a factor of its own: `1e-3 1/s * sqrt(1 mol/kg)`")
+    })
+}
+
 /// `.5` and `5.`.
 pub(super) fn bare_point(spot: &Spot) -> Option<Mistake> {
     let next = spot.after.strip_prefix('.')?;
