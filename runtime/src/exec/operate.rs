@@ -214,7 +214,10 @@ impl<'p> Executor<'p, '_> {
             Some(format!("`{waiter}` waits for `{name}`, which `{holder}` has"))
         });
         let jobs = self.frames.iter().filter_map(|(&id, f)| match f.kind {
-            Kind::Await { job } => Some(format!("`{}` waits for `{}`", self.label(id), self.label(job))),
+            Kind::Await { .. } => {
+                let Step::Await { job } = &self.plan.get(f.step?).step else { return None };
+                Some(format!("`{}` waits for the job `{job}`", self.label(id)))
+            }
             _ => None,
         });
         let all: Vec<String> = claims.chain(jobs).collect();
