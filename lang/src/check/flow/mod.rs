@@ -19,6 +19,7 @@ mod facts;
 mod fluxes;
 mod handled;
 mod history;
+mod in_time;
 mod interference;
 mod jobs;
 mod lasting;
@@ -59,6 +60,7 @@ const MOST_STEPS: usize = 400_000;
 type Raised = (String, Facts);
 
 /// A statement of the user's that is followed now.
+#[derive(Clone)]
 struct Site {
     span: Span,
     label: String,
@@ -206,6 +208,7 @@ pub fn check(
         flow
     };
     let mut flow = jobs::follow(noting);
+    in_time::add_findings(&mut flow, &begin);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
