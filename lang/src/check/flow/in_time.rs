@@ -85,6 +85,8 @@ struct Line<'p> {
     sites: Vec<Site>,
     caught: Vec<Vec<Option<String>>>,
     kept: Vec<&'p Condition>,
+    /// The uses of this moment that it comes behind, and its own, by index.
+    behind: BTreeSet<usize>,
 }
 
 /// All lines.
@@ -99,6 +101,10 @@ struct Lines<'p> {
     loose: bool,
     held: Vec<(InstanceId, usize)>,
     asked: usize,
+    /// Who uses what at this moment.
+    uses: Vec<(InstanceId, &'p Operation)>,
+    /// Whether two use one thing at one moment in no order.
+    met: bool,
     /// The run is over, or cannot be followed any further.
     over: bool,
 }
@@ -110,6 +116,20 @@ impl<'p> Lines<'p> {
 
     fn within(&self, line: usize, outer: usize) -> bool {
         std::iter::successors(Some(line), |l| self.all[*l].outer).any(|l| l == outer)
+    }
+
+    /// An operation of a line begins to use things.
+    fn note_uses(&mut self, at: usize, operation: &'p Operation) {
+        for instance in &operation.claims {
+            let own = self.held.iter().any(|(i, holder)| i == instance && *holder == at);
+            let line = &mut self.all[at];
+            let meets = |(index, (used, other)): (usize, &(InstanceId, &Operation))| {
+                used == instance && !line.behind.contains(&index) && !operation.is_independent_of(other)
+            };
+            self.met |= !own && self.uses.iter().enumerate().any(meets);
+            line.behind.insert(self.uses.len());
+            self.uses.push((*instance, operation));
+        }
     }
 
     fn is_free(&self, line: usize, instance: InstanceId) -> bool {
@@ -177,7 +197,8 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Follows all lines in the order of time; at one moment the last one first if `backward`.
-    pub(super) fn follow_in_time(&mut self, backward: bool) {
+    /// Whether all of them come to their ends at times that are known, and no two use one thing at the same time.
+    pub(super) fn follow_in_time(&mut self, backward: bool) -> bool {
         self.quiet += 1;
         let mut facts = self.start();
         self.fire((0..self.events.len() as u32).collect(), &mut facts);
@@ -192,6 +213,8 @@ impl<'l> Flow<'l, '_> {
             loose: false,
             held: Vec::new(),
             asked: 0,
+            uses: Vec::new(),
+            met: false,
             over: false,
         };
         self.begin_line(&mut lines, self.plan.root, None);
@@ -206,16 +229,16 @@ impl<'l> Flow<'l, '_> {
                 None => self.until_next(&mut lines),
             }
         }
+        let ended = lines.all.iter().all(|line| matches!(line.state, State::Done));
+        ended && !lines.loose && !lines.met && self.findings.is_empty() && self.steps <= MOST
     }
 
     fn begin_line(&mut self, lines: &mut Lines<'l>, root: StepId, outer: Option<usize>) -> usize {
-        let (sites, caught) = match outer {
-            Some(outer) => (lines.all[outer].sites.clone(), lines.all[outer].caught.clone()),
-            None => (Vec::new(), Vec::new()),
-        };
+        let behind = outer.map(|outer| lines.all[outer].behind.clone()).unwrap_or_default();
         let block = Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: &[] };
         let frames = vec![block, Frame::One(root)];
-        lines.all.push(Line { root, outer, state: State::Ready, frames, sites, caught, kept: Vec::new() });
+        let (sites, caught) = (self.sites.clone(), self.caught.clone());
+        lines.all.push(Line { root, outer, state: State::Ready, frames, sites, caught, kept: Vec::new(), behind });
         lines.all.len() - 1
     }
 
@@ -299,18 +322,11 @@ impl<'l> Flow<'l, '_> {
         match &node.step {
             Step::Sequence(steps) => lines.all[at].frames.push(Frame::Steps(steps.iter())),
             Step::Parallel(branches) => {
-                let (sites, caught) = (self.sites.clone(), self.caught.clone());
                 let begun: Vec<usize> = branches.iter().map(|b| self.begin_line(lines, *b, Some(at))).collect();
-                for line in &begun {
-                    lines.all[*line].sites.clone_from(&sites);
-                    lines.all[*line].caught.clone_from(&caught);
-                }
                 lines.all[at].state = State::Lines(begun);
             }
             Step::Start { job, body } => {
                 let line = self.begin_line(lines, *body, Some(at));
-                lines.all[line].sites.clone_from(&self.sites);
-                lines.all[line].caught.clone_from(&self.caught);
                 lines.jobs.insert(job, line);
                 let mut outer = Some(at);
                 while let Some(here) = outer {
@@ -417,6 +433,7 @@ impl<'l> Flow<'l, '_> {
             lines.over = true;
             return;
         }
+        lines.note_uses(at, operation);
         self.does(lines, at, &operation.at_start, label);
         match (&operation.takes, &operation.until) {
             (_, Some(_)) => self.leave_line(lines, at),
@@ -451,9 +468,13 @@ impl<'l> Flow<'l, '_> {
                     }
                 }
             }
+            let own = lines.all[at].behind.clone();
             let State::Wait(wait) = &mut lines.all[other].state else { continue };
             match self.eval(wait.condition.node, &lines.facts).truth() {
-                Some(true) => _ = wait.since.get_or_insert(now),
+                Some(true) => {
+                    wait.since.get_or_insert(now);
+                    lines.all[other].behind.extend(own);
+                }
                 Some(false) if wait.since.take().is_some() => wait.stopped = Some(span),
                 Some(false) => {}
                 None => self.leave_line(lines, other),
@@ -542,6 +563,8 @@ impl<'l> Flow<'l, '_> {
             return;
         }
         if next > now {
+            lines.uses.clear();
+            lines.all.iter_mut().for_each(|line| line.behind.clear());
             self.quiet += 1;
             self.pass(&Known::Point(next - now), &mut lines.facts);
             self.quiet -= 1;
@@ -639,9 +662,12 @@ fn takes(caught: &[Vec<Option<String>>], name: &str) -> bool {
 /// Lines go on that waited for lines which have ended.
 fn wake(lines: &mut Lines<'_>) {
     let done: Vec<bool> = lines.all.iter().map(|line| matches!(line.state, State::Done)).collect();
-    for line in &mut lines.all {
-        if matches!(&line.state, State::Lines(others) if others.iter().all(|other| done[*other])) {
-            line.state = State::Ready;
+    for at in 0..lines.all.len() {
+        let State::Lines(others) = &lines.all[at].state else { continue };
+        if others.iter().all(|other| done[*other]) {
+            let behind: Vec<usize> = others.iter().flat_map(|other| &lines.all[*other].behind).copied().collect();
+            lines.all[at].behind.extend(behind);
+            lines.all[at].state = State::Ready;
         }
     }
 }

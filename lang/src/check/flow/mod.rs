@@ -227,6 +227,17 @@ pub fn check(
     Followed { found, windows, seen }
 }
 
+/// Whether all branches and jobs go on at times that are known, and no two of them use one thing at the same time.
+pub fn takes_turns(
+    lab: &Elaborator<'_>,
+    sources: &Sources,
+    plan: &Plan,
+    events: &[Event],
+    derivatives: &[Derivative],
+) -> bool {
+    [false, true].into_iter().all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
+}
+
 impl<'l, 'a> Flow<'l, 'a> {
     fn new(
         lab: &'l Elaborator<'a>,
