@@ -1,7 +1,7 @@
 //! Steps that run beside each other: what meets in one order of them and not in another, in `check` and in the run; what is left on
 //! along one way; circles of claims and uses of one thing, however many there are.
 
-use crate::harness::{folder, matterixc, matterixc_in, write};
+use crate::harness::{folder, matterixc, matterixc_in, pass_cases, run_case, write};
 
 /// Code, severity and line of every finding of a check.
 fn findings(name: &str, text: &str) -> Vec<(String, String, u64)> {
@@ -332,4 +332,18 @@ fn many_uses_hide_no_clash() {
         assert_eq!(found.iter().filter(|f| f.0 == "claimed-twice").count(), 1, "{n}");
         assert!(found.iter().all(|f| f.0 != "not-analysed"), "{n}");
     }
+}
+
+#[test]
+fn what_waited_for_an_effect_comes_behind_it() {
+    pass_cases("handshake.mtx", &["handshake"]);
+    let (status, report) = run_case("handshake_of_three.mtx", "handshake", &[]);
+    assert_eq!(status, 1);
+    assert!(report.contains("claimed: `signal b` and `clear b` use `b` at the same time"), "{report}");
+}
+
+#[test]
+fn a_deadlock_names_the_job_that_is_waited_for() {
+    let (_, report) = run_case("../faults/530_await_in_a_claim_of_its_job.mtx", "w", &[]);
+    assert!(report.contains("wait for each other") || report.contains("waits for the job `b`"), "{report}");
 }

@@ -83,29 +83,3 @@ fn surely(plan: &Plan, timing: &Timing, step: StepId, instance: InstanceId) -> b
         step => step.children().iter().any(below),
     }
 }
-
-/// A block that claims instances, with those held around it in its own line.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Claim {
-    /// The `claim`.
-    pub step: StepId,
-    /// What it waits for.
-    pub wants: Vec<InstanceId>,
-    /// The claims around it.
-    pub around: Vec<StepId>,
-}
-
-/// The blocks of a plan that claim.
-pub fn claims(plan: &Plan, timing: &Timing) -> Vec<Claim> {
-    let is_claim = |s: &StepId| matches!(plan.get(*s).step, Step::Claim { .. });
-    (0..plan.steps.len() as u32)
-        .map(StepId)
-        .filter_map(|step| match &plan.get(step).step {
-            Step::Claim { claims, .. } if timing.visit(step).is_some() => {
-                let around = timing.around(step).filter(is_claim).collect();
-                Some(Claim { step, wants: claims.clone(), around })
-            }
-            _ => None,
-        })
-        .collect()
-}

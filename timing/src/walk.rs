@@ -102,13 +102,17 @@ impl Known<'_> {
 }
 
 impl Timing {
-    /// Walks through a plan.
+    /// Walks through a plan. A block with `claim` may have to wait wherever another one claims the same.
     pub fn of(plan: &Plan, known: &Known<'_>, durations: Durations) -> Timing {
-        Timing::with_waits(plan, known, durations, &BTreeSet::new())
+        Timing::walk(plan, known, durations, None)
     }
 
-    /// Walks through a plan in which these blocks with `claim` may have to wait for what they claim.
+    /// Walks through a plan in which only these blocks with `claim` may have to wait for what they claim.
     pub fn with_waits(plan: &Plan, known: &Known<'_>, durations: Durations, waits: &BTreeSet<StepId>) -> Timing {
+        Timing::walk(plan, known, durations, Some(waits))
+    }
+
+    fn walk(plan: &Plan, known: &Known<'_>, durations: Durations, waits: Option<&BTreeSet<StepId>>) -> Timing {
         let mut walk = Walk {
             plan,
             known,
@@ -119,6 +123,7 @@ impl Timing {
             threads: vec![Thread { outer: None, from: None, job: None }],
             locals: vec![None; plan.locals.len()],
             jobs: vec![Vec::new()],
+            awaited: Vec::new(),
             order: 0,
             claimed: claimed(plan),
             outcomes: Vec::new(),
@@ -261,11 +266,13 @@ struct Walk<'w, 'g> {
     locals: Vec<Option<(Scope, Linear)>>,
     /// Running jobs by the blocks that wait for them, innermost last.
     jobs: Vec<Vec<Job>>,
+    /// Jobs that lines waited for which are not those that began them: the job's line, and the one that waited.
+    awaited: Vec<(u32, u32)>,
     order: usize,
     /// How many blocks claim each instance.
     claimed: BTreeMap<InstanceId, usize>,
-    /// Blocks that may have to wait for what they claim.
-    waits: &'w BTreeSet<StepId>,
+    /// Blocks that may have to wait for what they claim; none where that was not looked into.
+    waits: Option<&'w BTreeSet<StepId>>,
     /// By scope: the outcome it stands for.
     outcomes: Vec<Option<Outcome>>,
     /// Scopes of conditions that come out alike all through a run, by the scope around.
@@ -383,10 +390,9 @@ impl Walk<'_, '_> {
                 self.turns(id, Interval { min: 0.0, max }, *body, place)
             }
             Step::Claim { claims, body } => {
-                // Whether others have what it claims is not followed: it may wait where others claim the same.
                 let alone = place.thread == 0 && self.jobs.iter().all(Vec::is_empty);
-                let free = alone || claims.iter().all(|i| self.claimed.get(i) == Some(&1));
-                if free && !self.waits.contains(&id) {
+                let contended = || !alone && claims.iter().any(|i| self.claimed.get(i) != Some(&1));
+                if !self.waits.map_or_else(contended, |waits| waits.contains(&id)) {
                     return self.scoped(id, *body, place);
                 }
                 let granted = self.network.point();
@@ -427,10 +433,15 @@ impl Walk<'_, '_> {
     fn parallel(&mut self, id: StepId, list: &[StepId], place: Place) -> End {
         let began = self.order;
         let mut ends = Vec::new();
+        let mut branches = Vec::new();
         for step in list {
             let thread = self.threads.len() as u32;
             self.threads.push(Thread { outer: Some((place.thread, began)), from: Some(id), job: None });
+            branches.push(thread);
             ends.push(self.step(*step, Place { thread, ..place }));
+        }
+        if !self.awaited.is_empty() {
+            self.meet(&branches, place.thread);
         }
         let lasts = ends.iter().fold(Interval::ZERO, |all, e| all.later(e.lasts));
         let dead = ends.iter().any(|e| e.dead);
@@ -488,6 +499,26 @@ impl Walk<'_, '_> {
         }
     }
 
+    /// The same where another line waits for it: it goes on beside the lines next to that one, until their branches meet.
+    fn joined_in(&mut self, job: u32, line: u32) {
+        let outer = |thread: u32| self.threads.get(thread as usize).and_then(|t| t.outer).map(|outer| outer.0);
+        if outer(job) == Some(line) {
+            self.joined(job);
+        } else {
+            self.awaited.push((job, line));
+        }
+    }
+
+    /// Branches meet: what one of them has waited for is over.
+    fn meet(&mut self, branches: &[u32], line: u32) {
+        let (met, other): (Vec<_>, Vec<_>) = self.awaited.drain(..).partition(|(_, at)| branches.contains(at));
+        self.awaited = other;
+        if !met.is_empty() {
+            self.order += 1;
+        }
+        met.into_iter().for_each(|(job, _)| self.joined_in(job, line));
+    }
+
     /// Waits for the job of this name in the innermost block that has one: after it, none of them goes on.
     fn wait_for_job(&mut self, id: StepId, name: &str, place: Place) -> End {
         let block = self.jobs.iter().rev().find(|block| block.iter().any(|j| j.name == name));
@@ -502,7 +533,7 @@ impl Walk<'_, '_> {
         for (end, lasts, thread, scope) in &jobs {
             // Where the job has begun, it is waited for.
             if self.network.holds_in(place.scope, *scope) {
-                self.joined(*thread);
+                self.joined_in(*thread, place.thread);
                 ends.push((*end, *scope));
             } else if self.network.holds_in(*scope, place.scope) {
                 ends.push((*end, place.scope));

@@ -10,13 +10,14 @@ use crate::elaborate::lab::SYMMETRIC;
 use crate::elaborate::properties::{GIVES, GIVES_AT};
 use crate::elaborate::tables::{MATTER, is_true};
 use crate::eval::Type;
+use crate::lower::BARS;
 use crate::names::near;
 use crate::stock::{COUNTS_AS, count_of};
 
 /// Options of a member that mean nothing for a member of its kind.
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {
     let (what, known): (&str, &[&str]) = match role {
-        Role::State => ("a state", &["unit", "scale", COUNTS_AS]),
+        Role::State => ("a state", &["unit", "scale", COUNTS_AS, BARS]),
         Role::Extensive => ("an extensive quantity", &["unit", "scale", "hidden", ONLY_WITH, MATTER]),
         Role::Derived => ("a derived quantity", &["unit", "hidden", INSTEAD, COUNTS_AS]),
         Role::Reading => ("a reading", &["unit", "resolution", "noise", "period"]),
@@ -34,6 +35,7 @@ fn misfit(o: &NamedExpr) -> Option<Diagnostic> {
     let given = std::slice::from_ref(o);
     let headline = match o.name.text.as_str() {
         GIVEN_BY if word(given, GIVEN_BY) != Some("at") => "`given_by` is `at`: what stands after `holding ... at`",
+        BARS if word(given, BARS).is_none() => "`bars` names the failure of what uses the thing",
         ONLY_WITH if word(given, ONLY_WITH).is_none() => "`only_with` names a parameter",
         MATTER if !is_true(&o.value) => "`matter` is `true`, or left out",
         GIVES_AT if !matches!(&*o.value.kind, ExprKind::Range(..)) => "`gives_at` is a range",

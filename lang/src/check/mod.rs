@@ -16,7 +16,7 @@ mod unused;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::Plan;
-use matterix_ir::{Diagnostic, NodeId, Sources};
+use matterix_ir::{Diagnostic, NodeId, Sources, codes};
 
 use self::flow::Window;
 pub use self::flow::{After, Known, Seen};
@@ -98,6 +98,11 @@ pub fn plan(
         true => share::two(meets, || share::two(takes, follow)),
         false => (meets(), (takes(), None)),
     };
+    // Where the order of all steps is known, nothing is in doubt.
+    let doubted = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE && !d.is_error();
+    let sound = is_whole && taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted);
+    let apart = sound && flow::takes_turns(about, sources, plan, events, derivatives);
+    let taken = taken.into_iter().filter(|d| !(apart && doubted(d)));
     met.into_iter().chain(taken).for_each(|d| lab.report(d));
     if !lab.diagnostics.iter().all(whole) {
         return Judged { hazards, ..Judged::default() };

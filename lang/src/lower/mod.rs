@@ -1,5 +1,6 @@
 //! Lowering: a workflow becomes the plan, skills written out where they are called.
 
+mod barred;
 mod call;
 mod clauses;
 mod columns;
@@ -13,6 +14,7 @@ mod stmt;
 mod text;
 pub mod wires;
 
+pub use barred::BARS;
 pub use call::Verb;
 pub use text::{dangers, declared_failures};
 pub use wires::Wires;
@@ -186,6 +188,7 @@ impl<'a, 'e> Planner<'a, 'e> {
         let name = crate::names::item_name(item).map(|n| n.0).unwrap_or_default();
         let limits = self.limits(false);
         if !self.draft {
+            self.ask_for_barred();
             self.note_limits(&limits);
         }
         // A test may leave things as it likes.

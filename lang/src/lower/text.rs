@@ -7,10 +7,12 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 
 use super::Planner;
+use super::barred::BARS;
 use super::call::Bound;
 use super::columns::with_names;
 use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
 use crate::elaborate::Compared;
+use crate::elaborate::given::word;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{Names, near, verb_text};
 
@@ -56,6 +58,9 @@ pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
                         MemberKind::Command { clauses, .. } => add(clauses, &mut out),
                         MemberKind::Limit { at_end: false, refusal, .. } => {
                             out.extend(refusal.iter().map(|r| r.failure.text.clone()))
+                        }
+                        MemberKind::Value { options, .. } => {
+                            out.extend(word(options, BARS).map(str::to_owned));
                         }
                         _ => {}
                     }

@@ -93,6 +93,11 @@ pub trait Backend {
         Vec::new()
     }
 
+    /// Whether an operation may change how a condition comes out: it sets what that rests on, or what sets off events that do.
+    fn may_change(&self, _operation: &Operation, _condition: NodeId) -> bool {
+        false
+    }
+
     /// The limits of the plan that are known to be broken, by their index.
     fn broken(&self) -> Vec<u32> {
         Vec::new()

@@ -355,6 +355,10 @@ impl Backend for Sim<'_> {
         self.prepared.keeps.decide(&self.prepared.model, limit)
     }
 
+    fn may_change(&self, operation: &Operation, condition: NodeId) -> bool {
+        self.prepared.may_change(operation, condition)
+    }
+
     fn moment_after(&mut self, duration: f64) -> f64 {
         self.moments.after(self.engine.time(), duration)
     }

@@ -1,10 +1,10 @@
 //! The model made ready for watching: a copy in which conditions on readings can be followed without their imperfection, and
 //! limits are broken only where they are clearly passed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::Model;
-use matterix_ir::plan::{Condition, Plan, Step};
+use matterix_ir::model::{Action, Model};
+use matterix_ir::plan::{Condition, Operation, Plan, Step};
 use matterix_ir::{Graph, NodeId, Op, Program};
 
 use super::{Follow, noise};
@@ -46,6 +46,46 @@ impl Prepared {
     /// How to follow this condition.
     pub fn follow(&self, condition: NodeId) -> Follow {
         self.follow.get(&condition).cloned().unwrap_or(Follow::Watch(condition))
+    }
+}
+
+impl Prepared {
+    /// Whether an operation sets what a condition rests on, itself or by events that it sets off.
+    pub fn may_change(&self, operation: &Operation, condition: NodeId) -> bool {
+        let written = self.written(operation.at_start.iter().chain(&operation.at_end));
+        let mut open: Vec<u32> = self.rests_on(condition).into_iter().collect();
+        let mut seen: BTreeSet<u32> = open.iter().copied().collect();
+        while let Some(state) = open.pop() {
+            if written.contains(&state) {
+                return true;
+            }
+            let setting = self.model.events.iter().filter(|event| self.written(event.actions.iter()).contains(&state));
+            let causes: Vec<u32> = setting.flat_map(|event| self.rests_on(event.when)).collect();
+            open.extend(causes.into_iter().filter(|cause| seen.insert(*cause)));
+        }
+        false
+    }
+
+    /// The states that actions set.
+    fn written<'a>(&self, actions: impl Iterator<Item = &'a Action>) -> BTreeSet<u32> {
+        let of_mixture = |m: &u32| self.model.mixtures.get(*m as usize).into_iter().flat_map(|m| &m.extensive);
+        let states = |action: &Action| match action {
+            Action::Assign { state, .. } => vec![*state],
+            Action::Move { from, to, .. } => [from, to].into_iter().flat_map(of_mixture).map(|(_, s)| *s).collect(),
+        };
+        actions.flat_map(states).collect()
+    }
+
+    /// The states that a node depends on, by way of readings too.
+    fn rests_on(&self, node: NodeId) -> BTreeSet<u32> {
+        let (mut states, mut values) = (BTreeSet::new(), Vec::new());
+        self.model.graph.visit(node, |op| match op {
+            Op::State(state) => _ = states.insert(state),
+            Op::Reading(reading) => values.extend(self.model.readings.get(reading as usize).map(|r| r.value)),
+            _ => {}
+        });
+        values.into_iter().for_each(|value| states.extend(self.rests_on(value)));
+        states
     }
 }
 

@@ -155,6 +155,11 @@ impl Claims {
         self.used.get(&instance).into_iter().flatten().filter(move |u| u.running || u.time >= now)
     }
 
+    /// The uses of all instances that go on or began at `now`.
+    pub fn all_uses(&self, now: f64) -> impl Iterator<Item = &Use> {
+        self.used.values().flatten().filter(move |u| u.running || u.time >= now)
+    }
+
     /// An operation begins to use an instance.
     pub fn begin(&mut self, instance: InstanceId, new: Use) {
         let uses = self.used.entry(instance).or_default();

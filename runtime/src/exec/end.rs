@@ -41,6 +41,10 @@ impl<'p> Executor<'p, '_> {
                 self.backend.halt(*ticket);
                 self.out.operation(self.now, step, operation, OperationState::Halted);
             }
+            (
+                Kind::WaitUntil { .. } | Kind::Hold { .. },
+                Step::WaitUntil { condition, .. } | Step::Hold { condition, .. },
+            ) if matches!(end, End::Done) => self.comes_behind(frame.parent, condition.node),
             (Kind::Named, Step::Named { end, .. }) => self.backend.set_local(*end, Some(self.now)),
             _ => {}
         }

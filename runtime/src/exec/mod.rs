@@ -13,6 +13,7 @@
 //! `keep`, `claim`, the run): they have ended before it goes on. The failure of a job that nobody awaits is the block's.
 
 mod alarm;
+mod behind;
 mod claims;
 mod end;
 mod ends;
@@ -195,6 +196,7 @@ struct Executor<'p, 'b> {
     created: FrameId,
     tasks: Vec<Task>,
     claims: Claims,
+    behind: behind::Behind,
     recordings: BTreeMap<StepId, Recording<'p>>,
     /// How many of the times have come at which something is looked at.
     looked: usize,
@@ -233,6 +235,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             created: 0,
             tasks: Vec::new(),
             claims: Claims::with_turns(limits.turns),
+            behind: behind::Behind::default(),
             recordings: BTreeMap::new(),
             looked: 0,
             job_names: BTreeSet::new(),

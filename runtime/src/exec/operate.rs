@@ -78,15 +78,16 @@ impl<'p> Executor<'p, '_> {
                 _ => false,
             };
             let mut others = self.claims.uses(instance, self.now).filter(|u| u.frame != id && !independent(u));
+            let behind = |u: &Use| self.is_behind(&within, u);
             let other = others
-                .find(|u| u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u)))?;
+                .find(|u| u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u) && !behind(u)))?;
             let other = &self.plan.get(other.step).label;
             Some(format!("`{own}` and `{other}` use `{name}` at the same time"))
         })
     }
 
     /// Whether the frames `within` run beside an earlier use, not after it.
-    fn beside(&self, within: &[FrameId], earlier: &Use) -> bool {
+    pub(super) fn beside(&self, within: &[FrameId], earlier: &Use) -> bool {
         let Some(position) = within.iter().position(|f| earlier.within.contains(f)) else { return false };
         let parallel = self.frames.get(&within[position]).is_some_and(|f| matches!(f.kind, Kind::Parallel { .. }));
         let is_job = |f: &FrameId| self.frames.get(f).is_some_and(|f| f.job);
@@ -214,7 +215,10 @@ impl<'p> Executor<'p, '_> {
             Some(format!("`{waiter}` waits for `{name}`, which `{holder}` has"))
         });
         let jobs = self.frames.iter().filter_map(|(&id, f)| match f.kind {
-            Kind::Await { job } => Some(format!("`{}` waits for `{}`", self.label(id), self.label(job))),
+            Kind::Await { .. } => {
+                let Step::Await { job } = &self.plan.get(f.step?).step else { return None };
+                Some(format!("`{}` waits for the job `{job}`", self.label(id)))
+            }
             _ => None,
         });
         let all: Vec<String> = claims.chain(jobs).collect();

@@ -1,7 +1,7 @@
 //! Bodies with handlers and `finally`, and bodies that a handler begins again.
 
-use matterix_ir::NodeId;
-use matterix_ir::plan::{Caught, StepId};
+use matterix_ir::plan::{Caught, PlanStep, Step, StepId};
+use matterix_ir::{NodeId, Span};
 
 use super::facts::Facts;
 use super::value::{Known, Why};
@@ -35,6 +35,8 @@ struct Again {
     /// How often it does so.
     times: Known,
     facts: Facts,
+    /// The `fail` that it has taken, where there was one, with its name.
+    fail: Option<(String, Span)>,
 }
 
 impl Flow<'_, '_> {
@@ -91,6 +93,7 @@ impl Flow<'_, '_> {
             let mut names: Vec<String> = taken.iter().map(|(name, _)| name.clone()).collect();
             names.sort_unstable();
             names.dedup();
+            let fail = taken.iter().find_map(|(name, facts)| Some((name.clone(), self.fail_at(facts.written?)?)));
             if let Some(mut entry) = self.entry(guard.id, guard.base, taken) {
                 entry.written = None;
                 let unsure = entry.unsure;
@@ -101,7 +104,8 @@ impl Flow<'_, '_> {
                 let begun = self.again.pop().unwrap_or_default();
                 self.doubt -= usize::from(unsure);
                 self.cleaning -= 1;
-                again.extend(begun.into_iter().map(|(times, facts)| Again { names: names.clone(), times, facts }));
+                let once_more = |(times, facts)| Again { names: names.clone(), times, facts, fail: fail.clone() };
+                again.extend(begun.into_iter().map(once_more));
                 after = self.meet(guard.id, guard.base, after.into_iter().chain(end));
             }
         }
@@ -112,13 +116,16 @@ impl Flow<'_, '_> {
     /// Follows a body again as often as its handlers begin it; then their failures go on outwards.
     fn retried(&mut self, guard: &Guard<'_>, first: Attempt) -> Attempt {
         let Attempt { mut after, mut raised, mut again } = first;
+        let fail =
+            again.iter().find_map(|a| a.fail.clone()).filter(|(name, _)| after.is_none() && !self.is_taken(name));
         for turn in 1..=MOST_RETRIES {
             let (more, over): (Vec<_>, Vec<_>) = again.into_iter().partition(|a| a.times.bounds().1 >= f64::from(turn));
             raised.extend(over.into_iter().flat_map(Again::given_up));
             let most = more.iter().map(|a| a.times.bounds().1).fold(0.0, f64::max);
             let Some(mut entry) = self.entry(guard.id, guard.base, more.iter().flat_map(Again::raised).collect())
             else {
-                return Attempt { after, raised, again: Vec::new() };
+                again = Vec::new();
+                break;
             };
             let last = most <= f64::from(turn);
             if turn == MOST_RETRIES && !last {
@@ -141,7 +148,16 @@ impl Flow<'_, '_> {
             again = next.again;
         }
         raised.extend(again.into_iter().flat_map(Again::given_up));
+        if let Some((name, place)) = fail.filter(|_| after.is_none()) {
+            self.retried_in_vain(&name, place);
+        }
         Attempt { after, raised, again: Vec::new() }
+    }
+
+    /// The place, if a `fail` stands there.
+    fn fail_at(&self, place: Span) -> Option<Span> {
+        let fails = |s: &PlanStep| s.span == place && matches!(s.step, Step::Fail { .. });
+        self.plan.steps.iter().any(fails).then_some(place)
     }
 
     /// A handler begins its body again.

@@ -125,7 +125,7 @@ impl<'p> Flow<'p, '_> {
     }
 
     /// The text of the step at a place.
-    fn label_at(&self, span: Span) -> String {
+    pub(super) fn label_at(&self, span: Span) -> String {
         self.plan.steps.iter().find(|s| s.span == span).map_or_else(String::new, |s| s.label.clone())
     }
 

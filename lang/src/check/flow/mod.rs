@@ -20,6 +20,7 @@ mod facts;
 mod fluxes;
 mod handled;
 mod history;
+mod in_time;
 mod interference;
 mod jobs;
 mod lasting;
@@ -63,6 +64,7 @@ const MOST_STEPS: usize = 400_000;
 type Raised = (String, Facts);
 
 /// A statement of the user's that is followed now.
+#[derive(Clone)]
 struct Site {
     span: Span,
     label: String,
@@ -212,6 +214,7 @@ pub fn check(
         flow
     };
     let mut flow = jobs::follow(noting);
+    in_time::add_findings(&mut flow, &begin);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
@@ -228,6 +231,17 @@ pub fn check(
         found.extend(new);
     }
     Followed { found, windows, seen }
+}
+
+/// Whether all branches and jobs go on at times that are known, and no two of them use one thing at the same time.
+pub fn takes_turns(
+    lab: &Elaborator<'_>,
+    sources: &Sources,
+    plan: &Plan,
+    events: &[Event],
+    derivatives: &[Derivative],
+) -> bool {
+    [false, true].into_iter().all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
 }
 
 impl<'l, 'a> Flow<'l, 'a> {

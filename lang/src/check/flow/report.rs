@@ -263,6 +263,17 @@ impl Flow<'_, '_> {
         Some(d)
     }
 
+    /// A body fails for certain with a failure that the text writes, however often a handler begins it again.
+    pub(super) fn retried_in_vain(&mut self, name: &str, place: Span) {
+        let headline = format!("the steps that `retry` begins again fail with `{name}` each time");
+        let mut d = Diagnostic::error(codes::RUN_FAILED, place, headline, format!("`{name}` is raised in every turn"));
+        if self.doubt > 0 {
+            d.severity = Severity::Warning;
+        }
+        let d = d.help("change in the handler what the failure comes of, or raise it under a condition");
+        self.found(d, place);
+    }
+
     /// A wait for something that cannot come: at all, or in the time given.
     pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &Facts, after: &Facts) {
         // What is within bounds only is on its way.

@@ -78,7 +78,10 @@ impl Flow<'_, '_> {
         let written = |step: &Step| {
             matches!(
                 step,
-                Step::Fail { .. } | Step::WaitUntil { timeout: Some(_), .. } | Step::Hold { timeout: Some(_), .. }
+                Step::Fail { .. }
+                    | Step::WaitUntil { timeout: Some(_), .. }
+                    | Step::Hold { timeout: Some(_), .. }
+                    | Step::RepeatWhile { .. }
             )
         };
         !self.plan.ends.is_empty()

@@ -360,7 +360,7 @@ impl Flow<'_, '_> {
                 if holds == Some(true) && ends.is_empty() {
                     self.runs_out(condition, most, &facts);
                 }
-                self.raise("max", facts);
+                self.raise_written("max", self.plan.get(id).span, facts);
                 return self.meet(id, &start, ends);
             }
             let before = facts.clone();
@@ -373,7 +373,7 @@ impl Flow<'_, '_> {
             facts = after;
             if self.rests(body, &mut facts, &before) {
                 self.more_turns(body, true, &facts);
-                self.raise("max", facts.clone());
+                self.raise_written("max", self.plan.get(id).span, facts.clone());
                 // A loop that changes nothing it looks at ends by what only a run can tell.
                 ends.push(later(facts, &Moment::of(&before)));
                 return self.meet(id, &start, ends);
@@ -382,6 +382,7 @@ impl Flow<'_, '_> {
         self.more_turns(body, false, &facts);
         self.turns_not_followed();
         self.widen(body, &mut facts);
+        self.raise_written("max", self.plan.get(id).span, facts.clone());
         ends.push(facts);
         self.meet(id, &start, ends)
     }

@@ -1,14 +1,16 @@
-//! R2: claims that wait for each other: blocks that hold one instance and ask for another, in a circle.
+//! R2: steps that wait for each other: blocks that hold one instance and ask for another, and `await`s of jobs, in a circle.
 //!
-//! Claims of one line of steps that hold and want the same are one class. A circle of claims lies within a strongly connected
-//! component of the graph of classes, which is small however long the plan is; the times of single claims are compared there only.
+//! A `claim` waits for the block that holds what it asks for, an `await` for the steps of its job; whoever stands still keeps the blocks
+//! and the job that it stands in from ending. Waits of one line of steps that hold and want the same are one class. A circle lies within
+//! a strongly connected component of the graph of classes, which is small however long the plan is; the times of single waits are compared
+//! there only.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, codes};
-use matterix_timing::usage::{self, Claim};
+use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_timing::ROUNDING;
 
 use super::components::components;
 use super::{Times, show, spent};
@@ -16,10 +18,62 @@ use super::{Times, show, spent};
 /// Comparisons of two claims at most; a plan that needs more is told that it was not searched to the end.
 const MOST: usize = 400_000;
 
-/// Circles of claims.
+/// What a step waits for, and what the steps around it keep from others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Thing {
+    /// An instance that a block claims.
+    Instance(InstanceId),
+    /// The end of a job, by its steps.
+    Job(StepId),
+}
+
+/// A step at which a line of steps may stand still.
+struct Wait {
+    /// The `claim` or `await`.
+    step: StepId,
+    /// What it waits for.
+    wants: Vec<Thing>,
+    /// What others may wait for and it stands in, innermost first: blocks that claim, and steps of jobs.
+    around: Vec<StepId>,
+}
+
+/// Claims, and `await`s where one stands in a claim, with what is around them.
+fn waits(times: &Times<'_>) -> Vec<Wait> {
+    let jobs = jobs_awaited_in_claims(times);
+    let bodies: BTreeSet<StepId> = jobs.values().flatten().copied().collect();
+    let holds = |s: &StepId| matches!(times.plan.get(*s).step, Step::Claim { .. }) || bodies.contains(s);
+    let steps = (0..times.plan.steps.len() as u32).map(StepId).filter(|s| times.timing.visit(*s).is_some());
+    let wait = |step: StepId| {
+        let wants = match &times.plan.get(step).step {
+            Step::Claim { claims, .. } => claims.iter().copied().map(Thing::Instance).collect(),
+            Step::Await { job } => jobs.get(job.as_str())?.iter().copied().map(Thing::Job).collect(),
+            _ => return None,
+        };
+        Some(Wait { step, wants, around: times.timing.around(step).filter(holds).collect() })
+    };
+    steps.filter_map(wait).filter(|wait| !wait.around.is_empty()).collect()
+}
+
+/// The steps of jobs by name, where an `await` stands in a claim.
+fn jobs_awaited_in_claims<'p>(times: &Times<'p>) -> BTreeMap<&'p str, Vec<StepId>> {
+    let plan = times.plan;
+    let steps = || (0..plan.steps.len() as u32).map(StepId).filter(|s| times.timing.visit(*s).is_some());
+    let in_claim = |s: StepId| times.timing.around(s).any(|a| matches!(plan.get(a).step, Step::Claim { .. }));
+    if !steps().any(|s| matches!(plan.get(s).step, Step::Await { .. }) && in_claim(s)) {
+        return BTreeMap::new();
+    }
+    let mut out: BTreeMap<&str, Vec<StepId>> = BTreeMap::new();
+    for step in steps() {
+        if let Step::Start { job, body } = &plan.get(step).step {
+            out.entry(job).or_default().push(*body);
+        }
+    }
+    out
+}
+
+/// Circles of claims and `await`s.
 pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
-    let mut nested: Vec<Claim> = usage::claims(times.plan, &times.timing);
-    nested.retain(|c| !c.around.is_empty());
+    let nested = waits(times);
     let mut search = Search::new(times, &nested);
     let mut found = Vec::new();
     let mut said: BTreeSet<BTreeSet<usize>> = BTreeSet::new();
@@ -43,38 +97,38 @@ pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -
     found
 }
 
-/// What tells claims of one line of steps apart: their line, what they want, and what is held around them.
-type Class = (u32, Vec<InstanceId>, BTreeSet<InstanceId>);
+/// What tells waits of one line of steps apart: their line, what they want, and what is held around them.
+type Class = (u32, Vec<Thing>, BTreeSet<Thing>);
 
-/// A search for circles among nested claims.
+/// A search for circles among nested waits.
 struct Search<'t, 'p> {
     times: &'t Times<'p>,
-    nested: &'t [Claim],
-    /// By claim: its class.
+    nested: &'t [Wait],
+    /// By wait: its class.
     class: Vec<usize>,
-    /// By claim: the strongly connected component of its class; none where no circle leads through it.
+    /// By wait: the strongly connected component of its class; none where no circle leads through it.
     component: Vec<Option<usize>>,
-    /// Claims by the instances held around them.
-    holders: BTreeMap<InstanceId, Vec<usize>>,
+    /// Waits by what is held around them.
+    holders: BTreeMap<Thing, Vec<usize>>,
     /// Comparisons that are left.
     left: usize,
 }
 
 impl<'t, 'p> Search<'t, 'p> {
-    fn new(times: &'t Times<'p>, nested: &'t [Claim]) -> Self {
+    fn new(times: &'t Times<'p>, nested: &'t [Wait]) -> Self {
         let mut numbers: BTreeMap<Class, usize> = BTreeMap::new();
         let mut class = Vec::with_capacity(nested.len());
-        let mut holders: BTreeMap<InstanceId, Vec<usize>> = BTreeMap::new();
-        for (i, claim) in nested.iter().enumerate() {
-            let around: BTreeSet<InstanceId> = claimed(times, &claim.around).collect();
-            around.iter().for_each(|instance| holders.entry(*instance).or_default().push(i));
-            let thread = times.timing.visit(claim.step).map_or(0, |v| v.thread);
+        let mut holders: BTreeMap<Thing, Vec<usize>> = BTreeMap::new();
+        for (i, wait) in nested.iter().enumerate() {
+            let around: BTreeSet<Thing> = kept(times, &wait.around).collect();
+            around.iter().for_each(|thing| holders.entry(*thing).or_default().push(i));
+            let thread = times.timing.visit(wait.step).map_or(0, |v| v.thread);
             let next = numbers.len();
-            class.push(*numbers.entry((thread, claim.wants.clone(), around)).or_insert(next));
+            class.push(*numbers.entry((thread, wait.wants.clone(), around)).or_insert(next));
         }
         let mut classes: Vec<(&Class, usize)> = numbers.iter().map(|(class, number)| (class, *number)).collect();
         classes.sort_by_key(|(_, number)| *number);
-        let holds = |wants: &[InstanceId], held: &BTreeSet<InstanceId>| wants.iter().any(|i| held.contains(i));
+        let holds = |wants: &[Thing], held: &BTreeSet<Thing>| wants.iter().any(|i| held.contains(i));
         let waits: Vec<Vec<usize>> = classes
             .iter()
             .map(|((_, wants, _), _)| {
@@ -86,7 +140,7 @@ impl<'t, 'p> Search<'t, 'p> {
         Search { times, nested, class, component, holders, left: MOST }
     }
 
-    /// Goes on along claims that wait for the next until the first is reached again.
+    /// Goes on along waits for the next until the first is reached again.
     fn close(&mut self, circle: &mut Vec<usize>) -> bool {
         let (Some(&first), Some(&last)) = (circle.first(), circle.last()) else { return false };
         if circle.len() > 1 && waits_for(self.times, &self.nested[last], &self.nested[first]).is_some() {
@@ -121,35 +175,40 @@ impl<'t, 'p> Search<'t, 'p> {
     }
 }
 
-/// The instances that these blocks claim.
-fn claimed<'p>(times: &'p Times<'_>, steps: &'p [StepId]) -> impl Iterator<Item = InstanceId> + 'p {
-    steps
-        .iter()
-        .flat_map(|s| match &times.plan.get(*s).step {
-            Step::Claim { claims, .. } => claims.as_slice(),
-            _ => &[],
-        })
-        .copied()
+/// What these blocks and jobs keep from others.
+fn kept<'p>(times: &'p Times<'_>, steps: &'p [StepId]) -> impl Iterator<Item = Thing> + 'p {
+    steps.iter().flat_map(|step| match &times.plan.get(*step).step {
+        Step::Claim { claims, .. } => claims.iter().copied().map(Thing::Instance).collect::<Vec<Thing>>(),
+        _ => vec![Thing::Job(*step)],
+    })
 }
 
-/// The instances that `a` holds while it waits, of which `b` is not inside as well.
-fn held(times: &Times<'_>, a: &Claim, b: &Claim) -> BTreeSet<InstanceId> {
+/// What `a` holds while it waits, of which `b` is not inside as well.
+fn held(times: &Times<'_>, a: &Wait, b: &Wait) -> BTreeSet<Thing> {
     let own: Vec<StepId> = a.around.iter().filter(|s| !b.around.contains(s)).copied().collect();
-    claimed(times, &own).collect()
+    kept(times, &own).collect()
 }
 
 /// Whether both can wait at the same time: side by side, with nothing in common in hand.
-fn meet(times: &Times<'_>, a: &Claim, b: &Claim) -> bool {
-    times.beside(a.step, b.step)
+fn meet(times: &Times<'_>, a: &Wait, b: &Wait) -> bool {
+    (times.beside(a.step, b.step) || awaits(a, b) || awaits(b, a))
         && held(times, a, b).is_disjoint(&held(times, b, a))
-        && !times.apart(outermost(a, b), outermost(b, a))
-}
-fn outermost(a: &Claim, b: &Claim) -> StepId {
-    a.around.iter().rfind(|s| !b.around.contains(s)).copied().unwrap_or(a.step)
+        && !times.apart(outermost(times, a, b), outermost(times, b, a))
 }
 
-/// The instance that `a` waits for while `b` holds it.
-fn waits_for(times: &Times<'_>, a: &Claim, b: &Claim) -> Option<InstanceId> {
+/// Whether `a` waits for a job that `b` stands in.
+fn awaits(a: &Wait, b: &Wait) -> bool {
+    a.wants.iter().any(|thing| matches!(thing, Thing::Job(body) if b.around.contains(body)))
+}
+
+/// The outermost block that claims around `a` and not around `b`, else `a` itself.
+fn outermost(times: &Times<'_>, a: &Wait, b: &Wait) -> StepId {
+    let claims = |s: &&StepId| matches!(times.plan.get(**s).step, Step::Claim { .. });
+    a.around.iter().filter(claims).rfind(|s| !b.around.contains(s)).copied().unwrap_or(a.step)
+}
+
+/// What `a` waits for while `b` keeps it.
+fn waits_for(times: &Times<'_>, a: &Wait, b: &Wait) -> Option<Thing> {
     if a.step == b.step || !meet(times, a, b) {
         return None;
     }
@@ -157,36 +216,88 @@ fn waits_for(times: &Times<'_>, a: &Claim, b: &Claim) -> Option<InstanceId> {
     a.wants.iter().copied().find(|i| others.contains(i) && !mine.contains(i))
 }
 
-fn finding(times: &Times<'_>, nested: &[Claim], circle: &[usize], name: &dyn Fn(InstanceId) -> String) -> Diagnostic {
-    let next = |i: usize| circle[(i + 1) % circle.len()];
-    let mut labels = Vec::new();
-    let mut waited = Vec::new();
-    for (i, &claim) in circle.iter().enumerate() {
-        let (own, other) = (&nested[claim], &nested[next(i)]);
-        let Some(wanted) = waits_for(times, own, other) else { continue };
-        let wanted = name(wanted);
-        labels.push((own.step, format!("waits here for `{wanted}`")));
-        waited.push(format!("`{wanted}`"));
+/// The block or job around `b` that keeps a thing.
+fn keeper(times: &Times<'_>, thing: Thing, b: &Wait) -> Option<StepId> {
+    b.around.iter().copied().find(|step| kept(times, &[*step]).any(|kept| kept == thing))
+}
+
+/// Whether every run comes to stand still in a circle: each block has what it keeps before the others ask for it, and nothing else
+/// does.
+fn certain(times: &Times<'_>, nested: &[Wait], circle: &[usize]) -> bool {
+    let of_circle: Vec<&Wait> = circle.iter().map(|i| &nested[*i]).collect();
+    of_circle.iter().enumerate().all(|(i, own)| {
+        let next = of_circle[(i + 1) % of_circle.len()];
+        times.must_fail(own.step, "deadlock")
+            && match waits_for(times, own, next) {
+                Some(Thing::Job(_)) => true,
+                Some(thing) => {
+                    keeper(times, thing, next).is_some_and(|block| is_first(times, &of_circle, block, own.step))
+                }
+                None => false,
+            }
+    })
+}
+
+/// Whether a block asks for what it claims before another one does, and nobody beyond the circle claims any of it.
+fn is_first(times: &Times<'_>, circle: &[&Wait], block: StepId, other: StepId) -> bool {
+    let (Some(first), Some(second)) = (times.timing.visit(block), times.timing.visit(other)) else { return false };
+    let earlier = times.least(first.start, second.start, &[first.scope, second.scope]).is_some_and(|t| t > ROUNDING);
+    let Step::Claim { claims, .. } = &times.plan.get(block).step else { return false };
+    let steps = (0..times.plan.steps.len() as u32).map(StepId);
+    let mut others = steps.filter(|step| match &times.plan.get(*step).step {
+        Step::Claim { claims: theirs, .. } => {
+            *step != block && theirs.iter().any(|i| claims.contains(i)) && times.beside(*step, block)
+        }
+        _ => false,
+    });
+    earlier && others.all(|step| circle.iter().any(|wait| wait.step == step))
+}
+
+fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(InstanceId) -> String) -> Diagnostic {
+    let own = |step: StepId| times.plan.get(show::own(times.plan, &times.timing, step));
+    let mut labels: Vec<(StepId, String)> = Vec::new();
+    let mut keeps: Vec<(StepId, String)> = Vec::new();
+    let (mut waited, mut jobs) = (Vec::new(), Vec::new());
+    for (i, &at) in circle.iter().enumerate() {
+        let (wait, next) = (&nested[at], &nested[circle[(i + 1) % circle.len()]]);
+        match waits_for(times, wait, next) {
+            Some(Thing::Instance(instance)) => {
+                let wanted = name(instance);
+                labels.push((wait.step, format!("waits here for `{wanted}`")));
+                let block = keeper(times, Thing::Instance(instance), next);
+                keeps.extend(block.map(|block| (block, format!("holds `{wanted}`"))));
+                waited.push(format!("`{wanted}`"));
+            }
+            Some(Thing::Job(_)) => {
+                labels.push((wait.step, "waits here for the job".to_owned()));
+                jobs.push(format!("`{}`", own(wait.step).label));
+            }
+            None => {}
+        }
     }
-    for (i, &claim) in circle.iter().enumerate() {
-        let before = &nested[circle[(i + circle.len() - 1) % circle.len()]];
-        let own = &nested[claim];
-        let Some(instance) = waits_for(times, before, own) else { continue };
-        let holder = own.around.iter().find(|s| match &times.plan.get(**s).step {
-            Step::Claim { claims, .. } => claims.contains(&instance),
-            _ => false,
-        });
-        labels.extend(holder.map(|h| (*h, format!("holds `{}`", name(instance)))));
-    }
-    let span = |step: StepId| times.plan.get(show::own(times.plan, &times.timing, step)).span;
-    let headline = format!("claims of {} can wait for each other for ever", waited.join(" and "));
+    labels.extend(keeps);
     let (first, rest) = (labels.first().cloned(), labels.get(1..).unwrap_or_default());
     let (step, text) = first.unwrap_or((times.plan.root, String::new()));
     let mut rest = rest.to_vec();
-    rest.sort_by_key(|(s, _)| span(*s));
-    let mut d = Diagnostic::error(codes::DEADLOCK, span(step), headline, text);
-    for (step, text) in rest {
-        d = d.because(span(step), text);
+    rest.sort_by_key(|(s, _)| own(*s).span);
+    let sure = jobs.is_empty() || certain(times, nested, circle);
+    let can = if jobs.is_empty() || !sure { " can" } else { "" };
+    let things = waited.join(" and ");
+    let all = match (jobs.is_empty(), waited.is_empty()) {
+        (true, _) => format!("claims of {things}"),
+        (false, true) => jobs.join(" and "),
+        (false, false) => format!("{} and a claim of {things}", jobs.join(" and ")),
+    };
+    let headline = format!("{all}{can} wait for each other for ever");
+    let mut d = Diagnostic::error(codes::DEADLOCK, own(step).span, headline, text);
+    if !sure {
+        d.severity = Severity::Warning;
     }
-    d.help("claim everything that is needed together in one `claim`, or everywhere in the same order")
+    for (step, text) in rest {
+        d = d.because(own(step).span, text);
+    }
+    d.help(match jobs.is_empty() {
+        true => "claim everything that is needed together in one `claim`, or everywhere in the same order",
+        false => "wait for the job outside of the `claim`, or start it inside, where it has what the block has claimed",
+    })
 }

@@ -27,12 +27,51 @@ pub(super) fn is_hold(times: &Times<'_>, used: &Use) -> bool {
     matches!(times.plan.get(used.step).step, Step::Claim { .. })
 }
 
-/// Blocks that may have to wait for a step which uses what they claim without a `claim` of its own.
+/// Pairs of blocks that are compared at most in one round; beyond, all wait that claim what others claim.
+const MOST_PAIRS: usize = 20_000;
+
+/// Blocks that may have to wait for a step which uses what they claim without a `claim` of its own, or for another block.
 pub(super) fn waiting(times: &Times<'_>) -> BTreeSet<StepId> {
     let holds = holds(times);
-    if holds.is_empty() {
-        return BTreeSet::new();
+    let mut out = if holds.is_empty() { BTreeSet::new() } else { delayed_by_uses(times, &holds) };
+    let mut left = MOST_PAIRS;
+    for blocks in shared(times).values() {
+        for (i, &a) in blocks.iter().enumerate() {
+            for &b in &blocks[..i] {
+                if left == 0 {
+                    return contended(times);
+                }
+                left -= 1;
+                let known = out.contains(&a) && out.contains(&b);
+                if !known && times.beside(a, b) && !times.before(a, b) && !times.before(b, a) {
+                    out.extend([a, b]);
+                }
+            }
+        }
     }
+    out
+}
+
+/// Blocks that claim what another one claims.
+pub(super) fn contended(times: &Times<'_>) -> BTreeSet<StepId> {
+    shared(times).into_values().flatten().collect()
+}
+
+/// Blocks by what they claim, where several claim it and not all of them are in one line of steps.
+fn shared(times: &Times<'_>) -> BTreeMap<InstanceId, Vec<StepId>> {
+    let mut blocks: BTreeMap<InstanceId, Vec<StepId>> = BTreeMap::new();
+    for step in (0..times.plan.steps.len() as u32).map(StepId) {
+        if let (Step::Claim { claims, .. }, Some(_)) = (&times.plan.get(step).step, times.timing.visit(step)) {
+            claims.iter().for_each(|instance| blocks.entry(*instance).or_default().push(step));
+        }
+    }
+    let line = |step: &StepId| times.timing.visit(*step).map(|v| v.thread);
+    blocks.retain(|_, all| all.iter().any(|step| line(step) != line(&all[0])));
+    blocks
+}
+
+/// Blocks that may have to wait for a step without a `claim` of its own.
+fn delayed_by_uses(times: &Times<'_>, holds: &[Use]) -> BTreeSet<StepId> {
     let mut uses: BTreeMap<InstanceId, Vec<Use>> = BTreeMap::new();
     for used in usage::uses(times.plan, &times.timing) {
         uses.entry(used.instance).or_default().push(used);

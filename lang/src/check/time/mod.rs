@@ -28,6 +28,9 @@ const MOST_KEPT: usize = 8_000_000;
 /// Differences that all searches look at, at most; a plan that needs more is told that its times were not all compared.
 const MOST_WORK: usize = 2_000_000_000;
 
+/// Rounds in which single blocks are found to wait; after them, all wait that others contend with.
+const MOST_ROUNDS: usize = 6;
+
 /// Reports contradictions in the times of a plan and in the use of instances.
 pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
@@ -50,11 +53,16 @@ pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], event
     found
 }
 
-/// The times of a plan, and what contradicts itself in them. A `claim` waits for what others use: where that may be, it has no time of
-/// its own.
+/// The times of a plan, and what contradicts itself in them. A `claim` waits for what others use or claim: where that may be, it has no
+/// time of its own.
+///
+/// At first no block waits. Then those wait that may meet another use, and so on until no further one does: up to the moment at which
+/// a block would be the first to wait, a run keeps to times without that wait, in which the two never meet.
 fn timed<'p>(plan: &'p Plan, known: &Known<'_>) -> (Vec<Diagnostic>, Times<'p>) {
     let mut waits: BTreeSet<StepId> = BTreeSet::new();
+    let mut round = 0;
     loop {
+        round += 1;
         let mut timing = Timing::with_waits(plan, known, Durations::Bounds, &waits);
         // What is contradicted says nothing about who meets whom.
         let (late, network) = windows::findings(plan, &timing);
@@ -62,6 +70,9 @@ fn timed<'p>(plan: &'p Plan, known: &Known<'_>) -> (Vec<Diagnostic>, Times<'p>) 
         let times = Times::new(plan, timing);
         let before = waits.len();
         waits.extend(held::waiting(&times));
+        if round >= MOST_ROUNDS {
+            waits.extend(held::contended(&times));
+        }
         if waits.len() == before {
             return (late, times);
         }

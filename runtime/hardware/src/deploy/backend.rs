@@ -52,6 +52,10 @@ impl Backend for Hardware<'_, '_> {
         self.twin.decide(limit)
     }
 
+    fn may_change(&self, operation: &Operation, condition: NodeId) -> bool {
+        self.twin.may_change(operation, condition)
+    }
+
     fn follow(&mut self, condition: NodeId) -> Follow {
         let (told, _) = self.observed.asks(&self.program.model, condition);
         if told.is_empty() {

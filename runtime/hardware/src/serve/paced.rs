@@ -78,6 +78,10 @@ impl Backend for Paced<'_, '_, '_> {
         self.inner.decide(limit)
     }
 
+    fn may_change(&self, operation: &Operation, condition: NodeId) -> bool {
+        self.inner.may_change(operation, condition)
+    }
+
     fn follow(&mut self, condition: NodeId) -> Follow {
         self.inner.follow(condition)
     }
