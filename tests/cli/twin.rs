@@ -120,3 +120,11 @@ fn a_vessel_that_runs_dry_ends_the_run_at_that_moment() {
     assert!(text.contains("error[transfer-fraction]: `leave(loop)` takes more than there is"), "{text}");
     assert!(text.contains("at 11.2702 s"), "{text}");
 }
+
+#[test]
+fn an_argument_known_only_in_the_run_is_shown_as_the_skill_writes_it() {
+    let (code, text) = run_case("shown_arguments.mtx", "w", &[]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("turn carousel c to c.full + 1"), "{text}");
+    assert!(!text.contains("to n"), "{text}");
+}

@@ -14,7 +14,7 @@ mod text;
 pub mod wires;
 
 pub use call::Verb;
-pub use text::{dangers, declared_failures};
+pub use text::{FAILURES, dangers, declared_failures};
 pub use wires::Wires;
 
 use std::cell::RefCell;
