@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::{FileId, Span};
+use matterix_lang::lower::FAILURES;
 use matterix_lang::syntax;
 
 use crate::Index;
@@ -110,7 +111,7 @@ fn same(a: &str, b: &str) -> bool {
 
 /// Whether a name can stand for such a thing.
 fn fits(kind: Kind, name: &str) -> bool {
-    let word = |w: &str| syntax::is_name(w) && !FIXED.contains(&w);
+    let word = |w: &str| syntax::is_name(w) && !FIXED.contains(&w) && !FAILURES.contains(&w);
     match kind {
         Kind::Skill | Kind::Command => {
             let mut words = name.split(' ');
@@ -132,31 +133,9 @@ fn reads(text: &str) -> bool {
     syntax::parse(FileId(0), text).1.is_empty()
 }
 
-/// Names that mean the same everywhere.
-const FIXED: &[&str] = &[
-    "true",
-    "false",
-    "nothing",
-    "unlimited",
-    "elapsed",
-    "self",
-    "ambient",
-    "rest",
-    "sum",
-    "product",
-    "all",
-    "any",
-    "failure",
-    "timeout",
-    "late",
-    "max",
-    "broken",
-    "need",
-    "promise",
-    "claimed",
-    "wrong_reagent",
-    "job",
-];
+/// Names that mean the same everywhere, besides the failures of the language.
+const FIXED: &[&str] =
+    &["true", "false", "nothing", "unlimited", "elapsed", "self", "ambient", "rest", "sum", "product", "all", "any"];
 
 impl Index {
     /// The text of a place apart from an index.

@@ -49,6 +49,7 @@ mod screening;
 mod sila;
 mod sizes;
 mod slips;
+mod stopped;
 mod strict;
 mod studies;
 mod time;

@@ -128,3 +128,11 @@ fn an_equality_that_is_missed_shows_what_is_there() {
     assert!(text.contains("50 degC, off by 5.68434e-14: allow a difference, as in `== 50 degC +- ...`"), "{text}");
     assert!(text.contains("is 50 degC, 5.684e-14 above"), "{text}");
 }
+
+#[test]
+fn an_argument_known_only_in_the_run_is_shown_as_the_skill_writes_it() {
+    let (code, text) = run_case("shown_arguments.mtx", "w", &[]);
+    assert_eq!(code, 0, "{text}");
+    assert!(text.contains("turn carousel c to c.full + 1"), "{text}");
+    assert!(!text.contains("to n"), "{text}");
+}

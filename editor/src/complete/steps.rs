@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use matterix_lang::lower::FAILURES;
 use matterix_lang::meanings::Sort;
 use matterix_lang::names::DeclId;
 
@@ -264,20 +265,7 @@ impl Place<'_> {
                 out.all.push(self.offer(&name, id, rank));
             }
         }
-        const BUILT_IN: [&str; 11] = [
-            "failure",
-            "timeout",
-            "late",
-            "max",
-            "broken",
-            "need",
-            "promise",
-            "claimed",
-            "wrong_reagent",
-            "job",
-            "incompatible_mix",
-        ];
-        BUILT_IN.iter().for_each(|name| self.keyword(name, name, 12, out));
+        FAILURES.iter().for_each(|name| self.keyword(name, name, 12, out));
     }
 
     /// Prepositions of a call that are not there yet.

@@ -38,6 +38,14 @@ pub enum UnaryOp {
     Floor,
 }
 
+impl UnaryOp {
+    /// All of them.
+    pub const ALL: [UnaryOp; 9] = {
+        use UnaryOp::{Abs, Cos, Exp, Floor, Ln, Neg, Not, Sin, Sqrt};
+        [Neg, Not, Exp, Ln, Sqrt, Abs, Sin, Cos, Floor]
+    };
+}
+
 /// Operations on two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum BinaryOp {
@@ -65,6 +73,14 @@ pub enum BinaryOp {
     And,
     /// 1 if one is not 0
     Or,
+}
+
+impl BinaryOp {
+    /// All of them.
+    pub const ALL: [BinaryOp; 12] = {
+        use BinaryOp::{Add, And, Div, Eq, Le, Lt, Max, Min, Mul, Or, Pow, Sub};
+        [Add, Sub, Mul, Div, Pow, Min, Max, Lt, Le, Eq, And, Or]
+    };
 }
 
 /// One operation.

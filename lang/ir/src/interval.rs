@@ -128,33 +128,6 @@ pub fn times(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const UNARY: [UnaryOp; 9] = [
-        UnaryOp::Neg,
-        UnaryOp::Not,
-        UnaryOp::Exp,
-        UnaryOp::Ln,
-        UnaryOp::Sqrt,
-        UnaryOp::Abs,
-        UnaryOp::Sin,
-        UnaryOp::Cos,
-        UnaryOp::Floor,
-    ];
-
-    const BINARY: [BinaryOp; 12] = [
-        BinaryOp::Add,
-        BinaryOp::Sub,
-        BinaryOp::Mul,
-        BinaryOp::Div,
-        BinaryOp::Pow,
-        BinaryOp::Min,
-        BinaryOp::Max,
-        BinaryOp::Lt,
-        BinaryOp::Le,
-        BinaryOp::Eq,
-        BinaryOp::And,
-        BinaryOp::Or,
-    ];
-
     const ENDS: [f64; 9] = [-7.3, -2.0, -1.0, -0.2, 0.0, 0.5, 1.0, 2.0, 9.1];
 
     fn intervals() -> impl Iterator<Item = Interval> {
@@ -173,14 +146,14 @@ mod tests {
     #[test]
     fn intervals_enclose_the_values_of_operations() {
         for a in intervals() {
-            for op in UNARY {
+            for op in UnaryOp::ALL {
                 let all = of_unary(op, a);
                 for x in within(a) {
                     assert!(encloses(all, unary(op, x)), "{op:?} of {x} in {a:?}: {all:?}");
                 }
             }
             for b in intervals() {
-                for op in BINARY {
+                for op in BinaryOp::ALL {
                     let all = of_binary(op, a, b);
                     for (x, y) in within(a).flat_map(|x| within(b).map(move |y| (x, y))) {
                         assert!(encloses(all, binary(op, x, y)), "{op:?} of {x}, {y} in {a:?}, {b:?}: {all:?}");

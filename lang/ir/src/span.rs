@@ -142,3 +142,35 @@ impl Sources {
         (line, column)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPAN: Span = Span { file: FileId(3), start: 258, end: u32::MAX };
+
+    /// A length in front, then file, start and end, the lowest byte of each first.
+    const BYTES: [u8; 13] = [12, 3, 0, 0, 0, 2, 1, 0, 0, 255, 255, 255, 255];
+
+    #[test]
+    fn machines_get_12_bytes() {
+        assert_eq!(postcard::to_stdvec(&SPAN), Ok(BYTES.to_vec()));
+        assert_eq!(postcard::from_bytes(&BYTES), Ok(SPAN));
+    }
+
+    #[test]
+    fn people_get_fields_by_name() {
+        let text = r#"{"file":3,"start":258,"end":4294967295}"#;
+        assert_eq!(serde_json::to_string(&SPAN).expect("it can be written"), text);
+        assert_eq!(serde_json::from_str::<Span>(text).expect("it can be read"), SPAN);
+    }
+
+    #[test]
+    fn another_number_of_bytes_is_no_span() {
+        for wrong in [11, 13] {
+            let bytes = postcard::to_stdvec(vec![0_u8; wrong].as_slice()).expect("it can be written");
+            assert!(postcard::from_bytes::<Span>(&bytes).is_err(), "{wrong}");
+        }
+        assert!(postcard::from_bytes::<Span>(&BYTES[..12]).is_err());
+    }
+}

@@ -32,6 +32,7 @@ pub struct MemberRef<'a> {
 
 /// A capability or an asset type with everything it inherits.
 #[derive(Clone, Debug)]
+#[cfg_attr(test, derive(Default))]
 pub struct Kind<'a> {
     /// Its declaration.
     pub id: DeclId,

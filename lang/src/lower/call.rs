@@ -59,10 +59,62 @@ impl<'a> Planner<'a, '_> {
         self.lab.note_verb(verb_span, &verb);
         self.lab.verbs.insert(call.span, verb.clone());
         self.said = said;
-        match verb {
-            Verb::Skill(id) => self.skill(id, call, object, span, scope),
-            Verb::Command(owner, m) => self.command(owner, m, call, object, span, scope).map(|s| (s, None)),
+        let before = self.lab.diagnostics.len();
+        let step = match &verb {
+            Verb::Skill(id) => self.skill(*id, call, object, span, scope),
+            Verb::Command(owner, m) => self.command(*owner, *m, call, object, span, scope).map(|s| (s, None)),
+        };
+        self.blame_call(&verb, call, verb_span, before, scope);
+        step
+    }
+
+    /// Names the call where what it calls is sound by itself, as the library is, and goes wrong with these arguments: one finding
+    /// there, for all that it led to in the library.
+    fn blame_call(&mut self, verb: &Verb<'a>, call: &'a Call, verb_span: Span, before: usize, scope: &mut Scope) {
+        let modules = &self.lab.tables.names.modules;
+        if self.lab.diagnostics.len() <= before || modules[scope.module].is_library() {
+            return;
         }
+        let inside = |d: &Diagnostic| d.is_error() && modules.iter().any(|m| m.file == d.span().file && m.is_library());
+        let Some(first) = self.lab.diagnostics[before..].iter().find(|d| inside(d)).cloned() else { return };
+        let found = self.lab.diagnostics.split_off(before);
+        self.lab.diagnostics.extend(found.into_iter().filter(|d| !inside(d)));
+        let (verb, unknown) = (self.text(verb_span), self.unknown_thing(verb, call, scope));
+        let d = match unknown {
+            Some(at) => {
+                let thing = self.text(at);
+                let headline = format!("`{verb}` has to know before the run which thing `{thing}` is");
+                Diagnostic::error(codes::UNSUPPORTED, at, headline, "known only when running")
+                    .help("name the thing itself")
+            }
+            None => {
+                let headline = format!("`{verb}` does not work with these arguments: {}", first.headline);
+                Diagnostic::error(first.code, call.span, headline, "called here")
+            }
+        };
+        self.lab.report(d.because(first.span(), "needed here"));
+    }
+
+    /// The argument of a call that is a thing known only when running.
+    fn unknown_thing(&mut self, verb: &Verb<'a>, call: &'a Call, scope: &mut Scope) -> Option<Span> {
+        let sig = match verb {
+            Verb::Skill(id) => match &self.lab.tables.names.decl(*id).item.kind {
+                ItemKind::Skill { sig, .. } => sig,
+                _ => return None,
+            },
+            Verb::Command(_, m) => match &m.member.kind {
+                MemberKind::Command { sig, .. } => sig,
+                _ => return None,
+            },
+        };
+        let labelled = call.labelled.iter().filter(|(label, _)| has_label(sig, label)).map(|(_, e)| e);
+        let found = call.object.iter().chain(labelled).find(|e| {
+            let noted = self.lab.diagnostics.len();
+            let value = self.lab.expr(e, scope);
+            self.lab.diagnostics.truncate(noted);
+            matches!(value, Value::InstanceNode(_))
+        });
+        found.map(|e| e.span)
     }
 
     fn name_value(&mut self, e: &Expr, scope: &mut Scope) -> Value {
@@ -645,7 +697,7 @@ impl<'a> Planner<'a, '_> {
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
         }
-        let label = self.call_label(sig, &bound, None).unwrap_or_else(|| self.text(span));
+        let label = self.call_label((sig, &bound), (call, scope), None).unwrap_or_else(|| self.text(span));
         let Some(body) = body else {
             let step = self.primitive(sig, clauses, &bound, &label, span, &mut inner)?;
             return Some((self.after(kept, label, span, step), None));

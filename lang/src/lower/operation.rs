@@ -36,7 +36,8 @@ impl<'a> Planner<'a, '_> {
         for (name, v) in &bound.values {
             inner.bind(name.clone(), v.clone());
         }
-        let label = self.call_label(sig, &bound, Some((device, object_is_device))).unwrap_or_else(|| self.text(span));
+        let label = self.call_label((sig, &bound), (call, scope), Some((device, object_is_device)));
+        let label = label.unwrap_or_else(|| self.text(span));
         let (mut operation, invariants) = self.operation(sig, clauses, &bound, &mut inner)?;
         operation.capability = Some(self.lab.tables.kind_name(owner).to_string());
         operation.device = Some(device);

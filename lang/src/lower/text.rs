@@ -10,15 +10,16 @@ use super::Planner;
 use super::barred::BARS;
 use super::call::Bound;
 use super::columns::with_names;
-use crate::ast::{self, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
+use crate::ast::{self, Call, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
 use crate::elaborate::Compared;
 use crate::elaborate::given::word;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{Names, near, verb_text};
 
-/// Failures the executor itself raises, and `failure`, which stands for all.
-const BUILT_IN: &[&str] =
-    &["timeout", "broken", "late", "max", "need", "promise", "claimed", "job", "wrong_reagent", "failure"];
+/// Failures of the language: `failure`, which stands for all, those that the executor itself raises, and the one of a run in which
+/// substances meet that must not.
+pub const FAILURES: [&str; 11] =
+    ["failure", "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job", MIX];
 
 /// The failure of a run in which substances meet that must not.
 const MIX: &str = "incompatible_mix";
@@ -34,7 +35,7 @@ pub fn dangers(names: &Names<'_>) -> BTreeSet<String> {
 
 /// Every failure that something declares or the executor raises.
 pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
-    let mut out: BTreeSet<String> = BUILT_IN.iter().map(|s| (*s).to_string()).collect();
+    let mut out: BTreeSet<String> = FAILURES.map(String::from).into();
     out.extend(dangers(names));
     let add = |clauses: &[Clause], out: &mut BTreeSet<String>| {
         for c in clauses {
@@ -93,7 +94,12 @@ impl<'a> Planner<'a, '_> {
 
     /// A call in a skill with its arguments in place of the parameters' names; none where that cannot be said before
     /// the run, and outside skills, where the text says it.
-    pub fn call_label(&self, sig: &Sig, bound: &Bound, device: Option<(InstanceId, bool)>) -> Option<String> {
+    pub fn call_label(
+        &self,
+        (sig, bound): (&Sig, &Bound),
+        (call, scope): (&Call, &Scope),
+        device: Option<(InstanceId, bool)>,
+    ) -> Option<String> {
         if self.open.is_empty() || self.lab.prototype || self.draft {
             return None;
         }
@@ -101,9 +107,9 @@ impl<'a> Planner<'a, '_> {
             let (_, value) = bound.values.iter().find(|(name, _)| *name == p.name.text)?;
             match value {
                 Value::Num(n) => {
-                    // What only a run can tell is called what the skill calls it.
+                    // What only a run can tell is shown as the skill writes it.
                     let unit = self.lab.unit_of(n);
-                    Some(self.lab.glance(n.node).map_or_else(|| p.name.text.clone(), |v| unit.show(v)))
+                    Some(self.lab.glance(n.node).map_or_else(|| self.as_written(sig, p, call, scope), |v| unit.show(v)))
                 }
                 Value::Frame(id, frame) if frame.is_empty() => self.lab.spoken(&Value::Instance(*id)),
                 Value::Frame(id, frame) => Some(format!("{}.{frame}", self.lab.spoken(&Value::Instance(*id))?)),
@@ -128,6 +134,30 @@ impl<'a> Planner<'a, '_> {
             None => {}
         }
         Some(words.join(" "))
+    }
+
+    /// An argument as the text has it, with things in place of the names that stand for them there; the name of its parameter where
+    /// it is left out.
+    fn as_written(&self, sig: &Sig, p: &Param, call: &Call, scope: &Scope) -> String {
+        let given = |label: &Name| call.labelled.iter().find(|(l, _)| l.text == label.text).map(|(_, e)| e);
+        let labelled = || {
+            let (label, params) = sig.labelled.iter().find(|(_, params)| params.iter().any(|q| std::ptr::eq(q, p)))?;
+            let at = params.iter().position(|q| std::ptr::eq(q, p))?;
+            match (&*given(label)?.kind, params.len()) {
+                (ast::ExprKind::Tuple(items, None), 2..) => items.get(at).map(|e| e.span),
+                _ => given(label).map(|e| e.span),
+            }
+        };
+        let object = || match &call.object {
+            Some(e) => Some(e.span),
+            None => call.words.last().map(|word| word.span),
+        };
+        let span = if sig.params.iter().any(|q| std::ptr::eq(q, p)) { object() } else { labelled() };
+        let Some(span) = span else { return p.name.text.clone() };
+        with_names(&self.text(span), |word| match scope.var(word)? {
+            Value::Instance(id) | Value::Qualified(id, _) => Some(self.lab.spoken_name(*id)),
+            _ => None,
+        })
     }
 
     /// A condition with what it compares.

@@ -91,6 +91,11 @@ impl Build {
         self.model.derivatives.push(Derivative { state, rate });
     }
 
+    /// The rates of the first states, in their order.
+    pub fn rates(&mut self, rates: &[NodeId]) {
+        (0..).zip(rates).for_each(|(state, rate)| self.rate(state, *rate));
+    }
+
     pub fn event(&mut self, name: &str, when: NodeId, actions: Vec<Action>) {
         self.model.events.push(Event { name: name.into(), when, actions, span: Span::default() });
     }

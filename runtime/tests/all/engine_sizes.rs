@@ -1,6 +1,6 @@
 //! The same laws at every size, without a declared scale: from traces to heaps.
 
-use matterix_ir::UnaryOp;
+use matterix_ir::{NodeId, UnaryOp};
 
 use crate::engine_model::{Build, close, run};
 
@@ -15,15 +15,21 @@ fn undeclared(mut build: Build) -> Build {
     build
 }
 
+/// Three states, of which the first holds all; the first two.
+fn three(b: &mut Build, unit: f64) -> (NodeId, NodeId) {
+    let two = (b.state("a", unit), b.state("b", 0.0));
+    b.state("c", 0.0);
+    two
+}
+
 #[test]
 fn a_chain_of_decays() {
     for unit in UNITS {
         let mut b = Build::default();
-        let (x, y) = (b.state("a", unit), b.state("b", 0.0));
-        b.state("c", 0.0);
+        let (x, y) = three(&mut b, unit);
         let (first, second) = (b.scale(0.01, x), b.scale(0.02, y));
         let (lost, between) = (b.scale(-1.0, first), b.sub(first, second));
-        [lost, between, second].into_iter().enumerate().for_each(|(i, rate)| b.rate(i as u32, rate));
+        b.rates(&[lost, between, second]);
         let b = undeclared(b);
         for t in [1e-3, 1.0, 300.0, 1500.0] {
             let (engine, _) = run(&b.model, t);
@@ -44,8 +50,7 @@ fn an_oscillation() {
         let mut b = Build::default();
         let (x, v) = (b.state("x", unit), b.state("v", 0.0));
         let back = b.scale(-1.0, x);
-        b.rate(0, v);
-        b.rate(1, back);
+        b.rates(&[v, back]);
         let b = undeclared(b);
         let (engine, _) = run(&b.model, 60.0);
         assert!((engine.states()[0] / unit - 60.0_f64.cos()).abs() < 1e-5, "{unit}: {:?}", engine.states());
@@ -58,7 +63,7 @@ fn growth_from_a_trace() {
     for unit in [1e-20, -1e-20, 1e-10, 1.0] {
         let mut b = Build::default();
         let x = b.state("x", unit);
-        b.rate(0, x);
+        b.rates(&[x]);
         let b = undeclared(b);
         let (engine, _) = run(&b.model, 60.0);
         close(engine.states()[0], unit * 60.0_f64.exp(), 1e-5);
@@ -77,8 +82,7 @@ fn a_tiny_feed_into_nothing() {
         let one = b.num(1.0);
         let sum = b.add(one, wave);
         let rate = b.scale(unit, sum);
-        b.rate(0, rate);
-        b.rate(1, x);
+        b.rates(&[rate, x]);
         let b = undeclared(b);
         let (engine, _) = run(&b.model, 20.0);
         close(engine.states()[0], unit * (21.0 - 20.0_f64.cos()), ACCURACY);
@@ -94,8 +98,7 @@ fn two_sizes_in_one_system() {
     let lost = b.scale(-0.1, heap);
     let product = b.mul(heap, trace);
     let grown = b.scale(1e-3, product);
-    b.rate(0, lost);
-    b.rate(1, grown);
+    b.rates(&[lost, grown]);
     let b = undeclared(b);
     let (engine, _) = run(&b.model, 50.0);
     close(engine.states()[0], 1e3 * (-5.0_f64).exp(), ACCURACY);
@@ -107,12 +110,11 @@ fn a_fast_equilibrium_of_traces() {
     // a <-> b at 1e9 and 3e9 per s, and b -> c at 0.05 per s.
     for unit in [1e-18, 1e-9, 1.0] {
         let mut b = Build::default();
-        let (x, y) = (b.state("a", unit), b.state("b", 0.0));
-        b.state("c", 0.0);
+        let (x, y) = three(&mut b, unit);
         let (there, back, on) = (b.scale(1e9, x), b.scale(3e9, y), b.scale(0.05, y));
         let (first, last) = (b.sub(back, there), b.sub(there, back));
         let middle = b.sub(last, on);
-        [first, middle, on].into_iter().enumerate().for_each(|(i, rate)| b.rate(i as u32, rate));
+        b.rates(&[first, middle, on]);
         let b = undeclared(b);
         let (engine, _) = run(&b.model, 100.0);
         let left = (-0.0125 * 100.0_f64).exp();
@@ -133,8 +135,7 @@ fn rounding_of_large_numbers_does_not_hold_up_a_small_state() {
     let (feed, pull) = (b.num(1e-9), b.scale(-1e-6, warm));
     let rate = b.add(error, pull);
     let warming = b.add(drift, feed);
-    b.rate(0, rate);
-    b.rate(1, warming);
+    b.rates(&[rate, warming]);
     let b = undeclared(b);
     let (engine, trace) = run(&b.model, 3600.0);
     assert!(engine.states()[0].abs() < 1e-5);

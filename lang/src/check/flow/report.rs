@@ -24,6 +24,9 @@ pub struct Finding {
     turn: bool,
 }
 
+/// The failure of a need that names none.
+const UNNAMED: &str = "need";
+
 impl Finding {
     /// Whether another one says the same of the same place.
     pub fn is_like(&self, other: &Finding) -> bool {
@@ -111,6 +114,8 @@ impl Flow<'_, '_> {
         // The library's own steps are not what the reader wrote.
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &need.refusal {
+            // The name that every need without one of its own has says nothing.
+            Some(r) if r.failure == UNNAMED => format!("`{label}` cannot be done"),
             Some(r) => format!("`{label}` cannot be done: {}", r.failure.replace('_', " ")),
             None => format!("`{label}` cannot be done: it needs `{}`", need.text),
         };

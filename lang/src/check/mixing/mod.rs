@@ -4,6 +4,7 @@
 //! nothing new. Where steps that run beside each other bring something into one vessel and take it out again, the plan is followed
 //! in every order besides (`orders.rs`). Residues count: what was emptied is still wet.
 
+mod doses;
 mod eyes;
 mod feeds;
 mod hazards;
@@ -115,6 +116,7 @@ pub fn mixing(
         uses,
         by_event: moves_of_events(&eyes, plan),
         feeds: feeds::feeds(&eyes, events),
+        events,
         eyes: &eyes,
         materials: ready.materials,
         hazards: ready.hazards,
@@ -233,6 +235,7 @@ struct Walk<'w, 'a> {
     library: BTreeSet<FileId>,
     /// Amounts that laws write.
     feeds: Vec<feeds::Feed>,
+    events: &'w [Event],
     /// Places in the user's text around the current step, innermost last.
     places: Vec<Span>,
     /// Pairs found, with the place and the mixture.
@@ -308,6 +311,8 @@ impl Walk<'_, '_> {
                 for action in &o.at_start {
                     self.action(action, &mut world);
                 }
+                let dose = self.dose(o, &world);
+                dose.iter().for_each(|dose| self.pours(dose, &mut world));
                 // What begins may be over when the operation is.
                 if !o.at_start.is_empty() && !o.at_end.is_empty() {
                     self.streams(&mut world);
@@ -316,6 +321,7 @@ impl Walk<'_, '_> {
                     self.action(action, &mut world);
                 }
                 self.streams(&mut world);
+                dose.iter().for_each(|dose| self.given_off(dose, &mut world));
                 self.fed(&mut world);
                 self.endanger(&mut world);
                 if let Some(raised) = self.raised.last_mut() {

@@ -142,6 +142,20 @@ impl World {
         }
     }
 
+    /// Takes over values of states that are known again, with what they are amounts of in these mixtures.
+    pub fn settle_at(
+        &mut self,
+        eyes: &Eyes<'_, '_>,
+        values: &[(u32, f64)],
+        mixtures: impl Iterator<Item = InstanceId>,
+    ) {
+        for (state, value) in values {
+            self.states[*state as usize] = *value;
+            self.changed.insert(*state);
+        }
+        mixtures.for_each(|m| self.weigh(eyes, m));
+    }
+
     /// The states changed since this was last asked.
     pub fn take_changed(&mut self) -> BTreeSet<u32> {
         std::mem::take(&mut self.changed)

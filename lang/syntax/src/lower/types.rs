@@ -37,10 +37,10 @@ impl Lower<'_> {
             let words = self.names(Kids::of(words).all(Rule::state_name));
             return Type { paths: Vec::new(), words, argument: None, optional: false, condition: None, span };
         }
-        let mut paths = self.paths(kids.all(Rule::path));
+        let mut paths = self.both(&mut kids);
         let mut arguments = Vec::new();
         while kids.has(Rule::langle) {
-            arguments.extend(kids.eat(Rule::path).map(|p| self.path(&p)));
+            arguments.push(self.both(&mut kids));
         }
         if arguments.len() != closing || arguments.len() > MAX_ARGUMENTS {
             self.report(
@@ -52,18 +52,21 @@ impl Lower<'_> {
         paths.extend(self.paths(kids.all(Rule::path)));
         let optional = kids.has(Rule::question);
         let condition = kids.eat(Rule::cond).map(|c| self.expr(c));
-        let argument = arguments.into_iter().rev().fold(None, |inner, path| {
-            let span = path.span;
-            Some(Box::new(Type {
-                paths: vec![path],
-                words: Vec::new(),
-                argument: inner,
-                optional: false,
-                condition: None,
-                span,
-            }))
+        let argument = arguments.into_iter().rev().fold(None, |inner, paths| {
+            let span = paths.first().zip(paths.last()).map_or(span, |(first, last)| first.span.to(last.span));
+            Some(Box::new(Type { paths, words: Vec::new(), argument: inner, optional: false, condition: None, span }))
         });
         Type { paths, words: Vec::new(), argument, optional, condition, span }
+    }
+
+    /// `A & B`, as far as it goes: what follows it is read by others.
+    fn both(&mut self, kids: &mut Kids) -> Vec<Path> {
+        let mut paths = Vec::new();
+        while let Some(path) = kids.eat(Rule::path) {
+            paths.push(self.path(&path));
+            kids.has(Rule::amp);
+        }
+        paths
     }
 
     /// The parameters of the group that stands next; none where there is no group.

@@ -1,0 +1,143 @@
+//! What a step moves while it lasts, where matter flows evenly all the time: the dose of a pump.
+
+use std::collections::BTreeSet;
+
+use matterix_ir::model::Action;
+use matterix_ir::plan::Operation;
+use matterix_ir::scene::InstanceId;
+
+use super::Walk;
+use super::world::World;
+
+/// Relative difference from which on a rate is not the same.
+const SAME_RATE: f64 = 1e-9;
+
+/// What an even flow has brought about when a step is over.
+pub(super) struct Dose {
+    /// States with their values.
+    values: Vec<(u32, f64)>,
+    /// Mixtures with the share of the first that has gone into the second.
+    shares: Vec<(InstanceId, InstanceId, f64)>,
+}
+
+impl Walk<'_, '_> {
+    /// The dose of an operation; none where nothing flows, or where time or amount cannot be told.
+    pub(super) fn dose(&self, o: &Operation, world: &World) -> Option<Dose> {
+        if self.eyes.lab.streams.is_empty() {
+            return None;
+        }
+        let time = o.takes.as_ref().map(|takes| self.eyes.value(takes.nominal, world))?;
+        let flowing = self.flowing(world)?;
+        if flowing.is_empty() || !(time > 0.0 && time.is_finite()) {
+            return None;
+        }
+        let rates = self.rates(&flowing, world)?;
+        let after = |t: f64| {
+            let mut later = world.clone();
+            rates.iter().for_each(|(state, rate)| later.states[*state as usize] += rate * t);
+            later
+        };
+        let halfway = self.rates(&flowing, &after(time / 2.0))?;
+        let even = |(was, is): (&(u32, f64), &(u32, f64))| {
+            was.0 == is.0 && (was.1 - is.1).abs() <= SAME_RATE * was.1.abs().max(is.1.abs())
+        };
+        if rates.len() != halfway.len() || !rates.iter().zip(&halfway).all(even) {
+            return None;
+        }
+        let mut end = after(time);
+        let mut values: Vec<(u32, f64)> = rates.iter().map(|(s, _)| (*s, end.states[*s as usize])).collect();
+        for (state, value) in &mut values {
+            let before = world.states[*state as usize];
+            if self.eyes.counted.contains(state) && *value < 0.0 {
+                if *value < -SAME_RATE * before {
+                    return None;
+                }
+                *value = 0.0;
+            }
+        }
+        for (state, value) in self.set_by_events(world, &after(time * (1.0 + SAME_RATE))) {
+            end.states[state as usize] = value;
+            values.push((state, value));
+        }
+        let over = o.until.as_ref().is_none_or(|until| self.eyes.value(until.node, &end) != 0.0);
+        let shares = flowing.iter().filter_map(|(process, from, to)| {
+            let passage = self.eyes.passage(*from, *to);
+            let (there, state) =
+                passage.iter().map(|(a, _)| (world.states[*a as usize], *a)).find(|(n, _)| *n > 0.0)?;
+            Some((*from, *to, -self.rate(state, world, |p| p == *process) * time / there))
+        });
+        over.then(|| Dose { values, shares: shares.collect() })
+    }
+
+    /// Transfers that go on; none where it is not known which.
+    fn flowing(&self, world: &World) -> Option<BTreeSet<(usize, InstanceId, InstanceId)>> {
+        let lab = self.eyes.lab;
+        let (mut flowing, mut open) = (BTreeSet::new(), self.by_event.clone());
+        for (stream, flows) in &lab.streams {
+            let guard = lab.processes.get(stream.0).and_then(|p| p.guard);
+            match guard.map_or(Some(true), |g| self.eyes.truth(g, world)) {
+                Some(false) => {}
+                Some(true) if self.eyes.value(*flows, world) == 0.0 => {}
+                Some(true) => {
+                    flowing.insert(*stream);
+                }
+                None => {
+                    open.insert((stream.1, stream.2));
+                }
+            }
+        }
+        let involved: BTreeSet<InstanceId> = flowing.iter().flat_map(|(_, from, to)| [*from, *to]).collect();
+        let apart = open.iter().all(|(from, to)| !involved.contains(from) && !involved.contains(to));
+        apart.then_some(flowing)
+    }
+
+    /// How fast these transfers change the states; none where an amount is among them of which that is not known.
+    fn rates(&self, flowing: &BTreeSet<(usize, InstanceId, InstanceId)>, world: &World) -> Option<Vec<(u32, f64)>> {
+        let processes: BTreeSet<usize> = flowing.iter().map(|stream| stream.0).collect();
+        let mut out = Vec::new();
+        for (state, contributions) in &self.eyes.lab.rates {
+            if !contributions.iter().any(|c| processes.contains(&c.process)) {
+                continue;
+            }
+            let rate = self.rate(*state, world, |p| processes.contains(&p));
+            if rate.is_finite() {
+                out.push((*state, rate));
+            } else if self.eyes.counted.contains(state) {
+                return None;
+            }
+        }
+        Some(out)
+    }
+
+    /// How fast some processes change a state.
+    fn rate(&self, state: u32, world: &World, of: impl Fn(usize) -> bool) -> f64 {
+        let contributions = self.eyes.lab.rates.get(&state).into_iter().flatten();
+        contributions.filter(|c| of(c.process)).map(|c| self.eyes.value(c.node, world)).sum()
+    }
+
+    /// What events assign that come about between two points, but amounts: a pump that has given its dose stops.
+    fn set_by_events(&self, before: &World, after: &World) -> Vec<(u32, f64)> {
+        let begins = |when| self.eyes.value(when, before) == 0.0 && self.eyes.value(when, after) != 0.0;
+        let come = self.events.iter().filter(|e| begins(e.when));
+        let assigned = come.flat_map(|e| &e.actions).filter_map(|action| match action {
+            Action::Assign { state, value, .. } if !self.eyes.counted.contains(state) => {
+                Some((*state, self.eyes.value(*value, after)))
+            }
+            _ => None,
+        });
+        assigned.filter(|(_, value)| value.is_finite()).collect()
+    }
+
+    /// Judges the hazards of what flows over with a dose.
+    pub(super) fn pours(&mut self, dose: &Dose, world: &mut World) {
+        for (from, to, share) in &dose.shares {
+            self.transfers(*from, *to, *share, world);
+        }
+    }
+
+    /// Puts down what a dose has left.
+    pub(super) fn given_off(&self, dose: &Dose, world: &mut World) {
+        let ends = dose.shares.iter().flat_map(|(from, to, _)| [*from, *to]);
+        world.settle_at(self.eyes, &dose.values, ends);
+    }
+}
