@@ -450,6 +450,8 @@ impl Flow<'_, '_> {
         } else if self.perform(&operation.at_start, &mut facts) == Asked::Handled {
             return None;
         }
+        let others = self.claimed.len();
+        self.claimed.extend(&operation.claims);
         match (&operation.takes, &operation.until) {
             (_, Some(until)) => {
                 let node = until.node;
@@ -474,6 +476,7 @@ impl Flow<'_, '_> {
             }
             (None, None) => {}
         }
+        self.claimed.truncate(others);
         if met {
             if self.perform(&operation.at_end, &mut facts) == Asked::Handled {
                 return None;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
+use matterix_ir::{BinaryOp, NodeId, Op, Severity, UnaryOp};
 
 use super::Flow;
 use super::dual::{Along, Dual};
@@ -68,6 +68,7 @@ impl Flow<'_, '_> {
         let mut left = longest;
         let end = facts.time.exact().map(|now| now + longest);
         let mut last = Even::default();
+        let mut changes = 0;
         let begun = facts.clone();
         for _ in 0..MOST_CHANGES {
             let even = self.even(facts, &last);
@@ -110,6 +111,11 @@ impl Flow<'_, '_> {
                 return Course::Passed;
             }
             last = even;
+            changes += 1;
+        }
+        if changes == MOST_CHANGES {
+            let headline = format!("flows and timers change more than {MOST_CHANGES} times in this step");
+            self.not_analysed(Severity::Advice, headline, "what they come to is known in bounds only");
         }
         Course::Left(left)
     }

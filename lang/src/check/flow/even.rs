@@ -150,8 +150,9 @@ impl Flow<'_, '_> {
     pub(super) fn even(&mut self, facts: &Facts, last: &Even) -> Even {
         let tracks = self.tracks();
         let mut open: BTreeSet<u32> = tracks.wild.iter().copied().collect();
+        let others = self.but_for_others(facts);
         loop {
-            let mut veiled = facts.clone();
+            let mut veiled = others.as_ref().unwrap_or(facts).clone();
             open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
             let mut found = Vec::new();
             let mut new = BTreeSet::new();

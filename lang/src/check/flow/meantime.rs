@@ -41,6 +41,36 @@ impl Flow<'_, '_> {
         behind
     }
 
+    /// What is known but for what concurrent steps may set at any time, such as whether a pump runs; none where there is no such.
+    /// What the step that is followed has to itself they do not.
+    pub(super) fn but_for_others(&mut self, facts: &Facts) -> Option<Facts> {
+        if self.shared.is_empty() && self.jobs.is_empty() {
+            return None;
+        }
+        let tracks = self.tracks();
+        let others: BTreeSet<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
+        let moved = |s: &u32| tracks.list.iter().any(|t| t.state == *s) || tracks.wild.contains(s);
+        let open: Vec<u32> = others.into_iter().filter(|s| !moved(s) && !self.has_claimed(*s)).collect();
+        if open.is_empty() {
+            return None;
+        }
+        let mut veiled = facts.clone();
+        open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
+        Some(veiled)
+    }
+
+    /// Whether what is followed has the thing to itself that a state is of.
+    fn has_claimed(&self, state: u32) -> bool {
+        let mut at = Some(self.lab.state_owner[state as usize]);
+        while let Some(id) = at {
+            if self.claimed.contains(&id) {
+                return true;
+            }
+            at = self.lab.instances[id.0 as usize].owner;
+        }
+        false
+    }
+
     /// Concurrent steps that change these states begin; nothing where nothing goes on by itself.
     pub(super) fn meantime(&mut self, written: &BTreeSet<u32>, facts: &Facts) -> Option<Meantime> {
         let moving = self.going_on(facts);

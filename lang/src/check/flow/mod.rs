@@ -45,6 +45,7 @@ use std::rc::Rc;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::values::Formulas;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
 use rustc_hash::FxHashMap;
@@ -153,6 +154,8 @@ struct Flow<'l, 'a> {
     shared: Vec<BTreeSet<u32>>,
     /// What goes on beside the branches and jobs that are followed, innermost last.
     rivals: Vec<Vec<interference::Rival>>,
+    /// Things that what is followed has to itself, innermost last.
+    claimed: Vec<InstanceId>,
     /// Conditions that `keep` asks for all the time.
     kept: Vec<&'l Condition>,
     /// Jobs that go on.
@@ -296,6 +299,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             cleaning: 0,
             shared: Vec::new(),
             rivals: Vec::new(),
+            claimed: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,

@@ -38,6 +38,8 @@ impl Flow<'_, '_> {
         if self.timed.is_empty() {
             return Timers::default();
         }
+        let others = self.but_for_others(facts);
+        let facts = others.as_ref().unwrap_or(facts);
         let mut within = self.veiled(even, facts);
         within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(0.0, left, Why::Unknown));
         let mut events = Vec::new();

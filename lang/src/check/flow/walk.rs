@@ -170,12 +170,16 @@ impl Flow<'_, '_> {
                 let max = self.turns(*max, &facts);
                 self.repeat_while(id, condition, &max, *body, facts)
             }
-            Step::Claim { body, .. } => {
+            Step::Claim { body, claims } => {
                 // Others may have what is claimed for any time.
                 if !self.shared.is_empty() {
                     facts.time = at_least(&facts.time);
                 }
-                self.walk(*body, facts)
+                let before = self.claimed.len();
+                self.claimed.extend(claims);
+                let after = self.walk(*body, facts);
+                self.claimed.truncate(before);
+                after
             }
             Step::Start { job, body } => self.start_job(job, *body, facts),
             Step::Await { job } => self.await_job(job, facts),
@@ -475,11 +479,11 @@ impl Flow<'_, '_> {
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
             let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
             self.begin_branch(&others);
-            self.shared.push(others);
             facts.time = start.clone();
             if longest != start {
                 self.begin_again(meantime.as_ref(), &mut facts);
             }
+            self.shared.push(others);
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
             let raised = self.guards.last().map_or(0, Vec::len);
