@@ -26,7 +26,9 @@ impl Executor<'_, '_> {
         for cause in now.iter().filter(|used| self.changes(used, condition)) {
             past.insert(cause.frame);
             past.extend(cause.within.iter().filter_map(|f| self.behind_now()?.get(f)).flatten());
-            past.extend(now.iter().filter(|u| u.frame < cause.frame && !self.beside(&cause.within, u)).map(|u| u.frame));
+            past.extend(
+                now.iter().filter(|u| u.frame < cause.frame && !self.beside(&cause.within, u)).map(|u| u.frame),
+            );
         }
         if past.is_empty() {
             return;

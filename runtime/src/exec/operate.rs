@@ -79,8 +79,9 @@ impl<'p> Executor<'p, '_> {
             };
             let mut others = self.claims.uses(instance, self.now).filter(|u| u.frame != id && !independent(u));
             let behind = |u: &Use| self.is_behind(&within, u);
-            let other = others
-                .find(|u| u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u) && !behind(u)))?;
+            let other = others.find(|u| {
+                u.running || (exclusive.is_none_or(|c| u.within.contains(&c)) && self.beside(&within, u) && !behind(u))
+            })?;
             let other = &self.plan.get(other.step).label;
             Some(format!("`{own}` and `{other}` use `{name}` at the same time"))
         })

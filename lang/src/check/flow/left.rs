@@ -128,7 +128,11 @@ pub(super) fn on_some_way<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> 
     let mut open = std::mem::take(&mut flow.forks.open);
     // One way may leave several things so.
     while open.len() > 1 {
-        let found = way_to_all(flow, begin, &open, &mut search);
+        // Branches are followed in two orders: a way through one of them is a choice in each.
+        let mut found = way_to_all(flow, begin, &open, Choices::Latest, &mut search);
+        if found.is_empty() {
+            found = way_to_all(flow, begin, &open, Choices::All, &mut search);
+        }
         if found.is_empty() {
             break;
         }
@@ -160,11 +164,21 @@ fn tell(flow: &mut Flow<'_, '_>, end: usize, mut d: Diagnostic, way: Vec<Span>) 
     flow.found(d, about);
 }
 
+/// At which meetings a way is chosen for each thing.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Choices {
+    /// At the latest one.
+    Latest,
+    /// At all of them.
+    All,
+}
+
 /// What is left so on the way that takes, at each meeting, a way on which one of these things is left so.
 fn way_to_all<'l, 'a>(
     flow: &Flow<'l, 'a>,
     begin: &impl Fn() -> Flow<'l, 'a>,
     ends: &[usize],
+    choices: Choices,
     search: &mut Search,
 ) -> Vec<(usize, Diagnostic, Vec<Span>)> {
     if search.left < flow.steps {
@@ -174,12 +188,17 @@ fn way_to_all<'l, 'a>(
     let mut chosen: BTreeMap<usize, usize> = BTreeMap::new();
     let mut spans: BTreeMap<usize, Span> = BTreeMap::new();
     for end in ends {
-        let ways = flow.forks.off.iter().filter(|f| f.end == *end && f.sure);
-        let fits = |f: &&Fork| chosen.get(&f.number).is_none_or(|way| *way == f.way);
-        let best = ways.filter(fits).min_by_key(|f| (std::cmp::Reverse(f.number), f.way)).copied();
-        if let Some(fork) = best {
-            chosen.insert(fork.number, fork.way);
-            spans.insert(*end, fork.span);
+        let mut ways: Vec<Fork> = flow.forks.off.iter().filter(|f| f.end == *end && f.sure).copied().collect();
+        ways.sort_by_key(|f| (std::cmp::Reverse(f.number), f.way));
+        let fits = |f: &Fork, chosen: &BTreeMap<usize, usize>| chosen.get(&f.number).is_none_or(|way| *way == f.way);
+        for fork in ways {
+            if fits(&fork, &chosen) {
+                chosen.insert(fork.number, fork.way);
+                spans.entry(*end).or_insert(fork.span);
+                if choices == Choices::Latest {
+                    break;
+                }
+            }
         }
     }
     let mut one = follow_chosen(flow, begin, chosen);

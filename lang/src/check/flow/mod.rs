@@ -244,7 +244,9 @@ pub fn takes_turns(
     events: &[Event],
     derivatives: &[Derivative],
 ) -> bool {
-    [false, true].into_iter().all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
+    [false, true]
+        .into_iter()
+        .all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
 }
 
 impl<'l, 'a> Flow<'l, 'a> {

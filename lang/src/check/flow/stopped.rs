@@ -240,6 +240,10 @@ impl Flow<'_, '_> {
     fn set(&mut self, change: &Change, facts: &mut Facts) {
         self.overwrite(change.span, change.states.clone(), facts);
         for finally in change.finally.iter().rev().filter(|_| change.off) {
+            // What only waits puts nothing right.
+            if self.writes(*finally).is_empty() {
+                continue;
+            }
             if let Some(end) = self.aside(*finally, facts.clone()) {
                 *facts = end;
             }
