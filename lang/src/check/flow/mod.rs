@@ -7,6 +7,7 @@
 //! run can tell is left to the run.
 
 mod actions;
+mod afloat;
 mod beside;
 mod bonds;
 mod course;

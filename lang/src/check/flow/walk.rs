@@ -467,7 +467,11 @@ impl Flow<'_, '_> {
     ) -> Option<Facts> {
         let start = facts.time.clone();
         let mut longest = start.clone();
+        let mut afloat = self.afloat(branches, writes, &facts);
         for i in order {
+            if let Some(afloat) = afloat.as_mut().filter(|_| Some(i) != order.first()) {
+                self.begin_again(afloat, &mut facts);
+            }
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
             let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
             self.begin_branch(&others);
@@ -486,8 +490,10 @@ impl Flow<'_, '_> {
             self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
+            afloat.iter_mut().for_each(|afloat| afloat.note(&facts));
         }
         facts.time = longest;
+        afloat.iter().for_each(|afloat| self.behind_all(afloat, &mut facts));
         Some(facts)
     }
 
