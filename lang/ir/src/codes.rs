@@ -108,6 +108,7 @@ codes! {
     WEAK_BASE_LEFT_OUT "weak-base-left-out" "H3" "a pH is used, and the model leaves out a weak base there";
     PH_OF_STRONG_SOLUTION "ph-of-strong-solution" "H3" "a pH is used where activities are far from concentrations";
     UNDISSOLVED "undissolved" "H3" "a mixture holds more of a salt than dissolves";
+    SECOND_PHASE "second-phase" "H3" "more of an organic liquid or solid is in water than dissolves";
     GAS_STAYS "gas-stays" "H3" "a gas leaves that the model keeps dissolved";
     GAS_LEAVES "gas-leaves" "H3" "more of a gas is there than stays dissolved";
     PH_FAR_FROM_25_DEGC "ph-far-from-25-degc" "H3" "the pH of a warm or cold solution is used";

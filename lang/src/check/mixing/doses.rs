@@ -1,7 +1,9 @@
-//! What a step moves while it lasts, where matter flows evenly all the time: the dose of a pump.
+//! What a step moves while it lasts, where matter flows evenly all the time: the dose of a pump, and what one that was switched on
+//! pumps during a wait.
 
 use std::collections::BTreeSet;
 
+use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::Operation;
 use matterix_ir::scene::InstanceId;
@@ -11,6 +13,21 @@ use super::world::World;
 
 /// Relative difference from which on a rate is not the same.
 const SAME_RATE: f64 = 1e-9;
+
+/// The longest time that a flow is followed for, s: that of a wait without a timeout.
+const LONGEST: f64 = 30.0 * 86400.0;
+
+/// How often the end of a flow is halved in on.
+const HALVINGS: usize = 60;
+
+/// How long something lasts.
+#[derive(Clone, Copy)]
+enum Lasts {
+    /// So many seconds.
+    For(f64),
+    /// Until a condition holds.
+    Until(NodeId),
+}
 
 /// What an even flow has brought about when a step is over.
 pub(super) struct Dose {
@@ -23,12 +40,34 @@ pub(super) struct Dose {
 impl Walk<'_, '_> {
     /// The dose of an operation; none where nothing flows, or where time or amount cannot be told.
     pub(super) fn dose(&self, o: &Operation, world: &World) -> Option<Dose> {
+        let lasts = match (&o.takes, &o.until) {
+            (Some(takes), _) => Lasts::For(self.eyes.value(takes.nominal, world)),
+            (None, Some(until)) => Lasts::Until(until.node),
+            (None, None) => return None,
+        };
+        let dose = self.even_flow(lasts, world)?;
+        let mut end = world.clone();
+        dose.values.iter().for_each(|(state, value)| end.states[*state as usize] = *value);
+        let over = o.until.as_ref().is_none_or(|until| self.eyes.value(until.node, &end) != 0.0);
+        over.then_some(dose)
+    }
+
+    /// What flows during a wait.
+    pub(super) fn waited(&self, time: f64, world: &World) -> Option<Dose> {
+        self.even_flow(Lasts::For(time), world)
+    }
+
+    /// Whether something flows already.
+    pub(super) fn is_flowing(&self, world: &World) -> bool {
+        !self.eyes.lab.streams.is_empty() && self.flowing(world).is_none_or(|flowing| !flowing.is_empty())
+    }
+
+    fn even_flow(&self, lasts: Lasts, world: &World) -> Option<Dose> {
         if self.eyes.lab.streams.is_empty() {
             return None;
         }
-        let time = o.takes.as_ref().map(|takes| self.eyes.value(takes.nominal, world))?;
         let flowing = self.flowing(world)?;
-        if flowing.is_empty() || !(time > 0.0 && time.is_finite()) {
+        if flowing.is_empty() {
             return None;
         }
         let rates = self.rates(&flowing, world)?;
@@ -37,6 +76,13 @@ impl Walk<'_, '_> {
             rates.iter().for_each(|(state, rate)| later.states[*state as usize] += rate * t);
             later
         };
+        let time = match lasts {
+            Lasts::For(time) => time,
+            Lasts::Until(node) => self.time_until(node, world, after)?,
+        };
+        if !(time > 0.0 && time <= LONGEST) {
+            return None;
+        }
         let halfway = self.rates(&flowing, &after(time / 2.0))?;
         let even = |(was, is): (&(u32, f64), &(u32, f64))| {
             was.0 == is.0 && (was.1 - is.1).abs() <= SAME_RATE * was.1.abs().max(is.1.abs())
@@ -44,7 +90,7 @@ impl Walk<'_, '_> {
         if rates.len() != halfway.len() || !rates.iter().zip(&halfway).all(even) {
             return None;
         }
-        let mut end = after(time);
+        let end = after(time);
         let mut values: Vec<(u32, f64)> = rates.iter().map(|(s, _)| (*s, end.states[*s as usize])).collect();
         for (state, value) in &mut values {
             let before = world.states[*state as usize];
@@ -55,18 +101,36 @@ impl Walk<'_, '_> {
                 *value = 0.0;
             }
         }
-        for (state, value) in self.set_by_events(world, &after(time * (1.0 + SAME_RATE))) {
-            end.states[state as usize] = value;
-            values.push((state, value));
-        }
-        let over = o.until.as_ref().is_none_or(|until| self.eyes.value(until.node, &end) != 0.0);
+        values.extend(self.set_by_events(world, &after(time * (1.0 + SAME_RATE))));
         let shares = flowing.iter().filter_map(|(process, from, to)| {
             let passage = self.eyes.passage(*from, *to);
             let (there, state) =
                 passage.iter().map(|(a, _)| (world.states[*a as usize], *a)).find(|(n, _)| *n > 0.0)?;
             Some((*from, *to, -self.rate(state, world, |p| p == *process) * time / there))
         });
-        over.then(|| Dose { values, shares: shares.collect() })
+        Some(Dose { values, shares: shares.collect() })
+    }
+
+    /// When a condition comes true, with what events set by then; none where it is true at once, or never.
+    fn time_until(&self, node: NodeId, world: &World, after: impl Fn(f64) -> World) -> Option<f64> {
+        let over = |t: f64| {
+            let mut then = after(t);
+            for (state, value) in self.set_by_events(world, &then) {
+                then.states[state as usize] = value;
+            }
+            self.eyes.value(node, &then) != 0.0
+        };
+        let mut late =
+            std::iter::successors(Some(1e-3), |t| Some(t * 2.0)).take_while(|t| *t < LONGEST).find(|t| over(*t))?;
+        let mut early = 0.0;
+        for _ in 0..HALVINGS {
+            let middle = (early + late) / 2.0;
+            match over(middle) {
+                true => late = middle,
+                false => early = middle,
+            }
+        }
+        (early > 0.0).then_some(late)
     }
 
     /// Transfers that go on; none where it is not known which.

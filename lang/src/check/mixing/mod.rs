@@ -21,7 +21,7 @@ use std::sync::Arc;
 use matterix_ir::model::{Action, Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, FileId, Severity, Span};
+use matterix_ir::{Diagnostic, FileId, NodeId, Severity, Span};
 
 use super::time::Times;
 use crate::ast::{MemberKind, Role};
@@ -116,6 +116,7 @@ pub fn mixing(
         uses,
         by_event: moves_of_events(&eyes, plan),
         feeds: feeds::feeds(&eyes, events),
+        beside: 0,
         events,
         eyes: &eyes,
         materials: ready.materials,
@@ -235,6 +236,8 @@ struct Walk<'w, 'a> {
     library: BTreeSet<FileId>,
     /// Amounts that laws write.
     feeds: Vec<feeds::Feed>,
+    /// Branches and jobs beside which the current step runs, and whose time passes with its own.
+    beside: usize,
     events: &'w [Event],
     /// Places in the user's text around the current step, innermost last.
     places: Vec<Span>,
@@ -302,16 +305,32 @@ impl Walk<'_, '_> {
 
     fn inside(&mut self, step: &Step, mut world: World) -> World {
         match step {
-            Step::Sequence(list) | Step::Parallel(list) => self.each(list, world),
+            Step::Sequence(list) => self.each(list, world),
+            Step::Parallel(list) => {
+                self.beside += 1;
+                let world = self.each(list, world);
+                self.beside -= 1;
+                world
+            }
+            Step::Wait { duration } => {
+                self.flow_on(Some(*duration), &mut world);
+                world
+            }
+            Step::WaitUntil { timeout: None, .. } | Step::Hold { timeout: None, .. } | Step::Await { .. } => {
+                self.flow_on(None, &mut world);
+                world
+            }
             Step::Operation(o) => {
                 // What cannot begin does nothing; that is another finding.
                 if o.needs.iter().any(|need| self.eyes.truth(need.node, &world) == Some(false)) {
                     return world;
                 }
+                // What flows already flows in the time of others too.
+                let apart = self.beside == 0 || !self.is_flowing(&world);
                 for action in &o.at_start {
                     self.action(action, &mut world);
                 }
-                let dose = self.dose(o, &world);
+                let dose = self.dose(o, &world).filter(|_| apart);
                 dose.iter().for_each(|dose| self.pours(dose, &mut world));
                 // What begins may be over when the operation is.
                 if !o.at_start.is_empty() && !o.at_end.is_empty() {
@@ -320,7 +339,11 @@ impl Walk<'_, '_> {
                 for action in &o.at_end {
                     self.action(action, &mut world);
                 }
+                // What is over at once leaves the amounts as they are, whatever begins to flow.
+                let at_once = o.takes.is_none() && o.until.is_none() && self.by_event.is_empty();
+                let at_once = at_once.then(|| world.states.clone());
                 self.streams(&mut world);
+                world.states = at_once.unwrap_or(world.states);
                 dose.iter().for_each(|dose| self.given_off(dose, &mut world));
                 self.fed(&mut world);
                 self.endanger(&mut world);
@@ -330,6 +353,7 @@ impl Walk<'_, '_> {
                 world
             }
             Step::WaitUntil { timeout: Some(_), .. } | Step::Hold { timeout: Some(_), .. } => {
+                self.flow_on(None, &mut world);
                 if let Some(raised) = self.raised.last_mut() {
                     Raised::note(&mut raised.timeout, &world);
                 }
@@ -406,8 +430,12 @@ impl Walk<'_, '_> {
             | Step::Keep { body, .. }
             | Step::During { body, .. }
             | Step::Within { body, .. }
-            | Step::Claim { body, .. }
-            | Step::Start { body, .. } => self.step(*body, world),
+            | Step::Claim { body, .. } => self.step(*body, world),
+            Step::Start { body, .. } => {
+                // Its time passes beside that of all that follows.
+                self.beside += 1;
+                self.step(*body, world)
+            }
             _ => world,
         }
     }
@@ -497,6 +525,20 @@ impl Walk<'_, '_> {
                 break;
             }
         }
+    }
+
+    /// What streams carry while a time passes, if that is known.
+    fn flow_on(&mut self, time: Option<NodeId>, world: &mut World) {
+        if !self.is_flowing(world) {
+            return;
+        }
+        let time = time.filter(|_| self.beside == 0).map(|time| self.eyes.value(time, world));
+        let dose = time.and_then(|time| self.waited(time, world));
+        dose.iter().for_each(|dose| self.pours(dose, world));
+        self.streams(world);
+        dose.iter().for_each(|dose| self.given_off(dose, world));
+        self.fed(world);
+        self.endanger(world);
     }
 
     /// What one body does not handle may be handled around it.
