@@ -13,12 +13,13 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use diffsol::{
-    Bdf, BdfState, DiffsolError, NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeSolverMethod, OdeSolverState,
-    Vector, VectorView,
+    Bdf, BdfState, DiffsolError, NalgebraMat, NalgebraVec, OdeBuilder, OdeSolverMethod, OdeSolverState, Vector,
+    VectorView,
 };
 
 use super::clock::Clock;
 use super::dense::Dense;
+use super::linear::WeighedLu;
 use super::tangent;
 use super::tape::Tape;
 use super::timed::{Busy, Timed};
@@ -313,9 +314,10 @@ fn drive(
             state
         }
     };
-    let mut solver = problem.bdf_solver::<NalgebraLU<f64>>(state)?;
+    let allowed = initial.iter().zip(atol).map(|(value, least)| least + rtol * value.abs());
+    let mut solver = Bdf::new(&problem, state, WeighedLu::new(allowed))?;
     let mut sampled = NalgebraVec::zeros(initial.len(), *problem.context());
-    let mut step = |dense: &mut Dense, solver: &mut Bdf<'_, _, NalgebraLU<f64>>| {
+    let mut step = |dense: &mut Dense, solver: &mut Bdf<'_, _, WeighedLu>| {
         solver.step()?;
         dense.extend(solver.state().t, |time, out| {
             solver.interpolate_inplace(time, &mut sampled)?;

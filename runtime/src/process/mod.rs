@@ -7,7 +7,7 @@
 //! - `tape`, `tangent`: the law of a segment as a short program, and its derivative.
 //! - `analysis`, `mode`: which part of the graph that is.
 //! - `switch`: the comparisons, and where they change.
-//! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
+//! - `integrator`, `linear`, `dense`, `clock`: steps, their linear systems, the solution between them, and the time that they count.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
@@ -20,6 +20,7 @@ mod dense;
 mod instant;
 mod integrator;
 mod limits;
+mod linear;
 mod memo;
 mod mode;
 mod suspicion;

@@ -10,10 +10,11 @@ use super::dual::{Along, Dual};
 use super::eval::Exact;
 use super::even::{Even, Tracks};
 use super::facts::Facts;
+use super::timers::{Timers, comes_before};
 use super::value::{CLOSE, Known, Why};
 
 /// Changes of conditions within one step before the rest of it is followed in bounds.
-const MOST_CHANGES: usize = 200;
+const MOST_CHANGES: usize = 1000;
 
 /// A difference that departs from a straight line by less than this share of what is compared is one.
 const STRAIGHT: f64 = 1e-9;
@@ -41,7 +42,7 @@ impl Flow<'_, '_> {
     /// Follows what moves evenly for at most `longest` s, or until a condition holds.
     pub(super) fn course(&mut self, longest: f64, until: Option<NodeId>, facts: &mut Facts) -> Course {
         let tracks = self.tracks();
-        if tracks.list.is_empty() {
+        if tracks.list.is_empty() && self.timed.is_empty() {
             return Course::Left(longest);
         }
         let mut passed = Vec::new();
@@ -65,31 +66,43 @@ impl Flow<'_, '_> {
         passed: &mut Vec<Passed>,
     ) -> Course {
         let mut left = longest;
+        let end = facts.time.exact().map(|now| now + longest);
         let mut last = Even::default();
         let begun = facts.clone();
         for _ in 0..MOST_CHANGES {
             let even = self.even(facts, &last);
-            if even.slopes.is_empty() {
+            let timers = self.timers(&even, left, facts);
+            if timers.unsure || (even.slopes.is_empty() && timers.events.is_empty()) {
                 break;
             }
             if left > 0.0 {
                 self.limits_passed(&even, &begun, facts, passed);
             }
-            let sides = self.sides(tracks, &even, until);
+            let sides = self.sides(tracks, &even, &timers, until);
             let Some(next) = self.next_change(&sides, &even, left, facts) else { break };
             let dry = dry_at(&even, &self.amounts);
-            let step = next.min(left).min(dry.unwrap_or(f64::INFINITY));
+            let mut step = next.min(left).min(dry.unwrap_or(f64::INFINITY));
             if !step.is_finite() {
                 break;
             }
-            let before = facts.clone();
-            self.go_along(step, &even, &sides, facts);
+            let (now, mut to) = (facts.time.exact(), None);
+            if let (Some(now), Some(end), false) = (now, end, timers.events.is_empty()) {
+                let moment = self.moment(&timers, now + step, &even, facts);
+                let Some(before) = comes_before(moment, end) else { break };
+                to = Some(if before { moment } else { end });
+                step = to.map_or(step, |to| to - now);
+            }
+            self.go_along(step, &even, &timers, &sides, facts);
             left -= step;
+            if let (Some(to), Some(end)) = (to, end) {
+                facts.time = Known::Point(to);
+                left = end - to;
+            }
             if dry.is_some_and(|dry| dry <= step) {
                 self.runs_dry(&even, step, facts);
                 return Course::Left(left);
             }
-            self.events_along(&even, &before, facts);
+            self.events_along(&even, &timers, facts);
             if until.is_some_and(|node| self.truth_beyond(node, &even, facts) == Some(true)) {
                 return Course::Reached;
             }
@@ -102,9 +115,9 @@ impl Flow<'_, '_> {
     }
 
     /// What is compared in conditions that what moves evenly decides.
-    fn sides(&mut self, tracks: &Tracks, even: &Even, until: Option<NodeId>) -> Vec<Sides> {
+    fn sides(&mut self, tracks: &Tracks, even: &Even, timers: &Timers, until: Option<NodeId>) -> Vec<Sides> {
         let states: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
-        let events = self.events_on(&states).into_iter().chain(self.timed.iter().copied());
+        let events = self.events_on(&states).into_iter().chain(timers.events.iter().copied());
         let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten();
         let mut roots: BTreeSet<NodeId> = events.map(|i| self.events[i as usize].when).collect();
         roots.extend(limits.map(|i| self.plan.limits[*i as usize].condition.node));
@@ -186,7 +199,7 @@ impl Flow<'_, '_> {
         Some((known(a.value - b.value), known(a.slope - b.slope), a.value.abs().max(b.value.abs())))
     }
 
-    fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &Facts) -> Option<Dual> {
+    pub(super) fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &Facts) -> Option<Dual> {
         let along = Along { exact: Exact { params: &self.params, facts }, even, time };
         self.formulas.of(&self.lab.graph, node).value(&along, &mut self.duals)
     }
@@ -198,13 +211,16 @@ impl Flow<'_, '_> {
     }
 
     /// Lets time pass in which what moves evenly does so; what else moves is known in bounds.
-    fn go_along(&mut self, step: f64, even: &Even, sides: &[Sides], facts: &mut Facts) {
+    fn go_along(&mut self, step: f64, even: &Even, timers: &Timers, sides: &[Sides], facts: &mut Facts) {
         let before = facts.clone();
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
-        let events = self.events_on(&followed);
+        let mut events = self.events_on(&followed);
+        events.extend(&timers.events);
         self.quiet += 1;
         let guards = std::mem::take(&mut self.guards);
+        self.at_moments.clone_from(&timers.events);
         self.drift(&Known::Point(step), facts);
+        self.at_moments.clear();
         self.guards = guards;
         self.quiet -= 1;
         // What the events that are followed do is done at their moment.
@@ -246,23 +262,32 @@ impl Flow<'_, '_> {
         }
     }
 
-    /// Events that what moved evenly brings about now.
-    fn events_along(&mut self, even: &Even, before: &Facts, facts: &mut Facts) {
+    /// Events that what moved evenly and the time bring about now, each time the first of the text, as in a run.
+    fn events_along(&mut self, even: &Even, timers: &Timers, facts: &mut Facts) {
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let mut due = self.events_on(&followed);
-        due.extend(&self.timed);
+        due.extend(&timers.events);
         due.sort_unstable();
         due.dedup();
-        for i in due {
-            let now = self.truth_beyond(self.events[i as usize].when, even, facts);
-            facts.fired[i as usize] = now;
-            if now == Some(true) && before.fired[i as usize] != Some(true) {
-                let changed = self.happen(i, facts);
-                facts.fired[i as usize] = self.truth_beyond(self.events[i as usize].when, even, facts);
-                let on = self.events_on(&changed).into_iter().filter(|e| *e != i).collect();
-                self.fire(on, facts);
+        for _ in 0..MOST_CHANGES {
+            let mut next = None;
+            for i in &due {
+                let now = self.truth_beyond(self.events[*i as usize].when, even, facts);
+                let before = &mut facts.fired[*i as usize];
+                if now != Some(true) {
+                    *before = now;
+                } else if *before != Some(true) && next.is_none() {
+                    next = Some(*i);
+                }
             }
+            let Some(i) = next else { return };
+            let changed = self.happen(i, facts);
+            facts.fired[i as usize] = Some(true);
+            let on = self.events_on(&changed).into_iter().filter(|e| !due.contains(e)).collect();
+            self.fire(on, facts);
         }
+        let changed = due.iter().flat_map(|i| self.changed_by(&self.events[*i as usize].actions)).collect::<Vec<u32>>();
+        self.forget(&changed, facts);
     }
 
     /// Notes the limits that hold no longer.

@@ -129,6 +129,7 @@ impl Flow<'_, '_> {
 
     fn goes_on(&mut self, longest: f64, span: &Known, facts: &mut Facts) {
         let mut timed = self.timed.clone();
+        timed.retain(|event| !self.at_moments.contains(event));
         for round in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();
             let moved = self.flow_through(longest, span, facts);
@@ -137,6 +138,7 @@ impl Flow<'_, '_> {
             }
             let mut due = self.events_on(&moved);
             due.append(&mut timed);
+            due.retain(|event| !self.at_moments.contains(event));
             let mut recurring = due.clone();
             self.fire(due, facts);
             self.fire_between(span, facts);
@@ -246,7 +248,7 @@ impl Flow<'_, '_> {
     fn fire_between(&mut self, span: &Known, facts: &mut Facts) {
         for event in self.timed.clone() {
             let when = self.events[event as usize].when;
-            if self.eval(when, facts).truth() != Some(false) {
+            if self.at_moments.contains(&event) || self.eval(when, facts).truth() != Some(false) {
                 continue;
             }
             let after = std::mem::replace(&mut facts.time, span.clone());

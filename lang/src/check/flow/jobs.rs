@@ -100,12 +100,17 @@ impl Flow<'_, '_> {
             false => {
                 let courses = std::mem::take(&mut self.courses);
                 self.begin_course();
+                let meantime = self.meantime(&writes, &facts);
                 let after = self.job(body, facts);
                 course = self.end_course();
                 self.courses = courses;
                 self.begun_job(name, body);
                 facts = after?;
-                Some(std::mem::replace(&mut facts.time, start.clone()))
+                let end = std::mem::replace(&mut facts.time, start.clone());
+                if end != start {
+                    self.begin_again(meantime.as_ref(), &mut facts);
+                }
+                Some(end)
             }
         };
         facts.begun.insert(name.to_owned(), true);
@@ -136,16 +141,20 @@ impl Flow<'_, '_> {
 
     fn end_of_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
         self.end_job(name);
-        let Some(Job { body, start, end, .. }) = self.jobs.remove(name) else { return Some(facts) };
+        let Some(Job { body, start, end, writes, .. }) = self.jobs.remove(name) else { return Some(facts) };
         let now = facts.time.clone();
         let end = match end {
             Some(end) => end,
             None => {
+                let meantime = self.look_back(&writes, &mut facts);
                 facts.time = start;
                 facts = self.job(body, facts)?;
-                facts.time.clone()
+                let end = std::mem::replace(&mut facts.time, now.clone());
+                self.begin_again(meantime.as_ref(), &mut facts);
+                end
             }
         };
+        self.catch_up(&end, &writes, &mut facts);
         facts.time = Known::binary(BinaryOp::Max, &now, &end);
         Some(facts)
     }

@@ -23,6 +23,7 @@ mod interference;
 mod jobs;
 mod lasting;
 mod left;
+mod meantime;
 mod otherwise;
 mod parted;
 mod points;
@@ -30,6 +31,7 @@ mod polytope;
 mod report;
 mod reported;
 mod stopped;
+mod timers;
 mod totals;
 mod value;
 mod walk;
@@ -112,6 +114,8 @@ struct Flow<'l, 'a> {
     presumed_of: BTreeMap<u32, Vec<NodeId>>,
     /// Events that depend on time.
     timed: Vec<u32>,
+    /// Those that are followed at their moments now: what bounds the passing of time leaves them out.
+    at_moments: Vec<u32>,
     /// Derivatives that depend on the time itself.
     clocked: Vec<u32>,
     /// While time passes: from when to when. An event comes about somewhere in it.
@@ -258,6 +262,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             limits_of: BTreeMap::new(),
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
+            at_moments: Vec::new(),
             clocked: Vec::new(),
             meanwhile: None,
             stopped: false,

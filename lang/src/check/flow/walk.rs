@@ -467,12 +467,18 @@ impl Flow<'_, '_> {
     ) -> Option<Facts> {
         let start = facts.time.clone();
         let mut longest = start.clone();
+        let all: BTreeSet<u32> = writes.iter().flatten().copied().collect();
+        let meantime = if branches.len() > 1 { self.meantime(&all, &facts) } else { None };
+        let mut ends = Vec::new();
         for i in order {
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
             let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
             self.begin_branch(&others);
             self.shared.push(others);
             facts.time = start.clone();
+            if longest != start {
+                self.begin_again(meantime.as_ref(), &mut facts);
+            }
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
             let raised = self.guards.last().map_or(0, Vec::len);
@@ -486,8 +492,12 @@ impl Flow<'_, '_> {
             self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
+            if meantime.is_some() {
+                ends.push(facts.clone());
+            }
         }
         facts.time = longest;
+        self.go_on_from(meantime.as_ref(), &ends, &mut facts);
         Some(facts)
     }
 

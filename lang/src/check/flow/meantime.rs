@@ -1,0 +1,117 @@
+//! What goes on by itself while branches or jobs are followed one after the other over the same time: flows and timers that
+//! were set going before. It goes on once, however many branches there are.
+
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
+use super::Flow;
+use super::even::Even;
+use super::facts::Facts;
+use super::value::Known;
+
+/// What moves by itself when concurrent steps begin.
+#[derive(Clone, Debug)]
+pub(super) struct Meantime {
+    /// What was known then.
+    begun: Rc<Facts>,
+    /// States that none of the concurrent steps changes, nor what they set going.
+    alone: BTreeSet<u32>,
+    /// Other states that move.
+    mixed: BTreeSet<u32>,
+}
+
+impl Flow<'_, '_> {
+    /// States that flows and timers change which go on now, as far as they are followed exactly.
+    fn going_on(&mut self, facts: &Facts) -> BTreeSet<u32> {
+        let tracks = self.tracks();
+        if tracks.list.is_empty() && self.timed.is_empty() {
+            return BTreeSet::new();
+        }
+        let even = self.even(facts, &Even::default());
+        let mut moved: BTreeSet<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
+        let events = self.events;
+        for timer in self.timers(&even, f64::INFINITY, facts).events {
+            moved.extend(self.changed_by(&events[timer as usize].actions));
+        }
+        if moved.is_empty() {
+            return moved;
+        }
+        let mut behind = self.behind(&moved);
+        tracks.wild.iter().for_each(|s| _ = behind.remove(s));
+        behind
+    }
+
+    /// Concurrent steps that change these states begin; nothing where nothing goes on by itself.
+    pub(super) fn meantime(&mut self, written: &BTreeSet<u32>, facts: &Facts) -> Option<Meantime> {
+        let moving = self.going_on(facts);
+        if moving.is_empty() {
+            return None;
+        }
+        let written = self.behind(written);
+        let (mixed, alone) = moving.into_iter().partition(|s| written.contains(s));
+        Some(Meantime { begun: Rc::new(facts.clone()), alone, mixed })
+    }
+
+    /// Another of the concurrent steps begins at the same time: what moves by itself is as it was then, and nothing is known of
+    /// what those before have set going, or changed of it.
+    pub(super) fn begin_again(&mut self, meantime: Option<&Meantime>, facts: &mut Facts) {
+        let mut open = self.going_on(facts);
+        if let Some(meantime) = meantime {
+            open.extend(&meantime.mixed);
+            open.retain(|s| !meantime.alone.contains(s));
+            self.put_back(meantime, &meantime.begun, facts);
+        }
+        self.forget(&open.into_iter().collect::<Vec<_>>(), facts);
+    }
+
+    /// What moves by itself is as it is in `other`.
+    fn put_back(&mut self, meantime: &Meantime, other: &Facts, facts: &mut Facts) {
+        let states: Vec<u32> = meantime.alone.iter().copied().collect();
+        facts.rebind(|bonds, _| bonds.release(&states));
+        for state in &states {
+            facts.states[*state as usize] = other.states[*state as usize].clone();
+            self.touch(*state, facts);
+        }
+        for event in self.events_on(&states) {
+            facts.fired[event as usize] = other.fired[event as usize];
+        }
+        facts.barrier = None;
+    }
+
+    /// The concurrent steps are over: what moves by itself is as the one that ended last left it.
+    pub(super) fn go_on_from(&mut self, meantime: Option<&Meantime>, ends: &[Facts], facts: &mut Facts) {
+        let Some(meantime) = meantime else { return };
+        let last = facts.time.exact().and_then(|time| ends.iter().find(|end| end.time.exact() == Some(time)));
+        match last {
+            Some(last) => self.put_back(meantime, last, facts),
+            None => self.forget(&meantime.alone.iter().copied().collect::<Vec<_>>(), facts),
+        }
+        self.forget(&meantime.mixed.iter().copied().collect::<Vec<_>>(), facts);
+    }
+
+    /// Time goes on from `facts.time` to `end` by what goes on beside a job that changes `written` and ends then.
+    pub(super) fn catch_up(&mut self, end: &Known, written: &BTreeSet<u32>, facts: &mut Facts) {
+        if end.bounds().1 <= facts.time.bounds().0 {
+            return;
+        }
+        let Some(meantime) = self.meantime(written, facts) else { return };
+        let mut later = facts.clone();
+        if let (Some(now), Some(end)) = (facts.time.exact(), end.exact()) {
+            self.pass(&Known::Point(end - now), &mut later);
+        } else {
+            later.time = Known::nothing();
+        }
+        let ends = [later];
+        let now = std::mem::replace(&mut facts.time, end.clone());
+        self.go_on_from(Some(&meantime), &ends, facts);
+        facts.time = now;
+    }
+
+    /// What moves by itself is not known while a job that changes `written` is followed behind its time.
+    pub(super) fn look_back(&mut self, written: &BTreeSet<u32>, facts: &mut Facts) -> Option<Meantime> {
+        let meantime = self.meantime(written, facts)?;
+        let moving: Vec<u32> = meantime.alone.union(&meantime.mixed).copied().collect();
+        self.forget(&moving, facts);
+        Some(meantime)
+    }
+}
