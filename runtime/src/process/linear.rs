@@ -4,7 +4,7 @@
 //! largest numbers wins, whatever its unit: the heat of a reaction (J) is a large number beside the last femtomoles of what
 //! reacts (mol), and the rounding of the one would become an error of the other that no shorter step makes smaller.
 
-use diffsol::{LaLinearOp, Matrix, Vector, NalgebraContext, NalgebraLU, NalgebraMat, NalgebraVec};
+use diffsol::{LaLinearOp, Matrix, NalgebraContext, NalgebraLU, NalgebraMat, NalgebraVec, Vector};
 use diffsol_la::{LaError, LinearSolver};
 
 /// Factorises with rows in units of their tolerances.

@@ -28,6 +28,7 @@ mod otherwise;
 mod parted;
 mod points;
 mod polytope;
+mod raced;
 mod report;
 mod reported;
 mod stopped;
@@ -147,6 +148,10 @@ struct Flow<'l, 'a> {
     cleaning: usize,
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
+    /// Of these, those that others change while the branch or job that is followed goes on.
+    meets: Vec<BTreeSet<u32>>,
+    /// How long operations last of which that follows from states, s, by step; joined over all times they are done.
+    lasting: BTreeMap<StepId, (f64, f64)>,
     /// What goes on beside the branches and jobs that are followed, innermost last.
     rivals: Vec<Vec<interference::Rival>>,
     /// Conditions that `keep` asks for all the time.
@@ -190,6 +195,8 @@ pub struct Followed {
     pub windows: BTreeMap<ReactionId, Window>,
     /// What is known of the nodes asked for: at the start, and after each statement.
     pub seen: Vec<Seen>,
+    /// How long operations last of which that follows from states, s, by step.
+    pub lasting: BTreeMap<StepId, (f64, f64)>,
 }
 
 /// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement.
@@ -212,6 +219,7 @@ pub fn check(
     let mut flow = jobs::follow(noting);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
+    let lasting = flow.durations();
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
     for (param, value) in others {
@@ -225,7 +233,7 @@ pub fn check(
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);
     }
-    Followed { found, windows, seen }
+    Followed { found, windows, seen, lasting }
 }
 
 impl<'l, 'a> Flow<'l, 'a> {
@@ -279,6 +287,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             doubt: 0,
             cleaning: 0,
             shared: Vec::new(),
+            meets: Vec::new(),
+            lasting: BTreeMap::new(),
             rivals: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
