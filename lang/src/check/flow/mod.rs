@@ -33,6 +33,7 @@ mod report;
 mod reported;
 mod stopped;
 mod timers;
+mod together;
 mod totals;
 mod value;
 mod walk;
