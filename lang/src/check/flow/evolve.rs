@@ -100,8 +100,8 @@ pub(super) struct Making {
     pub(super) moving: BTreeSet<u32>,
     /// How many of them have faces.
     pub(super) faces: usize,
-    /// Whether faces were moved out together.
-    pub(super) together: bool,
+    /// The walls whose lower, and whose upper, faces were moved out together.
+    pub(super) together: [Vec<Wall>; 2],
 }
 
 impl Flow<'_, '_> {
@@ -427,7 +427,7 @@ impl Flow<'_, '_> {
             ways: BTreeMap::new(),
             moving: BTreeSet::new(),
             faces: 0,
-            together: false,
+            together: Default::default(),
         };
         // Faces that late sweeps cross are without bound from then on, and each flux starts once, so that this ends.
         let mut round = 0;
@@ -445,9 +445,7 @@ impl Flow<'_, '_> {
                 self.settle_together(facts, &mut box_, &mut due);
             }
         }
-        if box_.together {
-            self.narrow_together(facts, &mut box_);
-        }
+        self.narrow_together(facts, &mut box_);
         if box_.faces <= MOST_MOVING {
             self.narrow(facts, &mut box_);
         }

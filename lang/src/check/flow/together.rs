@@ -29,22 +29,24 @@ impl Flow<'_, '_> {
                 continue;
             }
             let Some(further) = self.common_step(&walls, upper, facts, making) else { continue };
+            // What stays where it is, as a state that has come to its end, is not brought in with the others.
+            let moved = walls.iter().zip(&further).filter(|(_, by)| **by > 0.0);
+            making.together[usize::from(upper)] = moved.map(|(wall, _)| *wall).collect();
             for (wall, by) in walls.iter().zip(further) {
                 self.move_out(*wall, upper, by, facts, making);
                 let (Wall::Whole(i) | Wall::Apart(i)) = *wall;
                 due.insert(i);
                 due.extend(self.rates_of.get(&self.derivatives[i as usize].state).into_iter().flatten());
             }
-            making.together = true;
         }
     }
 
     /// Brings all faces in that were moved out together, by the same share of their ways, as far as nothing crosses them.
     pub(super) fn narrow_together(&mut self, facts: &Facts, making: &mut Making) {
         for upper in [true, false] {
-            let walls = self.moved_out(upper, facts, making);
+            let walls = std::mem::take(&mut making.together[usize::from(upper)]);
             let ways: Vec<f64> = walls.iter().map(|wall| self.way(*wall, upper, facts, making)).collect();
-            if walls.is_empty() {
+            if walls.is_empty() || ways.iter().any(|way| !way.is_finite()) {
                 continue;
             }
             let (mut near, mut far) = (0.0, 1.0);
