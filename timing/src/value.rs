@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::graph::{binary, unary};
 use matterix_ir::model::{Action, Derivative, Domain, Event, State};
-use matterix_ir::plan::{Plan, Step, Takes};
+use matterix_ir::plan::{Plan, Step, StepId, Takes};
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
 use crate::interval::Interval;
@@ -77,6 +77,8 @@ pub struct Known<'g> {
     pub(crate) states: Vec<Option<f64>>,
     pub(crate) derivatives: &'g [Derivative],
     pub(crate) events: &'g [Event],
+    /// How long operations last of which that follows from states, s, by step.
+    pub lasting: BTreeMap<StepId, Interval>,
 }
 
 impl<'g> Known<'g> {
@@ -103,7 +105,8 @@ impl<'g> Known<'g> {
                 _ => mixed = true,
             }
         }
-        let mut known = Known { graph, params, states: vec![None; states.len()], derivatives, events };
+        let mut known =
+            Known { graph, params, states: vec![None; states.len()], derivatives, events, lasting: BTreeMap::new() };
         let initial: Vec<Option<f64>> = states
             .iter()
             .enumerate()

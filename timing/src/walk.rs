@@ -303,7 +303,7 @@ impl Walk<'_, '_> {
             Step::Sequence(list) => self.sequence(list, place),
             Step::Parallel(list) => self.parallel(id, list, place),
             Step::Operation(operation) => {
-                let lasts = self.operation(operation);
+                let lasts = self.operation(id, operation);
                 self.lasting(id, place, lasts)
             }
             Step::Guarded { body, handlers, finally } => {
@@ -682,7 +682,7 @@ impl Walk<'_, '_> {
         End { at: end, lasts, dead: false }
     }
 
-    fn operation(&self, operation: &Operation) -> Interval {
+    fn operation(&self, id: StepId, operation: &Operation) -> Interval {
         match (&operation.takes, &operation.until) {
             (takes, Some(_)) => takes.and_then(|takes| self.bounds(takes)).unwrap_or_else(|| {
                 let max = self.known.counted(operation).unwrap_or(f64::INFINITY);
@@ -690,7 +690,11 @@ impl Walk<'_, '_> {
             }),
             (Some(takes), None) => {
                 let bounds = if self.durations == Durations::Bounds { self.bounds(*takes) } else { None };
-                bounds.unwrap_or_else(|| self.known.number(takes.nominal).as_duration())
+                let nominal = || {
+                    let known = self.known.lasting.get(&id).copied();
+                    known.unwrap_or_else(|| self.known.number(takes.nominal)).as_duration()
+                };
+                bounds.unwrap_or_else(nominal)
             }
             (None, None) => Interval::ZERO,
         }

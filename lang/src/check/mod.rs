@@ -92,25 +92,28 @@ pub fn plan(
     let hazards = ready.as_ref().map(mixing::Ready::hazards);
     let about = &*lab;
     let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
-    let takes = || time::plan(about, plan, derivatives, events);
+    let takes = || time::plan(about, plan, derivatives, events, &BTreeMap::new());
     let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
         true => share::two(meets, || share::two(takes, follow)),
         false => (meets(), (takes(), None)),
     };
-    // Where the order of all steps is known, nothing is in doubt.
-    let doubted = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE && !d.is_error();
-    let sound = is_whole && taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted);
-    let apart = sound && flow::takes_turns(about, sources, plan, events, derivatives);
-    let taken = taken.into_iter().filter(|d| !(apart && doubted(d)));
-    met.into_iter().chain(taken).for_each(|d| lab.report(d));
-    if !lab.diagnostics.iter().all(whole) {
+    met.into_iter().for_each(|d| lab.report(d));
+    if !lab.diagnostics.iter().chain(&taken).all(whole) {
+        taken.into_iter().for_each(|d| lab.report(d));
         return Judged { hazards, ..Judged::default() };
     }
     let about = &*lab;
     let follow = || flow::check(about, sources, plan, events, derivatives, asked);
-    let flow::Followed { found, windows, seen } = followed.unwrap_or_else(follow);
-    for d in found {
+    let flow::Followed { found, windows, seen, lasting } = followed.unwrap_or_else(follow);
+    // Times are compared again where following the plan tells how long steps last.
+    let taken = if lasting.is_empty() { taken } else { time::plan(about, plan, derivatives, events, &lasting) };
+    // Where the order of all steps is known, nothing is in doubt.
+    let doubted = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE && !d.is_error();
+    let sound = taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted);
+    let apart = sound && flow::takes_turns(about, sources, plan, events, derivatives);
+    let taken = taken.into_iter().filter(|d| !(apart && doubted(d)));
+    for d in taken.chain(found) {
         lab.report(d);
     }
     Judged { windows: Some(windows), seen, hazards }

@@ -447,12 +447,18 @@ impl Flow<'_, '_> {
             // Said already: what it would have done is not known.
             let written = self.written(operation);
             self.forget(&written, &mut facts);
-        } else if self.perform(&operation.at_start, &mut facts) == Asked::Handled {
+        }
+        // How long it takes follows from what it finds, not from what it does.
+        let lasts = match (&operation.takes, &operation.until) {
+            (Some(takes), None) => Some(self.duration(takes.nominal, &facts)),
+            _ => None,
+        };
+        if met && self.perform(&operation.at_start, &mut facts) == Asked::Handled {
             return None;
         }
         let others = self.claimed.len();
         self.claimed.extend(&operation.claims);
-        match (&operation.takes, &operation.until) {
+        match (lasts, &operation.until) {
             (_, Some(until)) => {
                 let node = until.node;
                 let value = self.eval(node, &facts);
@@ -468,12 +474,10 @@ impl Flow<'_, '_> {
                         self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
                         self.assume(node, true, &mut facts);
                     }
+                    self.waits_against_keep(label, until, &facts);
                 }
             }
-            (Some(takes), None) => {
-                let time = self.duration(takes.nominal, &facts);
-                self.pass(&time, &mut facts);
-            }
+            (Some(time), None) => self.pass(&time, &mut facts),
             (None, None) => {}
         }
         self.claimed.truncate(others);

@@ -3,7 +3,7 @@
 use matterix_ir::plan::{Comparison, Condition};
 use matterix_ir::quantity::show_number;
 use matterix_ir::undefined::{undefined, why};
-use matterix_ir::{Code, NodeId, Span, codes};
+use matterix_ir::{BinaryOp, Code, NodeId, Op, Span, codes};
 
 use super::Flow;
 use super::facts::Facts;
@@ -19,6 +19,53 @@ impl Flow<'_, '_> {
                 let about = Some((condition.span, "kept from here on"));
                 self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
             }
+        }
+    }
+
+    /// Reports a wait for something that cannot be while what is kept around it holds.
+    pub(super) fn waits_against_keep(&mut self, label: &str, awaited: &Condition, facts: &Facts) {
+        for condition in self.kept.clone() {
+            let open = self.is_taken("broken") || self.is_shared(condition.node) || self.is_shared(awaited.node);
+            if open || !self.excludes(awaited.node, condition.node, facts) {
+                continue;
+            }
+            let (label, kept) = (self.called(label), &condition.text);
+            let headline = format!("`{label}` can only end when `{kept}`, which is kept here, is broken");
+            let said = format!("`{}` and `{kept}` exclude each other", awaited.text);
+            let d = self.at_site(codes::EXPECTATION_FAILED, headline, said, self.doubt > 0);
+            let d = d.because(condition.span, "kept from here on");
+            let d = d.help("wait for a value within what is kept, or end the `keep` before the wait");
+            self.found(d, condition.span);
+        }
+    }
+
+    /// Whether two conditions cannot hold at the same time: they set limits to one value that leave nothing between them.
+    fn excludes(&mut self, one: NodeId, other: NodeId, facts: &Facts) -> bool {
+        let (mut these, mut those) = (Vec::new(), Vec::new());
+        self.limits_set(one, facts, &mut these);
+        self.limits_set(other, facts, &mut those);
+        these.iter().any(|(value, low, high)| {
+            those.iter().any(|(same, least, most)| value == same && (low > most || least > high))
+        })
+    }
+
+    /// The limits that a condition sets to values: value, least, most.
+    fn limits_set(&mut self, node: NodeId, facts: &Facts, out: &mut Vec<(NodeId, f64, f64)>) {
+        match self.lab.graph.op(node) {
+            Op::Binary(BinaryOp::And, a, b) => {
+                self.limits_set(a, facts, out);
+                self.limits_set(b, facts, out);
+            }
+            Op::Binary(BinaryOp::Lt | BinaryOp::Le, a, b) => {
+                let mut fixed =
+                    |n: NodeId| self.parts(n).states.is_empty().then(|| self.eval(n, facts).exact()).flatten();
+                match (fixed(a), fixed(b)) {
+                    (Some(low), None) => out.push((b, low, f64::INFINITY)),
+                    (None, Some(high)) => out.push((a, f64::NEG_INFINITY, high)),
+                    _ => {}
+                }
+            }
+            _ => {}
         }
     }
 

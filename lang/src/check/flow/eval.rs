@@ -15,6 +15,9 @@ use super::{Flow, Raised};
 /// So many cases are told apart.
 const MOST_CASES: usize = 16;
 
+/// So many states of one condition are narrowed to those of their few values that agree with it.
+const MOST_SIFTED: usize = 4;
+
 /// What a node depends on.
 #[derive(Debug, Default)]
 pub struct Parts {
@@ -399,9 +402,8 @@ impl Flow<'_, '_> {
     }
 
     /// Takes a condition for true or false, as far as that says something of single states.
-    pub fn assume(&self, node: NodeId, holds: bool, facts: &mut Facts) {
-        let graph = &self.lab.graph;
-        match graph.op(node) {
+    pub fn assume(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+        match self.lab.graph.op(node) {
             Op::Unary(UnaryOp::Not, a) => self.assume(a, !holds, facts),
             Op::Binary(BinaryOp::And, a, b) if holds => {
                 self.assume(a, true, facts);
@@ -418,22 +420,51 @@ impl Flow<'_, '_> {
             }
             Op::State(s) if self.is_truth(s) => facts.states[s as usize] = Known::Point(f64::from(u8::from(holds))),
             Op::Binary(op @ (BinaryOp::Eq | BinaryOp::Lt | BinaryOp::Le), a, b) => {
-                let number = |n: NodeId| match graph.op(n) {
-                    Op::Const(v) => Some(v),
-                    Op::Param(i) => self.params[i as usize].exact(),
-                    Op::State(s) => facts.states[s as usize].exact(),
-                    _ => None,
-                };
-                let (s, v, left) = match (graph.op(a), graph.op(b), number(a), number(b)) {
-                    (Op::State(s), _, None, Some(v)) => (s, v, true),
-                    (_, Op::State(s), Some(v), None) => (s, v, false),
-                    _ => return,
-                };
-                let mut known = facts.states[s as usize].clone();
-                cut(&mut known, op, v, holds, left);
-                facts.narrow(s, known);
+                self.assume_compared(op, (a, b), holds, facts);
+                self.sift(node, holds, facts);
             }
-            _ => {}
+            _ => self.sift(node, holds, facts),
+        }
+    }
+
+    /// Takes a comparison of a state with a number for true or false.
+    fn assume_compared(&self, op: BinaryOp, (a, b): (NodeId, NodeId), holds: bool, facts: &mut Facts) {
+        let graph = &self.lab.graph;
+        let number = |n: NodeId| match graph.op(n) {
+            Op::Const(v) => Some(v),
+            Op::Param(i) => self.params[i as usize].exact(),
+            Op::State(s) => facts.states[s as usize].exact(),
+            _ => None,
+        };
+        let (s, v, left) = match (graph.op(a), graph.op(b), number(a), number(b)) {
+            (Op::State(s), _, None, Some(v)) => (s, v, true),
+            (_, Op::State(s), Some(v), None) => (s, v, false),
+            _ => return,
+        };
+        let mut known = facts.states[s as usize].clone();
+        cut(&mut known, op, v, holds, left);
+        facts.narrow(s, known);
+    }
+
+    /// Of states that are one of a few numbers each, those numbers stay with which a condition may come out so.
+    fn sift(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+        let parts = self.parts(node);
+        let few = |s: &u32| matches!(facts.states[*s as usize], Known::Few(..)) && !facts.hangs(*s);
+        let open: Vec<u32> = parts.states.iter().copied().filter(few).take(MOST_SIFTED).collect();
+        if open.is_empty() || self.is_shared(node) {
+            return;
+        }
+        for state in open {
+            let Known::Few(all, why) = facts.states[state as usize].clone() else { continue };
+            let mut supposed = facts.clone();
+            let mut may = |value: &f64| {
+                supposed.states[state as usize] = Known::Point(*value);
+                self.eval(node, &supposed).truth() != Some(!holds)
+            };
+            let stay: Vec<f64> = all.iter().copied().filter(|value| may(value)).collect();
+            if !stay.is_empty() && stay.len() < all.len() {
+                facts.narrow(state, Known::of(stay, why));
+            }
         }
     }
 

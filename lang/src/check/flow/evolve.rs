@@ -35,6 +35,9 @@ const MOST_AT_ONCE: f64 = 512.0;
 /// Sweeps over all faces before those that are still crossed count as without bound.
 const SWEEPS: usize = 40;
 
+/// Sweeps after which faces that still push each other are moved out together, each time.
+const EACH: usize = 6;
+
 /// By this share of its distance a face is moved further than alone it would have to be.
 const OVERSHOOT: f64 = 0.1;
 
@@ -71,7 +74,7 @@ pub struct Barrier {
 
 /// A pair of faces of the box, by derivative.
 #[derive(Clone, Copy)]
-enum Wall {
+pub(super) enum Wall {
     /// Of the state.
     Whole(u32),
     /// Of the state without what the fluxes that change matter bring: a heat content without the heat of reactions.
@@ -89,9 +92,9 @@ enum Kind {
 }
 
 /// A box that is being made.
-struct Making {
+pub(super) struct Making {
     /// What is known within it.
-    within: Facts,
+    pub(super) within: Facts,
     /// Faces of states that fluxes of matter change besides others.
     whole: BTreeMap<u32, (f64, f64)>,
     /// Fluxes that go on.
@@ -99,9 +102,11 @@ struct Making {
     /// Whether extents go down and up.
     ways: BTreeMap<usize, (bool, bool)>,
     /// Derivatives that are not zero.
-    moving: BTreeSet<u32>,
+    pub(super) moving: BTreeSet<u32>,
     /// How many of them have faces.
-    faces: usize,
+    pub(super) faces: usize,
+    /// The walls whose lower, and whose upper, faces were moved out together.
+    pub(super) together: [Vec<Wall>; 2],
 }
 
 impl Flow<'_, '_> {
@@ -427,6 +432,7 @@ impl Flow<'_, '_> {
             ways: BTreeMap::new(),
             moving: BTreeSet::new(),
             faces: 0,
+            together: Default::default(),
         };
         // Faces that late sweeps cross are without bound from then on, and each flux starts once, so that this ends.
         let mut round = 0;
@@ -440,7 +446,11 @@ impl Flow<'_, '_> {
             }
             due = crossed;
             round += 1;
+            if !due.is_empty() && round % EACH == 0 && round < SWEEPS {
+                self.settle_together(facts, &mut box_, &mut due);
+            }
         }
+        self.narrow_together(facts, &mut box_);
         if box_.faces <= MOST_MOVING {
             self.narrow(facts, &mut box_);
         }
@@ -573,7 +583,7 @@ impl Flow<'_, '_> {
     }
 
     /// The faces of a wall.
-    fn faces(&self, wall: Wall, making: &Making) -> (f64, f64) {
+    pub(super) fn faces(&self, wall: Wall, making: &Making) -> (f64, f64) {
         let state = |i: u32| self.derivatives[i as usize].state;
         match wall {
             Wall::Whole(i) => {
@@ -590,14 +600,14 @@ impl Flow<'_, '_> {
     }
 
     /// Where the faces of a wall stand at first.
-    fn begins(&self, wall: Wall, facts: &Facts) -> (f64, f64) {
+    pub(super) fn begins(&self, wall: Wall, facts: &Facts) -> (f64, f64) {
         match wall {
             Wall::Whole(i) => facts.states[self.derivatives[i as usize].state as usize].bounds(),
             Wall::Apart(i) => self.apart(self.derivatives[i as usize].state, facts),
         }
     }
 
-    fn set_faces(&mut self, wall: Wall, faces: (f64, f64), facts: &Facts, making: &mut Making) {
+    pub(super) fn set_faces(&mut self, wall: Wall, faces: (f64, f64), facts: &Facts, making: &mut Making) {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let state = self.derivatives[i as usize].state;
         let known = Known::Range(faces.0, faces.1, Why::Unknown);
@@ -661,8 +671,8 @@ impl Flow<'_, '_> {
         if side > 0.0 { fast } else { -slow }
     }
 
-    /// Brings faces back in as far as nothing crosses them.
-    fn narrow(&mut self, facts: &Facts, making: &mut Making) {
+    /// The walls of the box.
+    pub(super) fn walls(&mut self, making: &Making) -> Vec<Wall> {
         let mut walls = Vec::new();
         for i in making.moving.clone() {
             match self.kind(i) {
@@ -673,6 +683,12 @@ impl Flow<'_, '_> {
                 _ => walls.push(Wall::Whole(i)),
             }
         }
+        walls
+    }
+
+    /// Brings faces back in as far as nothing crosses them.
+    fn narrow(&mut self, facts: &Facts, making: &mut Making) {
+        let walls = self.walls(making);
         for _ in 0..NARROWINGS {
             let mut rests = true;
             for wall in &walls {
@@ -710,13 +726,13 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds of a derivative.
-    fn rate(&mut self, derivative: u32, within: &Facts) -> (f64, f64) {
+    pub(super) fn rate(&mut self, derivative: u32, within: &Facts) -> (f64, f64) {
         self.enclose(self.derivatives[derivative as usize].rate, within).bounds()
     }
 
     /// Bounds of how fast what a wall is of changes where it has a value; the rate was evaluated before with nothing else
     /// otherwise. Nothing moves where both kinds of walls leave no room.
-    fn rate_at(&mut self, wall: Wall, at: f64, making: &mut Making) -> (f64, f64) {
+    pub(super) fn rate_at(&mut self, wall: Wall, at: f64, making: &mut Making) -> (f64, f64) {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let derivative = &self.derivatives[i as usize];
         let state = derivative.state;
@@ -750,7 +766,7 @@ impl Flow<'_, '_> {
         bounds
     }
 
-    fn still(&self, state: u32, facts: &Facts) -> f64 {
+    pub(super) fn still(&self, state: u32, facts: &Facts) -> f64 {
         STILL * self.scale(state, facts)
     }
 

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Step, StepId};
 use matterix_ir::quantity::show_duration;
-use matterix_ir::{Diagnostic, Severity, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Severity, Span, codes};
 
 use super::Flow;
 use super::facts::Facts;
@@ -159,8 +159,8 @@ impl<'p> Flow<'p, '_> {
         match &node.step {
             Step::Operation(operation) => self.effects_of(operation, place, time, facts, out),
             Step::Wait { duration } => {
-                let (low, high) = self.eval(*duration, facts).bounds();
-                *time = (time.0 + low.max(0.0), time.1 + high.max(0.0));
+                let (low, high) = self.lasts_beside(*duration, facts);
+                *time = (time.0 + low, time.1 + high);
             }
             Step::Sequence(_)
             | Step::Skill { .. }
@@ -224,10 +224,24 @@ impl<'p> Flow<'p, '_> {
         if operation.until.is_some() {
             time.1 = f64::INFINITY;
         } else if let Some(takes) = &operation.takes {
-            let (low, high) = self.eval(takes.nominal, facts).bounds();
-            *time = (time.0 + low.max(0.0), time.1 + high.max(0.0));
+            let (low, high) = self.lasts_beside(takes.nominal, facts);
+            *time = (time.0 + low, time.1 + high);
         }
         out.push(Effect { at: *time, actions: &operation.at_end, span, later });
+    }
+
+    /// How long a step of another branch or job lasts at least and at most, s: open where a step of the plan changes what that follows from.
+    fn lasts_beside(&mut self, duration: NodeId, facts: &Facts) -> (f64, f64) {
+        let parts = self.parts(duration);
+        let changes = |flow: &Self| {
+            let changed = flow.behind(&flow.writes(flow.plan.root));
+            parts.states.iter().any(|s| changed.contains(s))
+        };
+        if !parts.states.is_empty() && changes(self) {
+            return (0.0, f64::INFINITY);
+        }
+        let (low, high) = self.eval(duration, facts).bounds();
+        (low.max(0.0), high.max(0.0))
     }
 
     /// The steps that follow one in the block it stands in, up to where it is waited for.

@@ -25,6 +25,8 @@ pub(super) struct Job {
     end: Option<Known>,
     /// The states that it changes.
     writes: BTreeSet<u32>,
+    /// The states that hang on when it does something and when others do.
+    raced: BTreeSet<u32>,
     /// What it changes that should be in order at the end, as far as that was asked for.
     course: Rc<Course>,
     /// What was known when it began.
@@ -88,6 +90,7 @@ impl Flow<'_, '_> {
     pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: Facts) -> Option<Facts> {
         let (start, writes) = (facts.time.clone(), self.sets_going(self.writes(body)));
         let (depth, blocks) = (self.guards.len(), self.blocks);
+        let raced = self.raced_by_job(body);
         let base = self.stops_jobs.then(|| Rc::new(facts.clone()));
         let mut course = Rc::default();
         let end = match self.late {
@@ -101,7 +104,7 @@ impl Flow<'_, '_> {
                 let courses = std::mem::take(&mut self.courses);
                 self.begin_course();
                 let meantime = self.meantime(&writes, &facts);
-                let after = self.job(body, facts);
+                let after = self.job(body, &raced, facts);
                 course = self.end_course();
                 self.courses = courses;
                 self.begun_job(name, body);
@@ -116,7 +119,7 @@ impl Flow<'_, '_> {
         facts.begun.insert(name.to_owned(), true);
         self.jobs.insert(
             name.to_owned(),
-            Job { body, start, end, writes, course, base, depth, blocks, within: self.in_jobs },
+            Job { body, start, end, writes, raced, course, base, depth, blocks, within: self.in_jobs },
         );
         Some(facts)
     }
@@ -141,20 +144,22 @@ impl Flow<'_, '_> {
 
     fn end_of_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
         self.end_job(name);
-        let Some(Job { body, start, end, writes, .. }) = self.jobs.remove(name) else { return Some(facts) };
+        let Some(Job { body, start, end, writes, raced, .. }) = self.jobs.remove(name) else { return Some(facts) };
         let now = facts.time.clone();
         let end = match end {
             Some(end) => end,
             None => {
                 let meantime = self.look_back(&writes, &mut facts);
                 facts.time = start;
-                facts = self.job(body, facts)?;
+                facts = self.job(body, &raced, facts)?;
                 let end = std::mem::replace(&mut facts.time, now.clone());
                 self.begin_again(meantime.as_ref(), &mut facts);
                 end
             }
         };
         self.catch_up(&end, &writes, &mut facts);
+        let raced: Vec<u32> = raced.into_iter().collect();
+        self.forget(&raced, &mut facts);
         facts.time = Known::binary(BinaryOp::Max, &now, &end);
         Some(facts)
     }
@@ -167,8 +172,13 @@ impl Flow<'_, '_> {
         Some(facts)
     }
 
-    fn job(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
-        let others = self.sets_going(self.beside(body));
+    fn job(&mut self, body: StepId, raced: &BTreeSet<u32>, facts: Facts) -> Option<Facts> {
+        let mut others = self.sets_going(self.beside(body));
+        others.extend(raced);
+        let beside = self.concurrent(body);
+        let met: BTreeSet<u32> = beside.into_iter().flat_map(|id| self.writes(id)).collect();
+        let met = self.sets_going(met).union(raced).copied().collect();
+        self.meets.push(met);
         self.begin_job(&others);
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
@@ -180,6 +190,7 @@ impl Flow<'_, '_> {
         self.in_jobs -= 1;
         self.rivals.pop();
         self.shared.pop();
+        self.meets.pop();
         after
     }
 
@@ -207,7 +218,7 @@ impl Flow<'_, '_> {
 
     /// The states that jobs which go on change.
     pub(super) fn of_jobs(&self) -> impl Iterator<Item = &BTreeSet<u32>> {
-        self.jobs.values().map(|job| &job.writes)
+        self.jobs.values().flat_map(|job| [&job.writes, &job.raced])
     }
 }
 

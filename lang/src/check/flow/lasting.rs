@@ -1,12 +1,14 @@
 //! How long steps take and how often they are done, where that cannot be.
 
-use matterix_ir::plan::LONGEST_RUN;
+use std::collections::BTreeMap;
+
+use matterix_ir::plan::{LONGEST_RUN, Operation, StepId};
 use matterix_ir::quantity::{show_duration, show_number};
 use matterix_ir::{Code, NodeId, Severity, codes};
 
-use super::Flow;
 use super::facts::Facts;
 use super::value::{Known, Why};
+use super::{Flow, MOST_STEPS};
 
 impl Flow<'_, '_> {
     /// A duration as it is when a step is reached, s; reported where it is negative on every way.
@@ -21,6 +23,36 @@ impl Flow<'_, '_> {
             return Known::Range(0.0, f64::INFINITY, Why::Unknown);
         }
         time
+    }
+
+    /// Notes how long an operation lasts that begins now, where that follows from states.
+    pub(super) fn note_duration(&mut self, id: StepId, operation: &Operation, facts: &Facts) {
+        let Some(takes) = operation.takes.filter(|t| operation.until.is_none() && t.bounds.is_none()) else { return };
+        let parts = self.parts(takes.nominal);
+        if parts.states.is_empty() {
+            return;
+        }
+        let open = parts.timed || self.is_shared(takes.nominal);
+        let (low, high) = if open { (0.0, f64::INFINITY) } else { self.eval(takes.nominal, facts).bounds() };
+        let (least, most) = self.lasting.entry(id).or_insert((f64::INFINITY, 0.0));
+        (*least, *most) = (least.min(low.max(0.0)), most.max(high.max(0.0)));
+    }
+
+    /// Nothing is known of how long the operations in a body last: it is done more often than it was followed.
+    pub(super) fn durations_unknown(&mut self, body: StepId) {
+        for id in self.below(body) {
+            self.lasting.insert(id, (0.0, f64::INFINITY));
+        }
+    }
+
+    /// How long operations last of which that follows from states, s.
+    pub(super) fn durations(&mut self) -> BTreeMap<StepId, (f64, f64)> {
+        if self.steps > MOST_STEPS {
+            return BTreeMap::new();
+        }
+        let mut all = std::mem::take(&mut self.lasting);
+        all.retain(|_, (low, high)| *low > 0.0 || high.is_finite());
+        all
     }
 
     /// How often a body is done; reported where that is no whole number, or less than none.

@@ -30,10 +30,12 @@ mod otherwise;
 mod parted;
 mod points;
 mod polytope;
+mod raced;
 mod report;
 mod reported;
 mod stopped;
 mod timers;
+mod together;
 mod totals;
 mod turns;
 mod value;
@@ -152,6 +154,10 @@ struct Flow<'l, 'a> {
     cleaning: usize,
     /// States that other branches change at the same time.
     shared: Vec<BTreeSet<u32>>,
+    /// Of these, those that others change while the branch or job that is followed goes on.
+    meets: Vec<BTreeSet<u32>>,
+    /// How long operations last of which that follows from states, s, by step; joined over all times they are done.
+    lasting: BTreeMap<StepId, (f64, f64)>,
     /// What goes on beside the branches and jobs that are followed, innermost last.
     rivals: Vec<Vec<interference::Rival>>,
     /// Things that what is followed has to itself, innermost last.
@@ -197,6 +203,8 @@ pub struct Followed {
     pub windows: BTreeMap<ReactionId, Window>,
     /// What is known of the nodes asked for: at the start, and after each statement.
     pub seen: Vec<Seen>,
+    /// How long operations last of which that follows from states, s, by step.
+    pub lasting: BTreeMap<StepId, (f64, f64)>,
 }
 
 /// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement.
@@ -220,6 +228,7 @@ pub fn check(
     in_time::add_findings(&mut flow, &begin);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
+    let lasting = flow.durations();
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
     for (param, value) in others {
@@ -233,7 +242,7 @@ pub fn check(
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);
     }
-    Followed { found, windows, seen }
+    Followed { found, windows, seen, lasting }
 }
 
 /// Whether all branches and jobs go on at times that are known, and no two of them use one thing at the same time.
@@ -300,6 +309,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             doubt: 0,
             cleaning: 0,
             shared: Vec::new(),
+            meets: Vec::new(),
+            lasting: BTreeMap::new(),
             rivals: Vec::new(),
             claimed: Vec::new(),
             kept: Vec::new(),

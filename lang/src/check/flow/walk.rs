@@ -79,6 +79,7 @@ impl Flow<'_, '_> {
             }
             Step::Parallel(branches) => self.parallel(branches, facts),
             Step::Operation(operation) => {
+                self.note_duration(id, operation, &facts);
                 self.may_report(operation, &facts);
                 self.operation(&node.label, operation, facts)
             }
@@ -113,8 +114,9 @@ impl Flow<'_, '_> {
                 Some(after)
             }
             Step::Let { local, value } => {
-                let known = self.eval(*value, &facts);
-                if !known.exact().is_some_and(f64::is_finite) {
+                let raced = self.is_raced(*value);
+                let known = if raced { Known::nothing() } else { self.eval(*value, &facts) };
+                if !raced && !known.exact().is_some_and(f64::is_finite) {
                     self.without_value(*value, node.span, &facts);
                 }
                 facts.keep(*local, known);
@@ -125,9 +127,18 @@ impl Flow<'_, '_> {
                 self.pass(&time, &mut facts);
                 Some(facts)
             }
-            Step::WaitUntil { condition, timeout } => self.wait_until(id, condition, *timeout, facts),
+            Step::WaitUntil { condition, timeout } => {
+                let after = self.wait_until(id, condition, *timeout, facts)?;
+                if timeout.is_none() || !self.is_taken("timeout") {
+                    self.waits_against_keep(&node.label, condition, &after);
+                }
+                Some(after)
+            }
             Step::Hold { condition, duration, timeout } => {
                 let mut facts = self.wait_until(id, condition, *timeout, facts)?;
+                if timeout.is_none() || !self.is_taken("timeout") {
+                    self.waits_against_keep(&node.label, condition, &facts);
+                }
                 let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
                 self.assume(condition.node, true, &mut facts);
@@ -329,7 +340,7 @@ impl Flow<'_, '_> {
             }
         }
         self.more_turns(body, false, &facts);
-        self.turns_not_followed();
+        self.turns_not_followed(body);
         self.widen(body, &mut facts);
         Some(later(facts, &begun))
     }
@@ -384,7 +395,7 @@ impl Flow<'_, '_> {
             }
         }
         self.more_turns(body, false, &facts);
-        self.turns_not_followed();
+        self.turns_not_followed(body);
         self.widen(body, &mut facts);
         self.raise_written("max", self.plan.get(id).span, facts.clone());
         ends.push(facts);
@@ -392,7 +403,8 @@ impl Flow<'_, '_> {
     }
 
     /// Says that more turns of a loop are not followed one by one.
-    fn turns_not_followed(&mut self) {
+    fn turns_not_followed(&mut self, body: StepId) {
+        self.durations_unknown(body);
         let headline = format!("the turns of this loop are followed one by one up to {MOST_TURNS} of them");
         self.not_analysed(Severity::Advice, headline, "what further turns change is unknown after it");
     }
@@ -429,20 +441,25 @@ impl Flow<'_, '_> {
     /// wrong in one order only may be right in the order of the run.
     fn parallel(&mut self, branches: &[StepId], facts: Facts) -> Option<Facts> {
         let writes: Vec<BTreeSet<u32>> = branches.iter().map(|b| self.sets_going(self.writes(*b))).collect();
+        let raced = self.raced_in_branches(branches);
         let forward: Vec<usize> = (0..branches.len()).collect();
         let backward: Vec<usize> = forward.iter().rev().copied().collect();
         let mark = self.findings.len();
         let from = self.guards.last().map_or(0, Vec::len);
         let mut lines = (branches.len() > 1 && self.is_stopped_by(branches)).then(Lines::default);
-        let first = self.in_order(branches, &forward, &writes, facts.clone(), lines.as_mut());
+        let first = self.in_order(branches, &forward, (&writes, &raced), facts.clone(), lines.as_mut());
         if branches.len() < 2 || self.shared.len() >= MOST_PARALLEL {
             lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
             self.cut_short(from);
-            return first;
+            return first.map(|mut facts| {
+                let open: Vec<u32> = raced.iter().flatten().copied().collect();
+                self.forget(&open, &mut facts);
+                facts
+            });
         }
         let one: Vec<Finding> = self.findings.split_off(mark);
         self.once_more(true);
-        let second = self.in_order(branches, &backward, &writes, facts.clone(), lines.as_mut());
+        let second = self.in_order(branches, &backward, (&writes, &raced), facts.clone(), lines.as_mut());
         self.once_more(false);
         lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
         self.cut_short(from);
@@ -453,7 +470,9 @@ impl Flow<'_, '_> {
                 // What flows at once comes to something between, or to neither.
                 let tracks = self.tracks();
                 let differ = |s: &u32| a.states[*s as usize] != b.states[*s as usize];
-                let open: Vec<u32> = tracks.list.iter().map(|t| t.state).filter(differ).collect();
+                let raced = raced.iter().flatten().copied();
+                let open: BTreeSet<u32> = tracks.list.iter().map(|t| t.state).chain(raced).filter(differ).collect();
+                let open: Vec<u32> = open.into_iter().collect();
                 let mut both = facts.join(a, &b, self.site(), Why::Unknown);
                 self.forget(&open, &mut both);
                 Some(both)
@@ -466,7 +485,7 @@ impl Flow<'_, '_> {
         &mut self,
         branches: &[StepId],
         order: &[usize],
-        writes: &[BTreeSet<u32>],
+        (writes, raced): (&[BTreeSet<u32>], &[BTreeSet<u32>]),
         mut facts: Facts,
         mut lines: Option<&mut Lines>,
     ) -> Option<Facts> {
@@ -477,8 +496,10 @@ impl Flow<'_, '_> {
         let mut ends = Vec::new();
         for i in order {
             let others = writes.iter().enumerate().filter(|(o, _)| o != i);
-            let others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
+            let mut others: BTreeSet<u32> = others.flat_map(|(_, w)| w.iter().copied()).collect();
+            others.extend(&raced[*i]);
             self.begin_branch(&others);
+            self.meets.push(others.clone());
             facts.time = start.clone();
             if longest != start {
                 self.begin_again(meantime.as_ref(), &mut facts);
@@ -494,6 +515,7 @@ impl Flow<'_, '_> {
             self.blur(raised);
             self.rivals.pop();
             self.shared.pop();
+            self.meets.pop();
             self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);

@@ -18,7 +18,7 @@ use matterix_ir::plan::{Caught, Plan, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 use matterix_timing::network::WHOLE;
 use matterix_timing::walk::Durations;
-use matterix_timing::{Known, Point, ROUNDING, Scope, Timing, Visit};
+use matterix_timing::{Interval, Known, Point, ROUNDING, Scope, Timing, Visit};
 
 use crate::elaborate::Elaborator;
 
@@ -31,10 +31,18 @@ const MOST_WORK: usize = 2_000_000_000;
 /// Rounds in which single blocks are found to wait; after them, all wait that others contend with.
 const MOST_ROUNDS: usize = 6;
 
-/// Reports contradictions in the times of a plan and in the use of instances.
-pub fn plan(lab: &Elaborator<'_>, plan: &Plan, derivatives: &[Derivative], events: &[Event]) -> Vec<Diagnostic> {
+/// Reports contradictions in the times of a plan and in the use of instances; `lasting` says how long steps last, s, where that
+/// follows from states.
+pub fn plan(
+    lab: &Elaborator<'_>,
+    plan: &Plan,
+    derivatives: &[Derivative],
+    events: &[Event],
+    lasting: &BTreeMap<StepId, (f64, f64)>,
+) -> Vec<Diagnostic> {
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
-    let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
+    let mut known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
+    known.lasting = lasting.iter().map(|(id, (min, max))| (*id, Interval { min: *min, max: *max })).collect();
     let (late, times) = timed(plan, &known);
     let mut found = takes::findings(plan, &known, &times.timing);
     let told = |d: &Diagnostic| found.iter().any(|f: &Diagnostic| f.code == d.code && f.span() == d.span());
