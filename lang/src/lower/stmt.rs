@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 use super::Planner;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
 use crate::eval::{Num, Scope, Type, Value};
-use crate::task::Given;
+use crate::task::{Choice, Given};
 
 impl<'a> Planner<'a, '_> {
     /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
@@ -606,11 +606,13 @@ impl<'a> Planner<'a, '_> {
                     Value::Num(named)
                 }
                 Value::Bool(node) => {
+                    let node = self.chosen(&p.name.text, node, given, &["false", "true"]);
                     let truth = self.lab.graph.constant(node).map(|v| if v == 0.0 { "false" } else { "true" });
                     shown.extend(truth.map(|t| (p.name.text.clone(), t.to_string())));
                     Value::Bool(node)
                 }
                 Value::Enum(node, words) => {
+                    let node = self.chosen(&p.name.text, node, given, &words);
                     let word = self.lab.graph.constant(node).and_then(|v| words.get(v as usize));
                     shown.extend(word.map(|w| (p.name.text.clone(), w.clone())));
                     Value::Enum(node, words)
@@ -625,6 +627,22 @@ impl<'a> Planner<'a, '_> {
             scope.bind(p.name.text.clone(), v);
         }
         shown
+    }
+
+    /// The node of a parameter that is a truth value or a word: what it is given or supposed to have, or its default.
+    fn chosen<W: AsRef<str>>(&mut self, name: &str, node: NodeId, given: Option<&Given<'a>>, words: &[W]) -> NodeId {
+        let Some(word) = self.lab.graph.constant(node).and_then(|v| words.get(v as usize)) else { return node };
+        if given.is_some() {
+            return node;
+        }
+        let supposed = self.supposed.as_ref().filter(|choice| choice.name == name);
+        let other = supposed.and_then(|choice| words.iter().position(|word| word.as_ref() == choice.word));
+        if let Some(index) = other {
+            return self.lab.graph.number(index as f64);
+        }
+        let words: Vec<String> = words.iter().map(|word| word.as_ref().to_owned()).collect();
+        self.lab.choices.push(Choice { name: name.to_owned(), word: word.as_ref().to_owned(), words });
+        node
     }
 }
 

@@ -417,7 +417,7 @@ fn presumed(plan: &Plan) -> BTreeSet<NodeId> {
 }
 
 /// Whether a finding of this kind is an error even where it happens on some ways only: what is gone stays gone.
-fn forbidden_on_any_way(code: Code) -> bool {
+pub fn forbidden_on_any_way(code: Code) -> bool {
     code.family == "T2"
 }
 
