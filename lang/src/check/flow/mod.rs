@@ -210,13 +210,13 @@ pub fn check(
     let windows = std::mem::take(&mut flow.windows);
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
-    for (param, value) in others {
+    for other in others {
         let supposing = || {
             let mut flow = begin();
-            flow.params[param as usize] = Known::point(value);
+            flow.params[other.param as usize] = Known::point(other.value);
             flow
         };
-        let new = otherwise::said_of(lab, param, value, jobs::follow(supposing).diagnostics());
+        let new = otherwise::said_of(lab, &other, jobs::follow(supposing).diagnostics());
         let is_new = |d: &Diagnostic| !found.iter().any(|f| f.code == d.code && f.span() == d.span());
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);

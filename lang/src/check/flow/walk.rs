@@ -134,11 +134,17 @@ impl Flow<'_, '_> {
                 Some(facts)
             }
             Step::Keep { condition, body } => {
+                let fails = self.eval(condition.node, &facts).truth() == Some(false);
+                if fails && self.is_taken("broken") && !self.is_shared(condition.node) {
+                    // The body does not begin.
+                    self.raise("broken", facts);
+                    return None;
+                }
                 let mut broken = facts.clone();
                 self.widen(*body, &mut broken);
                 self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
                 self.raise("broken", broken);
-                if self.eval(condition.node, &facts).truth() == Some(false) && !self.is_shared(condition.node) {
+                if fails && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
                 }
                 self.kept.push(condition);
