@@ -537,6 +537,8 @@ impl Flow<'_, '_> {
             self.guards.push(Vec::new());
             let after = self.walk(*step, entry.clone());
             let raised = self.guards.pop().unwrap_or_default();
+            // A job does not outlast the alternative that began it.
+            let after = self.end_block(after);
             self.caught.pop();
             ends.extend(after);
             if last {
@@ -545,8 +547,8 @@ impl Flow<'_, '_> {
                 }
                 break;
             }
-            match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
-                Some(next) => entry = next,
+            match self.entry(id, &facts, raised) {
+                Some(next) => entry = Facts { written: None, ..next },
                 None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);
