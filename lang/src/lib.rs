@@ -28,6 +28,7 @@ mod share;
 mod sila;
 pub mod stock;
 mod study;
+mod supposed;
 pub mod task;
 pub mod units;
 

@@ -27,6 +27,7 @@ use crate::points::Questions;
 use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
 use crate::settle::{self, Purpose, Settled};
 use crate::study::{self, Many};
+use crate::supposed;
 use crate::task::{self, Given, Task};
 
 /// What a compilation is asked for.
@@ -148,7 +149,8 @@ fn examine(
     for item in items.iter().copied() {
         match task::labs(&tables, sources, root, item, &[]) {
             Ok(labs) => {
-                tasks.extend(labs.into_iter().map(|lab| Task { item, lab, given: task::given(&tables, item, &[]) }))
+                let given = |lab| Task { item, lab, given: task::given(&tables, item, &[]), supposed: None };
+                tasks.extend(labs.into_iter().map(given));
             }
             Err(d) => diagnostics.push(*d),
         }
@@ -306,7 +308,7 @@ fn task_of<'a>(
     let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
     diagnostics.extend(task::check_given(tables, item, &given));
     match task::lab(tables, sources, root, item, &given, options.lab.as_deref()) {
-        Ok(lab) => Some(Task { item, lab, given }),
+        Ok(lab) => Some(Task { item, lab, given, supposed: None }),
         Err(d) => {
             diagnostics.push(*d);
             None
@@ -386,7 +388,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let mut program = None;
         match task::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
-                let (task, wanted) = (Task { item, lab, given }, Wanted::Program(Wires::Off));
+                let (task, wanted) = (Task { item, lab, given, supposed: None }, Wanted::Program(Wires::Off));
                 let built = build(&tables, sources, &task, wanted, None, &|| false).unwrap_or_default();
                 found.extend(built.findings);
                 program = built.program;
@@ -544,6 +546,8 @@ struct Built {
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
     many: Option<Many>,
+    /// Truth values and words among the parameters that have only their default.
+    choices: Vec<task::Choice>,
     /// What can get where, where that was found anew.
     reach: Option<Reach>,
     /// What looking at motions has found, where that was asked for.
@@ -640,6 +644,16 @@ fn judge<'a>(
 ) -> Option<Built> {
     let stop = || (asked.stop)() || tables.stop.asked();
     let mut built = build(tables, sources, task, asked.wanted, foreseen, &stop)?;
+    let item = tables.names.decl(task.item).item;
+    // What is wrong with the defaults is mended first.
+    if let (ItemKind::Workflow { name, .. }, true) = (&item.kind, built.findings.iter().all(|d| !d.is_error())) {
+        let supposing = |choice: &task::Choice| {
+            let task = Task { supposed: Some(choice.clone()), ..task.clone() };
+            build(tables, sources, &task, Wanted::Findings, None, &stop).map(|built| built.findings)
+        };
+        let found = supposed::found(&built.choices, name.span, &built.findings, supposing)?;
+        built.findings.extend(found);
+    }
     if asked.wanted == Wanted::Motions {
         let fine = built.findings.iter().all(|d| !d.is_error());
         // What robots do is looked at for the workflow itself.
@@ -697,6 +711,7 @@ fn build<'a>(
     let starts = Some(starts);
     let many = study::resolve(&mut elaborator, task);
     elaborator.note_things(lab);
+    let choices = std::mem::take(&mut elaborator.choices);
     let noted = Noted::of(elaborator.meanings.take(), tables.names);
     let mut uses = None;
     if !to_run {
@@ -713,7 +728,18 @@ fn build<'a>(
         if wanted != Wanted::Motions || !(elaborator.has_robots() || elaborator.has_places()) {
             let findings = elaborator.diagnostics;
             let reach = Some(reach);
-            return Some(Built { wiring, points, noted, findings, starts, uses, many, reach, ..Built::default() });
+            return Some(Built {
+                wiring,
+                points,
+                noted,
+                findings,
+                starts,
+                uses,
+                many,
+                choices,
+                reach,
+                ..Built::default()
+            });
         }
     }
     let temperatures = elaborator.temperatures(&events, &plan);
@@ -755,7 +781,8 @@ fn build<'a>(
     let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
     let findings = elaborator.diagnostics;
     let program = Some(program);
-    Some(Built { program, wiring, points, noted, findings, starts, uses, many, reach: Some(reach), moved: None })
+    let reach = Some(reach);
+    Some(Built { program, wiring, points, noted, findings, starts, uses, many, choices, reach, moved: None })
 }
 
 fn species(s: &crate::elaborate::species::SpeciesDef<'_>) -> matterix_ir::model::Species {

@@ -29,6 +29,19 @@ pub struct Task<'a> {
     pub lab: DeclId,
     /// Values of parameters.
     pub given: Vec<Given<'a>>,
+    /// Another value than its default that one of the workflow's parameters is supposed to have.
+    pub supposed: Option<Choice>,
+}
+
+/// A value of a parameter that is a truth value or a word.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// The parameter.
+    pub name: String,
+    /// The word it has: `true` and `false` for a truth value.
+    pub word: String,
+    /// All words it may have, in their order.
+    pub words: Vec<String>,
 }
 
 /// The workflow that a test runs: `run synthesize { target: 76 degC }`.

@@ -157,3 +157,43 @@ fn a_label_names_what_is_weighed_in_or_an_ion_of_it() {
     let (headline, ..) = finding("zero", &text.replace("0.04 mol/kg of K+", "0 mol/kg of KI"));
     assert_eq!(headline, "the label of `iodide` is zero: its recipe gives 0.0394977 mol/kg of KI");
 }
+
+#[test]
+fn words_of_the_language_are_no_names_of_things() {
+    for word in ["through", "using", "within"] {
+        let (found, ..) =
+            finding("reserved", &BENCH.replace("    plate =", &format!("    {word} =")).replace("on plate ", ""));
+        assert_eq!(found, format!("`{word}` is a word of the language and cannot be a name"));
+    }
+}
+
+#[test]
+fn a_catalyst_of_the_order_alone_is_one_mistake() {
+    let reaction = "reaction decay: 2 H2O2 -> 2 H2O + O2 { rate: 1.2e-3 L/(mol*s), order: { H2O2: 1, I-: 1 } }\n\nlab";
+    let text = BENCH.replace("100 g of water", "100 mL of water + 0.1 mmol of H2O2 + 1 mmol of KI");
+    let (found, help, _) = finding("catalyst", &text.replace("lab", reaction));
+    assert_eq!(found, "`I-` is not in the equation of `decay`");
+    assert_eq!(help, ["a catalyst stands on both sides: `A + C -> B + C`"]);
+}
+
+#[test]
+fn an_ion_has_another_name() {
+    let dir = folder("meant_ion");
+    let text = "mtx 1\n\nspecies triiodide { same_as: I3- }\n\nspecies sulfate { same_as: SO4^2- }\n\n\
+                solution dip { triiodide: 0 mmol/L, sulfate: 1 mmol/L, Na+: 2 mmol/L, water: rest }\n";
+    write(&dir, "ion.mtx", text);
+    let out = matterixc_in(&dir, &["check", "ion.mtx", "--format", "json"]);
+    let errors = out.out_lines().into_iter().filter(|line| line["severity"] == "error");
+    assert_eq!(errors.count(), 0);
+}
+
+#[test]
+fn a_job_of_a_branch_that_lacks_a_value_has_its_name() {
+    let dir = folder("meant_job");
+    let text = "mtx 1\n\nlab bench {\n    ambient: 22 degC\n}\n\nworkflow warm(long: Bool) in bench {\n    \
+                if long { start soak = { wait 30 min } } else { start soak = { wait 5 min } }\n    await soak\n}\n";
+    write(&dir, "job.mtx", text);
+    let out = matterixc_in(&dir, &["run", "job.mtx"]);
+    assert!(out.err.contains("`long` has no value") || out.out.contains("`long` has no value"));
+    assert!(!out.err.contains("no job `soak`") && !out.out.contains("no job `soak`"));
+}

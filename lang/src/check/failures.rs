@@ -149,15 +149,44 @@ fn takes_time(plan: &Plan, root: StepId) -> bool {
 
 /// All that a step may fail with; without what only devices report, where those do what they are told.
 pub(super) fn raised(plan: &Plan, root: StepId, devices: bool) -> BTreeSet<String> {
-    let mut out: BTreeSet<String> = BTreeSet::new();
-    let mut awaited: BTreeSet<StepId> = BTreeSet::new();
-    let mut todo = vec![root];
-    while let Some(id) = todo.pop() {
+    Raising { plan, devices, awaited: BTreeSet::new() }.of(root)
+}
+
+/// Goes through what steps fail with.
+struct Raising<'p> {
+    plan: &'p Plan,
+    /// What only devices report counts.
+    devices: bool,
+    /// Bodies of jobs that were waited for.
+    awaited: BTreeSet<StepId>,
+}
+
+impl Raising<'_> {
+    fn of(&mut self, id: StepId) -> BTreeSet<String> {
+        let (plan, devices) = (self.plan, self.devices);
+        let mut out: BTreeSet<String> = BTreeSet::new();
+        let mut more: Vec<StepId> = Vec::new();
         let step = &plan.get(id).step;
         let mut add = |name: &str| {
             out.insert(name.to_string());
         };
         match step {
+            Step::Guarded { body, handlers, finally } => {
+                let mut open = self.of(*body);
+                for (caught, handler) in handlers {
+                    // When the turns of a handler are used up, the failure goes on.
+                    if !retries(plan, *handler) {
+                        match caught {
+                            Caught::Any => open.clear(),
+                            Caught::Named(name) => drop(open.remove(name)),
+                        }
+                    }
+                    out.extend(self.of(*handler));
+                }
+                out.extend(open);
+                finally.iter().for_each(|last| out.extend(self.of(*last)));
+                return out;
+            }
             Step::Operation(o) => {
                 o.fails.iter().filter(|_| devices).for_each(|name| add(name));
                 o.needs.iter().for_each(|need| add(need.failure()));
@@ -181,14 +210,25 @@ pub(super) fn raised(plan: &Plan, root: StepId, devices: bool) -> BTreeSet<Strin
             Step::Await { job } => {
                 add("job");
                 // The failure of the job becomes that of whoever waits for it.
-                todo.extend(bodies(plan, job).filter(|body| awaited.insert(*body)));
+                more.extend(bodies(plan, job).filter(|body| self.awaited.insert(*body)));
             }
             Step::Fail { name, .. } => add(name),
             _ => {}
         }
-        todo.extend(step.children());
+        more.extend(step.children());
+        more.into_iter().for_each(|below| out.extend(self.of(below)));
+        out
     }
-    out
+}
+
+/// Whether a handler begins its body again.
+fn retries(plan: &Plan, handler: StepId) -> bool {
+    match &plan.get(handler).step {
+        Step::Retry { .. } => true,
+        // What stands in the handlers of a handler is theirs.
+        Step::Guarded { body, .. } => retries(plan, *body),
+        step => step.children().into_iter().any(|below| retries(plan, below)),
+    }
 }
 
 /// What a job does, wherever it is started.

@@ -19,7 +19,7 @@ use matterix_ir::plan::Plan;
 use matterix_ir::{Diagnostic, NodeId, Sources, codes};
 
 use self::flow::Window;
-pub use self::flow::{After, Known, Seen};
+pub use self::flow::{After, Known, Seen, forbidden_on_any_way};
 use crate::elaborate::hazards::Hazard;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};

@@ -265,7 +265,7 @@ pub fn reagents(names: &Names<'_>, sources: &Sources, module: usize) -> Vec<Diag
     // Each word with the first item that has it, and whether others have it as well.
     let mut named: HashMap<&str, (usize, bool)> = HashMap::new();
     for (index, item) in items.iter().enumerate() {
-        for word in words(sources.slice(item.span)) {
+        for word in sources.slice(item.span).split(|c: char| !is_of_species(c)).filter(|w| !w.is_empty()) {
             let known = named.entry(word).or_insert((index, false));
             known.1 |= known.0 != index;
         }
@@ -278,7 +278,8 @@ pub fn reagents(names: &Names<'_>, sources: &Sources, module: usize) -> Vec<Diag
             _ => continue,
         };
         let Some((name, span)) = item_name(item) else { continue };
-        let word = name.trim_end_matches(|c: char| !is_word(c));
+        let bare = name.split_once('(').map_or(name.as_str(), |(bare, _phase)| bare);
+        let word = bare.trim_end_matches(|c: char| !is_of_species(c));
         if named.get(word).is_some_and(|(first, several)| *several || *first != index) {
             continue;
         }
@@ -351,4 +352,9 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
 
 fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
+}
+
+/// Whether a character is one of the name of a species, all but the sign of its charge: `SO4^2-`.
+fn is_of_species(c: char) -> bool {
+    is_word(c) || c == '^'
 }

@@ -207,6 +207,8 @@ pub struct Elaborator<'a> {
     pub open_parameters: bool,
     /// Parameters of the workflow that have only their default, by index.
     pub defaulted: BTreeSet<u32>,
+    /// Truth values and words among the parameters of the workflow that have only their default.
+    pub choices: Vec<crate::task::Choice>,
     /// Pair parameters.
     pub pairs: Vec<Pair<'a>>,
     /// Parameters of the model.
@@ -340,6 +342,7 @@ impl<'a> Elaborator<'a> {
             places: Vec::new(),
             open_parameters: false,
             defaulted: BTreeSet::new(),
+            choices: Vec::new(),
             pairs: Vec::new(),
             params: Vec::new(),
             open: crate::study::Open::default(),

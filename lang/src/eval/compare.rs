@@ -38,6 +38,14 @@ impl<'a> Elaborator<'a> {
             let node = self.graph.number(f64::from(u8::from(x == y)));
             return self.equality(op, node, at_a);
         }
+        // A thing that may have no material has `nothing` there.
+        if let (Value::Material(_), Value::Material(_) | Value::Nothing) | (Value::Nothing, Value::Material(_)) =
+            (&a, &b)
+        {
+            let same = matches!((&a, &b), (Value::Material(x), Value::Material(y)) if x == y);
+            let node = self.graph.number(f64::from(u8::from(same)));
+            return self.equality(op, node, at_a);
+        }
         if let (Value::Enum(..), Value::Enum(..)) = (&a, &b) {
             return match self.same_word(&a, &b, at_a, at_b) {
                 Some(node) => self.equality(op, node, at_a),

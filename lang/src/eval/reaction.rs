@@ -130,20 +130,13 @@ impl<'a> Elaborator<'a> {
         let Some(Field { value: FieldValue::Fields(lines), .. }) = field(def.fields, key) else { return Vec::new() };
         let mut out = Vec::new();
         for line in lines {
-            let species = match self.tables.species.lookup(self.tables.names, module, &line.key) {
+            let species = match self.order_of(r, line) {
                 Ok(s) => s,
                 Err(d) => {
                     self.report(*d);
                     continue;
                 }
             };
-            let def = &self.tables.reactions[r.0 as usize];
-            if !def.reactants.iter().chain(&def.products).any(|(s, _)| *s == species) {
-                let headline = format!("`{}` is not in the equation of `{}`", line.key.text, def.name);
-                let d = Diagnostic::error(codes::UNKNOWN_FIELD, line.key.span, headline, "not one of its species");
-                self.report(d.help("a catalyst stands on both sides: `A + C -> B + C`"));
-                continue;
-            }
             let FieldValue::Expr(e) = &line.value else { continue };
             let v = self.expr(e, &mut Scope::module(module));
             if let Value::Num(n) = self.coerce(v, &Type::ratio(), e.span, "order")
@@ -153,6 +146,27 @@ impl<'a> Elaborator<'a> {
             }
         }
         out
+    }
+
+    /// The species of a line of orders: one of the equation's.
+    fn order_of(&self, r: ReactionId, line: &Field) -> Result<SpeciesId, Box<Diagnostic>> {
+        let def = &self.tables.reactions[r.0 as usize];
+        let species = self.tables.species.lookup(self.tables.names, def.module, &line.key)?;
+        if def.reactants.iter().chain(&def.products).any(|(s, _)| *s == species) {
+            return Ok(species);
+        }
+        let headline = format!("`{}` is not in the equation of `{}`", line.key.text, def.name);
+        let d = Diagnostic::error(codes::UNKNOWN_FIELD, line.key.span, headline, "not one of its species");
+        Err(Box::new(d.help("a catalyst stands on both sides: `A + C -> B + C`")))
+    }
+
+    /// Whether the order of each species is known; where one is not, nor is the unit of the rate constant.
+    fn has_orders(&self, r: ReactionId) -> bool {
+        let def = &self.tables.reactions[r.0 as usize];
+        match field(def.fields, if def.reverse { "reverse_order" } else { "order" }) {
+            Some(Field { value: FieldValue::Fields(lines), .. }) => lines.iter().all(|l| self.order_of(r, l).is_ok()),
+            _ => true,
+        }
     }
 
     /// A method of a reaction, with its arguments evaluated.
@@ -165,6 +179,8 @@ impl<'a> Elaborator<'a> {
         scope: &Scope,
     ) -> Value {
         match (name, values.as_slice()) {
+            // What is wrong with the orders is said where they stand.
+            ("rate", [Value::Num(_)]) if !self.has_orders(r) => Value::Error,
             ("rate", [Value::Num(t)]) => self.rate(r, t.clone()),
             ("order", [Value::Species(s)]) => {
                 let order = self.orders(r).iter().find(|(o, _)| o == s).map_or(0.0, |(_, n)| *n);

@@ -33,7 +33,7 @@ use crate::ast::{Block, Handlers, ItemKind};
 use crate::elaborate::Elaborator;
 use crate::eval::{Scope, Type, Value};
 use crate::names::DeclId;
-use crate::task::{self, Given, Task};
+use crate::task::{self, Choice, Given, Task};
 
 /// Working state of the lowering of one workflow.
 pub struct Planner<'a, 'e> {
@@ -53,6 +53,8 @@ pub struct Planner<'a, 'e> {
     pub results: Vec<Option<ResultSlot>>,
     /// The plan is to be run: parameters without a default must have been given.
     pub to_run: bool,
+    /// Another value than its default that a parameter of the workflow is supposed to have.
+    pub supposed: Option<Choice>,
     /// Depth of failure handlers around.
     pub handlers: usize,
     /// Failures that something declares or raises.
@@ -119,6 +121,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             open: Vec::new(),
             results: Vec::new(),
             to_run: false,
+            supposed: None,
             handlers: 0,
             failures,
             jobs: BTreeSet::new(),
@@ -144,6 +147,7 @@ impl<'a, 'e> Planner<'a, 'e> {
     pub fn task(mut self, task: &Task<'a>) -> (Plan, Option<Wiring>) {
         let decl = self.lab.tables.names.decl(task.item);
         let mut scope = Scope { lab: true, ..Scope::module(decl.module) };
+        self.supposed.clone_from(&task.supposed);
         self.begin_wires();
         if self.wires == wires::Wires::Offered {
             self.lab.readings_live = true;

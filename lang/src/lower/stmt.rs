@@ -1,14 +1,15 @@
 //! Statements, one construct at a time.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use matterix_ir::plan::{Caught, Step, StepId};
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
-use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
+use crate::ast::{Binary, Block, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
 use crate::eval::{Num, Scope, Type, Value};
-use crate::task::Given;
+use crate::task::{Choice, Given};
 
 impl<'a> Planner<'a, '_> {
     /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
@@ -103,7 +104,11 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::If { cond, then, otherwise } => {
                 let seen = scope.reads.replace(0);
-                let condition = self.deciding(cond, scope)?;
+                let Some(condition) = self.deciding(cond, scope) else {
+                    begun(then, &mut self.jobs);
+                    otherwise.iter().for_each(|block| begun(block, &mut self.jobs));
+                    return None;
+                };
                 let read = scope.reads.replace(scope.reads.get() | seen);
                 // In a skill the arguments may decide it, in a loop the turn: the other branch need not make sense then.
                 let given = match self.open.as_slice() {
@@ -122,7 +127,10 @@ impl<'a> Planner<'a, '_> {
                 Step::If { condition, then, otherwise }
             }
             StmtKind::Repeat { times, body } => {
-                let times = self.count(times, scope)?;
+                let Some(times) = self.count(times, scope) else {
+                    begun(body, &mut self.jobs);
+                    return None;
+                };
                 Step::Repeat { times, body: self.block(body, scope) }
             }
             StmtKind::RepeatWhile { cond, max, body } => {
@@ -606,11 +614,13 @@ impl<'a> Planner<'a, '_> {
                     Value::Num(named)
                 }
                 Value::Bool(node) => {
+                    let node = self.chosen(&p.name.text, node, given, &["false", "true"]);
                     let truth = self.lab.graph.constant(node).map(|v| if v == 0.0 { "false" } else { "true" });
                     shown.extend(truth.map(|t| (p.name.text.clone(), t.to_string())));
                     Value::Bool(node)
                 }
                 Value::Enum(node, words) => {
+                    let node = self.chosen(&p.name.text, node, given, &words);
                     let word = self.lab.graph.constant(node).and_then(|v| words.get(v as usize));
                     shown.extend(word.map(|w| (p.name.text.clone(), w.clone())));
                     Value::Enum(node, words)
@@ -625,6 +635,46 @@ impl<'a> Planner<'a, '_> {
             scope.bind(p.name.text.clone(), v);
         }
         shown
+    }
+
+    /// The node of a parameter that is a truth value or a word: what it is given or supposed to have, or its default.
+    fn chosen<W: AsRef<str>>(&mut self, name: &str, node: NodeId, given: Option<&Given<'a>>, words: &[W]) -> NodeId {
+        let Some(word) = self.lab.graph.constant(node).and_then(|v| words.get(v as usize)) else { return node };
+        if given.is_some() {
+            return node;
+        }
+        let supposed = self.supposed.as_ref().filter(|choice| choice.name == name);
+        let other = supposed.and_then(|choice| words.iter().position(|word| word.as_ref() == choice.word));
+        if let Some(index) = other {
+            return self.lab.graph.number(index as f64);
+        }
+        let words: Vec<String> = words.iter().map(|word| word.as_ref().to_owned()).collect();
+        self.lab.choices.push(Choice { name: name.to_owned(), word: word.as_ref().to_owned(), words });
+        node
+    }
+}
+
+/// Adds the jobs that a block starts: where it cannot be written out, whoever waits for them is not wrong.
+fn begun(block: &Block, jobs: &mut BTreeSet<String>) {
+    for stmt in &block.stmts {
+        match &stmt.kind {
+            StmtKind::Start { name, .. } => {
+                jobs.insert(name.text.clone());
+            }
+            StmtKind::If { then, otherwise, .. } => {
+                begun(then, jobs);
+                otherwise.iter().for_each(|block| begun(block, jobs));
+            }
+            StmtKind::Repeat { body, .. }
+            | StmtKind::RepeatWhile { body, .. }
+            | StmtKind::For { body, .. }
+            | StmtKind::Within { body, .. }
+            | StmtKind::Keep { body, .. }
+            | StmtKind::Claim { body, .. }
+            | StmtKind::Step { body, .. }
+            | StmtKind::Sequence { body, .. } => begun(body, jobs),
+            _ => {}
+        }
     }
 }
 

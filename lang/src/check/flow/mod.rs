@@ -231,13 +231,13 @@ pub fn check(
     let lasting = flow.durations();
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
-    for (param, value) in others {
+    for other in others {
         let supposing = || {
             let mut flow = begin();
-            flow.params[param as usize] = Known::point(value);
+            flow.params[other.param as usize] = Known::point(other.value);
             flow
         };
-        let new = otherwise::said_of(lab, param, value, jobs::follow(supposing).diagnostics());
+        let new = otherwise::said_of(lab, &other, jobs::follow(supposing).diagnostics());
         let is_new = |d: &Diagnostic| !found.iter().any(|f| f.code == d.code && f.span() == d.span());
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);
@@ -455,7 +455,7 @@ fn presumed(plan: &Plan) -> BTreeSet<NodeId> {
 }
 
 /// Whether a finding of this kind is an error even where it happens on some ways only: what is gone stays gone.
-fn forbidden_on_any_way(code: Code) -> bool {
+pub fn forbidden_on_any_way(code: Code) -> bool {
     code.family == "T2"
 }
 

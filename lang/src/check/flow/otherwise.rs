@@ -1,10 +1,10 @@
-//! Other values of the workflow's parameters: a branch that a default does not take may still throw away what is used
-//! later. The plan is followed once more for each side of a condition on a parameter that has only its default.
+//! Other numbers of the workflow's parameters: a branch that a default does not take may go wrong, leave a device on, or throw away
+//! what is used later. The plan is followed once more for each side of a condition on a parameter that has only its default.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
-use matterix_ir::plan::{Plan, Step};
-use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, codes};
+use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Severity, Span, codes};
 
 use super::value::Known;
 use super::{Flow, forbidden_on_any_way};
@@ -16,10 +16,18 @@ const MOST_STEPS: usize = 400_000;
 /// So many other values are tried however long the plan is.
 const FEWEST_VALUES: usize = 8;
 
-/// Values of parameters, by index, that take the other side of a branch.
-pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
-    let mut out: Vec<(u32, f64)> = Vec::new();
-    for node in branches(flow.plan) {
+/// Another value of a parameter.
+pub struct Other {
+    pub param: u32,
+    pub value: f64,
+    /// Blocks that are done with it and not with the default.
+    done: Vec<Span>,
+}
+
+/// Values of parameters that take the other side of a branch.
+pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<Other> {
+    let mut out: Vec<Other> = Vec::new();
+    for (node, sides) in branches(flow.plan) {
         let parts = flow.parts(node);
         if !parts.states.is_empty() || parts.timed {
             continue;
@@ -35,14 +43,20 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
                 flow.params[param as usize] = kept;
                 truth.is_some() && truth != usual
             };
-            let other = around(limit, default).into_iter().find(flips);
-            out.extend(other.map(|v| (param, v)).filter(|new| !out.contains(new)));
+            let Some(value) = around(limit, default).into_iter().find(flips) else { continue };
+            let done =
+                sides.iter().filter_map(|(then, otherwise)| if usual == Some(true) { *otherwise } else { *then });
+            let done = done.map(|block| flow.plan.get(block).span);
+            match out.iter_mut().find(|other| other.param == param && other.value == value) {
+                Some(other) => other.done.extend(done),
+                None => out.push(Other { param, value, done: done.collect() }),
+            }
         }
     }
     let most = (MOST_STEPS / flow.steps.max(1)).max(FEWEST_VALUES);
     if out.len() > most {
         let headline = format!("{most} of {} other values of the parameters are tried", out.len());
-        let text = "use after disposal is not checked for the others".to_owned();
+        let text = "branches that only the others take are not checked".to_owned();
         let span = flow.plan.get(flow.plan.root).span;
         flow.found(Diagnostic::warning(codes::NOT_ANALYSED, span, headline, text), span);
     }
@@ -50,20 +64,38 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<(u32, f64)> {
     out
 }
 
-/// What is never right, whatever the ways, with another value of a parameter.
-pub fn said_of(lab: &Elaborator<'_>, param: u32, value: f64, found: Vec<Diagnostic>) -> Vec<Diagnostic> {
-    let p = &lab.params[param as usize];
-    let help = format!("so it is with `{}` at {}", p.name, p.unit.show(value));
-    found.into_iter().filter(|d| forbidden_on_any_way(d.code)).map(|d| d.help(help.clone())).collect()
+/// What goes wrong with another value of a parameter: what is never right, whatever the ways; what is done with that value only; what
+/// is left on at the end.
+pub fn said_of(lab: &Elaborator<'_>, other: &Other, found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let p = &lab.params[other.param as usize];
+    let help = format!("so it is with `{}` at {}", p.name, p.unit.show(other.value));
+    let within = |span: Span| {
+        other.done.iter().any(|block| block.file == span.file && block.start <= span.start && span.end <= block.end)
+    };
+    let tells = |d: &Diagnostic| {
+        forbidden_on_any_way(d.code) || d.code == codes::UNFINISHED || d.is_error() && within(d.span())
+    };
+    let said = |mut d: Diagnostic| {
+        if !forbidden_on_any_way(d.code) {
+            d.severity = Severity::Warning;
+        }
+        d.help(help.clone())
+    };
+    found.into_iter().filter(tells).map(said).collect()
 }
 
-/// The conditions of branches.
-fn branches(plan: &Plan) -> BTreeSet<NodeId> {
-    let conditions = plan.steps.iter().filter_map(|s| match &s.step {
-        Step::If { condition, .. } => Some(condition.node),
-        _ => None,
-    });
-    conditions.collect()
+/// Both sides of a branch.
+type Sides = (Option<StepId>, Option<StepId>);
+
+/// The conditions of branches, with their sides.
+fn branches(plan: &Plan) -> BTreeMap<NodeId, Vec<Sides>> {
+    let mut out: BTreeMap<NodeId, Vec<Sides>> = BTreeMap::new();
+    for step in &plan.steps {
+        if let Step::If { condition, then, otherwise } = &step.step {
+            out.entry(condition.node).or_default().push((Some(*then), *otherwise));
+        }
+    }
+    out
 }
 
 /// The parameters with their defaults among these operations, each with a number it is compared with.
@@ -82,10 +114,10 @@ fn compared(flow: &Flow<'_, '_>, order: &[NodeId]) -> Vec<(u32, f64)> {
     out
 }
 
-/// Values on either side of a limit, whole ones between whole numbers.
+/// A limit and values on either side of it, whole ones between whole numbers.
 fn around(limit: f64, default: f64) -> [f64; 3] {
     let whole = limit.fract() == 0.0 && default.fract() == 0.0;
     let largest = limit.abs().max(default.abs());
     let step = if whole || largest == 0.0 { 1.0 } else { 0.1 * largest };
-    [limit + step, limit - step, limit]
+    [limit, limit + step, limit - step]
 }

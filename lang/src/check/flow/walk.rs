@@ -145,11 +145,17 @@ impl Flow<'_, '_> {
                 Some(facts)
             }
             Step::Keep { condition, body } => {
+                let fails = self.eval(condition.node, &facts).truth() == Some(false);
+                if fails && self.is_taken("broken") && !self.is_shared(condition.node) {
+                    // The body does not begin.
+                    self.raise("broken", facts);
+                    return None;
+                }
                 let mut broken = facts.clone();
                 self.widen(*body, &mut broken);
                 self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
                 self.raise("broken", broken);
-                if self.eval(condition.node, &facts).truth() == Some(false) && !self.is_shared(condition.node) {
+                if fails && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
                 }
                 self.kept.push(condition);
@@ -568,6 +574,8 @@ impl Flow<'_, '_> {
             self.guards.push(Vec::new());
             let after = self.walk(*step, entry.clone());
             let raised = self.guards.pop().unwrap_or_default();
+            // A job does not outlast the alternative that began it.
+            let after = self.end_block(after);
             self.caught.pop();
             ends.extend(after);
             if last {
@@ -576,8 +584,8 @@ impl Flow<'_, '_> {
                 }
                 break;
             }
-            match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
-                Some(next) => entry = next,
+            match self.entry(id, &facts, raised) {
+                Some(next) => entry = Facts { written: None, ..next },
                 None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);

@@ -89,6 +89,10 @@ pub(super) fn colon(spot: &Spot) -> Option<Mistake> {
         return None;
     }
     let end = spot.start + spot.before.len();
+    if spot.token == "=" && spot.only == Rule::only_lab_line && RESERVED.contains(&name) {
+        let headline = format!("`{name}` is a word of the language and cannot be a name");
+        return Some(Mistake::new(headline, "choose another name").at(spot.start, end));
+    }
     if spot.token == "=" {
         let mistake = Mistake::new("a field is written with `:`", format!("write `{name}: ...`"));
         // `=` before a type declares a thing: the brace above may not have been closed.
