@@ -244,6 +244,10 @@ fn what_is_left_on_along_one_way_is_told() {
         ("fail", format!("heat plate to 60 degC\nwait 9 min\nif {hot} {{ fail hot \"!\" }}\nstop heating plate\n}}")),
         ("timeout", format!("heat plate to 60 degC\nwait until {hot} timeout 1 h\nstop heating plate\n}}")),
         (
+            "loop",
+            format!("heat plate to 60 degC\nrepeat while not ({hot}) max 90 {{ wait 1 min }}\nstop heating plate\n}}"),
+        ),
+        (
             "in_a_loop",
             format!("heat plate to 60 degC\nrepeat 3 times {{ wait 9 min; if {hot} {{ stop heating plate }} }}\n}}"),
         ),
@@ -272,10 +276,6 @@ fn what_every_way_turns_off_is_not_told() {
                 .to_owned(),
         ),
         ("no_timeout", format!("heat plate to 60 degC\nwait until {hot}\nstop heating plate\n}}")),
-        (
-            "loop",
-            format!("heat plate to 60 degC\nrepeat while not ({hot}) max 90 {{ wait 1 min }}\nstop heating plate\n}}"),
-        ),
         (
             "retry",
             format!(

@@ -687,7 +687,10 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
     asking.sort_unstable_by_key(|(asked, ..)| *asked);
     let free =
         |(_, at, claims, _): &&(usize, usize, &'p [InstanceId], StepId)| claims.iter().all(|i| lines.is_free(*at, *i));
-    let (_, at, claims, step) = *asking.iter().find(free)?;
+    let granted = asking.iter().find(free).copied();
+    // Who has it first is a matter of the schedule.
+    lines.loose |= asking.len() > usize::from(granted.is_some());
+    let (_, at, claims, step) = granted?;
     lines.held.extend(claims.iter().map(|i| (*i, at)));
     lines.all[at].state = State::Ready;
     lines.all[at].frames.extend([Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims }, Frame::One(step)]);
