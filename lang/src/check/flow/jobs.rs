@@ -170,6 +170,7 @@ impl Flow<'_, '_> {
     fn job(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
         let others = self.sets_going(self.beside(body));
         self.begin_job(&others);
+        self.contested.push(others.intersection(&self.writes(body)).copied().collect());
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
@@ -180,6 +181,7 @@ impl Flow<'_, '_> {
         self.in_jobs -= 1;
         self.rivals.pop();
         self.shared.pop();
+        self.contested.pop();
         after
     }
 

@@ -151,6 +151,8 @@ struct Flow<'l, 'a> {
     shared: Vec<BTreeSet<u32>>,
     /// What goes on beside the branches and jobs that are followed, innermost last.
     rivals: Vec<Vec<interference::Rival>>,
+    /// States that both what is followed and what goes on beside it set, innermost last.
+    contested: Vec<BTreeSet<u32>>,
     /// Things that what is followed has to itself, innermost last.
     claimed: Vec<InstanceId>,
     /// Conditions that `keep` asks for all the time.
@@ -284,6 +286,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             cleaning: 0,
             shared: Vec::new(),
             rivals: Vec::new(),
+            contested: Vec::new(),
             claimed: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
