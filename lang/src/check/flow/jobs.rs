@@ -180,6 +180,7 @@ impl Flow<'_, '_> {
         let met = self.sets_going(met).union(raced).copied().collect();
         self.meets.push(met);
         self.begin_job(&others);
+        self.contested.push(others.intersection(&self.writes(body)).copied().collect());
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
@@ -191,6 +192,7 @@ impl Flow<'_, '_> {
         self.rivals.pop();
         self.shared.pop();
         self.meets.pop();
+        self.contested.pop();
         after
     }
 

@@ -44,11 +44,11 @@ impl Flow<'_, '_> {
     /// What is known but for what concurrent steps may set at any time, such as whether a pump runs; none where there is no such.
     /// What the step that is followed has to itself they do not.
     pub(super) fn but_for_others(&mut self, facts: &Facts) -> Option<Facts> {
-        if self.shared.is_empty() && self.jobs.is_empty() {
+        let others: BTreeSet<u32> = self.contested.iter().flatten().copied().collect();
+        if others.is_empty() {
             return None;
         }
         let tracks = self.tracks();
-        let others: BTreeSet<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
         let moved = |s: &u32| tracks.list.iter().any(|t| t.state == *s) || tracks.wild.contains(s);
         let open: Vec<u32> = others.into_iter().filter(|s| !moved(s) && !self.has_claimed(*s)).collect();
         if open.is_empty() {

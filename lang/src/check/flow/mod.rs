@@ -160,6 +160,8 @@ struct Flow<'l, 'a> {
     lasting: BTreeMap<StepId, (f64, f64)>,
     /// What goes on beside the branches and jobs that are followed, innermost last.
     rivals: Vec<Vec<interference::Rival>>,
+    /// States that both what is followed and what goes on beside it set, innermost last.
+    contested: Vec<BTreeSet<u32>>,
     /// Things that what is followed has to itself, innermost last.
     claimed: Vec<InstanceId>,
     /// Conditions that `keep` asks for all the time.
@@ -312,6 +314,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             meets: Vec::new(),
             lasting: BTreeMap::new(),
             rivals: Vec::new(),
+            contested: Vec::new(),
             claimed: Vec::new(),
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),

@@ -510,6 +510,7 @@ impl Flow<'_, '_> {
             if longest != start {
                 self.begin_again(meantime.as_ref(), &mut facts);
             }
+            self.contested.push(others.intersection(&writes[*i]).copied().collect());
             self.shared.push(others);
             let rival = |o: usize| Rival { steps: vec![branches[o]], start: start.clone(), later: o > *i };
             self.rivals.push((0..branches.len()).filter(|o| o != i).map(rival).collect());
@@ -522,6 +523,7 @@ impl Flow<'_, '_> {
             self.rivals.pop();
             self.shared.pop();
             self.meets.pop();
+            self.contested.pop();
             self.end_branch();
             facts = after?;
             longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
