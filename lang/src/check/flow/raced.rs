@@ -166,7 +166,7 @@ impl<'p> Flow<'p, '_> {
                 let shared = !reads.iter().any(|s| held.contains(s)) && held.iter().any(|s| others.written.contains(s));
                 let beside = reads.iter().any(|s| !held.contains(s) && self.is_met(*s, others, claims, raced));
                 let kept = self.names(*fraction, &raced.locals);
-                let drawn = shared && !others.filled.get(from).is_some_and(|around| !around.is_disjoint(claims));
+                let drawn = shared && others.filled.get(from).is_none_or(|around| around.is_disjoint(claims));
                 if filled || drawn || beside || kept || !held.is_disjoint(&raced.states) {
                     self.add_held(&[*from, *to], &mut raced.states);
                 }
