@@ -42,9 +42,9 @@ fn others(choice: &Choice) -> impl Iterator<Item = Choice> + '_ {
     words.map(|word| Choice { word: word.clone(), ..choice.clone() })
 }
 
-/// Whether a finding is one for whoever gives the value. What is never done with it, or has no use, may be so for the default.
+/// Whether a finding is one for whoever gives the value. What is expected, never done or of no use may be so for the default.
 fn tells(d: &Diagnostic) -> bool {
-    let of_default = [codes::DEAD_BRANCH, codes::UNUSED, codes::NOT_ANALYSED];
+    let of_default = [codes::EXPECTATION_FAILED, codes::DEAD_BRANCH, codes::UNUSED, codes::NOT_ANALYSED];
     d.severity != Severity::Advice && !of_default.contains(&d.code)
 }
 

@@ -586,8 +586,8 @@ impl Flow<'_, '_> {
                 }
                 break;
             }
-            match self.entry(id, &facts, raised) {
-                Some(next) => entry = Facts { written: None, ..next },
+            match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
+                Some(next) => entry = next,
                 None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);
