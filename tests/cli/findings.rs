@@ -264,7 +264,7 @@ lab bench {
 }
 ";
     let says = |name: &str, step: &str, said: &str| {
-        let path = write(&folder(name), "bench.mtx", &format!("{bench}workflow w in bench {{ {step} }}\n"));
+        let path = write(&folder(name), "bench.mtx", format!("{bench}workflow w in bench {{ {step} }}\n"));
         let found = matterixc(&["check", &path]).out;
         assert!(found.contains(said), "{found}");
     };
