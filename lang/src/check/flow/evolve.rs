@@ -36,14 +36,14 @@ const MOST_AT_ONCE: f64 = 512.0;
 const SWEEPS: usize = 40;
 
 /// Sweeps after which faces that still push each other are moved out together, each time.
-const EACH: usize = 6;
+const EACH: usize = 12;
 
 /// By this share of its distance a face is moved further than alone it would have to be.
 const OVERSHOOT: f64 = 0.1;
 
 /// A face that moves out is found to within this share of its last step, 2^-12, one that comes in of its distance, 2^-24.
 const CLOSE_OUT: f64 = 1.0 / (1 << 12) as f64;
-const CLOSE_IN: f64 = 1.0 / (1 << 24) as f64;
+pub(super) const CLOSE_IN: f64 = 1.0 / (1 << 24) as f64;
 
 /// Times that faces are brought back in.
 const NARROWINGS: usize = 6;

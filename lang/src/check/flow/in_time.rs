@@ -167,7 +167,11 @@ impl<'l> Flow<'l, '_> {
             if written.is_empty() {
                 return false;
             }
-            let changed = self.behind(&written);
+            // What moves in a way that only a run knows is left to it.
+            let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
+            let mut changed = self.behind(&written);
+            let moves = |state: &u32| self.derivatives.iter().any(|d| d.state == *state);
+            changed.retain(|state| written.contains(state) || even.contains(state) || !moves(state));
             others.into_iter().any(|other| self.asks_of(other).iter().any(|state| changed.contains(state)))
         })
     }
@@ -196,8 +200,8 @@ impl<'l> Flow<'l, '_> {
         out
     }
 
-    /// Follows all lines in the order of time; at one moment the last one first if `backward`.
-    /// Whether all of them come to their ends at times that are known, and no two use one thing at the same time.
+    /// Follows all lines in the order of time; at one moment the last one first if `backward`. True if all of them come to their ends
+    /// at times that are known, and no two use one thing at the same time.
     pub(super) fn follow_in_time(&mut self, backward: bool) -> bool {
         self.quiet += 1;
         let mut facts = self.start();

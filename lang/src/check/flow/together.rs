@@ -5,11 +5,9 @@
 use std::collections::BTreeSet;
 
 use super::Flow;
-use super::evolve::{Making, Wall};
+use super::bracket::last_outwards;
+use super::evolve::{CLOSE_IN, Making, Wall};
 use super::facts::Facts;
-
-/// Halvings that bring faces back in together.
-const HALVINGS: usize = 24;
 
 /// So many faces are moved together.
 const MOST: usize = 16;
@@ -52,14 +50,12 @@ impl Flow<'_, '_> {
             if walls.is_empty() || ways.iter().any(|way| !way.is_finite()) {
                 continue;
             }
-            let (mut near, mut far) = (0.0, 1.0);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (near + far);
-                self.place(&walls, &ways, middle, upper, facts, making);
-                let crossed = walls.iter().any(|wall| self.outflow(*wall, upper, making) > 0.0);
-                if crossed { near = middle } else { far = middle }
-            }
-            self.place(&walls, &ways, far, upper, facts, making);
+            // How fast the face that is crossed most is crossed.
+            let share = last_outwards(0.0, 1.0, CLOSE_IN, |share| {
+                self.place(&walls, &ways, share, upper, facts, making);
+                walls.iter().map(|wall| self.outflow(*wall, upper, making)).fold(0.0, f64::max)
+            });
+            self.place(&walls, &ways, share, upper, facts, making);
         }
     }
 
