@@ -25,6 +25,11 @@ fn what_runs_out_runs_out_at_its_time() {
 }
 
 #[test]
+fn what_flows_through_a_vessel_loses_no_heat() {
+    pass_cases("feed_and_drain.mtx", &["feeds_and_drains"]);
+}
+
+#[test]
 fn what_recurs_what_is_slow_and_what_cools_down_is_followed() {
     pass_cases("slow.mtx", &["counts", "drips", "reacts_at_nanomolar", "cools_down_to_its_set_point"]);
 }

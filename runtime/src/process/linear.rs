@@ -2,7 +2,10 @@
 //!
 //! A row of the matrix is divided by the error that its state may have before a pivot is chosen. Without that the row with the
 //! largest numbers wins, whatever its unit: the heat of a reaction (J) is a large number beside the last femtomoles of what
-//! reacts (mol), and the rounding of the one would become an error of the other that no shorter step makes smaller.
+//! reacts (mol), and the rounding of the one would become an error of the other that no shorter step makes smaller. A solution is
+//! refined once by what it leaves over: else the rounding of pivots chosen so adds up to a loss of what rows have in common, as heat.
+
+use std::cell::RefCell;
 
 use diffsol::{LaLinearOp, Matrix, NalgebraContext, NalgebraLU, NalgebraMat, NalgebraVec, Vector};
 use diffsol_la::{LaError, LinearSolver};
@@ -13,12 +16,14 @@ pub(super) struct WeighedLu {
     /// What each row is multiplied by: powers of 2, which round nothing.
     weights: Vec<f64>,
     lu: NalgebraLU<f64>,
+    /// The matrix that was factorised.
+    matrix: RefCell<Option<NalgebraMat<f64>>>,
 }
 
 impl WeighedLu {
     /// For states that may be off by `allowed`.
     pub(super) fn new(allowed: impl Iterator<Item = f64>) -> Self {
-        WeighedLu { weights: allowed.map(weight).collect(), lu: NalgebraLU::default() }
+        WeighedLu { weights: allowed.map(weight).collect(), ..WeighedLu::default() }
     }
 
     fn weigh<'v>(&self, values: impl Iterator<Item = &'v mut f64>) {
@@ -37,6 +42,8 @@ fn weight(allowed: f64) -> f64 {
 struct Weighed<'o, C> {
     op: &'o C,
     weights: &'o [f64],
+    /// Takes the matrix as it is made.
+    kept: &'o RefCell<Option<NalgebraMat<f64>>>,
 }
 
 impl<C> LaLinearOp for Weighed<'_, C>
@@ -65,6 +72,10 @@ where
         for mut column in matrix.inner_mut().column_iter_mut() {
             column.iter_mut().zip(self.weights).for_each(|(value, weight)| *value *= weight);
         }
+        match &mut *self.kept.borrow_mut() {
+            Some(kept) => kept.copy_from(matrix),
+            none => *none = Some(matrix.clone()),
+        }
     }
 }
 
@@ -73,19 +84,26 @@ impl LinearSolver<NalgebraMat<f64>> for WeighedLu {
     where
         C: LaLinearOp<T = f64, V = NalgebraVec<f64>, M = NalgebraMat<f64>, C = NalgebraContext>,
     {
-        self.lu.set_linearisation(&Weighed { op, weights: &self.weights });
+        self.lu.set_linearisation(&Weighed { op, weights: &self.weights, kept: &self.matrix });
     }
 
     fn set_sparsity<C>(&mut self, op: &C)
     where
         C: LaLinearOp<T = f64, V = NalgebraVec<f64>, M = NalgebraMat<f64>, C = NalgebraContext>,
     {
-        self.lu.set_sparsity(&Weighed { op, weights: &self.weights });
+        self.lu.set_sparsity(&Weighed { op, weights: &self.weights, kept: &self.matrix });
     }
 
     fn solve_in_place(&self, values: &mut NalgebraVec<f64>) -> Result<(), LaError> {
         self.weigh(values.inner_mut().iter_mut());
-        self.lu.solve_in_place(values)
+        let mut left_over = values.clone();
+        self.lu.solve_in_place(values)?;
+        if let Some(matrix) = &*self.matrix.borrow() {
+            matrix.gemv(-1.0, values, 1.0, &mut left_over);
+            self.lu.solve_in_place(&mut left_over)?;
+            *values += &left_over;
+        }
+        Ok(())
     }
 
     fn solve_transpose_in_place(&self, values: &mut NalgebraVec<f64>) -> Result<(), LaError> {
