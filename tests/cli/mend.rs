@@ -114,16 +114,21 @@ fn a_file_is_looked_at_again_when_it_changes() {
 #[cfg(unix)]
 #[test]
 fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
-    use std::io::Read;
     let dir = folder("mend_watch_once");
+    // Whole at once: written in place on a busy machine a file may be read half written, which is a change more.
+    let put = |name: &str, text: &str| {
+        write(&dir, "sedX", text);
+        std::fs::rename(dir.join("sedX"), dir.join(name)).expect("a name");
+    };
     let lab = "mtx 1\nlab bench { ambient: 22 degC }\n";
     let text = "mtx 1\nuse labs::bench\nworkflow w in bench { wait 1 min }\n";
-    write(&dir, "labs.mtx", lab);
-    write(&dir, "w.mtx", text);
+    put("labs.mtx", lab);
+    put("w.mtx", text);
     let mut command = command();
     command.args(["check", "w.mtx", "--watch"]).current_dir(&dir).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().expect("the command starts");
     let mut lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    let mut complaints = BufReader::new(child.stderr.take().expect("piped")).lines().map_while(Result::ok);
     // How often it looked until it says something.
     let mut looks = |what: &str| {
         let said = lines.by_ref().take_while(|line| !line.contains(what)).filter(|line| line == "---").count();
@@ -131,31 +136,30 @@ fn a_file_is_looked_at_again_once_for_each_change_of_what_was_read() {
         said
     };
     assert_eq!(looks("no findings"), 0);
-    // Beside it, as it was, and away for a while.
+    // Beside it, as it was, and by another text.
     write(&dir, "w.mtx~", "x");
     write(&dir, "notes.txt", "x");
-    write(&dir, "w.mtx", text);
+    put("w.mtx", text);
     std::thread::sleep(std::time::Duration::from_millis(300));
-    // By another file in its place.
-    write(&dir, "sedX", text.replace("1 min", "1 mL"));
-    std::fs::rename(dir.join("sedX"), dir.join("w.mtx")).expect("a name");
+    put("w.mtx", &text.replace("1 min", "1 mL"));
     assert_eq!(looks("unit-mismatch"), 1);
     // A file that it imports.
-    write(&dir, "w.mtx", text);
+    put("w.mtx", text);
     assert_eq!(looks("no findings"), 1);
-    write(&dir, "labs.mtx", lab.replace("degC", "mL"));
+    put("labs.mtx", &lab.replace("degC", "mL"));
     assert_eq!(looks("unit-mismatch"), 1);
+    // Away: one complaint, however much happens beside it.
+    let is_complaint = |line: &String| line.contains("there is no such file");
     std::fs::remove_file(dir.join("w.mtx")).expect("it was there");
+    assert!(complaints.any(|line| is_complaint(&line)));
     for i in 0..3 {
         std::thread::sleep(std::time::Duration::from_millis(200));
         write(&dir, "notes.txt", format!("{i}"));
     }
     let id = rustix::process::Pid::from_child(&child);
     rustix::process::kill_process(id, rustix::process::Signal::INT).expect("it runs");
-    let mut complaints = String::new();
-    child.stderr.take().expect("piped").read_to_string(&mut complaints).expect("text");
+    assert_eq!(complaints.filter(is_complaint).count(), 0);
     child.wait().expect("it ends");
-    assert_eq!(complaints.matches("there is no such file").count(), 1, "{complaints}");
 }
 
 #[test]
