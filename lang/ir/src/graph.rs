@@ -377,7 +377,7 @@ impl Graph {
         let value = match op {
             Op::Unary(o, a) => self.constant(a).map(|a| (unary(o, a), a.is_finite())),
             Op::Binary(o, a, b) => {
-                self.constant(a).zip(self.constant(b)).map(|(a, b)| (binary(o, a, b), a.is_finite() && b.is_finite()))
+                self.constant(a).zip(self.constant(b)).map(|(a, b)| (written(o, a, b), a.is_finite() && b.is_finite()))
             }
             _ => None,
         };
@@ -577,6 +577,20 @@ pub fn binary(op: BinaryOp, a: f64, b: f64) -> f64 {
         BinaryOp::Eq => truth(a == b),
         BinaryOp::And => truth(a != 0.0 && b != 0.0),
         BinaryOp::Or => truth(a != 0.0 || b != 0.0),
+    }
+}
+
+/// Constants that are closer than this share of them are one number: `10 mL / (2 mL/min)` and `5 min` differ by the rounding of
+/// their units.
+const ROUNDING: f64 = 1e-14;
+
+/// The same on two numbers that the text gives. Where rounding alone parts them, they compare as equal.
+fn written(op: BinaryOp, a: f64, b: f64) -> f64 {
+    let same = (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
+    match op {
+        BinaryOp::Lt if same => truth(false),
+        BinaryOp::Le | BinaryOp::Eq if same => truth(true),
+        _ => binary(op, a, b),
     }
 }
 

@@ -21,7 +21,7 @@ impl Dual {
         Dual { value, slope: 0.0 }
     }
 
-    fn truth(holds: bool) -> Self {
+    fn of_truth(holds: bool) -> Self {
         Dual::still(f64::from(u8::from(holds)))
     }
 }
@@ -96,8 +96,8 @@ impl Rules for Along<'_> {
         Some(Dual { value, slope }).filter(|dual| !dual.slope.is_nan())
     }
 
-    fn select(&self, condition: Dual, a: Dual, b: Dual) -> Dual {
-        if condition.value != 0.0 { a } else { b }
+    fn truth(&self, condition: Dual) -> Option<bool> {
+        Some(condition.value != 0.0)
     }
 }
 
@@ -108,7 +108,7 @@ fn compare(op: BinaryOp, a: Dual, b: Dual) -> Option<Dual> {
     if !close || slope == 0.0 {
         return Known::exactly(op, a.value, b.value).map(Dual::still);
     }
-    Some(Dual::truth(match op {
+    Some(Dual::of_truth(match op {
         BinaryOp::Eq => false,
         _ => slope < 0.0,
     }))
@@ -121,10 +121,10 @@ mod tests {
     #[test]
     fn what_has_just_become_equal_comes_out_as_it_moves() {
         let (goal, rising) = (Dual::still(3e-5), Dual { value: 3e-5, slope: 1e-6 });
-        assert_eq!(compare(BinaryOp::Le, goal, rising), Some(Dual::truth(true)));
-        assert_eq!(compare(BinaryOp::Lt, goal, rising), Some(Dual::truth(true)));
-        assert_eq!(compare(BinaryOp::Le, rising, goal), Some(Dual::truth(false)));
-        assert_eq!(compare(BinaryOp::Le, goal, goal), Some(Dual::truth(true)));
+        assert_eq!(compare(BinaryOp::Le, goal, rising), Some(Dual::of_truth(true)));
+        assert_eq!(compare(BinaryOp::Lt, goal, rising), Some(Dual::of_truth(true)));
+        assert_eq!(compare(BinaryOp::Le, rising, goal), Some(Dual::of_truth(false)));
+        assert_eq!(compare(BinaryOp::Le, goal, goal), Some(Dual::of_truth(true)));
         assert_eq!(compare(BinaryOp::Lt, goal, Dual::still(3e-5 * (1.0 + 1e-15))), None);
     }
 }

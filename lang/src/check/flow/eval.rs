@@ -58,8 +58,8 @@ impl Rules for Exact<'_> {
         Known::exactly(op, a, b)
     }
 
-    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
-        if condition != 0.0 { a } else { b }
+    fn truth(&self, condition: f64) -> Option<bool> {
+        Some(condition != 0.0)
     }
 }
 
@@ -88,8 +88,8 @@ impl Rules for Supposed<'_> {
         self.exact.binary(op, a, b)
     }
 
-    fn select(&self, condition: f64, a: f64, b: f64) -> f64 {
-        self.exact.select(condition, a, b)
+    fn truth(&self, condition: f64) -> Option<bool> {
+        self.exact.truth(condition)
     }
 }
 

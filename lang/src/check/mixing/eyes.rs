@@ -134,7 +134,11 @@ impl<M: Fn(u32) -> bool> Rules for Look<'_, M> {
         Some((binary(op, a.0, b.0), a.1 && b.1))
     }
 
-    fn select(&self, condition: (f64, bool), a: (f64, bool), b: (f64, bool)) -> (f64, bool) {
-        (if condition.0 != 0.0 { a.0 } else { b.0 }, condition.1 && a.1 && b.1)
+    fn truth(&self, (value, known): (f64, bool)) -> Option<bool> {
+        known.then_some(value != 0.0)
+    }
+
+    fn either(&self, condition: (f64, bool), a: (f64, bool), b: (f64, bool)) -> Option<(f64, bool)> {
+        Some((if condition.0 != 0.0 { a.0 } else { b.0 }, false))
     }
 }

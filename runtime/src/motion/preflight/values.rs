@@ -157,17 +157,12 @@ impl Rules for Settled<'_> {
         })
     }
 
-    fn select(&self, condition: Option<f64>, a: Option<f64>, b: Option<f64>) -> Option<f64> {
-        match condition {
-            Some(condition) => {
-                if condition != 0.0 {
-                    a
-                } else {
-                    b
-                }
-            }
-            None => a.filter(|v| b == Some(*v)),
-        }
+    fn truth(&self, condition: Option<f64>) -> Option<bool> {
+        condition.map(|condition| condition != 0.0)
+    }
+
+    fn either(&self, _condition: Option<f64>, a: Option<f64>, b: Option<f64>) -> Option<Option<f64>> {
+        Some(a.filter(|v| b == Some(*v)))
     }
 }
 
