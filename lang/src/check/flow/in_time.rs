@@ -162,17 +162,21 @@ impl<'l> Flow<'l, '_> {
                 _ => {}
             }
         }
+        // What moves in a way that only a run knows is left to it.
+        let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
+        let uneven: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| !even.contains(s)).collect();
+        let mut asked: BTreeMap<StepId, BTreeSet<u32>> = BTreeMap::new();
         pairs.into_iter().any(|(own, others)| {
             let written = self.writes(own);
             if written.is_empty() {
                 return false;
             }
-            // What moves in a way that only a run knows is left to it.
-            let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
             let mut changed = self.behind(&written);
-            let moves = |state: &u32| self.derivatives.iter().any(|d| d.state == *state);
-            changed.retain(|state| written.contains(state) || even.contains(state) || !moves(state));
-            others.into_iter().any(|other| self.asks_of(other).iter().any(|state| changed.contains(state)))
+            changed.retain(|state| written.contains(state) || !uneven.contains(state));
+            others.into_iter().any(|other| {
+                let states = asked.entry(other).or_insert_with(|| self.asks_of(other));
+                !states.is_disjoint(&changed)
+            })
         })
     }
 
