@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use matterix_ir::{BinaryOp, NodeId, Op, Severity, UnaryOp};
+use matterix_ir::{BinaryOp, Leaves, NodeId, Op, Severity, UnaryOp};
 
 use super::Flow;
 use super::dual::{Along, Dual};
@@ -74,6 +74,10 @@ impl Flow<'_, '_> {
             let even = self.even(facts, &last);
             let timers = self.timers(&even, left, facts);
             if timers.unsure || (even.slopes.is_empty() && timers.events.is_empty()) {
+                break;
+            }
+            // What only a run can tell may come about at any moment.
+            if until.is_some_and(|node| self.along_at(node, &even, 0.0, facts).is_none()) {
                 break;
             }
             if left > 0.0 {
@@ -155,8 +159,9 @@ impl Flow<'_, '_> {
         for side in sides {
             // What rests on other things as well is looked at when the time has passed.
             let Some((now, slope, size)) = self.difference(*side, even, 0.0, facts) else {
-                // A wave of the time may come about and be over before that.
-                if self.parts(side.0).timed || side.1.is_some_and(|b| self.parts(b).timed) {
+                // A wave of the time may come about and be over before that, and what is read is known within bounds.
+                if [Some(side.0), side.1].into_iter().flatten().any(|node| self.parts(node).timed || self.is_read(node))
+                {
                     return None;
                 }
                 continue;
@@ -181,6 +186,11 @@ impl Flow<'_, '_> {
             }
         }
         Some(next)
+    }
+
+    /// Whether a node hangs on what a device reads.
+    fn is_read(&self, node: NodeId) -> bool {
+        self.lab.graph.leaves(node).meets(Leaves::READING)
     }
 
     /// Whether two sides are apart all the time.

@@ -75,7 +75,10 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));
         let (cut, other): (Vec<Finding>, Vec<Finding>) = late.findings.into_iter().partition(unsearched);
         late.findings = other;
-        flow.findings = in_both(first, &late.findings);
+        flow.findings = match late.needs_jobs {
+            true => first.into_iter().filter(|f| late.findings.iter().any(|o| o.is_like(f))).collect(),
+            false => in_both(first, &late.findings),
+        };
         flow.findings.extend(cut);
         // What was not looked at for a mistake that is none after all.
         if !flow.ended && late.ended {

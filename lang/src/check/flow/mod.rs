@@ -170,6 +170,8 @@ struct Flow<'l, 'a> {
     jobs: jobs::Jobs,
     /// Steps of jobs are followed when these are waited for, not when they are started.
     late: bool,
+    /// Steps of jobs that were not followed yet have been waited for: no run goes on as this flow does.
+    needs_jobs: bool,
     /// Loops of which a turn is followed.
     turning: usize,
     /// Ways that have met.
@@ -319,6 +321,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             kept: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,
+            needs_jobs: false,
             turning: 0,
             ways: parted::Ways::default(),
             forks: left::Forks::default(),

@@ -140,6 +140,9 @@ impl Flow<'_, '_> {
                     self.waits_against_keep(&node.label, condition, &facts);
                 }
                 let time = self.duration(*duration, &facts);
+                let longest = timeout.map_or(f64::INFINITY, |node| self.duration(node, &facts).bounds().1);
+                let time =
+                    if self.goes_on_holding(condition.node, &time, &facts) { time } else { at_most(&time, longest) };
                 self.pass(&time, &mut facts);
                 self.assume(condition.node, true, &mut facts);
                 Some(facts)
@@ -276,11 +279,27 @@ impl Flow<'_, '_> {
         }
         // Another branch may do what is waited for.
         if value.truth() == Some(false) && shared {
+            self.needs_jobs |= self.late && !self.jobs.is_empty();
             let states: Vec<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
             self.forget(&states, &mut facts);
         }
         self.assume(condition.node, true, &mut facts);
         Some(facts)
+    }
+
+    /// Whether a condition that holds goes on doing so for a time, whatever others do.
+    fn goes_on_holding(&mut self, condition: NodeId, time: &Known, facts: &Facts) -> bool {
+        if self.is_shared(condition) {
+            return false;
+        }
+        let mut within = facts.clone();
+        self.quiet += 1;
+        let guards = std::mem::take(&mut self.guards);
+        self.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
+        self.guards = guards;
+        self.quiet -= 1;
+        self.stopped = false;
+        self.eval(condition, &within).truth() == Some(true)
     }
 
     /// How long it is until a point in time that a condition waits for, s.
@@ -603,4 +622,10 @@ impl Flow<'_, '_> {
         }
         self.meet(id, &facts, ends)
     }
+}
+
+/// A time that may be longer than it is meant to be, as what it waits for begins anew.
+fn at_most(time: &Known, longest: f64) -> Known {
+    let (low, high) = time.bounds();
+    Known::Range(low, high.max(longest), Why::Unknown)
 }
