@@ -40,6 +40,14 @@ pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, s
         *seeing = lab.meanings.take();
         out.append(&mut lab.diagnostics);
     }
+    // What accepts a hazard declares no name.
+    let mut accepts = stand_in();
+    for item in &tables.names.modules[module].tree.items {
+        if let ItemKind::Accept { name, .. } = &item.kind {
+            accepts.check_accepted(name, module);
+        }
+    }
+    out.append(&mut accepts.diagnostics);
     out
 }
 
@@ -63,7 +71,6 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             bind(lab, params, module, &mut scope);
             lab.check_hazard(&item.kind, sources, &mut scope);
         }
-        ItemKind::Accept { name, .. } => lab.check_accepted(name, module),
         ItemKind::Fn { params, body, external, name, result, options } => {
             report(lab, ignored::function(params.len(), options));
             let mut scope = Scope::module(module);
