@@ -114,6 +114,11 @@ fn a_stroke_gives_off_what_it_took() {
 }
 
 #[test]
+fn what_rounding_parts_is_one() {
+    pass_cases("rounding.mtx", &["cools", "empties"]);
+}
+
+#[test]
 fn a_limit_that_a_flow_breaks_is_a_failure_at_its_moment() {
     pass_cases("limits.mtx", &["goes_on", "runs_dry", "overloads", "overloads_in_a_job"]);
 }

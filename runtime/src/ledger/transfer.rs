@@ -11,7 +11,7 @@ pub enum Refusal {
     NoPlace(String, u32),
 }
 
-/// A fraction above 1 by no more than this is all there is: what a thousand doses leave is known to their rounding only.
+/// A fraction that differs from 1 by no more than this is all there is: what a thousand doses leave is known to their rounding only.
 const ROUNDING: f64 = 1e-9;
 
 /// Moves `fraction` (0 to 1) of every extensive quantity of `from` into `to`, matched by key.
@@ -21,7 +21,7 @@ pub fn transfer(states: &mut [f64], fraction: f64, from: &Mixture, to: &Mixture)
     if !(0.0..=1.0 + ROUNDING).contains(&fraction) {
         return Err(Refusal::Fraction(fraction));
     }
-    let fraction = fraction.min(1.0);
+    let fraction = if (fraction - 1.0).abs() <= ROUNDING { 1.0 } else { fraction };
     let place = |key: &String| to.extensive.binary_search_by(|(k, _)| k.cmp(key)).ok().map(|i| to.extensive[i].1);
     for (key, source) in &from.extensive {
         if place(key).is_none() && fraction * states[*source as usize] != 0.0 {

@@ -180,7 +180,12 @@ impl Integrator {
             self.state = driven.state;
             let length = match driven.left {
                 Left::Visited => return Ok(()),
-                Left::Short => None,
+                Left::Short => {
+                    let (end, values) = (self.dense.end, self.dense.last());
+                    self.tolerance.listen(&self.field.rates, self.dense.clock.lab(end), values);
+                    let length = self.state.as_ref().map(|state| state.as_ref().h);
+                    length.filter(|length| self.tolerance.is_outgrown(values, *length))
+                }
                 Left::Before(limit) => {
                     self.first = Some(limit);
                     None

@@ -47,6 +47,10 @@ pub(super) fn noise(tape: &Tape, registers: &[f64]) -> Vec<f64> {
                 0.0 => 0.0,
                 noise => (unary(op, registers[a as usize], value) * noise).abs(),
             },
+            // Where rounding decides which of two it is, it is either.
+            Step::Binary(BinaryOp::Min | BinaryOp::Max, a, b) if is_tie(registers, &noise, a as usize, b as usize) => {
+                noise[a as usize].max(noise[b as usize])
+            }
             Step::Binary(op, a, b) => {
                 let (a, b) = (a as usize, b as usize);
                 let of = |slopes| binary(op, (registers[a], registers[b]), value, slopes).abs();
@@ -62,6 +66,11 @@ pub(super) fn noise(tape: &Tape, registers: &[f64]) -> Vec<f64> {
         noise[first + i] = if all.is_finite() { all } else { 0.0 };
     }
     noise
+}
+
+/// Whether rounding alone parts two values.
+fn is_tie(registers: &[f64], noise: &[f64], a: usize, b: usize) -> bool {
+    (registers[a] - registers[b]).abs() <= noise[a] + noise[b]
 }
 
 /// `d value / d a`.

@@ -68,10 +68,7 @@ impl Tolerance {
     /// Sizes of states that are nothing, by what their rates make of them.
     fn look_ahead(&mut self, rates: &Tape, time: f64, values: &[f64]) {
         let mut registers = rates.registers();
-        rates.run(time, values, &mut registers);
-        let mut noise = vec![0.0; values.len()];
-        rates.results(&tangent::noise(rates, &registers), &mut noise);
-        self.noise = noise;
+        self.weigh(rates, time, values, &mut registers);
         let mut slopes = vec![0.0; values.len()];
         rates.results(&registers, &mut slopes);
         let paces = values.iter().zip(&slopes).map(|(v, s)| (v / s).abs()).filter(|t| t.is_normal());
@@ -98,6 +95,21 @@ impl Tolerance {
             if before == slopes {
                 return;
             }
+        }
+    }
+
+    /// Weighs the rounding of the rates, whose values are in `registers` then.
+    fn weigh(&mut self, rates: &Tape, time: f64, values: &[f64], registers: &mut [f64]) {
+        rates.run(time, values, registers);
+        self.noise.resize(values.len(), 0.0);
+        rates.results(&tangent::noise(rates, registers), &mut self.noise);
+    }
+
+    /// Weighs the rounding of the rates anew where steps get short: a law may have come to a place at which rounding decides.
+    pub(super) fn listen(&mut self, rates: &Tape, time: f64, values: &[f64]) {
+        if self.scales.iter().any(Option::is_none) {
+            self.weigh(rates, time, values, &mut rates.registers());
+            self.weighed = 0.0;
         }
     }
 
