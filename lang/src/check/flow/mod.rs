@@ -136,6 +136,8 @@ struct Flow<'l, 'a> {
     /// Conditions of the workflow's own branches that constants decide: how they come out, and whether there is an `else`.
     branches: BTreeMap<Span, (String, BTreeSet<bool>, bool)>,
     findings: Vec<report::Finding>,
+    /// How what other orders break comes out in the order of time.
+    judged: in_time::Judged,
     /// Failures raised inside each open body with handlers, innermost last.
     guards: Vec<Vec<Raised>>,
     /// Failures that devices may report inside each open body with handlers, innermost last.
@@ -247,17 +249,33 @@ pub fn check(
     Followed { found, windows, seen, lasting }
 }
 
-/// Whether all branches and jobs go on at times that are known, and no two of them use one thing at the same time.
-pub fn takes_turns(
+/// Whether branches and jobs use things one after the other.
+pub enum Turns {
+    /// All of them go on at times that are known, and no two use one thing at the same time.
+    Taken,
+    /// The statements at these places always do.
+    Clash([Span; 2]),
+    /// Only a run can tell.
+    Unknown,
+}
+
+/// Follows branches and jobs in the order of time to tell whether two of them use one thing at the same time.
+pub fn turns(
     lab: &Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
     events: &[Event],
     derivatives: &[Derivative],
-) -> bool {
-    [false, true]
-        .into_iter()
-        .all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
+) -> Turns {
+    let follow = |backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward);
+    match follow(false) {
+        Turns::Taken if matches!(follow(true), Turns::Taken) => Turns::Taken,
+        Turns::Clash([a, b]) => match follow(true) {
+            Turns::Clash(met) if met.contains(&a) && met.contains(&b) => Turns::Clash(met),
+            _ => Turns::Unknown,
+        },
+        _ => Turns::Unknown,
+    }
 }
 
 impl<'l, 'a> Flow<'l, 'a> {
@@ -302,6 +320,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
             findings: Vec::new(),
+            judged: in_time::Judged::default(),
             guards: Vec::new(),
             reported: Vec::new(),
             again: Vec::new(),
