@@ -93,7 +93,8 @@ pub fn plan(
     let about = &*lab;
     let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
     let takes = || time::plan(about, plan, derivatives, events, &BTreeMap::new(), &[]);
-    let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
+    let dangers = hazards.as_deref().unwrap_or_default();
+    let follow = || is_whole.then(|| flow::check(about, sources, plan, (events, derivatives), dangers, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
         true => share::two(meets, || share::two(takes, follow)),
         false => (meets(), (takes(), None)),
@@ -104,7 +105,7 @@ pub fn plan(
         return Judged { hazards, ..Judged::default() };
     }
     let about = &*lab;
-    let follow = || flow::check(about, sources, plan, events, derivatives, asked);
+    let follow = || flow::check(about, sources, plan, (events, derivatives), dangers, asked);
     let flow::Followed { found, windows, seen, lasting } = followed.unwrap_or_else(follow);
     // Times are compared again where following the plan tells how long steps last.
     let again = |met: &[[Span; 2]]| time::plan(about, plan, derivatives, events, &lasting, met);
@@ -118,6 +119,12 @@ pub fn plan(
             flow::Turns::Unknown => {}
         }
     }
+    // What the order of the text brings about is said already.
+    let is_said = |d: &Diagnostic| {
+        dangers.iter().any(|h| h.code() == d.code)
+            && lab.diagnostics.iter().any(|m| m.code == d.code && (m.span() == d.span() || m.headline == d.headline))
+    };
+    let found: Vec<Diagnostic> = found.into_iter().filter(|d| !is_said(d)).collect();
     for d in taken.into_iter().chain(found) {
         lab.report(d);
     }

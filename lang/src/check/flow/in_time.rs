@@ -6,6 +6,7 @@
 //! elsewhere is a warning. Where two lines do something at one moment, both orders are followed, and what one of them brings is left to
 //! the run.
 
+mod dangers;
 mod judged;
 mod passing;
 
@@ -16,12 +17,14 @@ use matterix_ir::quantity::show_duration;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
+pub(super) use self::dangers::Dangers;
 pub(super) use self::judged::Judged;
 use super::actions::Asked;
 use super::facts::Facts;
 use super::report::Finding;
 use super::value::Known;
 use super::{Flow, MOST_STEPS, Site, Turns};
+use crate::elaborate::hazards::Hazard;
 
 /// Moments closer than this share of the time, or of 1 s, are one.
 const ROUNDING: f64 = 1e-9;
@@ -186,8 +189,8 @@ fn same(a: f64, b: f64) -> bool {
 }
 
 impl<'l> Flow<'l, '_> {
-    /// Whether what goes on side by side may disturb each other.
-    pub(super) fn may_disturb(&mut self) -> bool {
+    /// Steps, each with those that go on beside it.
+    fn side_by_side(&self) -> Vec<(StepId, Vec<StepId>)> {
         let plan = self.plan;
         let mut pairs: Vec<(StepId, Vec<StepId>)> = Vec::new();
         for step in &plan.steps {
@@ -203,8 +206,13 @@ impl<'l> Flow<'l, '_> {
                 _ => {}
             }
         }
-        pairs.into_iter().any(|(own, others)| {
-            let written = self.writes(own);
+        pairs
+    }
+
+    /// Whether some of these steps may disturb those beside them.
+    fn may_disturb(&mut self, pairs: &[(StepId, Vec<StepId>)]) -> bool {
+        pairs.iter().any(|(own, others)| {
+            let written = self.writes(*own);
             if written.is_empty() {
                 return false;
             }
@@ -213,7 +221,7 @@ impl<'l> Flow<'l, '_> {
             let mut changed = self.behind(&written);
             let moves = |state: &u32| self.derivatives.iter().any(|d| d.state == *state);
             changed.retain(|state| written.contains(state) || even.contains(state) || !moves(state));
-            others.into_iter().any(|other| self.asks_of(other).iter().any(|state| changed.contains(state)))
+            others.iter().any(|other| self.asks_of(*other).iter().any(|state| changed.contains(state)))
         })
     }
 
@@ -264,6 +272,7 @@ impl<'l> Flow<'l, '_> {
             idle: 0,
             over: false,
         };
+        self.judge_dangers(&mut lines);
         self.begin_line(&mut lines, self.plan.root, None);
         while !lines.over {
             let ready = |line: &Line<'_>| matches!(line.state, State::Ready);
@@ -528,6 +537,7 @@ impl<'l> Flow<'l, '_> {
         let kept: Vec<(usize, &Condition)> =
             kept.into_iter().filter(|(_, c)| self.eval(c.node, &lines.facts).truth() == Some(true)).collect();
         lines.over |= self.perform(actions, &mut lines.facts) == Asked::Handled;
+        self.judge_dangers(lines);
         let (span, now) = (self.site(), lines.now());
         for other in (0..lines.all.len()).filter(|other| *other != at) {
             for condition in kept.iter().filter(|(line, _)| *line == other).map(|(_, condition)| *condition) {
@@ -713,16 +723,20 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
 
 /// Adds what goes wrong where branches and jobs are followed in the order of time, whichever of two comes first at one moment, and drops
 /// what is then known not to; `begin` gives a flow that was not followed yet.
-pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>) {
-    let side_by_side = |step: &Step| matches!(step, Step::Parallel(_) | Step::Start { .. });
-    let any = flow.plan.steps.iter().any(|s| side_by_side(&s.step));
-    if !any || !flow.may_disturb() {
+pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard], begin: &impl Fn() -> Flow<'l, 'a>) {
+    let pairs = flow.side_by_side();
+    if pairs.is_empty() {
+        return;
+    }
+    let dangers = flow.dangers_between(&pairs, hazards);
+    if dangers.is_empty() && !flow.may_disturb(&pairs) {
         return;
     }
     let errors = flow.findings.iter().any(Finding::is_error);
     let follow = |backward| {
         let mut follower = begin();
         follower.judged = Judged::of(&flow.findings);
+        follower.dangers.looked_for.clone_from(&dangers);
         let turns = follower.follow_in_time(backward);
         (follower, matches!(turns, Turns::Taken))
     };

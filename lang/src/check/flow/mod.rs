@@ -56,6 +56,7 @@ pub use self::evolve::Window;
 use self::facts::Facts;
 pub use self::points::{After, Seen};
 pub use self::value::Known;
+use crate::elaborate::hazards::Hazard;
 use crate::elaborate::mixtures::Passages;
 use crate::elaborate::{Elaborator, ExtensiveKey};
 use crate::eval::ReactionId;
@@ -138,6 +139,8 @@ struct Flow<'l, 'a> {
     findings: Vec<report::Finding>,
     /// How what other orders break comes out in the order of time.
     judged: in_time::Judged,
+    /// Hazards that are looked for in the order of time.
+    dangers: in_time::Dangers<'l>,
     /// Failures raised inside each open body with handlers, innermost last.
     guards: Vec<Vec<Raised>>,
     /// Failures that devices may report inside each open body with handlers, innermost last.
@@ -211,13 +214,14 @@ pub struct Followed {
     pub lasting: BTreeMap<StepId, (f64, f64)>,
 }
 
-/// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement.
+/// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement. `hazards` are
+/// those that steps side by side may bring about.
 pub fn check(
     lab: &Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
-    events: &[Event],
-    derivatives: &[Derivative],
+    (events, derivatives): (&[Event], &[Derivative]),
+    hazards: &[Hazard],
     asked: Option<&[NodeId]>,
 ) -> Followed {
     let begin = || Flow::new(lab, sources, plan, events, derivatives);
@@ -229,7 +233,7 @@ pub fn check(
         flow
     };
     let mut flow = jobs::follow(noting);
-    in_time::add_findings(&mut flow, &begin);
+    in_time::add_findings(&mut flow, hazards, &begin);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let lasting = flow.durations();
@@ -321,6 +325,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             branches: BTreeMap::new(),
             findings: Vec::new(),
             judged: in_time::Judged::default(),
+            dangers: in_time::Dangers::default(),
             guards: Vec::new(),
             reported: Vec::new(),
             again: Vec::new(),

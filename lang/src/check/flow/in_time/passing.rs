@@ -109,7 +109,7 @@ impl<'l> Flow<'l, '_> {
         }
     }
 
-    /// Reports the limits that flows have passed, at the step of a line that goes on and has set them going.
+    /// Reports the limits that flows have passed, at the step of a line in hand that has set them going, or else where that line waits.
     fn limits_broken(&mut self, longest: f64, before: &Facts, lines: &mut Lines<'l>) {
         let tracks = self.tracks();
         let moved = tracks.list.iter().map(|t| t.state);
@@ -126,7 +126,8 @@ impl<'l> Flow<'l, '_> {
                 continue;
             }
             let states = self.parts(node).states.clone();
-            let Some(at) = self.set_going_by(&states, lines) else { continue };
+            let by = self.set_going_by(&states, lines).or_else(|| self.set_going_before(&states, lines));
+            let Some(at) = by else { continue };
             std::mem::swap(&mut self.sites, &mut lines.all[at].sites);
             std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
             let found = self.findings.len();
@@ -164,6 +165,17 @@ impl<'l> Flow<'l, '_> {
                 let set = self.sets_going(self.changed_by(&operation.at_start));
                 states.iter().any(|s| set.contains(s))
             })
+        })
+    }
+
+    /// The last line that waits and has steps which set one of these states going.
+    fn set_going_before(&mut self, states: &[u32], lines: &Lines<'l>) -> Option<usize> {
+        (0..lines.all.len()).rev().find(|at| {
+            let line = &lines.all[*at];
+            matches!(line.state, State::Until(_) | State::Wait(_)) && {
+                let set = self.sets_going(self.writes(line.root));
+                states.iter().any(|s| set.contains(s))
+            }
         })
     }
 
