@@ -16,7 +16,7 @@ mod unused;
 
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::Plan;
-use matterix_ir::{Diagnostic, NodeId, Sources, codes};
+use matterix_ir::{Diagnostic, NodeId, Sources, Span, codes};
 
 use self::flow::Window;
 pub use self::flow::{After, Known, Seen, forbidden_on_any_way};
@@ -92,8 +92,9 @@ pub fn plan(
     let hazards = ready.as_ref().map(mixing::Ready::hazards);
     let about = &*lab;
     let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
-    let takes = || time::plan(about, plan, derivatives, events, &BTreeMap::new());
-    let follow = || is_whole.then(|| flow::check(about, sources, plan, events, derivatives, asked));
+    let takes = || time::plan(about, plan, derivatives, events, &BTreeMap::new(), &[]);
+    let dangers = hazards.as_deref().unwrap_or_default();
+    let follow = || is_whole.then(|| flow::check(about, sources, plan, (events, derivatives), dangers, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
         true => share::two(meets, || share::two(takes, follow)),
         false => (meets(), (takes(), None)),
@@ -104,16 +105,27 @@ pub fn plan(
         return Judged { hazards, ..Judged::default() };
     }
     let about = &*lab;
-    let follow = || flow::check(about, sources, plan, events, derivatives, asked);
+    let follow = || flow::check(about, sources, plan, (events, derivatives), dangers, asked);
     let flow::Followed { found, windows, seen, lasting } = followed.unwrap_or_else(follow);
     // Times are compared again where following the plan tells how long steps last.
-    let taken = if lasting.is_empty() { taken } else { time::plan(about, plan, derivatives, events, &lasting) };
+    let again = |met: &[[Span; 2]]| time::plan(about, plan, derivatives, events, &lasting, met);
+    let mut taken = if lasting.is_empty() { taken } else { again(&[]) };
     // Where the order of all steps is known, nothing is in doubt.
     let doubted = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE && !d.is_error();
-    let sound = taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted);
-    let apart = sound && flow::takes_turns(about, sources, plan, events, derivatives);
-    let taken = taken.into_iter().filter(|d| !(apart && doubted(d)));
-    for d in taken.chain(found) {
+    if taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted) {
+        match flow::turns(about, sources, plan, events, derivatives) {
+            flow::Turns::Taken => taken.retain(|d| !doubted(d)),
+            flow::Turns::Clash(met) => taken = again(&[met]),
+            flow::Turns::Unknown => {}
+        }
+    }
+    // What the order of the text brings about is said already.
+    let is_said = |d: &Diagnostic| {
+        dangers.iter().any(|h| h.code() == d.code)
+            && lab.diagnostics.iter().any(|m| m.code == d.code && (m.span() == d.span() || m.headline == d.headline))
+    };
+    let found: Vec<Diagnostic> = found.into_iter().filter(|d| !is_said(d)).collect();
+    for d in taken.into_iter().chain(found) {
         lab.report(d);
     }
     Judged { windows: Some(windows), seen, hazards }

@@ -46,6 +46,7 @@ impl Flow<'_, '_> {
         for need in needs {
             let value = self.eval(need.node, facts);
             let truth = value.truth();
+            self.judge(need.span, truth);
             if truth == Some(true) {
                 continue;
             }
@@ -216,6 +217,7 @@ impl Flow<'_, '_> {
             let value = self.eval(limit.condition.node, facts);
             let condition = &limit.condition;
             let truth = value.truth();
+            self.judge(condition.span, truth);
             if truth == Some(true) {
                 continue;
             }
@@ -465,7 +467,7 @@ impl Flow<'_, '_> {
                 if value.truth() != Some(true) {
                     self.stopped_meanwhile(until, f64::INFINITY, &facts);
                     let begun = facts.time.bounds().0;
-                    if matches!(self.course(f64::INFINITY, Some(node), &mut facts), Course::Reached) {
+                    if matches!(self.course(f64::INFINITY, &[(node, true)], &mut facts), Course::Reached(_)) {
                         // Others that run meanwhile may end it earlier or later.
                         if self.flows_beside() {
                             facts.time = Known::Range(begun, f64::INFINITY, Why::Unknown);

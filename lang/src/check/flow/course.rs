@@ -21,8 +21,8 @@ const STRAIGHT: f64 = 1e-9;
 
 /// How a course ends.
 pub(super) enum Course {
-    /// What was waited for has come.
-    Reached,
+    /// These conditions have come to what was waited for.
+    Reached(Vec<NodeId>),
     /// All of the time has passed.
     Passed,
     /// Further on nothing moves evenly: what is left of the time, s.
@@ -39,8 +39,8 @@ struct Passed {
 }
 
 impl Flow<'_, '_> {
-    /// Follows what moves evenly for at most `longest` s, or until a condition holds.
-    pub(super) fn course(&mut self, longest: f64, until: Option<NodeId>, facts: &mut Facts) -> Course {
+    /// Follows what moves evenly for at most `longest` s, or until a condition comes to what it is waited for to be.
+    pub(super) fn course(&mut self, longest: f64, until: &[(NodeId, bool)], facts: &mut Facts) -> Course {
         let tracks = self.tracks();
         if tracks.list.is_empty() && self.timed.is_empty() {
             return Course::Left(longest);
@@ -61,7 +61,7 @@ impl Flow<'_, '_> {
         &mut self,
         tracks: &Tracks,
         longest: f64,
-        until: Option<NodeId>,
+        until: &[(NodeId, bool)],
         facts: &mut Facts,
         passed: &mut Vec<Passed>,
     ) -> Course {
@@ -108,8 +108,10 @@ impl Flow<'_, '_> {
                 return Course::Left(left);
             }
             self.events_along(&even, &timers, facts);
-            if until.is_some_and(|node| self.truth_beyond(node, &even, facts) == Some(true)) {
-                return Course::Reached;
+            let reached = until.iter().filter(|(node, truth)| self.truth_beyond(*node, &even, facts) == Some(*truth));
+            let reached: Vec<NodeId> = reached.map(|(node, _)| *node).collect();
+            if !reached.is_empty() {
+                return Course::Reached(reached);
             }
             if left <= 0.0 {
                 return Course::Passed;
@@ -125,13 +127,13 @@ impl Flow<'_, '_> {
     }
 
     /// What is compared in conditions that what moves evenly decides.
-    fn sides(&mut self, tracks: &Tracks, even: &Even, timers: &Timers, until: Option<NodeId>) -> Vec<Sides> {
+    fn sides(&mut self, tracks: &Tracks, even: &Even, timers: &Timers, until: &[(NodeId, bool)]) -> Vec<Sides> {
         let states: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let events = self.events_on(&states).into_iter().chain(timers.events.iter().copied());
         let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten();
         let mut roots: BTreeSet<NodeId> = events.map(|i| self.events[i as usize].when).collect();
         roots.extend(limits.map(|i| self.plan.limits[*i as usize].condition.node));
-        roots.extend(tracks.conditions.iter().copied().chain(until));
+        roots.extend(tracks.conditions.iter().copied().chain(until.iter().map(|(node, _)| *node)));
         let mut sides = BTreeSet::new();
         for root in roots {
             for node in self.order(root).iter() {

@@ -116,9 +116,9 @@ impl Flow<'_, '_> {
         if longest <= 0.0 {
             return;
         }
-        let course = duration.exact().map(|exact| self.course(exact, None, facts));
+        let course = duration.exact().map(|exact| self.course(exact, &[], facts));
         let rest = match course {
-            Some(Course::Passed | Course::Reached) => return,
+            Some(Course::Passed | Course::Reached(_)) => return,
             Some(Course::Left(left)) if left < longest => Known::Point(left),
             _ => duration.clone(),
         };

@@ -169,7 +169,7 @@ impl Flow<'_, '_> {
     }
 
     /// What is known where failures lead to one place.
-    fn entry(&mut self, id: StepId, base: &Facts, raised: Vec<Raised>) -> Option<Facts> {
+    pub(super) fn entry(&mut self, id: StepId, base: &Facts, raised: Vec<Raised>) -> Option<Facts> {
         let mut ways: Vec<Facts> = raised.into_iter().map(|(_, facts)| facts).collect();
         if let Some(way) = self.fork(id, &ways) {
             return Some(ways.swap_remove(way));

@@ -6,6 +6,10 @@
 //! elsewhere is a warning. Where two lines do something at one moment, both orders are followed, and what one of them brings is left to
 //! the run.
 
+mod dangers;
+mod judged;
+mod passing;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::plan::{Caught, Condition, Operation, Step, StepId};
@@ -13,11 +17,14 @@ use matterix_ir::quantity::show_duration;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
+pub(super) use self::dangers::Dangers;
+pub(super) use self::judged::Judged;
 use super::actions::Asked;
 use super::facts::Facts;
 use super::report::Finding;
 use super::value::Known;
-use super::{Flow, MOST_STEPS, Site};
+use super::{Flow, MOST_STEPS, Site, Turns};
+use crate::elaborate::hazards::Hazard;
 
 /// Moments closer than this share of the time, or of 1 s, are one.
 const ROUNDING: f64 = 1e-9;
@@ -41,8 +48,9 @@ enum Frame<'p> {
     Keep(u32),
     /// A statement of the user's ends.
     Site,
-    /// A block ends: it waits for the jobs begun in it. How many conditions it has kept, and whether it took failures.
-    Block { jobs: Vec<usize>, kept: usize, caught: bool, claims: &'p [InstanceId] },
+    /// A block ends: it waits for the jobs begun in it. How many conditions it has kept, whether it took failures, and what it has
+    /// claimed, with the statement that did.
+    Block { jobs: Vec<usize>, kept: usize, caught: bool, claims: Option<(Span, &'p [InstanceId])> },
 }
 
 /// What a line waits for.
@@ -89,6 +97,21 @@ struct Line<'p> {
     behind: BTreeSet<usize>,
 }
 
+impl Line<'_> {
+    /// Whether an operation of it uses an instance now.
+    fn uses(&self, instance: InstanceId) -> bool {
+        self.frames.iter().any(|f| matches!(f, Frame::End(o, _) if o.claims.contains(&instance)))
+    }
+
+    /// The statement that has claimed an instance.
+    fn claims_at(&self, instance: InstanceId) -> Option<Span> {
+        self.frames.iter().rev().find_map(|f| match f {
+            Frame::Block { claims: Some((span, claims)), .. } if claims.contains(&instance) => Some(*span),
+            _ => None,
+        })
+    }
+}
+
 /// All lines.
 struct Lines<'p> {
     all: Vec<Line<'p>>,
@@ -100,11 +123,15 @@ struct Lines<'p> {
     /// Whether some time is not exact.
     loose: bool,
     held: Vec<(InstanceId, usize)>,
+    /// Where a step fails that uses what another one uses or has claimed, and where that is.
+    clash: Option<[Span; 2]>,
     asked: usize,
     /// Who uses what at this moment.
     uses: Vec<(InstanceId, &'p Operation)>,
     /// Whether two use one thing at one moment in no order.
     met: bool,
+    /// Moments in a row at which no line went on.
+    idle: usize,
     /// The run is over, or cannot be followed any further.
     over: bool,
 }
@@ -133,10 +160,27 @@ impl<'p> Lines<'p> {
     }
 
     fn is_free(&self, line: usize, instance: InstanceId) -> bool {
-        let used =
-            |l: &Line<'_>| l.frames.iter().any(|f| matches!(f, Frame::End(o, _) if o.claims.contains(&instance)));
-        let held = self.held.iter().any(|(i, holder)| *i == instance && !self.within(line, *holder));
-        !held && !self.all.iter().any(used)
+        !self.is_claimed(line, instance) && !self.all.iter().any(|l| l.uses(instance))
+    }
+
+    /// Whether a line beside this one has claimed an instance.
+    fn is_claimed(&self, line: usize, instance: InstanceId) -> bool {
+        self.held.iter().any(|(i, holder)| *i == instance && !self.within(line, *holder))
+    }
+
+    /// Whether a line beside this one begins to use an instance at this moment.
+    fn is_used_now(&self, line: usize, instance: InstanceId) -> bool {
+        let behind = &self.all[line].behind;
+        self.uses.iter().enumerate().any(|(index, (used, _))| *used == instance && !behind.contains(&index))
+    }
+
+    /// The statement of another line that has claimed an instance, or else uses it.
+    fn user(&self, line: usize, instance: InstanceId) -> Option<Span> {
+        let holds = self.held.iter().find(|(i, holder)| *i == instance && !self.within(line, *holder));
+        match holds {
+            Some((_, holder)) => self.all[*holder].claims_at(instance),
+            None => self.all.iter().find(|l| l.uses(instance)).and_then(|l| l.sites.last().map(|site| site.span)),
+        }
     }
 }
 
@@ -145,8 +189,8 @@ fn same(a: f64, b: f64) -> bool {
 }
 
 impl<'l> Flow<'l, '_> {
-    /// Whether what goes on side by side may disturb each other.
-    pub(super) fn may_disturb(&mut self) -> bool {
+    /// Steps, each with those that go on beside it.
+    fn side_by_side(&self) -> Vec<(StepId, Vec<StepId>)> {
         let plan = self.plan;
         let mut pairs: Vec<(StepId, Vec<StepId>)> = Vec::new();
         for step in &plan.steps {
@@ -162,19 +206,24 @@ impl<'l> Flow<'l, '_> {
                 _ => {}
             }
         }
+        pairs
+    }
+
+    /// Whether some of these steps may disturb those beside them.
+    fn may_disturb(&mut self, pairs: &[(StepId, Vec<StepId>)]) -> bool {
         // What moves in a way that only a run knows is left to it.
         let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
         let uneven: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| !even.contains(s)).collect();
         let mut asked: BTreeMap<StepId, BTreeSet<u32>> = BTreeMap::new();
-        pairs.into_iter().any(|(own, others)| {
-            let written = self.writes(own);
+        pairs.iter().any(|(own, others)| {
+            let written = self.writes(*own);
             if written.is_empty() {
                 return false;
             }
             let mut changed = self.behind(&written);
             changed.retain(|state| written.contains(state) || !uneven.contains(state));
-            others.into_iter().any(|other| {
-                let states = asked.entry(other).or_insert_with(|| self.asks_of(other));
+            others.iter().any(|other| {
+                let states = asked.entry(*other).or_insert_with(|| self.asks_of(*other));
                 !states.is_disjoint(&changed)
             })
         })
@@ -195,6 +244,7 @@ impl<'l> Flow<'l, '_> {
                     vec![condition]
                 }
                 Step::During { invariants, .. } => invariants.iter().collect(),
+                Step::Expect(conditions) => conditions.iter().collect(),
                 _ => Vec::new(),
             };
             for condition in asked {
@@ -204,9 +254,8 @@ impl<'l> Flow<'l, '_> {
         out
     }
 
-    /// Follows all lines in the order of time; at one moment the last one first if `backward`. True if all of them come to their ends
-    /// at times that are known, and no two use one thing at the same time.
-    pub(super) fn follow_in_time(&mut self, backward: bool) -> bool {
+    /// Follows all lines in the order of time, at one moment the last one first if `backward`; how they use things.
+    pub(super) fn follow_in_time(&mut self, backward: bool) -> Turns {
         self.quiet += 1;
         let mut facts = self.start();
         self.fire((0..self.events.len() as u32).collect(), &mut facts);
@@ -220,11 +269,14 @@ impl<'l> Flow<'l, '_> {
             lost: BTreeSet::new(),
             loose: false,
             held: Vec::new(),
+            clash: None,
             asked: 0,
             uses: Vec::new(),
             met: false,
+            idle: 0,
             over: false,
         };
+        self.judge_dangers(&mut lines);
         self.begin_line(&mut lines, self.plan.root, None);
         while !lines.over {
             let ready = |line: &Line<'_>| matches!(line.state, State::Ready);
@@ -238,13 +290,20 @@ impl<'l> Flow<'l, '_> {
             }
         }
         let ended = lines.all.iter().all(|line| matches!(line.state, State::Done));
-        ended && !lines.loose && !lines.met && self.findings.is_empty() && self.steps <= MOST
+        match lines.clash {
+            Some(places) => Turns::Clash(places),
+            None if ended && !lines.loose && !lines.met && self.findings.is_empty() && self.steps <= MOST => {
+                Turns::Taken
+            }
+            None => Turns::Unknown,
+        }
     }
 
     fn begin_line(&mut self, lines: &mut Lines<'l>, root: StepId, outer: Option<usize>) -> usize {
         let behind = outer.map(|outer| lines.all[outer].behind.clone()).unwrap_or_default();
-        let block = Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: &[] };
-        let frames = vec![block, Frame::One(root)];
+        // What a branch or job begins may outlast it.
+        let block = Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: None };
+        let frames = outer.is_none().then_some(block).into_iter().chain([Frame::One(root)]).collect();
         let (sites, caught) = (self.sites.clone(), self.caught.clone());
         lines.all.push(Line { root, outer, state: State::Ready, frames, sites, caught, kept: Vec::new(), behind });
         lines.all.len() - 1
@@ -255,6 +314,7 @@ impl<'l> Flow<'l, '_> {
         std::mem::swap(&mut self.sites, &mut lines.all[at].sites);
         std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
         self.doubt = usize::from(lines.loose);
+        lines.idle = 0;
         while !lines.over && matches!(lines.all[at].state, State::Ready) {
             let found = self.findings.len();
             match lines.all[at].frames.pop() {
@@ -311,7 +371,9 @@ impl<'l> Flow<'l, '_> {
                 if caught {
                     self.caught.pop();
                 }
-                lines.held.retain(|(instance, holder)| *holder != at || !claims.contains(instance));
+                if let Some((_, claims)) = claims {
+                    lines.held.retain(|(instance, holder)| *holder != at || !claims.contains(instance));
+                }
             }
         }
     }
@@ -326,7 +388,7 @@ impl<'l> Flow<'l, '_> {
             self.sites.push(Site { span: node.span, label: node.label.clone(), calls });
             lines.all[at].frames.push(Frame::Site);
         }
-        let block = |kept, caught| Frame::Block { jobs: Vec::new(), kept, caught, claims: &[] };
+        let block = |kept, caught| Frame::Block { jobs: Vec::new(), kept, caught, claims: None };
         match &node.step {
             Step::Sequence(steps) => lines.all[at].frames.push(Frame::Steps(steps.iter())),
             Step::Parallel(branches) => {
@@ -430,21 +492,34 @@ impl<'l> Flow<'l, '_> {
                 lines.all[at].state = State::Claim(claims, *body, lines.asked);
             }
             Step::Fail { .. } | Step::Retry { .. } => lines.over = true,
-            Step::Expect(_) | Step::Record { .. } | Step::Note(_) | Step::Ask(_) => {}
+            Step::Expect(conditions) => {
+                for condition in conditions {
+                    if self.eval(condition.node, &lines.facts).truth() == Some(false) {
+                        self.unexpected(condition, &lines.facts);
+                    }
+                }
+            }
+            Step::Record { .. } | Step::Note(_) | Step::Ask(_) => {}
         }
     }
 
     fn begin_operation(&mut self, lines: &mut Lines<'l>, at: usize, operation: &'l Operation, label: &'l str) {
         // Two at once fail by themselves, which is another finding.
-        let taken = operation.claims.iter().any(|i| !lines.is_free(at, *i));
-        if taken || self.needs(label, &operation.needs, &mut lines.facts) != Asked::Met {
+        let taken = operation.claims.iter().copied().find(|i| !lines.is_free(at, *i));
+        if let Some(place) = taken.and_then(|instance| lines.user(at, instance)) {
+            lines.clash = Some([self.site(), place]).filter(|_| !lines.loose && !takes(&self.caught, "claimed"));
+        }
+        if taken.is_some() || self.needs(label, &operation.needs, &mut lines.facts) != Asked::Met {
             lines.over = true;
             return;
         }
         lines.note_uses(at, operation);
         self.does(lines, at, &operation.at_start, label);
         match (&operation.takes, &operation.until) {
-            (_, Some(_)) => self.leave_line(lines, at),
+            (_, Some(until)) => {
+                lines.all[at].frames.push(Frame::End(operation, label));
+                self.waits_until(lines, at, until, Some(0.0), Some(f64::INFINITY));
+            }
             (Some(takes), None) => {
                 let known = self.eval(takes.nominal, &lines.facts);
                 lines.loose |= takes.bounds.is_some();
@@ -466,6 +541,7 @@ impl<'l> Flow<'l, '_> {
         let kept: Vec<(usize, &Condition)> =
             kept.into_iter().filter(|(_, c)| self.eval(c.node, &lines.facts).truth() == Some(true)).collect();
         lines.over |= self.perform(actions, &mut lines.facts) == Asked::Handled;
+        self.judge_dangers(lines);
         let (span, now) = (self.site(), lines.now());
         for other in (0..lines.all.len()).filter(|other| *other != at) {
             for condition in kept.iter().filter(|(line, _)| *line == other).map(|(_, condition)| *condition) {
@@ -541,73 +617,6 @@ impl<'l> Flow<'l, '_> {
             let lost: Vec<u32> = lines.lost.iter().copied().collect();
             self.forget(&lost, &mut lines.facts);
         }
-    }
-
-    /// Time passes until the next line goes on.
-    fn until_next(&mut self, lines: &mut Lines<'l>) {
-        let now = lines.now();
-        for at in 0..lines.all.len() {
-            if let State::Wait(wait) = &lines.all[at].state {
-                let condition = wait.condition;
-                match wait.since {
-                    Some(since) if since + wait.lasts <= now || same(since + wait.lasts, now) => {
-                        lines.all[at].state = State::Ready;
-                        return;
-                    }
-                    _ if wait.deadline <= now || same(wait.deadline, now) => return self.timed_out(lines, at),
-                    _ if self.moves_by_itself(condition, &lines.facts) => self.leave_line(lines, at),
-                    _ => {}
-                }
-            }
-        }
-        let due = lines.all.iter().filter_map(|line| match &line.state {
-            State::Until(time) => Some(*time),
-            State::Wait(wait) => Some(wait.since.map_or(f64::INFINITY, |s| s + wait.lasts).min(wait.deadline)),
-            _ => None,
-        });
-        let next = due.fold(f64::INFINITY, f64::min);
-        if !next.is_finite() || now.is_nan() {
-            lines.over = true;
-            return;
-        }
-        if next > now {
-            lines.uses.clear();
-            lines.all.iter_mut().for_each(|line| line.behind.clear());
-            self.quiet += 1;
-            self.pass(&Known::Point(next - now), &mut lines.facts);
-            self.quiet -= 1;
-            lines.over |= std::mem::take(&mut self.stopped);
-            lines.facts.time = Known::Point(next);
-            self.forget_lost(lines);
-            self.look_after(lines);
-        }
-        for line in &mut lines.all {
-            if matches!(line.state, State::Until(time) if time <= next || same(time, next)) {
-                line.state = State::Ready;
-            }
-        }
-    }
-
-    /// What laws have changed meanwhile came about at a time that is not known here.
-    fn look_after(&mut self, lines: &mut Lines<'l>) {
-        for at in 0..lines.all.len() {
-            let State::Wait(wait) = &lines.all[at].state else { continue };
-            let (condition, held) = (wait.condition, wait.since.is_some());
-            if self.eval(condition.node, &lines.facts).truth() != Some(held) {
-                self.leave_line(lines, at);
-            }
-        }
-    }
-
-    /// Whether laws may change how a condition comes out while nothing is done.
-    fn moves_by_itself(&mut self, condition: &Condition, facts: &Facts) -> bool {
-        let parts = self.parts(condition.node);
-        if parts.timed || !self.timed.is_empty() {
-            return true;
-        }
-        let moving: Vec<usize> =
-            (0..self.derivatives.len()).filter(|i| parts.states.contains(&self.derivatives[*i].state)).collect();
-        moving.into_iter().any(|i| self.eval(self.derivatives[i].rate, facts).exact() != Some(0.0))
     }
 
     /// What a line waits for does not come in time.
@@ -696,31 +705,59 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
     let free =
         |(_, at, claims, _): &&(usize, usize, &'p [InstanceId], StepId)| claims.iter().all(|i| lines.is_free(*at, *i));
     let granted = asking.iter().find(free).copied();
-    // Who has it first is a matter of the schedule.
-    lines.loose |= asking.len() > usize::from(granted.is_some());
+    // Who has it first is a matter of the schedule, or of the order of two at one moment.
+    lines.loose |= asking.iter().any(|(asked, at, claims, _)| {
+        let waits = granted.is_none_or(|(first, ..)| first != *asked);
+        let others =
+            || asking.iter().filter(|(other, ..)| waits && other != asked).flat_map(|(_, _, claims, _)| *claims);
+        claims
+            .iter()
+            .any(|i| lines.is_claimed(*at, *i) || lines.is_used_now(*at, *i) || others().any(|other| other == i))
+    });
     let (_, at, claims, step) = granted?;
+    let place = lines.all[at].sites.last().map(|site| site.span).unwrap_or_default();
     lines.held.extend(claims.iter().map(|i| (*i, at)));
     lines.all[at].state = State::Ready;
-    lines.all[at].frames.extend([Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims }, Frame::One(step)]);
+    lines.all[at].frames.extend([
+        Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: Some((place, claims)) },
+        Frame::One(step),
+    ]);
     Some(at)
 }
 
-/// Adds what goes wrong where branches and jobs are followed in the order of time, whichever of two comes first at one moment; `begin`
-/// gives a flow that was not followed yet.
-pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>) {
-    let side_by_side = |step: &Step| matches!(step, Step::Parallel(_) | Step::Start { .. });
-    let any = flow.plan.steps.iter().any(|s| side_by_side(&s.step));
+/// Adds what goes wrong where branches and jobs are followed in the order of time, whichever of two comes first at one moment, and drops
+/// what is then known not to; `begin` gives a flow that was not followed yet.
+pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard], begin: &impl Fn() -> Flow<'l, 'a>) {
+    let pairs = flow.side_by_side();
+    if pairs.is_empty() {
+        return;
+    }
+    let dangers = flow.dangers_between(&pairs, hazards);
+    if dangers.is_empty() && !flow.may_disturb(&pairs) {
+        return;
+    }
+    let errors = flow.findings.iter().any(Finding::is_error);
+    let follow = |backward| {
+        let mut follower = begin();
+        follower.judged = Judged::of(&flow.findings);
+        follower.dangers.looked_for.clone_from(&dangers);
+        let turns = follower.follow_in_time(backward);
+        (follower, matches!(turns, Turns::Taken))
+    };
+    let (first, sound) = follow(false);
+    if first.findings.is_empty() && !(errors && sound) {
+        return;
+    }
+    let (second, as_sound) = follow(true);
+    if sound && as_sound {
+        let holds = |f: &Finding| first.judged.holds(f.place()) && second.judged.holds(f.place());
+        flow.findings.retain(|f| !(f.is_error() && holds(f)));
+        return;
+    }
     // What is wrong in any order needs no other one.
-    if !any || flow.findings.iter().any(Finding::is_error) || !flow.may_disturb() {
+    if errors {
         return;
     }
-    let mut first = begin();
-    first.follow_in_time(false);
-    if first.findings.is_empty() {
-        return;
-    }
-    let mut second = begin();
-    second.follow_in_time(true);
     let is_new = |f: &Finding| !flow.findings.iter().any(|old| old.place() == f.place());
     let new: Vec<Finding> =
         first.findings.into_iter().filter(|f| second.findings.iter().any(|o| o.is_like(f)) && is_new(f)).collect();

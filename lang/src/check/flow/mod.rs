@@ -56,6 +56,7 @@ pub use self::evolve::Window;
 use self::facts::Facts;
 pub use self::points::{After, Seen};
 pub use self::value::Known;
+use crate::elaborate::hazards::Hazard;
 use crate::elaborate::mixtures::Passages;
 use crate::elaborate::{Elaborator, ExtensiveKey};
 use crate::eval::ReactionId;
@@ -136,6 +137,10 @@ struct Flow<'l, 'a> {
     /// Conditions of the workflow's own branches that constants decide: how they come out, and whether there is an `else`.
     branches: BTreeMap<Span, (String, BTreeSet<bool>, bool)>,
     findings: Vec<report::Finding>,
+    /// How what other orders break comes out in the order of time.
+    judged: in_time::Judged,
+    /// Hazards that are looked for in the order of time.
+    dangers: in_time::Dangers<'l>,
     /// Failures raised inside each open body with handlers, innermost last.
     guards: Vec<Vec<Raised>>,
     /// Failures that devices may report inside each open body with handlers, innermost last.
@@ -211,13 +216,14 @@ pub struct Followed {
     pub lasting: BTreeMap<StepId, (f64, f64)>,
 }
 
-/// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement.
+/// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement. `hazards` are
+/// those that steps side by side may bring about.
 pub fn check(
     lab: &Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
-    events: &[Event],
-    derivatives: &[Derivative],
+    (events, derivatives): (&[Event], &[Derivative]),
+    hazards: &[Hazard],
     asked: Option<&[NodeId]>,
 ) -> Followed {
     let begin = || Flow::new(lab, sources, plan, events, derivatives);
@@ -229,7 +235,7 @@ pub fn check(
         flow
     };
     let mut flow = jobs::follow(noting);
-    in_time::add_findings(&mut flow, &begin);
+    in_time::add_findings(&mut flow, hazards, &begin);
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let lasting = flow.durations();
@@ -249,17 +255,33 @@ pub fn check(
     Followed { found, windows, seen, lasting }
 }
 
-/// Whether all branches and jobs go on at times that are known, and no two of them use one thing at the same time.
-pub fn takes_turns(
+/// Whether branches and jobs use things one after the other.
+pub enum Turns {
+    /// All of them go on at times that are known, and no two use one thing at the same time.
+    Taken,
+    /// The statements at these places always do.
+    Clash([Span; 2]),
+    /// Only a run can tell.
+    Unknown,
+}
+
+/// Follows branches and jobs in the order of time to tell whether two of them use one thing at the same time.
+pub fn turns(
     lab: &Elaborator<'_>,
     sources: &Sources,
     plan: &Plan,
     events: &[Event],
     derivatives: &[Derivative],
-) -> bool {
-    [false, true]
-        .into_iter()
-        .all(|backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward))
+) -> Turns {
+    let follow = |backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward);
+    match follow(false) {
+        Turns::Taken if matches!(follow(true), Turns::Taken) => Turns::Taken,
+        Turns::Clash([a, b]) => match follow(true) {
+            Turns::Clash(met) if met.contains(&a) && met.contains(&b) => Turns::Clash(met),
+            _ => Turns::Unknown,
+        },
+        _ => Turns::Unknown,
+    }
 }
 
 impl<'l, 'a> Flow<'l, 'a> {
@@ -304,6 +326,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
             findings: Vec::new(),
+            judged: in_time::Judged::default(),
+            dangers: in_time::Dangers::default(),
             guards: Vec::new(),
             reported: Vec::new(),
             again: Vec::new(),

@@ -249,9 +249,9 @@ impl Flow<'_, '_> {
         }
         let before = facts.clone();
         let course =
-            if shared { Course::Left(longest) } else { self.course(longest, Some(condition.node), &mut facts) };
+            if shared { Course::Left(longest) } else { self.course(longest, &[(condition.node, true)], &mut facts) };
         match course {
-            Course::Reached => return Some(facts),
+            Course::Reached(_) => return Some(facts),
             Course::Passed => {}
             Course::Left(left) => self.pass(&Known::Range(0.0, left, Why::Unknown), &mut facts),
         }
@@ -259,7 +259,9 @@ impl Flow<'_, '_> {
             self.by_totals(longest, &before, &mut facts);
         }
         if timeout.is_some() {
-            self.raise_written("timeout", self.plan.get(id).span, facts.clone());
+            let mut late = facts.clone();
+            late.time = Known::binary(BinaryOp::Add, &before.time, &Known::point(longest));
+            self.raise_written("timeout", self.plan.get(id).span, late);
         }
         if value.truth() == Some(false) && !parts.timed && !shared {
             let never = self.eval(condition.node, &facts).truth() == Some(false);
@@ -605,8 +607,8 @@ impl Flow<'_, '_> {
                 }
                 break;
             }
-            match raised.into_iter().map(|(_, f)| f).reduce(|a, b| facts.join(a, &b, self.site(), Why::Paths)) {
-                Some(next) => entry = next,
+            match self.entry(id, &facts, raised) {
+                Some(next) => entry = Facts { written: None, ..next },
                 None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);

@@ -88,7 +88,9 @@ fn may_delay(times: &Times<'_>, hold: &Use, used: &Use) -> bool {
         return false;
     };
     let begins_later = begins_after(times, block, step) || (step.start == block.start && step.order > block.order);
-    !begins_later && !times.before(used.step, hold.step)
+    // What is known of a block in a loop is known of its last turn.
+    let in_turns = times.all_turns(hold.step, used.step) != hold.step;
+    (in_turns || !begins_later) && !times.before(used.step, hold.step)
 }
 
 /// Whether a step stands in a block that claims what it uses, or that holds it.
@@ -120,15 +122,38 @@ pub(super) fn clash(times: &Times<'_>, hold: &Use, used: &Use) -> Option<bool> {
     let scopes = [block.scope, step.scope];
     let after = |a, b| times.least(a, b, &scopes).is_some_and(|t| t > ROUNDING);
     let together = step.start == begun.start;
-    // What begins before the block makes it wait.
+    // What begins before the block makes it wait, and what is over before its first turn never meets it.
     let turns = times.all_turns(used.step, hold.step) != used.step;
-    if !turns && (after(step.start, block.start) || (step.start == block.start && step.order < block.order)) {
+    let loops = times.all_turns(hold.step, used.step);
+    if loops == hold.step {
+        let sooner = after(step.start, block.start) || (step.start == block.start && step.order < block.order);
+        if !turns && sooner {
+            return None;
+        }
+    } else if sooner_than_turns(times, loops, block, step, turns) {
         return None;
     }
     // Of what is over at once, the moment counts.
     let moment = together && block.end == step.start;
     let within = moment || ((together || after(begun.start, step.start)) && after(step.start, block.end));
     Some(within && times.must_fail(used.step, "claimed") && times.must_fail(hold.step, "claimed"))
+}
+
+/// Whether a step begins before a block does so in the first turn of the loops around it, of which `loops` is the outermost; where the
+/// step has turns of its own, whether it is over by then.
+fn sooner_than_turns(times: &Times<'_>, loops: StepId, block: &Visit, step: &Visit, turns: bool) -> bool {
+    let Some((first, turn)) = loop_and_turn(times, loops) else { return false };
+    let scopes = [block.scope, step.scope];
+    let into_turn = times.least(turn.start, block.start, &scopes).unwrap_or(0.0).max(0.0);
+    let from = if turns { step.end } else { step.start };
+    let before_loop = times.least(from, first.start, &scopes);
+    before_loop.is_some_and(|t| t + into_turn > ROUNDING || (turns && t + into_turn > -ROUNDING))
+}
+
+/// A loop, and the body of its last turn.
+fn loop_and_turn<'t>(times: &'t Times<'_>, loops: StepId) -> Option<(&'t Visit, &'t Visit)> {
+    let (Step::Repeat { body, .. } | Step::RepeatWhile { body, .. }) = &times.plan.get(loops).step else { return None };
+    Some((times.timing.visit(loops)?, times.timing.visit(*body)?))
 }
 
 /// The body of a block that claims: it begins when the block has what it claims.

@@ -32,13 +32,14 @@ const MOST_WORK: usize = 2_000_000_000;
 const MOST_ROUNDS: usize = 6;
 
 /// Reports contradictions in the times of a plan and in the use of instances; `lasting` says how long steps last, s, where that
-/// follows from states.
+/// follows from states. Steps in `met`, by their places in the text, are known to use one thing at the same time.
 pub fn plan(
     lab: &Elaborator<'_>,
     plan: &Plan,
     derivatives: &[Derivative],
     events: &[Event],
     lasting: &BTreeMap<StepId, (f64, f64)>,
+    met: &[[Span; 2]],
 ) -> Vec<Diagnostic> {
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
     let mut known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
@@ -51,7 +52,7 @@ pub fn plan(
     let name = |i: matterix_ir::scene::InstanceId| {
         lab.instances.get(i.0 as usize).map_or_else(String::new, |i| i.name.clone())
     };
-    found.extend(twice::findings(&times, &name));
+    found.extend(twice::findings(&times, met, &name));
     found.extend(again::findings(&times, &known));
     found.extend(deadlock::findings(&times, &name));
     if times.work.get() > MOST_WORK {
@@ -204,9 +205,9 @@ impl<'p> Times<'p> {
     }
 }
 
-/// Whether a handler around a step names a failure: whoever wrote it expects it.
+/// Whether a handler of a step, or around it, names a failure: whoever wrote it expects it.
 fn expected(plan: &Plan, timing: &Timing, step: StepId, failure: &str) -> bool {
-    timing.around(step).any(|around| match &plan.get(around).step {
+    std::iter::once(step).chain(timing.around(step)).any(|around| match &plan.get(around).step {
         Step::Guarded { handlers, .. } => {
             handlers.iter().any(|(caught, _)| matches!(caught, Caught::Named(name) if name == failure))
         }

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Plan, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_ir::{Diagnostic, Severity, Span, codes};
 use matterix_timing::usage::{self, Use};
 
 use super::{Times, expected, held, show, spent};
@@ -17,8 +17,8 @@ const MOST: usize = 2_000_000;
 const MOST_CALLS: usize = 2;
 
 /// Uses that overlap, or may, where nothing makes them take turns. Between two lines of steps one clash over an instance is said,
-/// a certain one before one that may be.
-pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
+/// a certain one before one that may be. Of steps whose places are in `met` it is known that they do.
+pub(super) fn findings(times: &Times<'_>, met: &[[Span; 2]], name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
     let mut uses = usage::uses(times.plan, &times.timing);
     uses.extend(held::holds(times));
     uses.sort_unstable();
@@ -39,6 +39,11 @@ pub(super) fn findings(times: &Times<'_>, name: &dyn Fn(InstanceId) -> String) -
                 }
             }
         }
+    }
+    let place = |used: &Use| times.plan.get(show::own(times.plan, &times.timing, used.step)).span;
+    for (a, b, sure) in clashes.iter_mut().filter(|_| !met.is_empty()) {
+        let places = [place(a), place(b)];
+        *sure |= met.iter().any(|both| places.iter().all(|place| both.contains(place)));
     }
     clashes.sort_by_key(|c| !c.2);
     let mut said: BTreeSet<(InstanceId, StepId, StepId)> = BTreeSet::new();
