@@ -157,6 +157,9 @@ impl Flow<'_, '_> {
                 self.raise("broken", broken);
                 if fails && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
+                    // As if it held: what goes wrong in the body all the same is a mistake of its own.
+                    let states = self.parts(condition.node).states.clone();
+                    self.forget(&states, &mut facts);
                 }
                 self.kept.push(condition);
                 let after = match self.is_taken("broken") && !plan.ends.is_empty() {
