@@ -44,11 +44,17 @@ impl<'b, 'd, 'p> Paced<'b, 'd, 'p> {
             self.desk.answer(read, kind, value.as_ref().ok().copied().flatten());
             value?;
         }
+        self.measure(out)?;
+        self.desk.tell(self.inner.now());
+        Ok(())
+    }
+
+    /// Works out how long commands take that have just begun.
+    fn measure(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
         for (step, node) in self.desk.unmeasured() {
             let takes = self.inner.value(node, out)?.unwrap_or(0.0);
             self.desk.measured(step, takes);
         }
-        self.desk.tell(self.inner.now());
         Ok(())
     }
 }
@@ -95,6 +101,8 @@ impl Backend for Paced<'_, '_, '_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        // How long a command takes follows from what it finds, as in a run, not from what it does.
+        self.measure(out)?;
         self.inner.start(operation, out)
     }
 
