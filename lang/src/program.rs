@@ -647,9 +647,10 @@ fn judge<'a>(
     let item = tables.names.decl(task.item).item;
     // What is wrong with the defaults is mended first.
     if let (ItemKind::Workflow { name, .. }, true) = (&item.kind, built.findings.iter().all(|d| !d.is_error())) {
+        let usual = built.reach.clone();
         let supposing = |choice: &task::Choice| {
             let task = Task { supposed: Some(choice.clone()), ..task.clone() };
-            build(tables, sources, &task, Wanted::Findings, None, &stop).map(|built| built.findings)
+            build(tables, sources, &task, Wanted::Findings, usual.as_ref(), &stop).map(|built| built.findings)
         };
         let found = supposed::found(&built.choices, name.span, &built.findings, supposing)?;
         built.findings.extend(found);
