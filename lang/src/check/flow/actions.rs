@@ -68,8 +68,7 @@ impl Flow<'_, '_> {
                         self.may_fail(need, paths && !shared, facts);
                         if paths && !shared && !taken {
                             self.unmet(label, need, facts, true);
-                            let states = self.parts(need.node).states.clone();
-                            self.forget(&states, facts);
+                            self.go_on_after(need, facts);
                         } else if taken && !shared {
                             self.assume(need.node, true, facts);
                         }
@@ -92,6 +91,14 @@ impl Flow<'_, '_> {
         let states = self.parts(condition.node).states.clone();
         self.forget(&states, facts);
         Asked::Unmet
+    }
+
+    /// Behind a finding on some ways those on which the condition holds go on, where ways are told apart; else what it looks at is unknown.
+    fn go_on_after(&mut self, condition: &Condition, facts: &mut Facts) {
+        if !self.choose_ways(condition.node, true, facts) {
+            let states = self.parts(condition.node).states.clone();
+            self.forget(&states, facts);
+        }
     }
 
     /// What is known at some moment of the time that passes now.
@@ -237,8 +244,7 @@ impl Flow<'_, '_> {
                     self.may_fail(condition, on_some, facts);
                     if on_some && !taken {
                         self.passed(limit, facts, true);
-                        let states = self.parts(condition.node).states.clone();
-                        self.forget(&states, facts);
+                        self.go_on_after(condition, facts);
                     } else if on_some {
                         self.assume(condition.node, true, facts);
                     }
@@ -475,6 +481,8 @@ impl Flow<'_, '_> {
             (Some(takes), None) => Some(self.duration(takes.nominal, &facts)),
             _ => None,
         };
+        let lasts = lasts.filter(|time| met || time.bounds().0.is_finite());
+        self.quiet += usize::from(!met);
         if met && self.perform(&operation.at_start, &mut facts) == Asked::Handled {
             return None;
         }
@@ -503,6 +511,7 @@ impl Flow<'_, '_> {
             (None, None) => {}
         }
         self.claimed.truncate(others);
+        self.quiet -= usize::from(!met);
         if met {
             if self.perform(&operation.at_end, &mut facts) == Asked::Handled {
                 return None;

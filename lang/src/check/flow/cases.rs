@@ -9,16 +9,13 @@ use matterix_ir::NodeId;
 use super::Flow;
 use super::eval::{Exact, Supposed};
 use super::facts::Facts;
-use super::value::{Known, Why};
+use super::value::{Known, ROUNDING, Why};
 
 /// So many ways are told apart; where more meet, each state is known by itself only.
 const MOST_WAYS: usize = 8;
 
 /// Of so many states at most it is kept which values they have together.
 const MOST_STATES: usize = 1000;
-
-/// Two ways are one where no state differs by more than this, relative to the larger: rounding parts them.
-const SAME: f64 = 1e-12;
 
 /// A state that is one of several numbers, depending on the way.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +39,10 @@ impl Cases {
     /// of these in `out` comes to what the ways say.
     pub fn join(a: &Facts, b: &Facts, open: &[u32], out: &mut Facts, why: Why) -> Option<Rc<Cases>> {
         let (of_a, of_b) = (a.ways(), b.ways());
+        // Where branches were stopped partway, values of several ways may have come together.
+        if a.blurred.is_some() || b.blurred.is_some() {
+            return None;
+        }
         if open.len() < 2 || of_a > MOST_WAYS || of_b > MOST_WAYS {
             return None;
         }
@@ -55,8 +56,9 @@ impl Cases {
                 return None;
             }
         }
-        let same =
-            |i: usize, j: usize| states.iter().all(|(_, v)| (v[i] - v[j]).abs() <= SAME * v[i].abs().max(v[j].abs()));
+        let same = |i: usize, j: usize| {
+            states.iter().all(|(_, v)| (v[i] - v[j]).abs() <= ROUNDING * v[i].abs().max(v[j].abs()))
+        };
         let mut kept: Vec<usize> = Vec::new();
         for way in 0..of_a + of_b {
             if !kept.iter().any(|other| same(way, *other)) {
@@ -178,16 +180,18 @@ impl Flow<'_, '_> {
         Some((values.clone(), Known::of(values, why)))
     }
 
-    /// Takes a condition for true or false: ways on which it comes out otherwise do not lead here.
-    pub(super) fn choose_ways(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+    /// Takes a condition for true or false: ways on which it comes out otherwise do not lead here. Whether there are any.
+    pub(super) fn choose_ways(&mut self, node: NodeId, holds: bool, facts: &mut Facts) -> bool {
         if facts.cases.is_none() || self.is_shared(node) {
-            return;
+            return false;
         }
-        let Some((values, _)) = self.on_each_way(node, facts) else { return };
+        let Some((values, _)) = self.on_each_way(node, facts) else { return false };
         let stays: Vec<bool> = values.iter().map(|v| v.is_none_or(|v| (v != 0.0) == holds)).collect();
-        if stays.contains(&true) && stays.contains(&false) {
+        let some = stays.contains(&true) && stays.contains(&false);
+        if some {
             facts.keep_ways(&stays);
         }
+        some
     }
 
     /// The share that a transfer takes on each way, where ways are told apart.
@@ -206,4 +210,87 @@ pub(super) fn moved(shares: &[f64], source: u32, target: u32, facts: &Facts) -> 
     let rest = shares.iter().zip(&held).map(|(share, held)| (1.0 - share) * held).collect();
     let more = shares.iter().zip(&held).zip(&there).map(|((share, held), there)| there + share * held).collect();
     Some([rest, more])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use matterix_ir::Span;
+
+    use super::*;
+
+    fn facts(states: &[f64]) -> Facts {
+        Facts {
+            states: states.iter().map(|v| Known::Point(*v)).collect(),
+            locals: Vec::new(),
+            time: Known::Point(0.0),
+            history: None,
+            unsettled: BTreeSet::new(),
+            moving: BTreeSet::new(),
+            barrier: None,
+            bonds: None,
+            cases: None,
+            fired: Vec::new(),
+            held: BTreeSet::new(),
+            decided: Vec::new(),
+            written: None,
+            unsure: false,
+            blurred: None,
+            begun: BTreeMap::new(),
+        }
+    }
+
+    fn met(ways: &[&[f64]]) -> Facts {
+        let base = facts(ways[0]);
+        let all = ways.iter().map(|way| facts(way));
+        all.reduce(|a, b| base.join(a, &b, Span::default(), Why::Paths)).expect("there are ways")
+    }
+
+    #[test]
+    fn values_that_go_together_stay_together() {
+        let mut facts = met(&[&[1.0, 10.0, 5.0], &[2.0, 20.0, 5.0], &[3.0, 30.0, 5.0]]);
+        assert_eq!(facts.told(1), Some([10.0, 20.0, 30.0].as_slice()));
+        assert_eq!(facts.told(2), None);
+        facts.keep_ways(&[false, true, true]);
+        assert_eq!(facts.states[0].bounds(), (2.0, 3.0));
+        assert_eq!(facts.states[1].bounds(), (20.0, 30.0));
+        facts.keep_ways(&[false, true]);
+        assert_eq!([0, 1, 2].map(|s| facts.states[s].exact()), [Some(3.0), Some(30.0), Some(5.0)]);
+        assert!(facts.cases.is_none());
+    }
+
+    #[test]
+    fn ways_that_rounding_parts_are_one() {
+        let facts = met(&[&[0.1 + 0.2, 4.0], &[0.3, 4.0 + 1e-15], &[1.0, 2.0]]);
+        assert_eq!(facts.told(0), Some([0.1 + 0.2, 1.0].as_slice()));
+        assert_eq!(facts.ways(), 2);
+    }
+
+    #[test]
+    fn what_is_written_is_told_apart_no_more() {
+        let mut facts = met(&[&[1.0, 10.0], &[2.0, 20.0]]);
+        facts.write(Span::default(), vec![(1, Known::nothing())]);
+        assert_eq!(facts.told(1), None);
+        assert_eq!(facts.told(0), Some([1.0, 2.0].as_slice()));
+        // The same numbers again say nothing of which goes with which.
+        facts.write(Span::default(), vec![(1, Known::of(vec![10.0, 20.0], Why::Paths))]);
+        assert_eq!(facts.told(1), None);
+    }
+
+    #[test]
+    fn many_ways_are_not_told_apart() {
+        let ways: Vec<[f64; 2]> = (0..9).map(|i| [f64::from(i), f64::from(10 * i)]).collect();
+        let ways: Vec<&[f64]> = ways.iter().map(<[f64; 2]>::as_slice).collect();
+        assert!(met(&ways).cases.is_none());
+        assert_eq!(met(&ways[..8]).ways(), 8);
+    }
+
+    #[test]
+    fn a_share_is_taken_way_by_way() {
+        let facts = met(&[&[4.0, 0.0], &[2.0, 1.0]]);
+        let [rest, more] = moved(&[0.25, 0.5], 0, 1, &facts).expect("all is told apart");
+        assert_eq!(rest, [3.0, 1.0]);
+        assert_eq!(more, [1.0, 2.0]);
+    }
 }
