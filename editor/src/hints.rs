@@ -5,7 +5,6 @@ use matterix_ir::{FileId, Span};
 use matterix_syntax::ast::{Block, Expr, ExprKind, File, ItemKind, Stmt, StmtKind};
 
 use crate::Analysis;
-use crate::outline::blocks;
 
 /// Something to be shown.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,7 +90,7 @@ impl<'a> Walk<'a, '_> {
         if let Some(point) = point.filter(|p| !p.block) {
             self.moved(stmt, point);
         }
-        for block in blocks(&stmt.kind) {
+        for block in stmt.kind.blocks() {
             match stmt.kind {
                 // Branches begin together; what another branch does is not before them.
                 StmtKind::Parallel { .. } => block.stmts.iter().for_each(|branch| self.stmt(branch, since)),

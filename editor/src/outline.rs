@@ -176,25 +176,6 @@ fn step(stmt: &Stmt) -> Vec<Symbol> {
     match &stmt.kind {
         StmtKind::Step { name, body, .. } => vec![symbol(name, "step", SymbolKind::Step, stmt.span, steps(body))],
         StmtKind::Start { name, body } => vec![symbol(name, "job", SymbolKind::Step, stmt.span, steps(body))],
-        kind => blocks(kind).into_iter().flat_map(steps).collect(),
-    }
-}
-
-/// The blocks of a statement, without those of its handlers.
-pub(crate) fn blocks(kind: &StmtKind) -> Vec<&Block> {
-    match kind {
-        StmtKind::If { then, otherwise, .. } => std::iter::once(then).chain(otherwise).collect(),
-        StmtKind::Try { alternatives, .. } => alternatives.iter().collect(),
-        StmtKind::Step { body, .. }
-        | StmtKind::RepeatWhile { body, .. }
-        | StmtKind::Repeat { body, .. }
-        | StmtKind::For { body, .. }
-        | StmtKind::Within { body, .. }
-        | StmtKind::Keep { body, .. }
-        | StmtKind::Claim { body, .. }
-        | StmtKind::Sequence { body, .. }
-        | StmtKind::Parallel { body, .. }
-        | StmtKind::Start { body, .. } => vec![body],
-        _ => Vec::new(),
+        kind => kind.blocks().into_iter().flat_map(steps).collect(),
     }
 }

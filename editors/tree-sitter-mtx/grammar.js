@@ -51,7 +51,7 @@ module.exports = grammar({
 
   externals: ($) => [
     $._newline, $._blank_line, $._nl_clause, $._nl_more,
-    $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_argument, $._species_index, $._less,
+    $._unit, $._unit_after_as, $.state_word, $._first_word, $._next_word, $._species, $._species_argument, $._species_index, $._species_value, $._less,
     $._tight, $._same_line, $._beside, $._error_sentinel,
   ],
 
@@ -155,13 +155,14 @@ module.exports = grammar({
     type: ($) => choice(
       $._words_type,
       seq(
-        field('name', $._name), optional($.type_arguments), repeat(seq('&', field('name', $._name))), optional('?'),
+        field('name', $._name), repeat(seq('&', field('name', $._name))),
+        optional(seq($.type_arguments, repeat(seq('&', field('name', $._name))))), optional('?'),
         optional(seq('where', field('condition', $.expression))),
       ),
     ),
     _words_type: ($) => seq($._type_word, repeat1(seq('|', nl($), $._type_word))),
     _type_word: ($) => alias(word_of($, ...LABELS), $.state_word),
-    type_arguments: ($) => seq('<', $._name, optional($.type_arguments), '>'),
+    type_arguments: ($) => seq('<', $._name, repeat(seq('&', $._name)), optional($.type_arguments), '>'),
     parameters: ($) => seq('(', nl($), optional(listed($, $.parameter)), ')'),
     parameter: ($) => seq(
       field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), optional(seq('=', nl($), field('default', $.expression))),
@@ -174,7 +175,7 @@ module.exports = grammar({
     fields: ($) => fields_of($, $.field),
     field: ($) => choice(
       seq(alias('dissolves', $.field_name), ':', nl($), $._side),
-      seq(field('name', $._key), ':', nl($), field('value', choice($.fields, $.literal, $.expression))),
+      seq(field('name', $._key), ':', nl($), field('value', choice($.fields, $.literal, alias($._species_value, $.species), $.expression))),
     ),
     _key: ($) => choice(alias($._species, $.species), alias($._any_word, $.field_name)),
     literal: ($) => seq(field('type', $._name), $.fields),

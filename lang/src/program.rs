@@ -609,7 +609,7 @@ fn judge_anew<'a>(
         // A processor that is free for it makes the draft.
         let free = 2 * open.len() <= crate::share::processors();
         let foreseen = foreseen.of(names, task).filter(|reach| free && reach.is_of(tables));
-        judge(tables, sources, task, asked, foreseen)
+        judge(tables, sources, task, asked, (foreseen, free))
     })
     .into_iter();
     let mut all = Vec::with_capacity(tasks.len());
@@ -634,24 +634,25 @@ fn judge_anew<'a>(
     (!broken_off).then_some(all)
 }
 
-/// Judges a task, what robots do in it too where that is asked for.
+/// Judges a task, what robots do in it too where that is asked for; other values of its parameters at the same time where processors are `free`.
 fn judge<'a>(
     tables: &'a Tables<'a>,
     sources: &Sources,
     task: &Task<'a>,
     asked: &Asked<'_>,
-    foreseen: Option<&Reach>,
+    (foreseen, free): (Option<&Reach>, bool),
 ) -> Option<Built> {
     let stop = || (asked.stop)() || tables.stop.asked();
     let mut built = build(tables, sources, task, asked.wanted, foreseen, &stop)?;
     let item = tables.names.decl(task.item).item;
     // What is wrong with the defaults is mended first.
     if let (ItemKind::Workflow { name, .. }, true) = (&item.kind, built.findings.iter().all(|d| !d.is_error())) {
+        let usual = built.reach.clone();
         let supposing = |choice: &task::Choice| {
             let task = Task { supposed: Some(choice.clone()), ..task.clone() };
-            build(tables, sources, &task, Wanted::Findings, None, &stop).map(|built| built.findings)
+            build(tables, sources, &task, Wanted::Findings, usual.as_ref(), &stop).map(|built| built.findings)
         };
-        let found = supposed::found(&built.choices, name.span, &built.findings, supposing)?;
+        let found = supposed::found(&built.choices, name.span, &built.findings, free, supposing)?;
         built.findings.extend(found);
     }
     if asked.wanted == Wanted::Motions {

@@ -37,7 +37,8 @@ pub(crate) struct Settled<'a> {
 }
 
 /// Writes a task out. Where it is `foreseen` what can get where, the draft is made beside and tells whether that is so: what
-/// comes of it is what comes of it without. Nothing where `stop` says that it is of no use any more.
+/// comes of it is what comes of it without. A task that supposes another value of a parameter is given what the default led to, and needs no
+/// draft. Nothing where `stop` says that it is of no use any more.
 pub(crate) fn settled<'a>(
     tables: &'a Tables<'a>,
     sources: &Sources,
@@ -50,6 +51,8 @@ pub(crate) fn settled<'a>(
         || written(tables, sources, task, purpose, None, &|| false).map(|draft| draft.reach).unwrap_or_default();
     let mut reach = match foreseen {
         None => draft(),
+        // Another value of a parameter moves the same as a rule; where it does not, the turns below tell.
+        Some(usual) if task.supposed.is_some() && usual.is_moved() => usual.clone(),
         Some(foreseen) => {
             let mistaken = AtomicBool::new(false);
             let judge = || {

@@ -10,12 +10,13 @@ use crate::task::Choice;
 const MOST_VALUES: usize = 16;
 
 /// What is found with other values of `chosen`, the parameters that have their defaults, and was not found with those. `judge` gives
-/// all that is found with one other value; nothing where it was told to stop.
+/// all that is found with one other value; nothing where it was told to stop. Where processors are `free` they share the values.
 pub(crate) fn found(
     chosen: &[Choice],
     workflow: Span,
     usual: &[Diagnostic],
-    judge: impl Fn(&Choice) -> Option<Vec<Diagnostic>>,
+    free: bool,
+    judge: impl Fn(&Choice) -> Option<Vec<Diagnostic>> + Sync,
 ) -> Option<Vec<Diagnostic>> {
     let others: Vec<Choice> = chosen.iter().flat_map(others).collect();
     let mut out: Vec<Diagnostic> = Vec::new();
@@ -25,8 +26,10 @@ pub(crate) fn found(
         let said = format!("branches that only {} takes are not checked", left.join(" or "));
         out.push(Diagnostic::warning(codes::NOT_ANALYSED, workflow, headline, said));
     }
-    for other in others.iter().take(MOST_VALUES) {
-        for d in judge(other)? {
+    let tried = &others[..others.len().min(MOST_VALUES)];
+    let mut judged = if free { crate::share::over(tried, &judge) } else { Vec::new() }.into_iter();
+    for other in tried {
+        for d in judged.next().unwrap_or_else(|| judge(other))? {
             let known = |f: &Diagnostic| f.code == d.code && f.span() == d.span();
             if tells(&d) && !usual.iter().chain(&out).any(known) {
                 out.push(with(d, other));

@@ -17,6 +17,7 @@ mod explain;
 mod faults;
 mod files;
 mod findings;
+mod follows;
 mod formatting;
 mod grids;
 mod gripping;

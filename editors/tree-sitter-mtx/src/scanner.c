@@ -8,7 +8,7 @@
 
 enum Token {
     NEWLINE, BLANK_LINE, NL_CLAUSE, NL_MORE,
-    UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_ARGUMENT, SPECIES_INDEX, LESS,
+    UNIT, UNIT_AFTER_AS, STATE_WORD, FIRST_WORD, NEXT_WORD, SPECIES, SPECIES_ARGUMENT, SPECIES_INDEX, SPECIES_VALUE, LESS,
     TIGHT, SAME_LINE, BESIDE, ERROR_SENTINEL,
 };
 
@@ -314,6 +314,12 @@ static bool scan_species(TSLexer *lexer, const bool *valid) {
     bool phased = next(lexer) == '(' && scan_phase(lexer);
     if (!charged && !phased) return false;
     if (valid[SPECIES]) return found(lexer, SPECIES);
+    // The value of a field ends its line, or the field.
+    if (valid[SPECIES_VALUE] && charged) {
+        if (!skip_space(lexer, false)) return false;
+        if (lexer->eof(lexer) || next(lexer) == '\n' || next(lexer) == '}') return found(lexer, SPECIES_VALUE);
+        if (next(lexer) == ',' || next(lexer) == ';') return found(lexer, SPECIES_VALUE);
+    }
     // A phase that has been read in part hides what follows the charge; then it is none of these.
     if (!skip_space(lexer, true)) return false;
     if (valid[SPECIES_INDEX] && next(lexer) == ']') return found(lexer, SPECIES_INDEX);
@@ -346,7 +352,7 @@ static bool scan_word(TSLexer *lexer, const bool *valid) {
         return found(lexer, first ? FIRST_WORD : NEXT_WORD);
     }
     if (valid[STATE_WORD] && is_one_of(&word, LABELS)) return is_state_word(lexer) && found(lexer, STATE_WORD);
-    if (letter && (valid[SPECIES] || valid[SPECIES_ARGUMENT] || valid[SPECIES_INDEX])) return scan_species(lexer, valid);
+    if (letter && (valid[SPECIES] || valid[SPECIES_ARGUMENT] || valid[SPECIES_INDEX] || valid[SPECIES_VALUE])) return scan_species(lexer, valid);
     return false;
 }
 

@@ -28,6 +28,11 @@ impl Reach {
         self.sets.get(mixture)
     }
 
+    /// Whether it follows from what is moved where alone, so that a task which moves the same has the same.
+    pub fn is_moved(&self) -> bool {
+        self.written.is_empty()
+    }
+
     /// Whether all its species are of a table: one that an earlier state of a text led to may name some that are gone.
     pub fn is_of(&self, tables: &Tables<'_>) -> bool {
         let species = tables.species.iter().count();

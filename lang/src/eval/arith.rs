@@ -18,10 +18,29 @@ impl<'a> Elaborator<'a> {
             let pairs: Vec<_> = x.iter().cloned().zip(y.iter().cloned()).collect();
             return Value::Tuple(pairs.into_iter().map(|(x, y)| self.arith(op, x, y, at_a, at_b, span)).collect());
         }
+        let (a, b) = match op {
+            Binary::Mul | Binary::Div => (a, b),
+            _ => self.of_one_kind(a, b, at_a, at_b),
+        };
         let (Some(a), Some(b)) = (self.operand(a, at_a), self.operand(b, at_b)) else { return Value::Error };
         match op {
             Binary::Mul | Binary::Div => self.product(op, a, b, at_a, at_b),
             _ => self.sum(op, a, b, at_a, at_b, span),
+        }
+    }
+
+    /// Two operands of a sum; a concentration without a kind takes it from the other side, where that says one.
+    fn of_one_kind(&mut self, a: Value, b: Value, at_a: Span, at_b: Span) -> (Value, Value) {
+        let says = |n: &Num| n.unit.is_some() || !(n.dimension.is_any() || n.dimension.is_one());
+        match (a, b) {
+            (Value::Concentration(m, s), Value::Num(n)) if says(&n) => {
+                (self.concentration(m, s, &n, at_a).unwrap_or(Value::Error), Value::Num(n))
+            }
+            (Value::Num(n), Value::Concentration(m, s)) if says(&n) => {
+                let b = self.concentration(m, s, &n, at_b).unwrap_or(Value::Error);
+                (Value::Num(n), b)
+            }
+            other => other,
         }
     }
 
@@ -38,7 +57,9 @@ impl<'a> Elaborator<'a> {
             }),
             Value::Error => None,
             Value::Concentration(..) => {
-                self.kindless(span);
+                let help = "say which with a unit, in brackets: `(... as mol/L)`, `(... as mol/kg)`, \
+                            `(... as mol/kg_solvent)`, `(... as %w/w)`; without brackets `as` applies to the whole expression";
+                self.without_kind(span, help);
                 None
             }
             other => {
@@ -50,15 +71,13 @@ impl<'a> Elaborator<'a> {
 
     /// `v[S]` used before a unit says which concentration is meant.
     pub fn kindless(&mut self, span: Span) {
-        self.report(
-            Diagnostic::error(
-                codes::CONCENTRATION_KIND,
-                span,
-                "this concentration has no kind yet",
-                "per mass, per volume or per solvent?",
-            )
-            .help("say which with a unit: `as mol/L`, `as mol/kg`, `as mol/kg_solvent`, `as %w/w`"),
-        );
+        self.without_kind(span, "say which with a unit: `as mol/L`, `as mol/kg`, `as mol/kg_solvent`, `as %w/w`");
+    }
+
+    fn without_kind(&mut self, span: Span, help: &str) {
+        let headline = "this concentration has no kind yet";
+        let d = Diagnostic::error(codes::CONCENTRATION_KIND, span, headline, "per mass, per volume or per solvent?");
+        self.report(d.help(help));
     }
 
     fn product(&mut self, op: Binary, a: Num, b: Num, at_a: Span, at_b: Span) -> Value {
@@ -201,6 +220,7 @@ impl<'a> Elaborator<'a> {
 
     /// The smaller or larger of two quantities of one dimension.
     pub fn extreme(&mut self, op: BinaryOp, a: Value, b: Value, span: Span) -> Value {
+        let (a, b) = self.of_one_kind(a, b, span, span);
         let (Some(a), Some(b)) = (self.operand(a, span), self.operand(b, span)) else { return Value::Error };
         if !a.dimension.agrees(&b.dimension) || a.point != b.point {
             let (x, y) = (self.describe(&a), self.describe(&b));

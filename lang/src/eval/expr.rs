@@ -86,7 +86,7 @@ impl<'a> Elaborator<'a> {
                 self.range(low, high, a.span, b.span)
             }
             ExprKind::As(inner, unit) => {
-                let value = self.expr(inner, scope);
+                let value = self.sum_as(inner, unit, scope);
                 self.as_unit(value, unit, inner.span)
             }
             ExprKind::Tuple(items, unit) => self.tuple(items, unit.as_ref(), scope),
@@ -411,6 +411,19 @@ impl<'a> Elaborator<'a> {
                 Value::Error
             }
         }
+    }
+
+    /// What stands before `as`: concentrations that it sums take their kind from the unit.
+    fn sum_as(&mut self, e: &'a Expr, unit: &UnitText, scope: &mut Scope) -> Value {
+        let ExprKind::Binary(op @ (Binary::Add | Binary::Sub), a, b) = &*e.kind else { return self.expr(e, scope) };
+        let (x, y) = (self.sum_as(a, unit, scope), self.sum_as(b, unit, scope));
+        let kinds = [&x, &y].iter().filter(|v| matches!(v, Value::Concentration(..))).count();
+        // With another operand that is a quantity, that says which kind is meant.
+        if kinds < 2 {
+            return self.arith(*op, x, y, a.span, b.span, e.span);
+        }
+        let (x, y) = (self.as_unit(x, unit, a.span), self.as_unit(y, unit, b.span));
+        self.arith(*op, x, y, a.span, b.span, e.span)
     }
 
     /// Whether a part of a hazard's condition does not hold: of one that is judged at the start only, as things are given.

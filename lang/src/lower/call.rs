@@ -803,13 +803,14 @@ impl<'a> Planner<'a, '_> {
         let asked = self.asked(sig, clauses, inner);
         let (needs, invariants, promises, takes) = self.contract(clauses, inner);
         let needs: Vec<_> = asked.into_iter().chain(needs).collect();
-        // What can never begin is not written out: its steps may make no sense. What is in the sources is known only once
-        // all steps are.
+        // What can never begin is written out in silence: its steps may make no sense, but what they would change is not known
+        // behind it. What is in the sources is known only once all steps are.
         let never = !self.lab.prototype && needs.iter().any(|n| self.lab.graph.constant(n.node) == Some(0.0));
-        let steps = match never {
-            true => self.add("sequence", body.span, Step::Sequence(Vec::new())),
-            false => self.block(body, inner),
-        };
+        let sound = never.then_some(self.lab.diagnostics.len());
+        let steps = self.block(body, inner);
+        if let Some(sound) = sound {
+            self.lab.diagnostics.truncate(sound);
+        }
         let needs: Vec<_> = said.into_iter().map(Arc::new).chain(needs).collect();
         let verb = verb_text(&sig.verb);
         let step = Step::Skill { verb: verb.clone(), needs, invariants, promises, takes, body: steps };

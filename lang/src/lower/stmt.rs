@@ -7,7 +7,7 @@ use matterix_ir::plan::{Caught, Step, StepId};
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
-use crate::ast::{Binary, Block, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
+use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
 use crate::eval::{Num, Scope, Type, Value};
 use crate::task::{Choice, Given};
 
@@ -19,7 +19,12 @@ impl<'a> Planner<'a, '_> {
         }
         let step = (self.lab.enter(s.span) && self.lab.has_room(self.steps.len())).then(|| self.statement(s, scope));
         self.lab.leave();
-        step.flatten()
+        let step = step.flatten();
+        // An `if` that its condition decides leaves its steps out on purpose.
+        if step.is_none() && !matches!(s.kind, StmtKind::If { .. }) {
+            begun(s, &mut self.jobs);
+        }
+        step
     }
 
     fn statement(&mut self, s: &'a Stmt, scope: &mut Scope) -> Option<StepId> {
@@ -105,8 +110,7 @@ impl<'a> Planner<'a, '_> {
             StmtKind::If { cond, then, otherwise } => {
                 let seen = scope.reads.replace(0);
                 let Some(condition) = self.deciding(cond, scope) else {
-                    begun(then, &mut self.jobs);
-                    otherwise.iter().for_each(|block| begun(block, &mut self.jobs));
+                    begun(s, &mut self.jobs);
                     return None;
                 };
                 let read = scope.reads.replace(scope.reads.get() | seen);
@@ -127,10 +131,7 @@ impl<'a> Planner<'a, '_> {
                 Step::If { condition, then, otherwise }
             }
             StmtKind::Repeat { times, body } => {
-                let Some(times) = self.count(times, scope) else {
-                    begun(body, &mut self.jobs);
-                    return None;
-                };
+                let times = self.count(times, scope)?;
                 Step::Repeat { times, body: self.block(body, scope) }
             }
             StmtKind::RepeatWhile { cond, max, body } => {
@@ -654,28 +655,12 @@ impl<'a> Planner<'a, '_> {
     }
 }
 
-/// Adds the jobs that a block starts: where it cannot be written out, whoever waits for them is not wrong.
-fn begun(block: &Block, jobs: &mut BTreeSet<String>) {
-    for stmt in &block.stmts {
-        match &stmt.kind {
-            StmtKind::Start { name, .. } => {
-                jobs.insert(name.text.clone());
-            }
-            StmtKind::If { then, otherwise, .. } => {
-                begun(then, jobs);
-                otherwise.iter().for_each(|block| begun(block, jobs));
-            }
-            StmtKind::Repeat { body, .. }
-            | StmtKind::RepeatWhile { body, .. }
-            | StmtKind::For { body, .. }
-            | StmtKind::Within { body, .. }
-            | StmtKind::Keep { body, .. }
-            | StmtKind::Claim { body, .. }
-            | StmtKind::Step { body, .. }
-            | StmtKind::Sequence { body, .. } => begun(body, jobs),
-            _ => {}
-        }
+/// Adds the jobs that a statement starts: where it cannot be written out, whoever waits for them is not wrong.
+fn begun(stmt: &Stmt, jobs: &mut BTreeSet<String>) {
+    if let StmtKind::Start { name, .. } = &stmt.kind {
+        jobs.insert(name.text.clone());
     }
+    stmt.kind.blocks().into_iter().flat_map(|block| &block.stmts).for_each(|inner| begun(inner, jobs));
 }
 
 /// The part of a statement that names it: without its block.

@@ -1341,6 +1341,27 @@ pub enum StmtKind {
     Call(Call),
 }
 
+impl StmtKind {
+    /// The blocks of a statement, without those of its handlers.
+    pub fn blocks(&self) -> Vec<&Block> {
+        match self {
+            StmtKind::If { then, otherwise, .. } => std::iter::once(then).chain(otherwise).collect(),
+            StmtKind::Try { alternatives, .. } => alternatives.iter().collect(),
+            StmtKind::Step { body, .. }
+            | StmtKind::RepeatWhile { body, .. }
+            | StmtKind::Repeat { body, .. }
+            | StmtKind::For { body, .. }
+            | StmtKind::Within { body, .. }
+            | StmtKind::Keep { body, .. }
+            | StmtKind::Claim { body, .. }
+            | StmtKind::Sequence { body, .. }
+            | StmtKind::Parallel { body, .. }
+            | StmtKind::Start { body, .. } => vec![body],
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// `transfer 100 uL from a to b by p { tips: once }`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Call {

@@ -16,4 +16,6 @@ pub use client::{Client, is_of};
 pub use raw::Raw;
 pub use server::{Call, News, Read, Request, Server, serve};
 pub use service::spaced;
+/// The channels by which news of a call goes out.
+pub use tokio::sync::mpsc as news;
 pub use value::{Value, decode, encode, fits};

@@ -31,7 +31,8 @@ impl Executor<'_, '_> {
         for (index, condition) in kept.iter().enumerate() {
             let Some(follower) = self.follower(step, condition) else { continue };
             if !from_start && !self.follower_holds(&follower)? {
-                let raised = self.broken(condition);
+                let text = format!("`{}` does not hold at the start", condition.text);
+                let raised = self.unmet(condition, "broken", codes::RUN_FAILED, text);
                 self.fail(id, raised);
                 return Ok(());
             }

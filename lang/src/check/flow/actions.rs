@@ -10,6 +10,7 @@ use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::Flow;
 use super::bonds::{Bonds, Form};
+use super::cases;
 use super::course::Course;
 use super::facts::Facts;
 use super::value::{Known, Why};
@@ -68,8 +69,7 @@ impl Flow<'_, '_> {
                         self.may_fail(need, paths && !shared, facts);
                         if paths && !shared && !taken {
                             self.unmet(label, need, facts, true);
-                            let states = self.parts(need.node).states.clone();
-                            self.forget(&states, facts);
+                            self.go_on_after(need, facts);
                         } else if taken && !shared {
                             self.assume(need.node, true, facts);
                         }
@@ -92,6 +92,14 @@ impl Flow<'_, '_> {
         let states = self.parts(condition.node).states.clone();
         self.forget(&states, facts);
         Asked::Unmet
+    }
+
+    /// Behind a finding on some ways those on which the condition holds go on, where ways are told apart; else what it looks at is unknown.
+    fn go_on_after(&mut self, condition: &Condition, facts: &mut Facts) {
+        if !self.choose_ways(condition.node, true, facts) {
+            let states = self.parts(condition.node).states.clone();
+            self.forget(&states, facts);
+        }
     }
 
     /// What is known at some moment of the time that passes now.
@@ -238,8 +246,7 @@ impl Flow<'_, '_> {
                     self.may_fail(condition, on_some, facts);
                     if on_some && !taken {
                         self.passed(limit, facts, true);
-                        let states = self.parts(condition.node).states.clone();
-                        self.forget(&states, facts);
+                        self.go_on_after(condition, facts);
                     } else if on_some {
                         self.assume(condition.node, true, facts);
                     }
@@ -252,20 +259,28 @@ impl Flow<'_, '_> {
     fn act(&mut self, action: &Action, facts: &mut Facts) -> Vec<u32> {
         match action {
             Action::Assign { state, value, .. } => {
-                let known = self.eval(*value, facts);
+                let told = self.by_case(*value, facts);
+                let known = match &told {
+                    Some((_, known)) => known.clone(),
+                    None => self.eval(*value, facts),
+                };
                 let bonds =
                     facts.bonds.as_deref().cloned().zip(self.form_in(*value, facts)).map(|(mut bonds, form)| {
                         bonds.assigned(*state, &form, facts);
                         bonds
                     });
                 let changed = self.write(vec![(*state, known)], facts);
+                if let Some((values, _)) = told {
+                    facts.tell(*state, values);
+                }
                 self.bind(bonds, facts);
                 changed
             }
             Action::Move { fraction, from, to, .. } => {
                 let share = self.eval(*fraction, facts);
                 let ends = if share.exact().is_none() { self.shares(*fraction, *from, facts) } else { None };
-                self.transfer(&share, ends, *from, *to, facts)
+                let told = self.share_by_case(*fraction, &share, facts);
+                self.transfer(&share, (ends, told), *from, *to, facts)
             }
         }
     }
@@ -296,7 +311,7 @@ impl Flow<'_, '_> {
     fn transfer(
         &mut self,
         fraction: &Known,
-        ends: Option<[f64; 2]>,
+        (ends, told): (Option<[f64; 2]>, Option<Vec<f64>>),
         from: u32,
         to: u32,
         facts: &mut Facts,
@@ -316,13 +331,25 @@ impl Flow<'_, '_> {
                 _ => Known::Range(low.clamp(0.0, 1.0), high.clamp(0.0, 1.0), fraction.why().unwrap_or(Why::Unknown)),
             },
         };
+        let told: Option<Vec<f64>> = told.map(|all| all.into_iter().map(|f| whole(f.clamp(0.0, 1.0))).collect());
         let mut changes = Vec::new();
+        let mut by_case = Vec::new();
         for (source, target) in self.passages.between(from, to, &self.mixtures).iter() {
             let Some(target) = *target else {
                 self.no_place(*source, from, to, &fraction, facts);
                 continue;
             };
             if target == *source {
+                continue;
+            }
+            let apart = told.as_ref().and_then(|shares| cases::moved(shares, *source, target, facts));
+            if let Some([rest, more]) = apart {
+                let ends = [*source, target].map(|state| facts.states[state as usize].why());
+                let why = ends.into_iter().chain([fraction.why()]).flatten().max().unwrap_or(Why::Paths);
+                for (state, values) in [(*source, rest), (target, more)] {
+                    changes.push((state, Known::of(values.clone(), why)));
+                    by_case.push((state, values));
+                }
                 continue;
             }
             let held = &facts.states[*source as usize];
@@ -350,6 +377,7 @@ impl Flow<'_, '_> {
             bonds
         });
         let changed = self.write(changes, facts);
+        by_case.into_iter().for_each(|(state, values)| facts.tell(state, values));
         self.bind(bonds, facts);
         changed
     }
@@ -455,6 +483,8 @@ impl Flow<'_, '_> {
             (Some(takes), None) => Some(self.duration(takes.nominal, &facts)),
             _ => None,
         };
+        let lasts = lasts.filter(|time| met || time.bounds().0.is_finite());
+        self.quiet += usize::from(!met);
         if met && self.perform(&operation.at_start, &mut facts) == Asked::Handled {
             return None;
         }
@@ -483,6 +513,7 @@ impl Flow<'_, '_> {
             (None, None) => {}
         }
         self.claimed.truncate(others);
+        self.quiet -= usize::from(!met);
         if met {
             if self.perform(&operation.at_end, &mut facts) == Asked::Handled {
                 return None;

@@ -77,7 +77,7 @@ impl Flow<'_, '_> {
                 break;
             }
             // What only a run can tell may come about at any moment.
-            if until.is_some_and(|node| self.along_at(node, &even, 0.0, facts).is_none()) {
+            if until.iter().any(|(node, _)| self.along_at(*node, &even, 0.0, facts).is_none()) {
                 break;
             }
             if left > 0.0 {

@@ -64,9 +64,9 @@ impl Rules for Exact<'_> {
 }
 
 /// The same, with these numbers as the values of some states.
-struct Supposed<'f> {
-    exact: Exact<'f>,
-    states: &'f [(u32, f64)],
+pub(super) struct Supposed<'f> {
+    pub exact: Exact<'f>,
+    pub states: &'f [(u32, f64)],
 }
 
 impl Rules for Supposed<'_> {
@@ -215,7 +215,11 @@ impl Flow<'_, '_> {
         let exact = Exact { params: &self.params, facts };
         match formula.value(&exact, &mut self.numbers) {
             Some(value) => Known::Point(value),
-            None => self.case_by_case(node, facts).unwrap_or_else(|| self.enclose(node, facts)),
+            None => {
+                let told = self.by_case(node, facts).map(|(_, known)| known);
+                let told = told.or_else(|| self.case_by_case(node, facts));
+                told.unwrap_or_else(|| self.enclose(node, facts))
+            }
         }
     }
 
@@ -403,6 +407,7 @@ impl Flow<'_, '_> {
 
     /// Takes a condition for true or false, as far as that says something of single states.
     pub fn assume(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+        self.choose_ways(node, holds, facts);
         match self.lab.graph.op(node) {
             Op::Unary(UnaryOp::Not, a) => self.assume(a, !holds, facts),
             Op::Binary(BinaryOp::And, a, b) if holds => {

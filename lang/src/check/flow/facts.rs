@@ -7,6 +7,7 @@ use matterix_ir::pages::Pages;
 use matterix_ir::{NodeId, Span};
 
 use super::bonds::Bonds;
+use super::cases::Cases;
 use super::evolve::Barrier;
 use super::value::{Known, Why};
 
@@ -56,6 +57,8 @@ pub struct Facts {
     pub barrier: Option<Rc<Barrier>>,
     /// How states hang together that laws change.
     pub bonds: Option<Rc<Bonds>>,
+    /// Which values states have together, where few ways lead here.
+    pub cases: Option<Rc<Cases>>,
     /// By event index: whether its condition held when it was last looked at.
     pub fired: Vec<Option<bool>>,
     /// Presumed conditions that have held at some moment, or may have.
@@ -75,6 +78,7 @@ pub struct Facts {
 impl Facts {
     /// Sets states, noting what they were.
     pub fn write(&mut self, span: Span, changes: Vec<(u32, Known)>) {
+        self.untell(changes.iter().map(|(state, _)| *state));
         let mut before = Vec::with_capacity(changes.len());
         for (state, value) in changes {
             let place = &mut self.states[state as usize];
@@ -169,8 +173,12 @@ impl Facts {
             (one, other) => one.clone().or_else(|| other.clone()),
         };
         let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
+        let mut open: Vec<u32> = Vec::new();
         for (i, (x, y)) in a.states.iter().zip(b.states.iter()).enumerate() {
             let both = x.join(y, why);
+            if both.exact().is_none() {
+                open.push(i as u32);
+            }
             if both == self.states[i] {
                 continue;
             }
@@ -186,6 +194,7 @@ impl Facts {
         for (maker, list) in changes {
             out.write(maker, list);
         }
+        out.cases = Cases::join(&a, b, &open, &mut out, why);
         out.locals = a.locals.iter().zip(&b.locals).map(|(x, y)| x.join(y, why)).collect();
         out.time = a.time.join(&b.time, Why::Unknown);
         out.unsettled.extend(a.unsettled.iter().chain(&b.unsettled));

@@ -100,6 +100,7 @@ impl Flow<'_, '_> {
         facts.rebind(|bonds, _| bonds.release(&states));
         for state in &states {
             facts.states[*state as usize] = other.states[*state as usize].clone();
+            facts.untell(std::iter::once(*state));
             self.touch(*state, facts);
         }
         for event in self.events_on(&states) {

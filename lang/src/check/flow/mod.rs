@@ -10,6 +10,7 @@ mod actions;
 mod beside;
 mod bonds;
 mod bracket;
+mod cases;
 mod course;
 mod demands;
 mod dual;
@@ -425,6 +426,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             moving: BTreeSet::new(),
             barrier: None,
             bonds: None,
+            cases: None,
             fired: vec![Some(false); self.events.len()],
             held: BTreeSet::new(),
             decided: Vec::new(),

@@ -223,6 +223,7 @@ fn bare(facts: &Facts) -> Facts {
         moving: BTreeSet::new(),
         barrier: None,
         bonds: facts.bonds.clone(),
+        cases: None,
         fired: Vec::new(),
         held: BTreeSet::new(),
         decided: Vec::new(),

@@ -24,7 +24,11 @@ impl Flow<'_, '_> {
         if !related {
             facts.bonds = None;
         }
-        related && (facts.time == before.time || !self.time_brings(body, before))
+        let told = before.cases.is_none() || facts.cases == before.cases;
+        if !told {
+            facts.cases = None;
+        }
+        related && told && (facts.time == before.time || !self.time_brings(body, before))
     }
 
     /// Whether a later turn may do something else for the time alone: a timer, a law that follows the clock, a condition.

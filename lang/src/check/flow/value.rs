@@ -32,6 +32,9 @@ const MOST: usize = 8;
 /// Numbers closer than this, relative to the larger, are not told apart.
 pub(super) const CLOSE: f64 = 1e-10;
 
+/// Two ways of working out one number differ by no more than this, relative to the larger.
+pub(super) const ROUNDING: f64 = 1e-12;
+
 thread_local! {
     /// No and yes, of which many comparisons are made.
     static EITHER: Rc<[f64]> = Rc::from([0.0, 1.0]);
@@ -64,6 +67,14 @@ impl Known {
                 one == other && (Rc::ptr_eq(a, b) || a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits())))
             }
             _ => false,
+        }
+    }
+
+    /// Whether both say the same but for rounding.
+    pub fn is_close(&self, other: &Known) -> bool {
+        match (self, other) {
+            (Known::Point(a), Known::Point(b)) => a == b || (a - b).abs() <= ROUNDING * a.abs().max(b.abs()),
+            _ => self == other,
         }
     }
 

@@ -94,16 +94,12 @@ impl Flow<'_, '_> {
                     Asked::Handled => return None,
                     asked => asked == Asked::Met,
                 };
-                self.quiet += usize::from(!met);
+                if !met {
+                    return Some(self.refused(*body, facts));
+                }
                 let mut after = self.walk(*body, facts);
-                self.quiet -= usize::from(!met);
-                // What never begins does nothing: of what it would have done nothing is known.
                 if let Some(after) = after.as_mut() {
-                    if met {
-                        self.promised(&node.label, promises, after);
-                    } else {
-                        self.widen(*body, after);
-                    }
+                    self.promised(&node.label, promises, after);
                 }
                 after
             }
@@ -160,6 +156,9 @@ impl Flow<'_, '_> {
                 self.raise("broken", broken);
                 if fails && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
+                    // As if it held: what goes wrong in the body all the same is a mistake of its own.
+                    let states = self.parts(condition.node).states.clone();
+                    self.forget(&states, &mut facts);
                 }
                 self.kept.push(condition);
                 let after = match self.is_taken("broken") && !plan.ends.is_empty() {
@@ -221,6 +220,18 @@ impl Flow<'_, '_> {
             }
             Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
         }
+    }
+
+    /// Follows the body of a skill that is refused, which was said: of what it would have done nothing is known, and whether it would have
+    /// come to an end does not matter.
+    fn refused(&mut self, body: StepId, facts: Facts) -> Facts {
+        let before = facts.clone();
+        self.quiet += 1;
+        let after = self.walk(body, facts).filter(|after| after.time.bounds().0.is_finite());
+        self.quiet -= 1;
+        let mut after = after.unwrap_or_else(|| Facts { time: at_least(&before.time), ..before });
+        self.widen(body, &mut after);
+        after
     }
 
     fn wait_until(
@@ -493,14 +504,23 @@ impl Flow<'_, '_> {
         let other: Vec<Finding> = self.findings.split_off(mark);
         self.findings.extend(in_both(one, &other));
         match (first, second) {
-            (Some(a), Some(b)) => {
+            (Some(a), Some(mut b)) => {
                 // What flows at once comes to something between, or to neither.
                 let tracks = self.tracks();
-                let differ = |s: &u32| a.states[*s as usize] != b.states[*s as usize];
-                let raced = raced.iter().flatten().copied();
-                let open: BTreeSet<u32> = tracks.list.iter().map(|t| t.state).chain(raced).filter(differ).collect();
+                let mut open: BTreeSet<u32> = tracks.list.iter().map(|t| t.state).collect();
+                open.extend(raced.iter().flatten());
+                open.retain(|s| {
+                    let (one, other) = (&a.states[*s as usize], &b.states[*s as usize]);
+                    let close = one.is_close(other);
+                    if close && one != other {
+                        b.states[*s as usize] = one.clone();
+                    }
+                    !close
+                });
                 let open: Vec<u32> = open.into_iter().collect();
                 let mut both = facts.join(a, &b, self.site(), Why::Unknown);
+                // A run may have one value of one order and another of the other.
+                both.cases = None;
                 self.forget(&open, &mut both);
                 Some(both)
             }

@@ -7,9 +7,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::plan::{Step, StepId};
+use matterix_ir::plan::{PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, Severity, codes};
+use matterix_ir::{Diagnostic, Severity, Span, codes};
 use matterix_timing::ROUNDING;
 
 use super::components::components;
@@ -253,33 +253,97 @@ fn is_first(times: &Times<'_>, circle: &[&Wait], block: StepId, other: StepId) -
     earlier && others.all(|step| circle.iter().any(|wait| wait.step == step))
 }
 
-fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(InstanceId) -> String) -> Diagnostic {
+/// So many calls around each wait of a circle are named.
+const MOST_CALLS: usize = 2;
+
+/// How one wait of a circle is told: what it waits for, and what it keeps from the one before it.
+struct Told {
+    /// The `claim` or `await`.
+    step: StepId,
+    /// What it waits for, in words.
+    waits: String,
+    /// The block that keeps what the one before it waits for, and its words; none for a job.
+    holds: Option<(StepId, String)>,
+}
+
+/// How the waits of a circle are told, with what they wait for: the names of things, and the labels of `await`s.
+fn told(
+    times: &Times<'_>,
+    circle: &[&Wait],
+    name: &dyn Fn(InstanceId) -> String,
+) -> (Vec<Told>, Vec<String>, Vec<String>) {
     let own = |step: StepId| times.plan.get(show::own(times.plan, &times.timing, step));
-    let mut labels: Vec<(StepId, String)> = Vec::new();
-    let mut keeps: Vec<(StepId, String)> = Vec::new();
     let (mut waited, mut jobs) = (Vec::new(), Vec::new());
-    for (i, &at) in circle.iter().enumerate() {
-        let (wait, next) = (&nested[at], &nested[circle[(i + 1) % circle.len()]]);
-        match waits_for(times, wait, next) {
+    let mut told: Vec<Told> = Vec::new();
+    let mut keeps: Vec<Option<(StepId, String)>> = vec![None; circle.len()];
+    for (i, wait) in circle.iter().enumerate() {
+        let after = (i + 1) % circle.len();
+        let waits = match waits_for(times, wait, circle[after]) {
             Some(Thing::Instance(instance)) => {
                 let wanted = name(instance);
-                labels.push((wait.step, format!("waits here for `{wanted}`")));
-                let block = keeper(times, Thing::Instance(instance), next);
-                keeps.extend(block.map(|block| (block, format!("holds `{wanted}`"))));
+                let block = keeper(times, Thing::Instance(instance), circle[after]);
+                keeps[after] = block.map(|block| (block, format!("holds `{wanted}`")));
                 waited.push(format!("`{wanted}`"));
+                format!("for `{wanted}`")
             }
             Some(Thing::Job(_)) => {
-                labels.push((wait.step, "waits here for the job".to_owned()));
                 jobs.push(format!("`{}`", own(wait.step).label));
+                "for the job".to_owned()
             }
-            None => {}
+            None => continue,
+        };
+        told.push(Told { step: wait.step, waits, holds: None });
+    }
+    for (told, keeps) in told.iter_mut().zip(keeps) {
+        told.holds = keeps;
+    }
+    (told, waited, jobs)
+}
+
+/// The places of a circle with their words, that of the first wait first. Where several lines of steps stand still at one place of a
+/// skill, each is told at the call that it comes from.
+fn places(times: &Times<'_>, all: &[Told]) -> Vec<(Span, String)> {
+    let own = |step: StepId| times.plan.get(show::own(times.plan, &times.timing, step)).span;
+    let calls = |told: &Told| -> Vec<&PlanStep> { show::calls(times.plan, &times.timing, told.step).collect() };
+    let of: Vec<Vec<&PlanStep>> = all.iter().map(calls).collect();
+    let alone = |i: usize| {
+        let others = |span: Span| (0..all.len()).any(|j| j != i && of[j].iter().any(|call| call.span == span));
+        of[i].iter().map(|call| call.span).find(|span| !others(*span))
+    };
+    let shared = all.iter().enumerate().any(|(i, a)| all[..i].iter().any(|b| own(a.step) == own(b.step)));
+    let apart: Option<Vec<Span>> = (0..all.len()).map(alone).collect();
+    let mut out: Vec<(Span, String)> = Vec::new();
+    if let Some(apart) = apart.filter(|_| shared) {
+        for (told, span) in all.iter().zip(apart) {
+            let holds = told.holds.as_ref().map_or_else(String::new, |(_, holds)| format!("{holds} and "));
+            out.push((span, format!("{holds}waits {}", told.waits)));
+        }
+        for told in all {
+            let blocks = told.holds.iter().map(|(block, _)| (own(*block), "held from here on".to_owned()));
+            out.extend(blocks.chain([(own(told.step), "waits here".to_owned())]));
+        }
+    } else {
+        out.extend(all.iter().map(|told| (own(told.step), format!("waits here {}", told.waits))));
+        out.extend(all.iter().filter_map(|told| told.holds.clone()).map(|(block, holds)| (own(block), holds)));
+        for call in of.iter().flat_map(|calls| calls.iter().take(MOST_CALLS)) {
+            if out.iter().all(|(span, _)| *span != call.span) {
+                out.push((call.span, format!("in `{}`", call.label)));
+            }
         }
     }
-    labels.extend(keeps);
-    let (first, rest) = (labels.first().cloned(), labels.get(1..).unwrap_or_default());
-    let (step, text) = first.unwrap_or((times.plan.root, String::new()));
-    let mut rest = rest.to_vec();
-    rest.sort_by_key(|(s, _)| own(*s).span);
+    let mut said = BTreeSet::new();
+    out.retain(|place| said.insert(place.clone()));
+    if let Some(rest) = out.get_mut(1..) {
+        rest.sort_by_key(|(span, _)| *span);
+    }
+    out
+}
+
+fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(InstanceId) -> String) -> Diagnostic {
+    let waits: Vec<&Wait> = circle.iter().map(|at| &nested[*at]).collect();
+    let (all, waited, jobs) = told(times, &waits, name);
+    let mut places = places(times, &all).into_iter();
+    let (span, text) = places.next().unwrap_or((times.plan.get(times.plan.root).span, String::new()));
     let sure = jobs.is_empty() || certain(times, nested, circle);
     let can = if jobs.is_empty() || !sure { " can" } else { "" };
     let things = waited.join(" and ");
@@ -289,12 +353,12 @@ fn finding(times: &Times<'_>, nested: &[Wait], circle: &[usize], name: &dyn Fn(I
         (false, false) => format!("{} and a claim of {things}", jobs.join(" and ")),
     };
     let headline = format!("{all}{can} wait for each other for ever");
-    let mut d = Diagnostic::error(codes::DEADLOCK, own(step).span, headline, text);
+    let mut d = Diagnostic::error(codes::DEADLOCK, span, headline, text);
     if !sure {
         d.severity = Severity::Warning;
     }
-    for (step, text) in rest {
-        d = d.because(own(step).span, text);
+    for (span, text) in places {
+        d = d.because(span, text);
     }
     d.help(match jobs.is_empty() {
         true => "claim everything that is needed together in one `claim`, or everywhere in the same order",

@@ -1,5 +1,6 @@
 //! Tests of the whole crate.
 
+mod blocks;
 mod generator;
 mod limits;
 mod nested;

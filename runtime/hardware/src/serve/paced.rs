@@ -44,11 +44,17 @@ impl<'b, 'd, 'p> Paced<'b, 'd, 'p> {
             self.desk.answer(read, kind, value.as_ref().ok().copied().flatten());
             value?;
         }
+        self.measure(out)?;
+        self.desk.tell(self.inner.now());
+        Ok(())
+    }
+
+    /// Works out how long commands take that have just begun.
+    fn measure(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
         for (step, node) in self.desk.unmeasured() {
             let takes = self.inner.value(node, out)?.unwrap_or(0.0);
             self.desk.measured(step, takes);
         }
-        self.desk.tell(self.inner.now());
         Ok(())
     }
 }
@@ -58,8 +64,16 @@ impl Backend for Paced<'_, '_, '_> {
         self.inner.now()
     }
 
+    fn moment_after(&mut self, duration: f64) -> f64 {
+        self.inner.moment_after(duration)
+    }
+
     fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
         self.inner.value(node, out)
+    }
+
+    fn defined(&mut self, node: NodeId) -> Result<(), Fault> {
+        self.inner.defined(node)
     }
 
     fn observe(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
@@ -95,6 +109,8 @@ impl Backend for Paced<'_, '_, '_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        // How long a command takes follows from what it finds, as in a run, not from what it does.
+        self.measure(out)?;
         self.inner.start(operation, out)
     }
 
@@ -121,5 +137,120 @@ impl Backend for Paced<'_, '_, '_> {
             }
             std::thread::sleep(TICK);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use matterix_ir::offer::{Arranged, Offer};
+    use matterix_ir::plan::{Plan, PlanStep, Step, Takes};
+    use matterix_ir::scene::Scene;
+    use matterix_ir::{Sources, Span};
+    use matterix_sila_wire::{Call, Request, news};
+
+    use super::super::desk::Attendant;
+    use super::super::features::Catalogue;
+    use super::*;
+
+    /// A backend that notes the order in which it is asked.
+    #[derive(Default)]
+    struct Noting {
+        asked: Vec<&'static str>,
+    }
+
+    impl Backend for Noting {
+        fn now(&self) -> f64 {
+            0.0
+        }
+
+        fn value(&mut self, _: NodeId, _: &mut dyn Listener) -> Result<Option<f64>, Fault> {
+            self.asked.push("value");
+            Ok(Some(2.0))
+        }
+
+        fn follow(&mut self, _: NodeId) -> Follow {
+            Follow::Assumed
+        }
+
+        fn set_local(&mut self, _: u32, _: Option<f64>) {}
+
+        fn start(&mut self, _: &Operation, _: &mut dyn Listener) -> Result<Ticket, Fault> {
+            self.asked.push("start");
+            Ok(Ticket(0))
+        }
+
+        fn poll(&mut self, _: Ticket, _: &mut dyn Listener) -> Result<Status, Fault> {
+            Ok(Status::Done)
+        }
+
+        fn halt(&mut self, _: Ticket) {}
+
+        fn advance(&mut self, _: f64, _: &[Watch], _: &mut dyn Listener) -> Result<Advance, Fault> {
+            Ok(Advance::Reached)
+        }
+    }
+
+    fn heats() -> Operation {
+        Operation {
+            verb: "heat".to_owned(),
+            capability: None,
+            device: None,
+            arguments: Vec::new(),
+            needs: Vec::new(),
+            presumes: Vec::new(),
+            at_start: Vec::new(),
+            at_end: Vec::new(),
+            takes: Some(Takes { nominal: NodeId(0), bounds: None }),
+            until: None,
+            claims: Vec::new(),
+            reads: Vec::new(),
+            fails: Vec::new(),
+            limits: Vec::new(),
+            motion: None,
+        }
+    }
+
+    #[test]
+    fn how_long_a_command_takes_is_asked_before_it_does_anything() {
+        let step = Step::Operation(Box::new(heats()));
+        let plan = Plan {
+            workflow: String::new(),
+            arguments: Vec::new(),
+            steps: vec![PlanStep { label: "heat".to_owned(), span: Span::default(), step }],
+            root: StepId(0),
+            locals: Vec::new(),
+            limits: Vec::new(),
+            ends: Vec::new(),
+        };
+        let offer = Offer {
+            device: None,
+            capability: String::new(),
+            verb: "heat".to_owned(),
+            docs: String::new(),
+            parameters: Vec::new(),
+            arrangements: vec![Arranged { things: Vec::new(), locals: Vec::new(), step: StepId(0) }],
+            lasts: true,
+            fails: Vec::new(),
+        };
+        let (scene, sources, cancel) = (Scene::default(), Sources::default(), AtomicBool::new(false));
+        let catalogue = Catalogue { features: Vec::new(), commands: vec![vec![&offer]], properties: vec![Vec::new()] };
+        let (ask, requests) = channel();
+        let desk = Desk::new(catalogue, &scene, &plan, requests);
+        let (told, mut heard) = news::unbounded_channel();
+        ask.send(Request::Call(Call { feature: 0, command: 0, arguments: Vec::new(), news: told }))
+            .expect("it is open");
+        let mut say = |_: &str| {};
+        let mut listener = Attendant::new(&desk, &sources, &mut say);
+        let begun = listener.asked(0.0);
+        assert_eq!(begun.len(), 1);
+        let mut backend = Noting::default();
+        let mut paced = Paced::new(&mut backend, &desk, &cancel, 1.0);
+        paced.start(&heats(), &mut listener).expect("it starts");
+        paced.answer(&mut listener).expect("it answers");
+        drop(paced);
+        assert_eq!(backend.asked, ["value", "start"]);
+        assert!(heard.try_recv().is_ok());
     }
 }
