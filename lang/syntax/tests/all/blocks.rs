@@ -32,8 +32,8 @@ fn every_block_of_a_statement_is_one_of_its_blocks() {
         ("claim plate { wait 1 s }", 1),
         ("sequence { wait 1 s }", 1),
         ("parallel {\n wait 1 s\n wait 2 s\n}", 1),
-        ("start job = sequence { wait 1 s }", 1),
-        ("start job { wait 1 s }", 1),
+        ("start job = { wait 1 s }", 1),
+        ("start job = heat plate to 50 degC", 1),
         // Handlers are no part of it.
         ("sequence { wait 1 s } on slip { wait 2 s } finally { wait 3 s }", 1),
         ("wait until x timeout 1 s on timeout { wait 2 s }", 0),
