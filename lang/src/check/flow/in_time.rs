@@ -397,7 +397,13 @@ impl<'l> Flow<'l, '_> {
                 self.waits_until(lines, at, condition, lasts, deadline);
             }
             Step::Keep { condition, body } => {
-                let holds = self.eval(condition.node, &lines.facts).truth() == Some(true);
+                let holds = self.eval(condition.node, &lines.facts).truth();
+                // The body does not begin.
+                if holds == Some(false) {
+                    lines.over = true;
+                    return;
+                }
+                let holds = holds == Some(true);
                 lines.all[at].kept.extend(holds.then_some(condition));
                 lines.all[at].frames.extend([block(usize::from(holds), false), Frame::One(*body)]);
             }
@@ -707,16 +713,21 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() ->
     let side_by_side = |step: &Step| matches!(step, Step::Parallel(_) | Step::Start { .. });
     let any = flow.plan.steps.iter().any(|s| side_by_side(&s.step));
     // What is wrong in any order needs no other one.
-    if !any || flow.findings.iter().any(Finding::is_error) || !flow.may_disturb() {
+    let wrong = |f: &Finding| f.is_error() && !f.is_of_one_order();
+    if !any || flow.findings.iter().any(wrong) || !flow.may_disturb() {
         return;
     }
     let mut first = begin();
-    first.follow_in_time(false);
-    if first.findings.is_empty() {
+    let sound = first.follow_in_time(false);
+    if first.findings.is_empty() && !(sound && flow.findings.iter().any(Finding::is_of_one_order)) {
         return;
     }
     let mut second = begin();
-    second.follow_in_time(true);
+    let sound = second.follow_in_time(true) && sound;
+    // The order of time decides between what comes up in one order only and what comes up in the other.
+    if sound || first.findings.iter().any(|f| f.is_error() && second.findings.iter().any(|o| o.is_like(f))) {
+        flow.findings.retain(|f| !f.is_of_one_order());
+    }
     let is_new = |f: &Finding| !flow.findings.iter().any(|old| old.place() == f.place());
     let new: Vec<Finding> =
         first.findings.into_iter().filter(|f| second.findings.iter().any(|o| o.is_like(f)) && is_new(f)).collect();
