@@ -86,19 +86,77 @@ pub struct Execution {
 /// A block that a thread is in.
 #[derive(Debug)]
 enum Frame<'p> {
-    Block { stmts: &'p [Stmt], next: usize },
-    Repeat { stmt: Id, body: &'p Block, left: u32 },
-    While { stmt: Id, condition: Condition, body: &'p Block, left: u32 },
-    Parallel { stmt: Id, children: Vec<usize> },
-    Guard { stmt: Id, body: &'p Block, handlers: &'p [Handler], tries: Vec<u32>, handling: bool, jobs: Vec<usize> },
-    Try { stmt: Id, other: &'p Block, second: bool, jobs: Vec<usize> },
-    Claim { stmt: Id, things: &'p [Thing], jobs: Vec<usize> },
-    Double { stmt: Id, volume: u32, from: usize, to: usize, part: usize },
-    After { stmt: Id },
-    Named { stmt: Id, name: usize },
-    Window { stmt: Id, handler: Option<&'p Block>, jobs: Vec<usize> },
-    Keep { stmt: Id, condition: Condition, handler: Option<&'p Block>, handling: bool, jobs: Vec<usize> },
-    Root { jobs: Vec<usize>, finally: bool, failed: Option<Failure> },
+    Block {
+        stmts: &'p [Stmt],
+        next: usize,
+    },
+    Repeat {
+        stmt: Id,
+        body: &'p Block,
+        left: u32,
+    },
+    While {
+        stmt: Id,
+        condition: Condition,
+        body: &'p Block,
+        left: u32,
+    },
+    Parallel {
+        stmt: Id,
+        children: Vec<usize>,
+    },
+    Guard {
+        stmt: Id,
+        body: &'p Block,
+        handlers: &'p [Handler],
+        tries: Vec<u32>,
+        handling: bool,
+        jobs: Vec<usize>,
+    },
+    Try {
+        stmt: Id,
+        other: &'p Block,
+        second: bool,
+        jobs: Vec<usize>,
+    },
+    Claim {
+        stmt: Id,
+        things: &'p [Thing],
+        jobs: Vec<usize>,
+    },
+    Double {
+        stmt: Id,
+        volume: u32,
+        from: usize,
+        to: usize,
+        part: usize,
+    },
+    After {
+        stmt: Id,
+    },
+    Named {
+        stmt: Id,
+        name: usize,
+    },
+    /// Only where it has a handler it waits for the jobs begun in it.
+    Window {
+        stmt: Id,
+        handler: Option<&'p Block>,
+        owns: bool,
+        jobs: Vec<usize>,
+    },
+    Keep {
+        stmt: Id,
+        condition: Condition,
+        handler: Option<&'p Block>,
+        handling: bool,
+        jobs: Vec<usize>,
+    },
+    Root {
+        jobs: Vec<usize>,
+        finally: bool,
+        failed: Option<Failure>,
+    },
 }
 
 /// What a thread does.
@@ -694,7 +752,12 @@ impl<'p> Machine<'p, '_> {
                 self.certain &= limit.is_finite() && (self.now - limit).abs() > 1e-6;
                 let late = self.now > limit;
                 let handler = handler.as_ref();
-                self.threads[t].frames.push(Frame::Window { stmt: id, handler, jobs: Vec::new() });
+                self.threads[t].frames.push(Frame::Window {
+                    stmt: id,
+                    handler,
+                    owns: handler.is_some(),
+                    jobs: Vec::new(),
+                });
                 match late {
                     true => self.fail(t, Failure { name: "late", stmt: id, meant: true }),
                     false => self.push(t, body),
@@ -799,7 +862,7 @@ impl<'p> Machine<'p, '_> {
         while let Some(thread) = at {
             for frame in self.threads[thread].frames.iter_mut().rev() {
                 if let Frame::Guard { jobs, .. }
-                | Frame::Window { jobs, .. }
+                | Frame::Window { owns: true, jobs, .. }
                 | Frame::Keep { jobs, .. }
                 | Frame::Try { jobs, .. }
                 | Frame::Claim { jobs, .. }
