@@ -109,6 +109,15 @@ fn runs_stay_within_what_is_known() {
     }
 }
 
+#[test]
+fn runs_with_jobs_stay_within_what_is_known() {
+    for name in ["271_warmed_while_a_job_waits", "273_sample_before_a_job_pours", "276_two_branches_at_one_plate"] {
+        let compared =
+            stays_within(&format!("tests/faults/clean/{name}.mtx"), &folder(&format!("contents_{}", &name[..3])));
+        assert!(compared > 0, "{name}: nothing was compared");
+    }
+}
+
 /// Runs a file and compares what is recorded after each statement with what `check` knows there; how many values were.
 pub fn stays_within(file: &str, dir: &std::path::Path) -> usize {
     let out = dir.to_str().expect("text");

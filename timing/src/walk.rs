@@ -307,16 +307,17 @@ impl Walk<'_, '_> {
                 self.lasting(id, place, lasts)
             }
             Step::Guarded { body, handlers, finally } => {
-                let handled = !handlers.is_empty();
                 let mut end = self.scoped(id, *body, place);
+                let mut longest: Option<f64> = None;
                 for (_, handler) in handlers {
                     let (scope, start) = (self.network.scope(place.scope), self.network.point());
                     self.network.least(at, start, 0.0, scope, Reason { step: id, why: Why::Order });
-                    self.step(*handler, Place { at: start, scope, aside: true, ..place });
+                    let handled = self.step(*handler, Place { at: start, scope, aside: true, ..place });
+                    let lasts = if self.begins_again(*handler) { f64::INFINITY } else { handled.lasts.max };
+                    longest = Some(longest.map_or(lasts, |l| l.max(lasts)));
                 }
-                if handled {
-                    end.lasts.max = f64::INFINITY;
-                    end.dead = false;
+                if let Some(longest) = longest {
+                    end = self.or_later(id, place, end, longest);
                 }
                 match finally {
                     Some(finally) => {
@@ -328,17 +329,17 @@ impl Walk<'_, '_> {
             }
             Step::Try(list) => {
                 let mut end = now;
+                let mut longest = 0.0;
                 for (index, alternative) in list.iter().enumerate() {
                     if index == 0 {
                         end = self.scoped(id, *alternative, place);
                         continue;
                     }
                     let scope = self.network.scope(place.scope);
-                    self.scoped(id, *alternative, Place { scope, ..place });
+                    longest += self.scoped(id, *alternative, Place { scope, ..place }).lasts.max;
                 }
                 if list.len() > 1 {
-                    end.lasts.max = f64::INFINITY;
-                    end.dead = false;
+                    end = self.or_later(id, place, end, longest);
                 }
                 end
             }
@@ -419,6 +420,22 @@ impl Walk<'_, '_> {
             Step::Fail { .. } | Step::Retry { .. } => End { dead: true, ..now },
             _ => now,
         }
+    }
+
+    /// The end of a body of which a failure leads to steps that last so long, s, at most: that of the body, or later.
+    fn or_later(&mut self, id: StepId, place: Place, body: End, longest: f64) -> End {
+        let lasts = Interval { max: body.lasts.max + longest, ..body.lasts };
+        let order = Reason { step: id, why: Why::Order };
+        let at = self.network.point();
+        self.network.least(body.at, at, 0.0, place.scope, order);
+        self.network.most(place.at, at, lasts.max, place.scope, order);
+        End { at, lasts, dead: false }
+    }
+
+    /// Whether a handler may have its body begin again.
+    fn begins_again(&self, handler: StepId) -> bool {
+        let step = &self.plan.get(handler).step;
+        matches!(step, Step::Retry { .. }) || step.children().into_iter().any(|child| self.begins_again(child))
     }
 
     fn sequence(&mut self, list: &[StepId], place: Place) -> End {

@@ -62,6 +62,8 @@ pub enum Step {
     Failed(Id, &'static str),
     /// It presumed what was not so.
     Presumed(Id),
+    /// A turn of it begins.
+    Turn(Id),
 }
 
 /// One execution.
@@ -84,19 +86,77 @@ pub struct Execution {
 /// A block that a thread is in.
 #[derive(Debug)]
 enum Frame<'p> {
-    Block { stmts: &'p [Stmt], next: usize },
-    Repeat { stmt: Id, body: &'p Block, left: u32 },
-    While { stmt: Id, condition: Condition, body: &'p Block, left: u32 },
-    Parallel { stmt: Id, children: Vec<usize> },
-    Guard { stmt: Id, body: &'p Block, handlers: &'p [Handler], tries: Vec<u32>, handling: bool, jobs: Vec<usize> },
-    Try { stmt: Id, other: &'p Block, second: bool, jobs: Vec<usize> },
-    Claim { stmt: Id, things: &'p [Thing], jobs: Vec<usize> },
-    Double { stmt: Id, volume: u32, from: usize, to: usize, part: usize },
-    After { stmt: Id },
-    Named { stmt: Id, name: usize },
-    Window { stmt: Id, late: bool, handler: Option<&'p Block>, jobs: Vec<usize> },
-    Keep { stmt: Id, condition: Condition, handler: Option<&'p Block>, handling: bool, jobs: Vec<usize> },
-    Root { jobs: Vec<usize>, finally: bool, failed: Option<Failure> },
+    Block {
+        stmts: &'p [Stmt],
+        next: usize,
+    },
+    Repeat {
+        stmt: Id,
+        body: &'p Block,
+        left: u32,
+    },
+    While {
+        stmt: Id,
+        condition: Condition,
+        body: &'p Block,
+        left: u32,
+    },
+    Parallel {
+        stmt: Id,
+        children: Vec<usize>,
+    },
+    Guard {
+        stmt: Id,
+        body: &'p Block,
+        handlers: &'p [Handler],
+        tries: Vec<u32>,
+        handling: bool,
+        jobs: Vec<usize>,
+    },
+    Try {
+        stmt: Id,
+        other: &'p Block,
+        second: bool,
+        jobs: Vec<usize>,
+    },
+    Claim {
+        stmt: Id,
+        things: &'p [Thing],
+        jobs: Vec<usize>,
+    },
+    Double {
+        stmt: Id,
+        volume: u32,
+        from: usize,
+        to: usize,
+        part: usize,
+    },
+    After {
+        stmt: Id,
+    },
+    Named {
+        stmt: Id,
+        name: usize,
+    },
+    /// Only where it has a handler it waits for the jobs begun in it.
+    Window {
+        stmt: Id,
+        handler: Option<&'p Block>,
+        owns: bool,
+        jobs: Vec<usize>,
+    },
+    Keep {
+        stmt: Id,
+        condition: Condition,
+        handler: Option<&'p Block>,
+        handling: bool,
+        jobs: Vec<usize>,
+    },
+    Root {
+        jobs: Vec<usize>,
+        finally: bool,
+        failed: Option<Failure>,
+    },
 }
 
 /// What a thread does.
@@ -122,6 +182,8 @@ struct Thread<'p> {
     failed: Option<Failure>,
     /// The block that keeps something which does not hold any more.
     breaks: Option<Id>,
+    /// What the threads around it had claimed when it began.
+    inherits: Vec<Thing>,
     /// By thread: how many of its touches come before what this one does now.
     knows: BTreeMap<usize, usize>,
     touches: usize,
@@ -277,8 +339,34 @@ impl<'p> Machine<'p, '_> {
                 _ => None,
             })
             .collect();
+        let over: Vec<bool> = self.world.cups.iter().map(|c| c.is_over()).collect();
         let passed = self.world.pass(moment - self.now, &warm);
         self.now = if passed + self.now + 1e-12 < moment { self.now + passed } else { moment };
+        if self.world.cups.iter().zip(over).any(|(c, over)| c.is_over() && !over) {
+            self.run_over();
+        }
+    }
+
+    /// A law has made a vessel run over: the step in hand fails. `check` leaves that to the run, so it is no violation.
+    fn run_over(&mut self) {
+        let in_hand = |(t, thread): (usize, &Thread<'_>)| match thread.state {
+            State::Waits { stmt, .. }
+            | State::Acts { stmt, .. }
+            | State::Until { stmt, .. }
+            | State::Holds { stmt, .. } => Some((t, stmt)),
+            _ => None,
+        };
+        let steps: Vec<(usize, Id)> = self.threads.iter().enumerate().filter_map(in_hand).collect();
+        // Of several the one counts that has set the law going: a matter of what was done before.
+        self.certain &= steps.len() == 1;
+        let Some(&(t, stmt)) = steps.first() else { return };
+        let around = self.threads[t].frames.iter().rev().find_map(|f| match f {
+            Frame::Double { stmt, .. } => Some(*stmt),
+            _ => None,
+        });
+        let stmt = if stmt == Id::MAX { around.unwrap_or(stmt) } else { stmt };
+        let failure = Failure { name: "volume_overflow", stmt, meant: true };
+        self.fail(t, failure);
     }
 
     /// The condition that a thread waits for has come true.
@@ -291,7 +379,14 @@ impl<'p> Machine<'p, '_> {
 
     fn spawn(&mut self, parent: Option<usize>, frames: Vec<Frame<'p>>) -> usize {
         let mut knows = BTreeMap::new();
+        let mut inherits = Vec::new();
         if let Some(p) = parent {
+            let claimed = self.threads[p].frames.iter().filter_map(|f| match f {
+                Frame::Claim { things, .. } => Some(things.iter().copied()),
+                _ => None,
+            });
+            inherits.extend(claimed.flatten());
+            inherits.extend(&self.threads[p].inherits);
             knows.clone_from(&self.threads[p].knows);
             knows.insert(p, self.threads[p].touches);
         }
@@ -303,6 +398,7 @@ impl<'p> Machine<'p, '_> {
             stopped: false,
             failed: None,
             breaks: None,
+            inherits,
             knows,
             touches: 0,
         });
@@ -427,7 +523,8 @@ impl<'p> Machine<'p, '_> {
                 }
                 _ => {
                     *left -= 1;
-                    let body = *body;
+                    let (stmt, body) = (*stmt, *body);
+                    self.out.push(Step::Turn(stmt));
                     self.push(t, body);
                 }
             },
@@ -447,6 +544,7 @@ impl<'p> Machine<'p, '_> {
                     (true, _) => {
                         *left -= 1;
                         let body = *body;
+                        self.out.push(Step::Turn(stmt));
                         self.push(t, body);
                     }
                 }
@@ -621,7 +719,8 @@ impl<'p> Machine<'p, '_> {
             Kind::Start(job, _)
                 if self.jobs.get(job).is_some_and(|t| !matches!(self.threads[*t].state, State::Ended)) =>
             {
-                self.fail(t, Failure { name: "job", stmt: id, meant: false });
+                let failure = Failure { name: "job", stmt: id, meant: false };
+                self.fail_with(t, failure, "job-still-running");
             }
             Kind::Start(job, body) => {
                 let thread = self.spawn(Some(t), vec![Frame::Block { stmts: body, next: 0 }]);
@@ -653,7 +752,12 @@ impl<'p> Machine<'p, '_> {
                 self.certain &= limit.is_finite() && (self.now - limit).abs() > 1e-6;
                 let late = self.now > limit;
                 let handler = handler.as_ref();
-                self.threads[t].frames.push(Frame::Window { stmt: id, late, handler, jobs: Vec::new() });
+                self.threads[t].frames.push(Frame::Window {
+                    stmt: id,
+                    handler,
+                    owns: handler.is_some(),
+                    jobs: Vec::new(),
+                });
                 match late {
                     true => self.fail(t, Failure { name: "late", stmt: id, meant: true }),
                     false => self.push(t, body),
@@ -758,7 +862,7 @@ impl<'p> Machine<'p, '_> {
         while let Some(thread) = at {
             for frame in self.threads[thread].frames.iter_mut().rev() {
                 if let Frame::Guard { jobs, .. }
-                | Frame::Window { jobs, .. }
+                | Frame::Window { owns: true, jobs, .. }
                 | Frame::Keep { jobs, .. }
                 | Frame::Try { jobs, .. }
                 | Frame::Claim { jobs, .. }
@@ -776,7 +880,7 @@ impl<'p> Machine<'p, '_> {
     fn act(&mut self, t: usize, action: Action, stmt: Id, whole: bool) {
         for thing in action.uses() {
             self.touch(t, thing, true);
-            if self.holders.get(&thing).is_some_and(|h| !self.within(t, *h)) {
+            if self.holders.get(&thing).is_some_and(|h| !self.may_use(t, thing, *h)) {
                 // What becomes of a use of what another one has claimed is not said.
                 self.certain = false;
             }
@@ -806,6 +910,11 @@ impl<'p> Machine<'p, '_> {
                 self.threads[t].state = State::Acts { until, action, stmt, whole };
             }
         }
+    }
+
+    /// Whether a thing that is claimed is claimed for this thread: by itself, or by one around when this one began inside of its block.
+    fn may_use(&self, t: usize, thing: Thing, holder: usize) -> bool {
+        t == holder || self.within(t, holder) && self.threads[t].inherits.contains(&thing)
     }
 
     /// Whether a thread is another one, or one of its branches or jobs.
@@ -861,7 +970,11 @@ impl<'p> Machine<'p, '_> {
 
     /// A failure begins its way outwards. One that somebody has thought of is no violation.
     fn fail(&mut self, t: usize, failure: Failure) {
-        let code = code(failure.name);
+        self.fail_with(t, failure, code(failure.name));
+    }
+
+    /// The same, where one name stands for several findings.
+    fn fail_with(&mut self, t: usize, failure: Failure, code: &'static str) {
         self.out.push(Step::Failed(failure.stmt, code));
         if !self.thought_of(t, failure.name) {
             let violation = Violation { code, stmt: failure.stmt };
@@ -913,7 +1026,7 @@ impl<'p> Machine<'p, '_> {
 
     fn claim(&mut self, t: usize, things: &'p [Thing], stmt: Id, body: &'p Block, order: usize) -> bool {
         let free = |thing: &Thing| {
-            let held = self.holders.get(thing).is_some_and(|h| !self.within(t, *h));
+            let held = self.holders.get(thing).is_some_and(|h| !self.may_use(t, *thing, *h));
             let used = self.threads.iter().enumerate().any(|(o, other)| {
                 o != t && matches!(other.state, State::Acts { action, .. } if action.uses().contains(thing))
             });
@@ -1045,12 +1158,11 @@ impl<'p> Machine<'p, '_> {
         let named = failure.filter(|f| !f.name.is_empty()).map(|f| f.name);
         let breaks = self.threads[t].breaks;
         match self.threads[t].frames.last_mut() {
-            Some(Frame::Window { late, handler, jobs, .. }) if *late && named == Some("late") => {
+            // Its handler takes what comes too late within it as well.
+            Some(Frame::Window { handler, jobs, .. }) if handler.is_some() && named == Some("late") => {
                 jobs.clear();
-                *late = false;
-                match handler.take() {
-                    Some(block) => self.push(t, block),
-                    None => drop(self.threads[t].frames.pop()),
+                if let Some(block) = handler.take() {
+                    self.push(t, block);
                 }
             }
             Some(Frame::Keep { stmt, handler, handling, jobs, .. }) if breaks == Some(*stmt) => {
@@ -1067,7 +1179,7 @@ impl<'p> Machine<'p, '_> {
                     }
                 }
             }
-            Some(Frame::Guard { body, handlers, tries, handling, jobs, .. }) if !*handling && named.is_some() => {
+            Some(Frame::Guard { stmt, body, handlers, tries, handling, jobs }) if !*handling && named.is_some() => {
                 jobs.clear();
                 let fits = |h: &&Handler| Some(h.on) == named || h.on == "failure";
                 let Some(which) = handlers.iter().position(|h| fits(&h)) else {
@@ -1077,7 +1189,8 @@ impl<'p> Machine<'p, '_> {
                 match &handlers[which].what {
                     Remedy::Retry(n) if tries[which] < *n => {
                         tries[which] += 1;
-                        let body = *body;
+                        let (stmt, body) = (*stmt, *body);
+                        self.out.push(Step::Turn(stmt));
                         self.push(t, body);
                     }
                     Remedy::Retry(_) => drop(self.threads[t].frames.pop()),
@@ -1151,7 +1264,7 @@ fn takes(frame: &Frame<'_>, name: &str) -> bool {
             first.is_some_and(|i| !matches!(handlers[i].what, Remedy::Retry(n) if tries[i] >= n))
         }
         Frame::Try { second: false, .. } => true,
-        Frame::Window { late: true, handler: Some(_), .. } => name == "late",
+        Frame::Window { handler: Some(_), .. } => name == "late",
         _ => false,
     }
 }

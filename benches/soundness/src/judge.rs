@@ -11,11 +11,11 @@ use matterix_runtime::exec::{Listener, RunStatus};
 use matterix_runtime::process::{Engine, Observer};
 use matterix_runtime::run::{RunOptions, run};
 
-use crate::explore::{Summary, explore};
+use crate::explore::{Summary, explore, same};
 use crate::interpret::Violation;
 use crate::plan::{Id, LIQUIDS, Plan, Stmt, Theme};
 use crate::print::{Text, print, well};
-use crate::world::World;
+use crate::world::{DROP, World};
 
 /// Relative difference between two values of one quantity that comes of rounding and of the steps of solvers.
 const SAME: f64 = 1e-5;
@@ -35,6 +35,8 @@ pub struct Finding {
     pub family: &'static str,
     /// How grave it is.
     pub severity: Severity,
+    /// The statement it is about, where that is known.
+    pub at: Option<Id>,
     /// The statements it points at, that of the cause first.
     pub stmts: Vec<Id>,
     /// What it says.
@@ -123,7 +125,7 @@ pub fn judge(plans: &[Plan], seed: u64, budget: usize, session: &mut Session) ->
     let at = Lines::new(file, &text);
     let mut out = Vec::new();
     for (number, plan) in plans.iter().enumerate() {
-        let findings = found.iter().filter_map(|d| at.finding(number, d)).collect();
+        let findings = found.iter().filter_map(|d| at.finding(plan, number, d)).collect();
         let summary = explore(plan, budget, seed);
         let mut verdict = Verdict { findings, summary, disagreements: Vec::new(), ran: false };
         let flow = format!("flow{number}");
@@ -165,14 +167,21 @@ impl<'t> Lines<'t> {
     }
 
     /// A finding, if it is about this plan.
-    fn finding(&self, number: usize, d: &matterix_ir::Diagnostic) -> Option<Finding> {
+    fn finding(&self, plan: &Plan, number: usize, d: &matterix_ir::Diagnostic) -> Option<Finding> {
         let (from, to) = self.text.spans[number];
         let about = |l: &&matterix_ir::diagnostic::Label| self.line(l.span).is_some_and(|n| n >= from && n < to);
         d.labels.iter().find(about)?;
         let spans = std::iter::once(d.span()).chain(d.labels.iter().map(|l| l.span));
-        let stmts = spans.filter_map(|span| self.stmt(number, span)).collect();
+        let stmts: Vec<Id> = spans.filter_map(|span| self.stmt(number, span)).collect();
+        // What stands in a skill is about the one call that is named.
+        let mut calls: Vec<Id> = stmts.iter().copied().filter(|id| plan.calls_a_skill(*id)).collect();
+        calls.dedup();
+        let at = self.stmt(number, d.span()).or(match calls[..] {
+            [one] => Some(one),
+            _ => None,
+        });
         let (code, family) = (d.code.name, d.code.family);
-        Some(Finding { code, family, severity: d.severity, stmts, headline: d.headline.clone() })
+        Some(Finding { code, family, severity: d.severity, at, stmts, headline: d.headline.clone() })
     }
 }
 
@@ -228,6 +237,7 @@ impl Verdict {
 
     /// Errors about what some execution does without that fault.
     fn false_errors(&mut self, places: &Places<'_>) {
+        let jobs = places.names.values().any(|name| name.contains("start"));
         for finding in self.findings.clone() {
             // What was thrown away may be used on no way, so that some ways are enough.
             if finding.severity != Severity::Error {
@@ -235,26 +245,34 @@ impl Verdict {
             }
             // Who of two that meet is in fault is a matter of words.
             let between = ["claimed-twice", "deadlock", "stopped-meanwhile"].contains(&finding.code);
-            let first = finding.stmts.first().filter(|_| !between);
+            let first = finding.at.as_ref().filter(|_| !between);
             // It stands in a skill: which call it is about is not known.
             if first.is_none() && !between {
                 continue;
             }
             // Some ways are enough.
-            if finding.family == "T2" && self.goes_wrong(finding.code) {
+            let alone = self.findings.iter().filter(|f| f.severity == Severity::Error).count() == 1;
+            if finding.family == "T2" && (!alone || self.goes_wrong(finding.code)) {
                 continue;
             }
-            let done = |id: &Id, well| self.summary.fates.get(id).is_some_and(|f| f.clean_of(finding.code, well));
-            // Behind another error nothing is certain.
-            let alone = self.findings.iter().filter(|f| f.severity == Severity::Error).count() == 1;
-            // Where it goes wrong in the same way in every order, the place is a matter of which order is told of.
-            let elsewhere = !self.summary.certain || self.goes_wrong(finding.code);
-            let clean = match first {
-                None => self.summary.clean,
-                Some(id) => done(id, true) || done(id, false) && !elsewhere && alone,
+            // Where it goes wrong in the same way in every order, the place is a matter of which order is told of. Behind another
+            // error nothing is certain.
+            // Where no order ends well, what is told of those beside each other is what comes first in one of them.
+            let beside = jobs || finding.at.is_some_and(|id| places.of(id).contains("parallel"));
+            if beside && !self.summary.well && self.summary.complete {
+                continue;
+            }
+            let nowhere = self.summary.certain && !self.goes_wrong(finding.code) && alone;
+            let clean = match first.and_then(|id| self.summary.fates.get(id)) {
+                None => first.is_none() && self.summary.clean,
+                // Where an execution leaves a loop early, the finding may be about a turn that it did not come to.
+                Some(fate) if !fate.always_in_a_turn(finding.code) => fate
+                    .clean_of(finding.code)
+                    .any(|b| b.whole && (b.well || nowhere) || nowhere && b.well && self.summary.complete),
+                Some(_) => false,
             };
             if clean {
-                let place = finding.stmts.first().map(|id| places.of(*id)).unwrap_or_default();
+                let place = finding.at.or(finding.stmts.first().copied()).map(|id| places.of(id)).unwrap_or_default();
                 self.differ(Sort::FalseError, finding.code, place, finding.headline.clone());
             }
         }
@@ -262,7 +280,7 @@ impl Verdict {
 
     /// Whether some execution fails with a code.
     fn goes_wrong(&self, code: &str) -> bool {
-        self.summary.fates.values().any(|f| f.failed.contains_key(code))
+        self.summary.fates.values().any(|f| f.failed.keys().any(|c| same(c, code)))
     }
 
     /// What `check --strict` is content with although it goes wrong in some execution, if it is.
@@ -329,6 +347,10 @@ impl Verdict {
 
     /// The twin against the executions, and against what is known at every statement.
     fn run(&mut self, plan: &Plan, program: &Program, known: Option<&Points>, at: &Lines<'_>, places: &Places<'_>) {
+        // What a wrong equation makes of matter is a breach of the balances, as it should be.
+        if plan.declared.is_some_and(|declared| declared.wrong().is_some()) {
+            return;
+        }
         let mut watch = Watch::new(plan, program, places);
         let outcome = run(program, &RunOptions::default(), &mut watch);
         self.ran = true;
@@ -407,6 +429,8 @@ fn quantity(plan: &Plan, vessel: &crate::world::Vessel, name: &str) -> Option<f6
         "mass" => Some(contents.mass.iter().sum::<f64>() * 1e-6),
         // The interpreter keeps no heat where a reaction turns one capacity into another.
         "temperature" if plan.theme == Theme::Reaction => None,
+        // What rounding has left has any temperature.
+        "temperature" if contents.capacity() <= DROP => None,
         "temperature" => Some(contents.temperature() + 273.15),
         species => {
             let index = LIQUIDS.iter().position(|l| l.name == species)?;

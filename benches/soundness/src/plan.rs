@@ -310,6 +310,13 @@ impl Plan {
         each(&self.finally, f);
     }
 
+    /// Whether a statement calls a skill with steps.
+    pub fn calls_a_skill(&self, id: Id) -> bool {
+        let mut calls = false;
+        self.each(&mut |stmt| calls |= stmt.id == id && matches!(stmt.kind, Kind::Do(Action::Double(..))));
+        calls
+    }
+
     /// How many statements it has.
     pub fn size(&self) -> usize {
         let mut n = 0;

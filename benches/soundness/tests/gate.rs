@@ -13,8 +13,6 @@ const PLANS: u64 = 500;
 const KNOWN: &[(u64, &str)] = &[
     // Two steps that meet in a block of which a failure is taken.
     (396, "FalseError claimed-twice"),
-    // The block of a `keep` whose condition does not hold when it begins is screened all the same.
-    (240, "FalseError incompatible-mix"),
 ];
 
 /// Families of checks that the machine must miss when they are switched off.

@@ -75,3 +75,36 @@ fn a_wait_for_noise_ends_before_and_after_what_goes_on_beside_it() {
     let summary = of(vec![Kind::Parallel(vec![wait, other])]);
     assert!(summary.complete && codes(&summary).contains(&"incompatible-mix") && summary.clean);
 }
+
+#[test]
+fn a_job_that_is_begun_again_while_it_runs_fails() {
+    let start = Kind::Start(0, block(vec![Kind::Wait(9_000)], 5));
+    assert_eq!(codes(&of(vec![Kind::Repeat(2, block(vec![start], 3))])), ["job-still-running"]);
+    assert_eq!(codes(&of(vec![Kind::Await(0)])), ["job-not-begun"]);
+}
+
+#[test]
+fn what_is_claimed_later_is_not_claimed_for_a_job_begun_before() {
+    let late = block(vec![Kind::Wait(2_000), Kind::Do(Action::Drip(100, 0, 1))], 10);
+    let claim = Kind::Claim(vec![Thing::Cup(1)], block(vec![Kind::Wait(9_000)], 20));
+    assert!(!of(vec![Kind::Start(0, late.clone()), claim]).certain);
+    let inside = Kind::Claim(vec![Thing::Cup(1)], block(vec![Kind::Start(0, late), Kind::Wait(9_000)], 20));
+    assert!(of(vec![inside]).certain);
+}
+
+#[test]
+fn a_window_takes_what_comes_too_late_within_it() {
+    let inner = vec![Kind::Wait(5_000), Kind::Within(0, 1_000, block(vec![Kind::Wait(1)], 20), None)];
+    let handler = block(vec![Kind::Wait(1)], 30);
+    let step = Kind::Step(0, block(vec![Kind::Wait(10)], 5));
+    assert!(of(vec![step, Kind::Within(0, 1_000, block(inner, 10), Some(handler))]).clean);
+}
+
+#[test]
+fn a_turn_of_a_loop_that_always_fails_is_told_from_one_that_may_not() {
+    let drip = |n| vec![Kind::Repeat(n, block(vec![Kind::Do(Action::Drip(300, 0, 1))], 5))];
+    let second = of(drip(2));
+    assert!(second.fates[&5].always_in_a_turn("volume-underflow"));
+    assert!(!of(drip(1)).fates[&5].always_in_a_turn("volume-underflow"));
+    assert!(second.fates[&5].clean_of("volume-underflow").next().is_none());
+}

@@ -211,8 +211,20 @@ impl Flow<'_, '_> {
 
     /// Looks at the limits that depend on these states.
     pub(super) fn limits_on(&mut self, states: &[u32], facts: &mut Facts) -> Asked {
-        let limits = states.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
+        let limits = self.limits_that_ask_for(states);
         self.limits(limits, facts)
+    }
+
+    /// The limits that depend on these states.
+    pub(super) fn limits_that_ask_for(&self, states: &[u32]) -> Vec<u32> {
+        states.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect()
+    }
+
+    /// The limits that are passed already, behind a handler that took that: time that goes by does not break them once more.
+    pub(super) fn passed_before(&mut self, facts: &Facts) -> BTreeSet<u32> {
+        let limits = if self.limit_taken { 0..self.plan.limits.len() as u32 } else { 0..0 };
+        let broken = |i: &u32| self.eval(self.plan.limits[*i as usize].condition.node, facts).truth() == Some(false);
+        limits.filter(broken).collect()
     }
 
     /// Looks at limits after what they depend on has changed.
@@ -230,6 +242,7 @@ impl Flow<'_, '_> {
                 continue;
             }
             let taken = self.is_taken(condition.failure());
+            self.limit_taken |= taken;
             match truth {
                 Some(_) => {
                     if !taken {

@@ -9,6 +9,7 @@ use matterix_ir::plan::{Step, StepId};
 
 use super::Flow;
 use super::facts::Facts;
+use super::jobs::Job;
 use super::points::{Notes, at_least};
 use super::value::Known;
 use crate::elaborate::mixtures::written;
@@ -65,6 +66,20 @@ impl Flow<'_, '_> {
         }
     }
 
+    /// How far the jobs had got that a failure stops, those begun at this depth of handlers, is not known where it is taken; what should
+    /// be in order at the end is followed by itself.
+    pub(super) fn stop_short(&mut self, depth: usize, facts: &mut Facts) {
+        let stopped = self.jobs.values().filter(|job| job.is_stopped_at(depth, self.in_jobs));
+        let changed: BTreeSet<u32> = stopped.flat_map(Job::changes).collect();
+        if changed.is_empty() {
+            return;
+        }
+        let kept = self.ends_of();
+        let states: Vec<u32> = self.behind(&changed).into_iter().filter(|s| !kept.contains_key(s)).collect();
+        self.forget(&states, facts);
+        facts.time = at_least(&facts.time);
+    }
+
     /// The branch ends.
     pub fn end_branch(&mut self) {
         self.notes.iter_mut().for_each(Notes::idle);
@@ -117,12 +132,12 @@ impl Flow<'_, '_> {
         operations.flat_map(|o| written(o, &self.mixtures)).collect()
     }
 
-    /// Its steps have been followed: from now until it is waited for, what they change is not known.
-    pub fn begun_job(&mut self, job: &str, body: StepId) {
+    /// Its steps have been followed: from now until it is waited for, what they change is not known, and what hangs on when they do.
+    pub fn begun_job(&mut self, job: &str, body: StepId, raced: &BTreeSet<u32>) {
         if self.notes.is_none() {
             return;
         }
-        let states = self.behind(&self.writes(body));
+        let states = self.behind(&self.writes(body).union(raced).copied().collect());
         let moved: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| states.contains(s)).collect();
         if let Some(notes) = &mut self.notes {
             notes.idle();

@@ -334,6 +334,7 @@ impl Flow<'_, '_> {
             let shown = if lasts { facts.clone() } else { there.clone() };
             self.passed(limit, &shown, false);
         }
+        self.limit_taken |= self.is_taken(name);
         let goes_on = !self.is_taken(name) || self.is_shared(limit.condition.node);
         self.raise(name, there);
         if goes_on {

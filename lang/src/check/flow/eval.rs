@@ -487,7 +487,10 @@ impl Flow<'_, '_> {
     }
 
     /// Notes a failure for the handlers around.
-    pub fn raise(&mut self, name: &str, facts: Facts) {
+    pub fn raise(&mut self, name: &str, mut facts: Facts) {
+        if !self.jobs.is_empty() {
+            self.stop_short(self.guards.len(), &mut facts);
+        }
         if let Some(guard) = self.guards.last_mut() {
             let raised: Raised = (name.to_string(), facts);
             guard.push(raised);

@@ -133,13 +133,14 @@ impl Flow<'_, '_> {
         let span = Known::Range(before.bounds().0, facts.time.bounds().1, Why::Unknown);
         facts.reopen(|s| self.lab.rates.contains_key(&s));
         self.meanwhile = Some(span.clone());
-        self.goes_on(longest, &span, facts);
+        self.beside_others(facts, |flow, facts| flow.goes_on(longest, &span, facts));
         self.meanwhile = None;
     }
 
     fn goes_on(&mut self, longest: f64, span: &Known, facts: &mut Facts) {
         let mut timed = self.timed.clone();
         timed.retain(|event| !self.at_moments.contains(event));
+        let passed = self.passed_before(facts);
         for round in 0..ROUNDS {
             let changed = !facts.unsettled.is_empty();
             let moved = self.flow_through(longest, span, facts);
@@ -157,7 +158,9 @@ impl Flow<'_, '_> {
             let again = self.recur(&recurring, span, facts);
             let moving = facts.moving.iter().map(|i| self.derivatives[*i as usize].state);
             let touched: Vec<u32> = moved.iter().copied().chain(moving).collect();
-            if self.limits_on(&touched, facts) == Asked::Handled {
+            let mut due = self.limits_that_ask_for(&touched);
+            due.retain(|limit| !passed.contains(limit));
+            if self.limits(due, facts) == Asked::Handled {
                 self.stopped = true;
                 return;
             }

@@ -61,6 +61,9 @@ impl Flow<'_, '_> {
         }
         self.after_report(&facts, reported, handlers, finally);
         raised = self.stop_jobs(raised, self.guards.len());
+        if !self.jobs.is_empty() {
+            raised.iter_mut().for_each(|(_, facts)| self.stop_short(self.guards.len(), facts));
+        }
         if let Some(outer) = self.guards.last_mut() {
             outer.extend(raised);
         }
@@ -99,9 +102,11 @@ impl Flow<'_, '_> {
                 let unsure = entry.unsure;
                 self.cleaning += 1;
                 self.doubt += usize::from(unsure);
+                self.open += 1;
                 self.again.push(Vec::new());
                 let end = self.walk(*handler, entry);
                 let begun = self.again.pop().unwrap_or_default();
+                self.open -= 1;
                 self.doubt -= usize::from(unsure);
                 self.cleaning -= 1;
                 let once_more = |(times, facts)| Again { names: names.clone(), times, facts, fail: fail.clone() };

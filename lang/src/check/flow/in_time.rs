@@ -463,7 +463,13 @@ impl<'l> Flow<'l, '_> {
                 self.waits_until(lines, at, condition, lasts, deadline);
             }
             Step::Keep { condition, body } => {
-                let holds = self.eval(condition.node, &lines.facts).truth() == Some(true);
+                let holds = self.eval(condition.node, &lines.facts).truth();
+                // The body does not begin.
+                if holds == Some(false) {
+                    lines.over = true;
+                    return;
+                }
+                let holds = holds == Some(true);
                 lines.all[at].kept.extend(holds.then_some(condition));
                 lines.all[at].frames.extend([block(usize::from(holds), false), Frame::One(*body)]);
             }
@@ -736,7 +742,8 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     if dangers.is_empty() && !flow.may_disturb(&pairs) {
         return;
     }
-    let errors = flow.findings.iter().any(Finding::is_error);
+    let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
+    let uncertain = errors || flow.findings.iter().any(Finding::is_of_one_order);
     let follow = |backward| {
         let mut follower = begin();
         follower.judged = Judged::of(&flow.findings);
@@ -745,18 +752,22 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
         (follower, matches!(turns, Turns::Taken))
     };
     let (first, sound) = follow(false);
-    if first.findings.is_empty() && !(errors && sound) {
+    if first.findings.is_empty() && !(uncertain && sound) {
         return;
     }
     let (second, as_sound) = follow(true);
     if sound && as_sound {
         let holds = |f: &Finding| first.judged.holds(f.place()) && second.judged.holds(f.place());
-        flow.findings.retain(|f| !(f.is_error() && holds(f)));
+        flow.findings.retain(|f| !(f.is_of_one_order() || f.is_error() && holds(f)));
         return;
     }
     // What is wrong in any order needs no other one.
     if errors {
         return;
+    }
+    // The order of time decides between what comes up in one order only and what comes up in the other.
+    if first.findings.iter().any(|f| f.is_error() && second.findings.iter().any(|o| o.is_like(f))) {
+        flow.findings.retain(|f| !f.is_of_one_order());
     }
     let is_new = |f: &Finding| !flow.findings.iter().any(|old| old.place() == f.place());
     let new: Vec<Finding> =

@@ -83,6 +83,8 @@ impl<'p> Flow<'p, '_> {
         let mut facts = facts.clone();
         let guards = std::mem::take(&mut self.guards);
         let reported = std::mem::take(&mut self.reported);
+        // What the others set is followed here, one by one.
+        let contested = std::mem::take(&mut self.contested);
         self.quiet += 1;
         let mut at = now;
         let mut open = true;
@@ -98,6 +100,7 @@ impl<'p> Flow<'p, '_> {
         self.quiet -= 1;
         self.guards = guards;
         self.reported = reported;
+        self.contested = contested;
         never
     }
 

@@ -10,6 +10,7 @@ use matterix_ir::{BinaryOp, codes};
 use super::Flow;
 use super::facts::Facts;
 use super::interference::Rival;
+use super::points::at_least;
 use super::report::Finding;
 use super::stopped::{Beside, Course};
 use super::value::Known;
@@ -37,6 +38,8 @@ pub(super) struct Job {
     blocks: usize,
     /// In how many jobs it was started.
     within: usize,
+    /// It fails for certain, with one of these, where it is waited for.
+    fails: Option<Vec<String>>,
 }
 
 impl Job {
@@ -47,9 +50,19 @@ impl Job {
 
     /// What it does beside a failure that stops jobs begun at this depth of handlers.
     pub(super) fn beside(&self, depth: usize, within: usize) -> Option<Beside> {
-        let stopped = self.depth >= depth && self.within == within && !self.course.is_empty();
+        let stopped = self.is_stopped_at(depth, within) && !self.course.is_empty();
         let base = self.base.clone().filter(|_| stopped)?;
         Some(Beside { course: self.course.clone(), base, first: true })
+    }
+
+    /// Whether a failure at this depth of handlers stops it.
+    pub(super) fn is_stopped_at(&self, depth: usize, within: usize) -> bool {
+        self.depth >= depth && self.within == within
+    }
+
+    /// The states that it changes, or that hang on when it does something.
+    pub(super) fn changes(&self) -> impl Iterator<Item = u32> {
+        self.writes.iter().chain(&self.raced).copied()
     }
 
     /// When it began, s.
@@ -77,7 +90,7 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         late.findings = other;
         flow.findings = match late.needs_jobs {
             true => first.into_iter().filter(|f| late.findings.iter().any(|o| o.is_like(f))).collect(),
-            false => in_both(first, &late.findings),
+            false => in_both(first, &late.findings, flow.open_at_start),
         };
         flow.findings.extend(cut);
         // What was not looked at for a mistake that is none after all.
@@ -96,6 +109,7 @@ impl Flow<'_, '_> {
         let raced = self.raced_by_job(body);
         let base = self.stops_jobs.then(|| Rc::new(facts.clone()));
         let mut course = Rc::default();
+        let mut fails = None;
         let end = match self.late {
             true => {
                 if let Some(base) = &base {
@@ -107,22 +121,37 @@ impl Flow<'_, '_> {
                 let courses = std::mem::take(&mut self.courses);
                 self.begin_course();
                 let meantime = self.meantime(&writes, &facts);
+                let before = facts.clone();
+                let raised = self.guards.last().map_or(0, Vec::len);
                 let after = self.job(body, &raced, facts);
                 course = self.end_course();
                 self.courses = courses;
-                self.begun_job(name, body);
-                facts = after?;
-                let end = std::mem::replace(&mut facts.time, start.clone());
-                if end != start {
-                    self.begin_again(meantime.as_ref(), &mut facts);
+                self.begun_job(name, body, &raced);
+                match after {
+                    Some(after) => {
+                        facts = after;
+                        let end = std::mem::replace(&mut facts.time, start.clone());
+                        if end != start {
+                            self.begin_again(meantime.as_ref(), &mut facts);
+                        }
+                        Some(end)
+                    }
+                    // Its failure comes where it is waited for.
+                    None => {
+                        facts = before;
+                        self.widen(body, &mut facts);
+                        let raised = self.guards.last().into_iter().flatten().skip(raised);
+                        fails = Some(raised.map(|(name, _)| name.clone()).collect());
+                        Some(at_least(&start))
+                    }
                 }
-                Some(end)
             }
         };
+        self.open_at_start = self.open_at_start.max(self.open);
         facts.begun.insert(name.to_owned(), true);
         self.jobs.insert(
             name.to_owned(),
-            Job { body, start, end, writes, raced, course, base, depth, blocks, within: self.in_jobs },
+            Job { body, start, end, writes, raced, course, base, depth, blocks, within: self.in_jobs, fails },
         );
         Some(facts)
     }
@@ -147,7 +176,13 @@ impl Flow<'_, '_> {
 
     fn end_of_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
         self.end_job(name);
-        let Some(Job { body, start, end, writes, raced, .. }) = self.jobs.remove(name) else { return Some(facts) };
+        let Some(Job { body, start, end, writes, raced, fails, .. }) = self.jobs.remove(name) else {
+            return Some(facts);
+        };
+        if let Some(names) = fails {
+            names.iter().for_each(|name| self.raise(name, facts.clone()));
+            return None;
+        }
         let now = facts.time.clone();
         let end = match end {
             Some(end) => end,
@@ -161,6 +196,7 @@ impl Flow<'_, '_> {
             }
         };
         self.catch_up(&end, &writes, &mut facts);
+        self.moves_until(&end, &mut facts);
         let raced: Vec<u32> = raced.into_iter().collect();
         self.forget(&raced, &mut facts);
         facts.time = Known::binary(BinaryOp::Max, &now, &end);
@@ -228,12 +264,15 @@ impl Flow<'_, '_> {
 }
 
 /// What goes wrong in both orders. Where it does in either, if nowhere in both, the first order tells it: two that put something
-/// in one place. What goes wrong in turns of a loop may be right turn by turn.
-pub(super) fn in_both(first: Vec<Finding>, second: &[Finding]) -> Vec<Finding> {
+/// in one place. What goes wrong in turns of a loop may be right turn by turn, and what a run need not come to proves nothing:
+/// `open` choices and handlers are around both.
+pub(super) fn in_both(first: Vec<Finding>, second: &[Finding], open: usize) -> Vec<Finding> {
     let both = first.iter().any(|f| second.iter().any(|o| o.is_like(f)));
-    let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && !f.in_turn());
+    let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && f.is_come_to(open));
     let either = !both && wrong(&first) && wrong(second);
-    let stays =
-        |f: &Finding| f.is(codes::NOT_ANALYSED) || (either && !f.in_turn()) || second.iter().any(|o| o.is_like(f));
-    first.into_iter().filter(stays).collect()
+    let stays = |f: Finding| match f.is(codes::NOT_ANALYSED) || second.iter().any(|o| o.is_like(&f)) {
+        true => Some(f),
+        false => (either && f.is_come_to(open)).then(|| f.of_one_order()),
+    };
+    first.into_iter().filter_map(stays).collect()
 }

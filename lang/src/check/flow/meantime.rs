@@ -7,7 +7,7 @@ use std::rc::Rc;
 use super::Flow;
 use super::even::Even;
 use super::facts::Facts;
-use super::value::Known;
+use super::value::{Known, Why};
 
 /// What moves by itself when concurrent steps begin.
 #[derive(Clone, Debug)]
@@ -44,19 +44,43 @@ impl Flow<'_, '_> {
     /// What is known but for what concurrent steps may set at any time, such as whether a pump runs; none where there is no such.
     /// What the step that is followed has to itself they do not.
     pub(super) fn but_for_others(&mut self, facts: &Facts) -> Option<Facts> {
-        let others: BTreeSet<u32> = self.contested.iter().flatten().copied().collect();
-        if others.is_empty() {
-            return None;
-        }
-        let tracks = self.tracks();
-        let moved = |s: &u32| tracks.list.iter().any(|t| t.state == *s) || tracks.wild.contains(s);
-        let open: Vec<u32> = others.into_iter().filter(|s| !moved(s) && !self.has_claimed(*s)).collect();
+        let open = self.set_by_others();
         if open.is_empty() {
             return None;
         }
         let mut veiled = facts.clone();
         open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
         Some(veiled)
+    }
+
+    /// Time passes in which concurrent steps may set states that this line sets too: what moves is bounded whatever these are.
+    pub(super) fn beside_others(&mut self, facts: &mut Facts, pass: impl FnOnce(&mut Self, &mut Facts)) {
+        let open = self.set_by_others();
+        let mut kept = Vec::with_capacity(open.len());
+        for s in open {
+            kept.push((s, std::mem::replace(&mut facts.states[s as usize], Known::nothing())));
+            self.touch(s, facts);
+        }
+        if !kept.is_empty() {
+            facts.barrier = None;
+        }
+        pass(self, facts);
+        for (s, known) in kept {
+            facts.states[s as usize] = known;
+            facts.barrier = None;
+            self.touch(s, facts);
+        }
+    }
+
+    /// States that concurrent steps may set at any time, and this line as well; not what it has to itself.
+    fn set_by_others(&mut self) -> Vec<u32> {
+        let others: BTreeSet<u32> = self.contested.iter().flatten().copied().collect();
+        if others.is_empty() {
+            return Vec::new();
+        }
+        let tracks = self.tracks();
+        let moved = |s: &u32| tracks.list.iter().any(|t| t.state == *s) || tracks.wild.contains(s);
+        others.into_iter().filter(|s| !moved(s) && !self.has_claimed(*s)).collect()
     }
 
     /// Whether what is followed has the thing to itself that a state is of.
@@ -136,6 +160,20 @@ impl Flow<'_, '_> {
         let now = std::mem::replace(&mut facts.time, end.clone());
         self.go_on_from(Some(&meantime), &ends, facts);
         facts.time = now;
+    }
+
+    /// What moves otherwise than evenly goes on while a job is waited for that ends then.
+    pub(super) fn moves_until(&mut self, end: &Known, facts: &mut Facts) {
+        let longest = end.bounds().1 - facts.time.bounds().0;
+        if longest <= 0.0 || facts.unsettled.is_empty() && facts.moving.is_empty() {
+            return;
+        }
+        let even: Vec<u32> = self.going_on(facts).into_iter().collect();
+        let kept: Vec<Known> = even.iter().map(|s| facts.states[*s as usize].clone()).collect();
+        let now = facts.time.clone();
+        self.drift(&Known::Range(0.0, longest, Why::Unknown), facts);
+        facts.time = now;
+        even.iter().zip(kept).for_each(|(s, known)| facts.states[*s as usize] = known);
     }
 
     /// What moves by itself is not known while a job that changes `written` is followed behind its time.

@@ -50,7 +50,7 @@ use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::values::Formulas;
-use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span};
+use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span, codes};
 use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
@@ -131,6 +131,8 @@ struct Flow<'l, 'a> {
     meanwhile: Option<Known>,
     /// A law has broken a limit while time passed, and a handler takes that: the step goes no further.
     stopped: bool,
+    /// A handler has taken the failure of a limit, which may still be passed behind it.
+    limit_taken: bool,
     /// States that are amounts of species.
     amounts: BTreeSet<u32>,
     /// What is known of the conditions of reactions.
@@ -156,6 +158,10 @@ struct Flow<'l, 'a> {
     quiet: usize,
     /// While this is not 0 it is open whether the plan gets here: what fails for certain fails on some ways.
     doubt: usize,
+    /// Choices and handlers around of which a run may take another way.
+    open: usize,
+    /// The most of them around a `start`.
+    open_at_start: usize,
     /// While this is not 0 the steps clean up, as those of handlers and `finally` do.
     cleaning: usize,
     /// States that other branches change at the same time.
@@ -323,6 +329,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             clocked: Vec::new(),
             meanwhile: None,
             stopped: false,
+            limit_taken: false,
             amounts: lab.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect(),
             windows: BTreeMap::new(),
             branches: BTreeMap::new(),
@@ -336,6 +343,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             sites: Vec::new(),
             quiet: 0,
             doubt: 0,
+            open: 0,
+            open_at_start: 0,
             cleaning: 0,
             shared: Vec::new(),
             meets: Vec::new(),
@@ -488,7 +497,7 @@ fn presumed(plan: &Plan) -> BTreeSet<NodeId> {
 
 /// Whether a finding of this kind is an error even where it happens on some ways only: what is gone stays gone.
 pub fn forbidden_on_any_way(code: Code) -> bool {
-    code.family == "T2"
+    [codes::TIP_USED, codes::USED_AFTER_DISPOSAL, codes::DISPOSED_TWICE].contains(&code)
 }
 
 /// Whether a finding of this kind is a warning even where it happens on every way: what is done twice does no harm.

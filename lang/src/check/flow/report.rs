@@ -22,6 +22,10 @@ pub struct Finding {
     some: Option<usize>,
     /// It was made in a turn of a loop, and other branches or jobs may undo what it comes of.
     turn: bool,
+    /// So many choices and handlers are around of which a run may take another way.
+    open: usize,
+    /// It comes up in one order of branches or jobs, and something else does in the other.
+    one_order: bool,
 }
 
 /// The failure of a need that names none.
@@ -52,9 +56,20 @@ impl Finding {
         Some((self.place(), self.some?))
     }
 
-    /// Whether it was made in a turn of a loop, and other branches or jobs may undo what it comes of.
-    pub(super) fn in_turn(&self) -> bool {
-        self.turn
+    /// Whether every run comes to it that comes to where so many choices and handlers are open, whatever order branches and jobs are done in.
+    pub(super) fn is_come_to(&self, open: usize) -> bool {
+        !self.turn && self.open <= open
+    }
+
+    /// Notes that it comes up in one order of branches or jobs, and something else does in the other.
+    pub(super) fn of_one_order(mut self) -> Finding {
+        self.one_order = true;
+        self
+    }
+
+    /// Whether it comes up in one order of branches or jobs, and something else does in the other.
+    pub(super) fn is_of_one_order(&self) -> bool {
+        self.one_order
     }
 
     /// Whether it is of a kind.
@@ -95,10 +110,11 @@ impl Flow<'_, '_> {
         if self.quiet > 0 {
             return;
         }
-        let new = Finding { diagnostic, about, count: 1, some, turn };
+        let new = Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
                 old.count += 1;
+                old.open = old.open.min(new.open);
                 old.some =
                     old.some.and(new.some).map(|meetings| old.some.map_or(meetings, |first| first.min(meetings)));
                 if new.is_error() && !old.is_error() {

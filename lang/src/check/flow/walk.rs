@@ -131,6 +131,15 @@ impl Flow<'_, '_> {
                 Some(after)
             }
             Step::Hold { condition, duration, timeout } => {
+                // It cannot hold so long in the time given: only the way of the handler goes on.
+                if let Some(limit) = timeout.filter(|_| self.is_taken("timeout")) {
+                    let (lasts, limit) = (self.duration(*duration, &facts), self.duration(limit, &facts));
+                    if lasts.bounds().0 > limit.bounds().1 {
+                        self.pass(&limit, &mut facts);
+                        self.raise_written("timeout", node.span, facts);
+                        return None;
+                    }
+                }
                 let mut facts = self.wait_until(id, condition, *timeout, facts)?;
                 if timeout.is_none() || !self.is_taken("timeout") {
                     self.waits_against_keep(&node.label, condition, &facts);
@@ -334,6 +343,7 @@ impl Flow<'_, '_> {
     ) -> Option<Facts> {
         let truth = self.truth(condition.node, &facts);
         self.note_branch(condition, otherwise.is_some());
+        self.open += usize::from(truth.is_none());
         let mut branch = |holds: bool, facts: &Facts| {
             let mut facts = facts.clone();
             self.decide(condition.node, holds, &mut facts);
@@ -347,6 +357,7 @@ impl Flow<'_, '_> {
             Some(holds) => branch(holds, &facts),
             None => {
                 let (yes, no) = (branch(true, &facts), branch(false, &facts));
+                self.open -= 1;
                 self.meet(id, &facts, yes.into_iter().chain(no))
             }
         }
@@ -420,7 +431,9 @@ impl Flow<'_, '_> {
             self.assume(condition.node, true, &mut facts);
             let open = turn > 0 && !ends.is_empty();
             self.doubt += usize::from(open);
+            self.open += usize::from(holds.is_none());
             let after = self.turn(body, facts);
+            self.open -= usize::from(holds.is_none());
             self.doubt -= usize::from(open);
             let Some(after) = after else { return self.meet(id, &start, ends) };
             facts = after;
@@ -502,7 +515,7 @@ impl Flow<'_, '_> {
         lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
         self.cut_short(from);
         let other: Vec<Finding> = self.findings.split_off(mark);
-        self.findings.extend(in_both(one, &other));
+        self.findings.extend(in_both(one, &other, self.open));
         match (first, second) {
             (Some(a), Some(mut b)) => {
                 // What flows at once comes to something between, or to neither.
@@ -615,7 +628,9 @@ impl Flow<'_, '_> {
             let last = i + 1 == alternatives.len();
             self.caught.push(if last { Vec::new() } else { vec![None] });
             self.guards.push(Vec::new());
+            self.open += usize::from(i > 0);
             let after = self.walk(*step, entry.clone());
+            self.open -= usize::from(i > 0);
             let raised = self.guards.pop().unwrap_or_default();
             // A job does not outlast the alternative that began it.
             let after = self.end_block(after);

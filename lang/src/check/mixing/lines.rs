@@ -177,10 +177,16 @@ impl Build<'_> {
                 Some(end)
             }
             Step::Repeat { times, body } => self.turns((self.times)(*times), *body, at),
-            Step::RepeatWhile { body, .. } => {
+            Step::RepeatWhile { max, body, .. } => {
                 let head = self.after(at, Edge::Pass);
                 self.raise("max", head);
                 let turned = self.step(*body, head)?;
+                if (self.times)(*max) <= 1.0 {
+                    self.raise("max", turned);
+                    let end = self.after(head, Edge::Pass);
+                    self.edge(turned, Edge::Pass, end);
+                    return Some(end);
+                }
                 self.edge(turned, Edge::Pass, head);
                 Some(self.after(head, Edge::Pass))
             }
@@ -216,7 +222,13 @@ impl Build<'_> {
                 self.raise("promise", end);
                 Some(end)
             }
-            Step::Keep { body, .. } | Step::During { body, .. } => self.broken(*body, at),
+            Step::Keep { condition, body } => {
+                self.raise("broken", at);
+                let begin = self.point();
+                self.edge(at, Edge::Assume(condition.node, true), begin);
+                self.broken(*body, begin)
+            }
+            Step::During { body, .. } => self.broken(*body, at),
             _ => Some(at),
         }
     }

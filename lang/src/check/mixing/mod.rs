@@ -412,7 +412,14 @@ impl Walk<'_, '_> {
                 let times = self.eyes.value(*times, &world);
                 self.turns(times, *body, world)
             }
-            Step::RepeatWhile { body, .. } => {
+            Step::RepeatWhile { condition, max, body } => {
+                if self.eyes.truth(condition.node, &world) == Some(false) {
+                    return world;
+                }
+                if self.eyes.value(*max, &world) <= 1.0 {
+                    let once = self.step(*body, world.clone());
+                    return world.join(once);
+                }
                 if self.steps > PATIENCE {
                     return self.more_turns(*body, world);
                 }
@@ -425,6 +432,8 @@ impl Walk<'_, '_> {
                 world.keep(*local, value);
                 world
             }
+            // Its body does not begin.
+            Step::Keep { condition, .. } if self.eyes.truth(condition.node, &world) == Some(false) => world,
             Step::Skill { body, .. }
             | Step::Named { body, .. }
             | Step::Keep { body, .. }
