@@ -293,7 +293,13 @@ fn the_reference_protocols_pass_their_tests() {
     write(&dir, "study_fit.mtx", spec("study_fit.mtx"));
     write(&dir, "sn1.mtx", std::fs::read_to_string(root().join("examples/sn1.mtx")).expect("it can be read"));
     let ended = matterixc_in(&dir, &["check", "two_arms.mtx"]);
-    assert_eq!((ended.code, ended.out.as_str()), (0, "no findings\n"));
+    // Behind `lost` nobody knows what the robot's hand still holds.
+    assert!(ended.code == 0 && ended.out.ends_with("1 warning\n"), "{}", ended.out);
+    assert!(
+        ended.out.starts_with("warning[unfinished]: `two_samples` can end, and `kmr` is left holding"),
+        "{}",
+        ended.out
+    );
     let ended = matterixc_in(&dir, &["test"]);
     assert!(ended.code == 0 && ended.out.ends_with("2 passed, 0 failed in 2 files\n"), "{}", ended.out);
 }

@@ -39,8 +39,9 @@ impl Flow<'_, '_> {
                 let value = self.eval(term.node, facts);
                 let span = owner.map(|o| self.declared_at(o)).unwrap_or_default();
                 if !span.is_empty() && value.why().is_none() {
-                    steps
-                        .push((span, format!("`{}` is {} from the start", term.name, self.show(&value, &term.domain))));
+                    let begun = self.start();
+                    let since = if self.eval(term.node, &begun) == value { "from the start" } else { "by then" };
+                    steps.push((span, format!("`{}` is {} {since}", term.name, self.show(&value, &term.domain))));
                 }
             }
             steps.reverse();

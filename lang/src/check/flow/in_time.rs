@@ -215,10 +215,21 @@ impl<'l> Flow<'l, '_> {
         let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
         let uneven: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| !even.contains(s)).collect();
         let mut asked: BTreeMap<StepId, BTreeSet<u32>> = BTreeMap::new();
+        let in_all = self.asks_of(self.plan.root);
         pairs.iter().any(|(own, others)| {
+            // What flows however others go on.
+            if !even.is_disjoint(&self.asks_of(*own)) {
+                return true;
+            }
             let written = self.writes(*own);
             if written.is_empty() {
                 return false;
+            }
+            // Which of two is the last to set something decides what is asked behind both.
+            let mut both: BTreeSet<u32> = others.iter().flat_map(|other| self.writes(*other)).collect();
+            both.retain(|state| written.contains(state) && !self.amounts.contains(state));
+            if !both.is_empty() && !self.behind(&both).is_disjoint(&in_all) {
+                return true;
             }
             let mut changed = self.behind(&written);
             changed.retain(|state| written.contains(state) || !uneven.contains(state));
@@ -245,6 +256,10 @@ impl<'l> Flow<'l, '_> {
                 }
                 Step::During { invariants, .. } => invariants.iter().collect(),
                 Step::Expect(conditions) => conditions.iter().collect(),
+                Step::Let { value, .. } if !self.in_library(plan.get(id).span) => {
+                    out.extend(self.parts(*value).states.iter().copied());
+                    Vec::new()
+                }
                 _ => Vec::new(),
             };
             for condition in asked {

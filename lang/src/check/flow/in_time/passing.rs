@@ -1,7 +1,7 @@
 //! Time passes until the next line goes on: at a moment that is written, or when what it waits for comes about by the laws.
 
-use matterix_ir::NodeId;
 use matterix_ir::plan::Condition;
+use matterix_ir::{Diagnostic, NodeId, codes};
 
 use super::super::Flow;
 use super::super::course::Course;
@@ -48,8 +48,32 @@ impl<'l> Flow<'l, '_> {
         lines.all.iter_mut().for_each(|line| line.behind.clear());
         match self.pass_until(next, lines) {
             Some(end) => wake_due(lines, end),
-            None => lines.over = true,
+            None => {
+                lines.over = true;
+                self.waits_for_ever(lines);
+            }
         }
+    }
+
+    /// Reports a wait without a limit that no other line ends, as they have all come to their ends.
+    fn waits_for_ever(&mut self, lines: &Lines<'l>) {
+        let ends = |line: &Line<'l>| matches!(line.state, State::Done | State::Lines(_) | State::Wait(_));
+        if lines.loose || !lines.all.iter().all(ends) {
+            return;
+        }
+        let waits = lines.all.iter().find_map(|line| match &line.state {
+            State::Wait(wait) if wait.since.is_none() => Some((line, wait)),
+            _ => None,
+        });
+        let Some((line, wait)) = waits else { return };
+        if self.eval(wait.condition.node, &lines.facts).truth() != Some(false) {
+            return;
+        }
+        let place = line.sites.last().map(|s| s.span).unwrap_or_default();
+        let headline = format!("`{}` never comes about", wait.condition.text);
+        let d = Diagnostic::error(codes::WAITS_FOR_EVER, place, headline, "waited for here")
+            .help("wait for what the other branches and jobs bring about, and give a `timeout`");
+        self.found(d, wait.condition.span);
     }
 
     /// Time passes up to `next`, s, or to what a line waits for, if that comes before; when that is. None where it never comes.
