@@ -525,6 +525,9 @@ impl Flow<'_, '_> {
             (Some(time), None) => self.pass(&time, &mut facts),
             (None, None) => {}
         }
+        if operation.takes.is_some() || operation.until.is_some() {
+            self.still_goes_on(label, &facts);
+        }
         self.claimed.truncate(others);
         self.quiet -= usize::from(!met);
         if met {

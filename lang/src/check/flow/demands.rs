@@ -22,6 +22,19 @@ impl Flow<'_, '_> {
         }
     }
 
+    /// Looks whether what a command or skill asks for all the time still holds after some time.
+    pub(super) fn still_goes_on(&mut self, label: &str, facts: &Facts) {
+        for condition in self.during.clone() {
+            if self.fails(condition, "broken", facts) {
+                let label = self.called(label);
+                let headline =
+                    format!("`{label}` cannot go on to its end: `{}` does not hold any more", condition.text);
+                let about = Some((condition.span, "asked for all the time"));
+                self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
+            }
+        }
+    }
+
     /// Reports a wait for something that cannot be while what is kept around it holds.
     pub(super) fn waits_against_keep(&mut self, label: &str, awaited: &Condition, facts: &Facts) {
         for condition in self.kept.clone() {

@@ -178,6 +178,8 @@ struct Flow<'l, 'a> {
     claimed: Vec<InstanceId>,
     /// Conditions that `keep` asks for all the time.
     kept: Vec<&'l Condition>,
+    /// Conditions that commands and skills around ask for while they go on.
+    during: Vec<&'l Condition>,
     /// Jobs that go on.
     jobs: jobs::Jobs,
     /// Steps of jobs are followed when these are waited for, not when they are started.
@@ -353,6 +355,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             contested: Vec::new(),
             claimed: Vec::new(),
             kept: Vec::new(),
+            during: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,
             needs_jobs: false,

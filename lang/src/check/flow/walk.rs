@@ -121,6 +121,8 @@ impl Flow<'_, '_> {
             Step::Wait { duration } => {
                 let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
+                self.still_goes_on(&node.label, &facts);
+                self.still_kept(&node.label, &facts);
                 Some(facts)
             }
             Step::WaitUntil { condition, timeout } => {
@@ -177,13 +179,17 @@ impl Flow<'_, '_> {
                 self.kept.pop();
                 after
             }
-            Step::During { body, .. } => {
+            Step::During { body, invariants } => {
                 // It breaks after any time, with any part of the body done.
                 let mut broken = facts.clone();
                 self.widen(*body, &mut broken);
                 self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
                 self.raise("broken", broken);
-                self.walk(*body, facts)
+                let around = self.during.len();
+                self.during.extend(invariants);
+                let after = self.walk(*body, facts);
+                self.during.truncate(around);
+                after
             }
             Step::Within { body, .. } => {
                 self.raise("late", facts.clone());
