@@ -112,7 +112,8 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
             }
             let Caught::Named(name) = caught else { continue };
             let by_time = || takes_time(plan, *body) && may_flow(plan, lab, name);
-            if raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name) || by_time() {
+            let known = raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name);
+            if known || by_time() || is_declared(plan, *body, lab, name) {
                 needed.insert(at);
             } else if own && declared.contains(name) && !out.iter().any(|d| d.span() == at) {
                 let headline = format!("nothing before it fails with `{name}`");
@@ -124,6 +125,27 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
     // A turn of a loop may raise what another does not.
     out.retain(|d| !needed.contains(&d.span()));
     out
+}
+
+/// Whether a skill that is called declares a failure: a caller may handle it, whatever the values of this call.
+fn is_declared(plan: &Plan, root: StepId, lab: &Elaborator<'_>, failure: &str) -> bool {
+    let declares = |verb: &str| {
+        lab.tables.names.decls.iter().any(|decl| match &decl.item.kind {
+            ItemKind::Skill { sig, clauses, .. } => {
+                verb_text(&sig.verb) == verb && clauses.iter().filter_map(fails).flatten().any(|n| n.text == failure)
+            }
+            _ => false,
+        })
+    };
+    let mut todo = vec![root];
+    while let Some(id) = todo.pop() {
+        let step = &plan.get(id).step;
+        if matches!(step, Step::Skill { verb, .. } if declares(verb)) {
+            return true;
+        }
+        todo.extend(step.children());
+    }
+    false
 }
 
 /// Whether laws may break a limit of this failure while time passes.

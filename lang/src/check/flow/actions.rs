@@ -526,7 +526,7 @@ impl Flow<'_, '_> {
             (None, None) => {}
         }
         if operation.takes.is_some() || operation.until.is_some() {
-            self.still_goes_on(label, &facts);
+            self.still_goes_on(label, &mut facts);
         }
         self.claimed.truncate(others);
         self.quiet -= usize::from(!met);

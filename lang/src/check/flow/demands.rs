@@ -22,8 +22,8 @@ impl Flow<'_, '_> {
         }
     }
 
-    /// Looks whether what a command or skill asks for all the time still holds after some time.
-    pub(super) fn still_goes_on(&mut self, label: &str, facts: &Facts) {
+    /// Looks whether what a command or skill asks for all the time still holds after some time. What is reported is unknown from then on.
+    pub(super) fn still_goes_on(&mut self, label: &str, facts: &mut Facts) {
         for condition in self.during.clone() {
             if self.fails(condition, "broken", facts) {
                 let label = self.called(label);
@@ -31,6 +31,8 @@ impl Flow<'_, '_> {
                     format!("`{label}` cannot go on to its end: `{}` does not hold any more", condition.text);
                 let about = Some((condition.span, "asked for all the time"));
                 self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
+                let states = self.parts(condition.node).states.clone();
+                self.forget(&states, facts);
             }
         }
     }

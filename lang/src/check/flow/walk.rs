@@ -26,7 +26,7 @@ const MOST_TURNS: usize = 2000;
 /// Depth of `parallel` to which every branch is followed both before and after its siblings.
 const MOST_PARALLEL: usize = 3;
 
-impl Flow<'_, '_> {
+impl<'l> Flow<'l, '_> {
     /// Follows a step.
     pub fn walk(&mut self, id: StepId, facts: Facts) -> Option<Facts> {
         self.steps += 1;
@@ -67,6 +67,15 @@ impl Flow<'_, '_> {
         after
     }
 
+    /// Walks a body all through which conditions must hold.
+    fn walk_during(&mut self, invariants: &'l [Condition], body: StepId, facts: Facts) -> Option<Facts> {
+        let around = self.during.len();
+        self.during.extend(invariants);
+        let after = self.walk(body, facts);
+        self.during.truncate(around);
+        after
+    }
+
     fn step(&mut self, id: StepId, mut facts: Facts) -> Option<Facts> {
         let plan = self.plan;
         let node = plan.get(id);
@@ -89,7 +98,7 @@ impl Flow<'_, '_> {
                 None
             }
             Step::Try(alternatives) => self.alternatives(id, alternatives, facts),
-            Step::Skill { needs, promises, body, .. } => {
+            Step::Skill { needs, invariants, promises, body, .. } => {
                 let met = match self.needs(&node.label, needs, &mut facts) {
                     Asked::Handled => return None,
                     asked => asked == Asked::Met,
@@ -97,7 +106,7 @@ impl Flow<'_, '_> {
                 if !met {
                     return Some(self.refused(*body, facts));
                 }
-                let mut after = self.walk(*body, facts);
+                let mut after = self.walk_during(invariants, *body, facts);
                 if let Some(after) = after.as_mut() {
                     self.promised(&node.label, promises, after);
                 }
@@ -121,7 +130,7 @@ impl Flow<'_, '_> {
             Step::Wait { duration } => {
                 let time = self.duration(*duration, &facts);
                 self.pass(&time, &mut facts);
-                self.still_goes_on(&node.label, &facts);
+                self.still_goes_on(&node.label, &mut facts);
                 self.still_kept(&node.label, &facts);
                 Some(facts)
             }
@@ -185,11 +194,7 @@ impl Flow<'_, '_> {
                 self.widen(*body, &mut broken);
                 self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
                 self.raise("broken", broken);
-                let around = self.during.len();
-                self.during.extend(invariants);
-                let after = self.walk(*body, facts);
-                self.during.truncate(around);
-                after
+                self.walk_during(invariants, *body, facts)
             }
             Step::Within { body, .. } => {
                 self.raise("late", facts.clone());

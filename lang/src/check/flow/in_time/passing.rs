@@ -170,7 +170,8 @@ impl<'l> Flow<'l, '_> {
         let Some((keeps, condition)) = found else { return };
         lines.over = true;
         let states = self.parts(condition.node).states.clone();
-        let by = self.set_going_by(&states, lines).filter(|by| *by != keeps);
+        let by = self.set_going_by(&states, lines).or_else(|| self.set_going_before(&states, lines));
+        let by = by.filter(|by| *by != keeps);
         let Some(site) = by.and_then(|by| lines.all[by].sites.last().cloned()) else { return };
         if !takes(&lines.all[keeps].caught, "broken") {
             self.doubt = usize::from(lines.loose);
