@@ -118,6 +118,10 @@ struct Lines<'p> {
     /// The latest job of each name.
     jobs: BTreeMap<&'p str, usize>,
     facts: Facts,
+    /// A job goes on before what follows its `start`.
+    job_first: bool,
+    /// The line in hand lets another one go on.
+    yields: bool,
     /// What lines that were left may change.
     lost: BTreeSet<u32>,
     /// Whether some time is not exact.
@@ -281,6 +285,8 @@ impl<'l> Flow<'l, '_> {
             all: Vec::new(),
             jobs: BTreeMap::new(),
             facts,
+            job_first: backward,
+            yields: false,
             lost: BTreeSet::new(),
             loose: false,
             held: Vec::new(),
@@ -330,7 +336,8 @@ impl<'l> Flow<'l, '_> {
         std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
         self.doubt = usize::from(lines.loose);
         lines.idle = 0;
-        while !lines.over && matches!(lines.all[at].state, State::Ready) {
+        lines.yields = false;
+        while !lines.over && !lines.yields && matches!(lines.all[at].state, State::Ready) {
             let found = self.findings.len();
             match lines.all[at].frames.pop() {
                 Some(frame) => self.next_of(lines, at, frame),
@@ -413,6 +420,7 @@ impl<'l> Flow<'l, '_> {
             Step::Start { job, body } => {
                 let line = self.begin_line(lines, *body, Some(at));
                 lines.jobs.insert(job, line);
+                lines.yields = lines.job_first;
                 let mut outer = Some(at);
                 while let Some(here) = outer {
                     let blocks = lines.all[here].frames.iter_mut().rev();
