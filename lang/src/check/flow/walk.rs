@@ -325,14 +325,23 @@ impl<'l> Flow<'l, '_> {
         if self.is_shared(condition) {
             return false;
         }
-        let mut within = facts.clone();
         self.quiet += 1;
         let guards = std::mem::take(&mut self.guards);
-        self.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
+        let mut along = facts.clone();
+        let course = time.exact().map(|time| self.course(time, &[(condition, false)], &mut along));
+        let holds = match course {
+            Some(Course::Passed) => true,
+            Some(Course::Reached(_)) => false,
+            Some(Course::Left(_)) | None => {
+                let mut within = facts.clone();
+                self.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
+                self.eval(condition, &within).truth() == Some(true)
+            }
+        };
         self.guards = guards;
         self.quiet -= 1;
         self.stopped = false;
-        self.eval(condition, &within).truth() == Some(true)
+        holds
     }
 
     /// How long it is until a point in time that a condition waits for, s.
