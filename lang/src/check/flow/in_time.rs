@@ -767,18 +767,20 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     }
     let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
     let uncertain = errors || flow.findings.iter().any(Finding::is_of_one_order);
-    let follow = |backward| {
+    let follow = |flow: &mut Flow<'l, 'a>, backward| {
         let mut follower = begin();
+        follower.swap_known(flow);
         follower.judged = Judged::of(&flow.findings);
         follower.dangers.looked_for.clone_from(&dangers);
         let turns = follower.follow_in_time(backward);
+        follower.swap_known(flow);
         (follower, matches!(turns, Turns::Taken))
     };
-    let (first, sound) = follow(false);
+    let (first, sound) = follow(flow, false);
     if first.findings.is_empty() && !(uncertain && sound) {
         return;
     }
-    let (second, as_sound) = follow(true);
+    let (second, as_sound) = follow(flow, true);
     if sound && as_sound {
         let holds = |f: &Finding| first.judged.holds(f.place()) && second.judged.holds(f.place());
         flow.findings.retain(|f| !(f.is_of_one_order() || f.is_error() && holds(f)));

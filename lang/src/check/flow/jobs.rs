@@ -82,7 +82,9 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         let mut late = begin();
         late.notes = None;
         late.late = true;
+        late.swap_known(&mut flow);
         late.follow();
+        late.swap_known(&mut flow);
         left::on_some_way(&mut late, &begin);
         let first = std::mem::take(&mut flow.findings);
         let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));

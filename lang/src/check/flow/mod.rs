@@ -402,6 +402,18 @@ impl<'l, 'a> Flow<'l, 'a> {
         flow
     }
 
+    /// Exchanges with another flow of the same plan what is known of nodes and derivatives by themselves, so that it is found once.
+    fn swap_known(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.parts, &mut other.parts);
+        std::mem::swap(&mut self.orders, &mut other.orders);
+        std::mem::swap(&mut self.formulas, &mut other.formulas);
+        std::mem::swap(&mut self.stoichiometry, &mut other.stoichiometry);
+        std::mem::swap(&mut self.tracks, &mut other.tracks);
+        std::mem::swap(&mut self.terms_known, &mut other.terms_known);
+        std::mem::swap(&mut self.forms, &mut other.forms);
+        std::mem::swap(&mut self.parts_on, &mut other.parts_on);
+    }
+
     /// Follows the plan from its start.
     fn follow(&mut self) {
         let mut facts = self.start();
