@@ -316,7 +316,7 @@ impl Motion {
 }
 
 /// A leaf: a command of a device or a primitive skill.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Operation {
     /// The verb as declared: `heat`, `stop heating`, `move`.
     pub verb: String,

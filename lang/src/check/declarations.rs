@@ -41,13 +41,12 @@ pub fn declarations_and(tables: &Tables<'_>, sources: &Sources, module: usize, s
         out.append(&mut lab.diagnostics);
     }
     // What accepts a hazard declares no name.
-    let mut accepts = stand_in();
     for item in &tables.names.modules[module].tree.items {
         if let ItemKind::Accept { name, .. } = &item.kind {
-            accepts.check_accepted(name, module);
+            constants.check_accepted(name, module);
         }
     }
-    out.append(&mut accepts.diagnostics);
+    out.append(&mut constants.diagnostics);
     out
 }
 

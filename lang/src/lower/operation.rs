@@ -98,20 +98,9 @@ impl<'a> Planner<'a, '_> {
         let said = std::mem::take(&mut self.said);
         let mut operation = Operation {
             verb: verb_text(&sig.verb),
-            capability: None,
-            device: None,
             arguments: self.driver_arguments(bound),
             needs: said.into_iter().map(Arc::new).chain(self.asked(sig, clauses, inner)).collect(),
-            presumes: Vec::new(),
-            at_start: Vec::new(),
-            at_end: Vec::new(),
-            takes: None,
-            until: None,
-            claims: Vec::new(),
-            reads: Vec::new(),
-            fails: Vec::new(),
-            limits: Vec::new(),
-            motion: None,
+            ..Operation::default()
         };
         // What can never begin is written out in silence: what it would do may make no sense.
         let mut sound = None;

@@ -665,27 +665,17 @@ fn begun(stmt: &Stmt, jobs: &mut BTreeSet<String>) {
 
 /// The part of a statement that names it: without its block.
 fn head(s: &Stmt) -> Span {
-    let until = |body: Span| Span { end: body.start.max(s.span.start), ..s.span };
     match &s.kind {
-        StmtKind::Step { body, .. }
-        | StmtKind::Repeat { body, .. }
-        | StmtKind::RepeatWhile { body, .. }
-        | StmtKind::For { body, .. }
-        | StmtKind::Within { body, .. }
-        | StmtKind::Keep { body, .. }
-        | StmtKind::Claim { body, .. }
-        | StmtKind::Sequence { body, .. }
-        | StmtKind::Parallel { body, .. }
-        | StmtKind::Start { body, .. } => until(body.span),
-        StmtKind::If { then, .. } => until(then.span),
-        StmtKind::Try { alternatives, .. } => alternatives.first().map_or(s.span, |b| until(b.span)),
         StmtKind::WaitUntil { timeout, cond, .. } => {
             Span { end: timeout.as_ref().map_or(cond.span.end, |t| t.span.end), ..s.span }
         }
         StmtKind::Hold { timeout, duration, .. } => {
             Span { end: timeout.as_ref().map_or(duration.span.end, |t| t.span.end), ..s.span }
         }
-        _ => s.span,
+        kind => match kind.blocks().first() {
+            Some(block) => Span { end: block.span.start.max(s.span.start), ..s.span },
+            None => s.span,
+        },
     }
 }
 

@@ -247,23 +247,7 @@ impl Lab {
     }
 
     pub fn operation(&mut self, verb: &str) -> Operation {
-        Operation {
-            verb: verb.into(),
-            capability: None,
-            device: None,
-            arguments: Vec::new(),
-            needs: Vec::new(),
-            presumes: Vec::new(),
-            at_start: Vec::new(),
-            at_end: Vec::new(),
-            takes: None,
-            until: None,
-            claims: Vec::new(),
-            reads: Vec::new(),
-            fails: Vec::new(),
-            limits: Vec::new(),
-            motion: None,
-        }
+        Operation { verb: verb.into(), ..Operation::default() }
     }
 
     pub fn op(&mut self, operation: Operation) -> StepId {

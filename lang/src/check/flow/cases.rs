@@ -214,31 +214,13 @@ pub(super) fn moved(shares: &[f64], source: u32, target: u32, facts: &Facts) -> 
 
 #[cfg(test)]
 mod tests {
-    use std::collections::{BTreeMap, BTreeSet};
 
     use matterix_ir::Span;
 
     use super::*;
 
     fn facts(states: &[f64]) -> Facts {
-        Facts {
-            states: states.iter().map(|v| Known::Point(*v)).collect(),
-            locals: Vec::new(),
-            time: Known::Point(0.0),
-            history: None,
-            unsettled: BTreeSet::new(),
-            moving: BTreeSet::new(),
-            barrier: None,
-            bonds: None,
-            cases: None,
-            fired: Vec::new(),
-            held: BTreeSet::new(),
-            decided: Vec::new(),
-            written: None,
-            unsure: false,
-            blurred: None,
-            begun: BTreeMap::new(),
-        }
+        Facts::new(states.iter().map(|v| Known::Point(*v)).collect(), Vec::new(), Known::Point(0.0))
     }
 
     fn met(ways: &[&[f64]]) -> Facts {

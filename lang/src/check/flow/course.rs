@@ -234,13 +234,9 @@ impl Flow<'_, '_> {
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let mut events = self.events_on(&followed);
         events.extend(&timers.events);
-        self.quiet += 1;
-        let guards = std::mem::take(&mut self.guards);
         self.at_moments.clone_from(&timers.events);
-        self.drift(&Known::Point(step), facts);
+        self.unheard(|flow| flow.drift(&Known::Point(step), facts));
         self.at_moments.clear();
-        self.guards = guards;
-        self.quiet -= 1;
         // What the events that are followed do is done at their moment.
         let set: BTreeSet<u32> =
             events.iter().flat_map(|i| self.changed_by(&self.events[*i as usize].actions)).collect();

@@ -76,6 +76,28 @@ pub struct Facts {
 }
 
 impl Facts {
+    /// These values at this time, s, and nothing else that is known.
+    pub fn new(states: Pages<Known>, locals: Vec<Known>, time: Known) -> Self {
+        Facts {
+            states,
+            locals,
+            time,
+            history: None,
+            unsettled: BTreeSet::new(),
+            moving: BTreeSet::new(),
+            barrier: None,
+            bonds: None,
+            cases: None,
+            fired: Vec::new(),
+            held: BTreeSet::new(),
+            decided: Vec::new(),
+            written: None,
+            unsure: false,
+            blurred: None,
+            begun: BTreeMap::new(),
+        }
+    }
+
     /// Sets states, noting what they were.
     pub fn write(&mut self, span: Span, changes: Vec<(u32, Known)>) {
         self.untell(changes.iter().map(|(state, _)| *state));

@@ -218,11 +218,11 @@ impl<'l> Flow<'l, '_> {
         // What moves in a way that only a run knows is left to it.
         let even: BTreeSet<u32> = self.tracks().list.iter().map(|track| track.state).collect();
         let uneven: BTreeSet<u32> = self.derivatives.iter().map(|d| d.state).filter(|s| !even.contains(s)).collect();
-        let mut asked: BTreeMap<StepId, BTreeSet<u32>> = BTreeMap::new();
+        let mut known: BTreeMap<StepId, BTreeSet<u32>> = BTreeMap::new();
         let in_all = self.asks_of(self.plan.root);
         pairs.iter().any(|(own, others)| {
             // What flows however others go on.
-            if !even.is_disjoint(&self.asks_of(*own)) {
+            if !even.is_disjoint(known.entry(*own).or_insert_with(|| self.asks_of(*own))) {
                 return true;
             }
             let written = self.writes(*own);
@@ -238,8 +238,8 @@ impl<'l> Flow<'l, '_> {
             let mut changed = self.behind(&written);
             changed.retain(|state| written.contains(state) || !uneven.contains(state));
             others.iter().any(|other| {
-                let states = asked.entry(*other).or_insert_with(|| self.asks_of(*other));
-                !states.is_disjoint(&changed)
+                let asked = known.entry(*other).or_insert_with(|| self.asks_of(*other));
+                !asked.is_disjoint(&changed)
             })
         })
     }

@@ -81,25 +81,21 @@ impl<'p> Flow<'p, '_> {
         facts: &Facts,
     ) -> bool {
         let mut facts = facts.clone();
-        let guards = std::mem::take(&mut self.guards);
-        let reported = std::mem::take(&mut self.reported);
         // What the others set is followed here, one by one.
         let contested = std::mem::take(&mut self.contested);
-        self.quiet += 1;
-        let mut at = now;
-        let mut open = true;
-        for effect in effects {
-            self.pass_closely(effect.at.0 - at, &mut facts);
-            open &= self.eval(condition.node, &facts).truth() == Some(false);
-            at = effect.at.0;
-            facts.time = Known::Point(at);
-            self.perform(effect.actions, &mut facts);
-        }
-        self.pass_by_totals(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
-        let never = open && self.eval(condition.node, &facts).truth() == Some(false);
-        self.quiet -= 1;
-        self.guards = guards;
-        self.reported = reported;
+        let never = self.unheard(|flow| {
+            let mut at = now;
+            let mut open = true;
+            for effect in effects {
+                flow.pass_closely(effect.at.0 - at, &mut facts);
+                open &= flow.eval(condition.node, &facts).truth() == Some(false);
+                at = effect.at.0;
+                facts.time = Known::Point(at);
+                flow.perform(effect.actions, &mut facts);
+            }
+            flow.pass_by_totals(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
+            open && flow.eval(condition.node, &facts).truth() == Some(false)
+        });
         self.contested = contested;
         never
     }

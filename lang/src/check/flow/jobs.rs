@@ -90,10 +90,8 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));
         let (cut, other): (Vec<Finding>, Vec<Finding>) = late.findings.into_iter().partition(unsearched);
         late.findings = other;
-        flow.findings = match late.needs_jobs {
-            true => first.into_iter().filter(|f| late.findings.iter().any(|o| o.is_like(f))).collect(),
-            false => in_both(first, &late.findings, flow.open_at_start),
-        };
+        let open = (!late.needs_jobs).then_some(flow.open_at_start);
+        flow.findings = in_both(first, &late.findings, open);
         flow.findings.extend(cut);
         // What was not looked at for a mistake that is none after all.
         if !flow.ended && late.ended {
@@ -267,14 +265,15 @@ impl Flow<'_, '_> {
 
 /// What goes wrong in both orders. Where it does in either, if nowhere in both, the first order tells it: two that put something
 /// in one place. What goes wrong in turns of a loop may be right turn by turn, and what a run need not come to proves nothing:
-/// `open` choices and handlers are around both.
-pub(super) fn in_both(first: Vec<Finding>, second: &[Finding], open: usize) -> Vec<Finding> {
+/// `open` choices and handlers are around both; none where no run goes on in the second order.
+pub(super) fn in_both(first: Vec<Finding>, second: &[Finding], open: Option<usize>) -> Vec<Finding> {
     let both = first.iter().any(|f| second.iter().any(|o| o.is_like(f)));
-    let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && f.is_come_to(open));
+    let is_come_to = |f: &Finding| open.is_some_and(|open| f.is_come_to(open));
+    let wrong = |found: &[Finding]| found.iter().any(|f| f.is_error() && is_come_to(f));
     let either = !both && wrong(&first) && wrong(second);
     let stays = |f: Finding| match f.is(codes::NOT_ANALYSED) || second.iter().any(|o| o.is_like(&f)) {
         true => Some(f),
-        false => (either && f.is_come_to(open)).then(|| f.of_one_order()),
+        false => (either && is_come_to(&f)).then(|| f.of_one_order()),
     };
     first.into_iter().filter_map(stays).collect()
 }

@@ -441,24 +441,11 @@ impl<'l, 'a> Flow<'l, 'a> {
 
     /// What is known when the run begins.
     fn start(&mut self) -> Facts {
-        let mut facts = Facts {
-            states: self.lab.states.iter().map(|_| Known::nothing()).collect(),
-            locals: vec![Known::nothing(); self.plan.locals.len()],
-            time: Known::Point(0.0),
-            history: None,
-            unsettled: (0..self.derivatives.len() as u32).collect(),
-            moving: BTreeSet::new(),
-            barrier: None,
-            bonds: None,
-            cases: None,
-            fired: vec![Some(false); self.events.len()],
-            held: BTreeSet::new(),
-            decided: Vec::new(),
-            written: None,
-            unsure: false,
-            blurred: None,
-            begun: BTreeMap::new(),
-        };
+        let nothing = |count: usize| vec![Known::nothing(); count];
+        let states = nothing(self.lab.states.len()).into_iter().collect();
+        let mut facts = Facts::new(states, nothing(self.plan.locals.len()), Known::Point(0.0));
+        facts.unsettled = (0..self.derivatives.len() as u32).collect();
+        facts.fired = vec![Some(false); self.events.len()];
         let states = &self.lab.states;
         facts.states = (0..states.len()).map(|i| self.eval(states[i].initial, &facts)).collect();
         for node in presumed(self.plan) {

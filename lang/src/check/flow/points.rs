@@ -214,24 +214,8 @@ pub(super) fn at_least(time: &Known) -> Known {
 
 /// The values alone.
 fn bare(facts: &Facts) -> Facts {
-    let mut bare = Facts {
-        states: facts.states.clone(),
-        locals: facts.locals.clone(),
-        time: facts.time.clone(),
-        history: None,
-        unsettled: BTreeSet::new(),
-        moving: BTreeSet::new(),
-        barrier: None,
-        bonds: facts.bonds.clone(),
-        cases: None,
-        fired: Vec::new(),
-        held: BTreeSet::new(),
-        decided: Vec::new(),
-        written: None,
-        unsure: false,
-        blurred: None,
-        begun: BTreeMap::new(),
-    };
+    let mut bare = Facts::new(facts.states.clone(), facts.locals.clone(), facts.time.clone());
+    bare.bonds.clone_from(&facts.bonds);
     if let Some(blurred) = &facts.blurred {
         bare.forget(&blurred.iter().copied().collect::<Vec<_>>());
     }

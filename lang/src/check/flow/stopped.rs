@@ -269,27 +269,31 @@ impl Flow<'_, '_> {
 
     /// Follows steps beside the way that is followed: nothing is reported of them, and no failure of theirs leads anywhere.
     pub(super) fn aside(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
-        let (guards, reported) = (std::mem::take(&mut self.guards), std::mem::take(&mut self.reported));
         let (courses, jobs) = (std::mem::take(&mut self.courses), self.jobs.clone());
-        self.quiet += 1;
-        let end = self.unnoted(body, facts);
-        self.quiet -= 1;
-        (self.guards, self.reported, self.courses, self.jobs) = (guards, reported, courses, jobs);
+        let end = self.unheard(|flow| flow.unnoted(body, facts));
+        (self.courses, self.jobs) = (courses, jobs);
         end
+    }
+
+    /// Does something of which nothing is reported, and no failure of which leads anywhere.
+    pub(super) fn unheard<T>(&mut self, act: impl FnOnce(&mut Self) -> T) -> T {
+        let (guards, reported) = (std::mem::take(&mut self.guards), std::mem::take(&mut self.reported));
+        self.quiet += 1;
+        let out = act(self);
+        self.quiet -= 1;
+        (self.guards, self.reported) = (guards, reported);
+        out
     }
 
     /// The course of steps from here, followed aside.
     pub(super) fn course_aside(&mut self, body: StepId, facts: Facts) -> Rc<Course> {
-        let (guards, reported) = (std::mem::take(&mut self.guards), std::mem::take(&mut self.reported));
         let (courses, jobs) = (std::mem::take(&mut self.courses), self.jobs.clone());
         self.begin_course();
-        self.quiet += 1;
         self.in_jobs += 1;
-        self.unnoted(body, facts);
+        self.unheard(|flow| flow.unnoted(body, facts));
         self.in_jobs -= 1;
-        self.quiet -= 1;
         let course = self.end_course();
-        (self.guards, self.reported, self.courses, self.jobs) = (guards, reported, courses, jobs);
+        (self.courses, self.jobs) = (courses, jobs);
         course
     }
 

@@ -325,21 +325,18 @@ impl<'l> Flow<'l, '_> {
         if self.is_shared(condition) {
             return false;
         }
-        self.quiet += 1;
-        let guards = std::mem::take(&mut self.guards);
-        let mut along = facts.clone();
-        let course = time.exact().map(|time| self.course(time, &[(condition, false)], &mut along));
-        let holds = match course {
-            Some(Course::Passed) => true,
-            Some(Course::Reached(_)) => false,
-            Some(Course::Left(_)) | None => {
-                let mut within = facts.clone();
-                self.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
-                self.eval(condition, &within).truth() == Some(true)
+        let holds = self.unheard(|flow| {
+            let mut along = facts.clone();
+            match time.exact().map(|time| flow.course(time, &[(condition, false)], &mut along)) {
+                Some(Course::Passed) => true,
+                Some(Course::Reached(_)) => false,
+                Some(Course::Left(_)) | None => {
+                    let mut within = facts.clone();
+                    flow.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
+                    flow.eval(condition, &within).truth() == Some(true)
+                }
             }
-        };
-        self.guards = guards;
-        self.quiet -= 1;
+        });
         self.stopped = false;
         holds
     }
@@ -535,7 +532,7 @@ impl<'l> Flow<'l, '_> {
         lines.iter().for_each(|lines| self.stop_branches(&facts, lines));
         self.cut_short(from);
         let other: Vec<Finding> = self.findings.split_off(mark);
-        self.findings.extend(in_both(one, &other, self.open));
+        self.findings.extend(in_both(one, &other, Some(self.open)));
         match (first, second) {
             (Some(a), Some(mut b)) => {
                 // What flows at once comes to something between, or to neither.

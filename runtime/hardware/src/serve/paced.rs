@@ -193,23 +193,8 @@ mod tests {
     }
 
     fn heats() -> Operation {
-        Operation {
-            verb: "heat".to_owned(),
-            capability: None,
-            device: None,
-            arguments: Vec::new(),
-            needs: Vec::new(),
-            presumes: Vec::new(),
-            at_start: Vec::new(),
-            at_end: Vec::new(),
-            takes: Some(Takes { nominal: NodeId(0), bounds: None }),
-            until: None,
-            claims: Vec::new(),
-            reads: Vec::new(),
-            fails: Vec::new(),
-            limits: Vec::new(),
-            motion: None,
-        }
+        let takes = Some(Takes { nominal: NodeId(0), bounds: None });
+        Operation { verb: "heat".to_owned(), takes, ..Operation::default() }
     }
 
     #[test]

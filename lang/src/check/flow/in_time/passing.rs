@@ -139,7 +139,7 @@ impl<'l> Flow<'l, '_> {
         let moved = tracks.list.iter().map(|t| t.state);
         let moved = moved.filter(|s| before.states[*s as usize] != lines.facts.states[*s as usize]);
         let moved: Vec<u32> = moved.collect();
-        let mut due: Vec<u32> = moved.iter().filter_map(|s| self.limits_of.get(s)).flatten().copied().collect();
+        let mut due = self.limits_that_ask_for(&moved);
         due.sort_unstable();
         due.dedup();
         let plan = self.plan;
@@ -150,8 +150,7 @@ impl<'l> Flow<'l, '_> {
                 continue;
             }
             let states = self.parts(node).states.clone();
-            let by = self.set_going_by(&states, lines).or_else(|| self.set_going_before(&states, lines));
-            let Some(at) = by else { continue };
+            let Some(at) = self.set_going(&states, lines) else { continue };
             std::mem::swap(&mut self.sites, &mut lines.all[at].sites);
             std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
             let found = self.findings.len();
@@ -170,13 +169,17 @@ impl<'l> Flow<'l, '_> {
         let Some((keeps, condition)) = found else { return };
         lines.over = true;
         let states = self.parts(condition.node).states.clone();
-        let by = self.set_going_by(&states, lines).or_else(|| self.set_going_before(&states, lines));
-        let by = by.filter(|by| *by != keeps);
+        let by = self.set_going(&states, lines).filter(|by| *by != keeps);
         let Some(site) = by.and_then(|by| lines.all[by].sites.last().cloned()) else { return };
         if !takes(&lines.all[keeps].caught, "broken") {
             self.doubt = usize::from(lines.loose);
             self.breaks(condition, site.span, &site.label);
         }
+    }
+
+    /// The line that has set one of these states going.
+    fn set_going(&mut self, states: &[u32], lines: &Lines<'l>) -> Option<usize> {
+        self.set_going_by(states, lines).or_else(|| self.set_going_before(states, lines))
     }
 
     /// The last line within an operation that sets one of these states going.
