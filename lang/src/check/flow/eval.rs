@@ -1,11 +1,12 @@
 //! Values of nodes from what is known.
 
-use std::collections::BTreeSet;
+use std::collections::hash_map::Entry;
 use std::rc::Rc;
 
 use matterix_ir::graph::unary;
 use matterix_ir::values::Rules;
 use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
+use rustc_hash::FxHashSet;
 
 use super::bonds::Bonds;
 use super::facts::{Decided, Facts};
@@ -96,80 +97,107 @@ impl Rules for Supposed<'_> {
 /// A sum of states that may hang together, as it was done last.
 #[derive(Debug)]
 pub struct Sum {
-    /// The operations without operands that it rests on.
-    leaves: Rc<[NodeId]>,
     /// How states hung together then. It is kept, so that no other one is taken for it.
     bonds: Option<Rc<Bonds>>,
+}
+
+/// What the value of a node rests on besides numbers that never change; found once.
+#[derive(Debug)]
+pub struct Inputs {
+    /// The operations without operands: states, kept values, readings and the time.
+    leaves: Rc<[NodeId]>,
+    /// Its operations that are sums of states which may hang together.
+    sums: Rc<[NodeId]>,
+}
+
+/// Whether states hang together alike: it is the same object, or none.
+fn alike(one: &Option<Rc<Bonds>>, other: &Option<Rc<Bonds>>) -> bool {
+    match (one, other) {
+        (None, None) => true,
+        (Some(one), Some(other)) => Rc::ptr_eq(one, other),
+        _ => false,
+    }
+}
+
+/// The last value of an operation.
+#[derive(Clone, Debug)]
+struct Slot {
+    known: Known,
+    /// When it was done last; 0 for never.
+    done: u64,
+    /// When it has become another one.
+    changed: u64,
+    /// When all that it rests on was last done; 0 for never.
+    settled: u64,
 }
 
 /// Values of operations as they were when they were done last, and when that was.
 #[derive(Debug)]
 pub struct Values {
-    known: Vec<Known>,
-    /// When each was done last; 0 for never.
-    done: Vec<u64>,
-    /// When each has become another one.
-    changed: Vec<u64>,
+    slots: Vec<Slot>,
     now: u64,
 }
 
 impl Values {
     /// None yet, of so many operations.
     pub fn new(count: usize) -> Self {
-        Values { known: vec![Known::Point(0.0); count], done: vec![0; count], changed: vec![0; count], now: 0 }
+        Values { slots: vec![Slot { known: Known::Point(0.0), done: 0, changed: 0, settled: 0 }; count], now: 0 }
     }
 
     /// The last value of an operation.
     pub fn of(&self, node: NodeId) -> &Known {
-        &self.known[node.0 as usize]
+        &self.slots[node.0 as usize].known
     }
 
     /// Whether an operation was done at all.
     fn is_done(&self, node: NodeId) -> bool {
-        self.done[node.0 as usize] != 0
+        self.slots[node.0 as usize].done != 0
+    }
+
+    /// When an operation has become another one.
+    fn changed(&self, node: NodeId) -> u64 {
+        self.slots[node.0 as usize].changed
+    }
+
+    /// When a node and all that it rests on was last done; 0 for never.
+    fn settled(&self, node: NodeId) -> u64 {
+        self.slots[node.0 as usize].settled
+    }
+
+    /// A node and all that it rests on is done.
+    fn settle(&mut self, node: NodeId) {
+        self.slots[node.0 as usize].settled = self.now;
     }
 
     /// Takes in what an operation without operands is.
     fn leaf(&mut self, node: NodeId, value: &Known) {
-        let at = node.0 as usize;
-        if self.done[at] == 0 || !self.known[at].is(value) {
-            self.set(at, value.clone());
+        let slot = &self.slots[node.0 as usize];
+        if slot.done == 0 || !slot.known.is(value) {
+            self.set(node, value.clone());
         }
-    }
-
-    /// Does an operation, by the values of all, if one of its operands has changed since.
-    fn result<const N: usize>(&mut self, node: NodeId, on: [NodeId; N], how: impl FnOnce(&[Known]) -> Known) {
-        let at = node.0 as usize;
-        let done = self.done[at];
-        if done != 0 && on.iter().all(|a| self.changed[a.0 as usize] <= done) {
-            return;
-        }
-        let value = how(&self.known);
-        self.redo(node, value);
     }
 
     /// Whether one of the operations that an operation rests on has become another one since it was done.
     fn is_stale(&self, node: NodeId, on: &[NodeId]) -> bool {
-        let done = self.done[node.0 as usize];
-        done == 0 || on.iter().any(|a| self.changed[a.0 as usize] > done)
+        let done = self.slots[node.0 as usize].done;
+        done == 0 || on.iter().any(|a| self.changed(*a) > done)
     }
 
     /// Takes in the value of an operation that was done again.
     fn redo(&mut self, node: NodeId, value: Known) {
-        let at = node.0 as usize;
-        if self.done[at] != 0 && self.known[at].is(&value) {
+        let slot = &mut self.slots[node.0 as usize];
+        if slot.done != 0 && slot.known.is(&value) {
             self.now += 1;
-            self.done[at] = self.now;
+            slot.done = self.now;
         } else {
-            self.set(at, value);
+            self.set(node, value);
         }
     }
 
-    fn set(&mut self, at: usize, value: Known) {
+    fn set(&mut self, node: NodeId, value: Known) {
         self.now += 1;
-        self.known[at] = value;
-        self.done[at] = self.now;
-        self.changed[at] = self.now;
+        let slot = &mut self.slots[node.0 as usize];
+        (slot.known, slot.done, slot.changed) = (value, self.now, self.now);
     }
 }
 
@@ -256,8 +284,7 @@ impl Flow<'_, '_> {
     /// The value of a node with those of all that it rests on, which stay in `values`. Of its operations those are done again
     /// whose operands are no longer what they were.
     pub fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
-        let order = self.order(node);
-        self.work_out(&order, facts);
+        self.bring_up_to_date(node, facts);
         let known = self.values.of(node).clone();
         if facts.bonds.is_some() && matches!(self.lab.graph.op(node), Op::Binary(BinaryOp::Add | BinaryOp::Sub, ..)) {
             return self.together(node, known, facts);
@@ -265,20 +292,104 @@ impl Flow<'_, '_> {
         known
     }
 
+    /// Does those operations of a node again that rest on something that has changed since they were done.
+    fn bring_up_to_date(&mut self, node: NodeId, facts: &Facts) {
+        let inputs = self.inputs(node);
+        inputs.leaves.iter().for_each(|leaf| self.take(*leaf, facts));
+        let since = self.values.settled(node);
+        let order = if since == 0 {
+            self.order(node)
+        } else {
+            let is_new = |n: &&NodeId| self.values.changed(**n) > since;
+            let is_new_sum =
+                |n: &&NodeId| is_new(n) || !self.sums.get(n).is_some_and(|s| alike(&s.bonds, &facts.bonds));
+            let sums = inputs.sums.iter().filter(is_new_sum);
+            let changed: Vec<NodeId> = inputs.leaves.iter().filter(is_new).chain(sums).copied().collect();
+            if changed.is_empty() {
+                return;
+            }
+            self.above_all(node, &changed)
+        };
+        self.work_out(&order, facts);
+        self.values.settle(node);
+    }
+
+    /// The operations of a node that depend on some of those it rests on, operands first; all of it where these are not known yet
+    /// or not much less.
+    fn above_all(&mut self, node: NodeId, leaves: &[NodeId]) -> Rc<[NodeId]> {
+        let order = self.order(node);
+        let mut found: Vec<NodeId> = Vec::new();
+        let mut known = true;
+        for leaf in leaves {
+            match self.above(node, *leaf, &order) {
+                Some(above) => found.extend(above.iter()),
+                None => known = false,
+            }
+            if !known || 2 * found.len() > order.len() {
+                return order;
+            }
+        }
+        // Operands have smaller numbers.
+        found.sort_unstable();
+        found.dedup();
+        found.into()
+    }
+
+    /// The operations of a node that depend on one of them, itself among them. They are found when they are asked for again.
+    fn above(&mut self, node: NodeId, leaf: NodeId, order: &[NodeId]) -> Option<Rc<[NodeId]>> {
+        let lab = self.lab;
+        let find = || {
+            let mut on: FxHashSet<NodeId> = FxHashSet::default();
+            let depends = |n: &&NodeId| {
+                let is = **n == leaf || lab.graph.op(**n).operands().any(|a| on.contains(&a));
+                is && on.insert(**n)
+            };
+            order.iter().filter(depends).copied().collect::<Rc<[NodeId]>>()
+        };
+        match self.above.entry((node, leaf)) {
+            Entry::Occupied(mut known) => Some(known.get_mut().get_or_insert_with(find).clone()),
+            Entry::Vacant(place) => {
+                place.insert(None);
+                None
+            }
+        }
+    }
+
+    /// What a node rests on; found once.
+    fn inputs(&mut self, node: NodeId) -> Rc<Inputs> {
+        if let Some(known) = self.inputs.get(&node) {
+            return known.clone();
+        }
+        let order = self.order(node);
+        let op = |n: &NodeId| self.lab.graph.op(*n);
+        let is_leaf = |n: &NodeId| op(n).operands().next().is_none() && !matches!(op(n), Op::Const(_));
+        let leaves = order.iter().copied().filter(is_leaf).collect();
+        let sums = order.iter().copied().filter(|n| self.is_outer_sum(*n)).collect();
+        let inputs = Rc::new(Inputs { leaves, sums });
+        self.inputs.insert(node, inputs.clone());
+        inputs
+    }
+
     /// The value of a node that was enclosed just before, now that of what is known one state alone has changed.
     pub fn enclose_again(&mut self, node: NodeId, state: u32, facts: &Facts) -> Known {
         let order = self.parts_on(node, state);
+        for n in order.iter() {
+            if self.lab.graph.op(*n).operands().next().is_some() {
+                break;
+            }
+            self.take(*n, facts);
+        }
         self.work_out(&order, facts);
         self.values.of(node).clone()
     }
 
-    /// The operations of a node that depend on a state; found once.
+    /// The operations of a node that depend on a state, those without operands first; found once.
     fn parts_on(&mut self, node: NodeId, state: u32) -> Rc<[NodeId]> {
         if let Some(known) = self.parts_on.get(&(node, state)) {
             return known.clone();
         }
         let order = self.order(node);
-        let mut on: BTreeSet<NodeId> = BTreeSet::new();
+        let mut on: FxHashSet<NodeId> = FxHashSet::default();
         for n in order.iter() {
             let op = self.lab.graph.op(*n);
             let depends = match op {
@@ -290,64 +401,75 @@ impl Flow<'_, '_> {
                 on.insert(*n);
             }
         }
-        let found: Rc<[NodeId]> = order.iter().copied().filter(|n| on.contains(n)).collect();
+        let depend = || order.iter().copied().filter(|n| on.contains(n));
+        let is_leaf = |n: &NodeId| self.lab.graph.op(*n).operands().next().is_none();
+        let found: Rc<[NodeId]> = depend().filter(is_leaf).chain(depend().filter(|n| !is_leaf(n))).collect();
         self.parts_on.insert((node, state), found.clone());
         found
     }
 
+    /// Does operations again of which an operand has changed; those without operands are taken in already.
     fn work_out(&mut self, order: &[NodeId], facts: &Facts) {
         for n in order {
-            match self.lab.graph.op(*n) {
-                Op::Const(_) if self.values.is_done(*n) => {}
-                Op::Const(v) => self.values.leaf(*n, &Known::point(v)),
-                Op::Time => self.values.leaf(*n, &facts.time),
-                Op::State(i) => self.values.leaf(*n, &facts.states[i as usize]),
-                Op::Param(i) => self.values.leaf(*n, &self.params[i as usize]),
-                Op::Local(i) => self.values.leaf(*n, &facts.locals[i as usize]),
-                Op::Reading(i) => {
-                    let value = self.reading(i, facts);
-                    self.values.leaf(*n, &value);
-                }
-                Op::Unary(op, a) => self.values.result(*n, [a], |known| Known::unary(op, &known[a.0 as usize])),
-                Op::Binary(BinaryOp::Eq, a, b) if a == b => self.values.leaf(*n, &Known::Point(1.0)),
+            let op = self.lab.graph.op(*n);
+            let stale = match op {
+                Op::Const(_) => !self.values.is_done(*n),
+                Op::Time | Op::State(_) | Op::Param(_) | Op::Local(_) | Op::Reading(_) => false,
                 // What is known of a sum hangs on more than what is known of its parts.
                 Op::Binary(op @ (BinaryOp::Add | BinaryOp::Sub), a, b) if self.is_outer_sum(*n) => {
                     self.outer_sum(*n, op, [a, b], facts);
+                    false
                 }
-                Op::Binary(op, a, b) => self
-                    .values
-                    .result(*n, [a, b], |known| Known::binary(op, &known[a.0 as usize], &known[b.0 as usize])),
-                Op::Select(c, a, b) => self.values.result(*n, [c, a, b], |known| {
-                    Known::select(&known[c.0 as usize], &known[a.0 as usize], &known[b.0 as usize])
-                }),
+                Op::Unary(_, a) => self.values.is_stale(*n, &[a]),
+                Op::Binary(_, a, b) => self.values.is_stale(*n, &[a, b]),
+                Op::Select(c, a, b) => self.values.is_stale(*n, &[c, a, b]),
+            };
+            if stale {
+                let value = self.done_again(op);
+                self.values.redo(*n, value);
             }
+        }
+    }
+
+    /// An operation by the last values of its operands.
+    fn done_again(&self, op: Op) -> Known {
+        let of = |n| self.values.of(n);
+        match op {
+            Op::Const(v) => Known::point(v),
+            Op::Unary(op, a) => Known::unary(op, of(a)),
+            Op::Binary(BinaryOp::Eq, a, b) if a == b => Known::Point(1.0),
+            Op::Binary(op, a, b) => Known::binary(op, of(a), of(b)),
+            Op::Select(c, a, b) => Known::select(of(c), of(a), of(b)),
+            Op::Time | Op::State(_) | Op::Param(_) | Op::Local(_) | Op::Reading(_) => Known::nothing(),
+        }
+    }
+
+    /// Takes in the value of an operation without operands; a number never changes.
+    fn take(&mut self, leaf: NodeId, facts: &Facts) {
+        match self.lab.graph.op(leaf) {
+            Op::Time => self.values.leaf(leaf, &facts.time),
+            Op::State(i) => self.values.leaf(leaf, &facts.states[i as usize]),
+            Op::Param(i) => self.values.leaf(leaf, &self.params[i as usize]),
+            Op::Local(i) => self.values.leaf(leaf, &facts.locals[i as usize]),
+            Op::Reading(i) => {
+                let value = self.reading(i, facts);
+                self.values.leaf(leaf, &value);
+            }
+            Op::Const(_) | Op::Unary(..) | Op::Binary(..) | Op::Select(..) => {}
         }
     }
 
     /// Does a sum of states that may hang together if one of them or how they hang together has changed since.
     fn outer_sum(&mut self, node: NodeId, op: BinaryOp, [a, b]: [NodeId; 2], facts: &Facts) {
-        let same = |bonds: &Option<Rc<Bonds>>| match (bonds, &facts.bonds) {
-            (None, None) => true,
-            (Some(one), Some(other)) => Rc::ptr_eq(one, other),
-            _ => false,
-        };
-        let sum = match self.sums.remove(&node) {
-            Some(sum) if same(&sum.bonds) && !self.values.is_stale(node, &sum.leaves) => sum,
-            known => {
-                let apart = Known::binary(op, self.values.of(a), self.values.of(b));
-                let value = self.together(node, apart, facts);
-                self.values.redo(node, value);
-                let leaves = known.map_or_else(|| self.leaves(node), |sum| sum.leaves);
-                Sum { leaves, bonds: facts.bonds.clone() }
-            }
-        };
-        self.sums.insert(node, sum);
-    }
-
-    /// The operations without operands below a node.
-    fn leaves(&mut self, node: NodeId) -> Rc<[NodeId]> {
-        let order = self.order(node);
-        order.iter().copied().filter(|n| self.lab.graph.op(*n).operands().next().is_none()).collect()
+        let inputs = self.inputs(node);
+        let is_same = self.sums.get(&node).is_some_and(|sum| alike(&sum.bonds, &facts.bonds));
+        if is_same && !self.values.is_stale(node, &inputs.leaves) {
+            return;
+        }
+        let apart = Known::binary(op, self.values.of(a), self.values.of(b));
+        let value = self.together(node, apart, facts);
+        self.values.redo(node, value);
+        self.sums.insert(node, Sum { bonds: facts.bonds.clone() });
     }
 
     /// What a device shows: the true value, give or take its imperfection.

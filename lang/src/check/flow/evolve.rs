@@ -70,6 +70,8 @@ pub struct Barrier {
     states: BTreeMap<u32, (f64, f64)>,
     /// How far what goes on can go, and what states that it changes are without it.
     bonds: Option<Rc<Bonds>>,
+    /// States of which nothing counted as known, for concurrent steps may set them.
+    pub(super) veiled: Vec<u32>,
 }
 
 /// A pair of faces of the box, by derivative.
@@ -277,12 +279,15 @@ impl Flow<'_, '_> {
 
     /// Lets the laws act for at most `longest` s; the states that are no longer what they were.
     fn flow_on(&mut self, longest: f64, facts: &mut Facts) -> Vec<u32> {
+        if self.pass_unheeded(facts) {
+            return Vec::new();
+        }
         if !facts.unsettled.is_empty() || facts.bonds.as_ref().is_some_and(|bonds| !bonds.all_hold(facts)) {
             facts.barrier = None;
         }
         let barrier = match facts.barrier.clone() {
-            Some(barrier) => barrier,
-            None => {
+            Some(barrier) if barrier.veiled == self.veiled => barrier,
+            _ => {
                 let barrier = Rc::new(self.barrier(facts));
                 facts.barrier = Some(barrier.clone());
                 barrier
@@ -462,7 +467,8 @@ impl Flow<'_, '_> {
             let state = self.derivatives[*i as usize].state;
             (state, box_.within.states[state as usize].bounds())
         };
-        Barrier { states: facts.moving.iter().map(bounds).collect(), bonds: box_.within.bonds }
+        let states = facts.moving.iter().map(bounds).collect();
+        Barrier { states, bonds: box_.within.bonds, veiled: self.veiled.clone() }
     }
 
     /// Lets the fluxes that change an amount go as far as they can.

@@ -53,6 +53,8 @@ impl Flow<'_, '_> {
         }
         let found = Rc::new(self.read_off());
         self.stoichiometry = Some(found.clone());
+        // Only now is it known which sums hang on how states hang together.
+        self.inputs.clear();
         found
     }
 

@@ -9,6 +9,7 @@
 mod dangers;
 mod judged;
 mod passing;
+mod unheeded;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -772,6 +773,7 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
         follower.swap_known(flow);
         follower.judged = Judged::of(&flow.findings);
         follower.dangers.looked_for.clone_from(&dangers);
+        follower.unheeded = follower.unheeded(&dangers);
         let turns = follower.follow_in_time(backward);
         follower.swap_known(flow);
         (follower, matches!(turns, Turns::Taken))

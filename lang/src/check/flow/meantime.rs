@@ -55,20 +55,25 @@ impl Flow<'_, '_> {
 
     /// Time passes in which concurrent steps may set states that this line sets too: what moves is bounded whatever these are.
     pub(super) fn beside_others(&mut self, facts: &mut Facts, pass: impl FnOnce(&mut Self, &mut Facts)) {
-        let open = self.set_by_others();
-        let mut kept = Vec::with_capacity(open.len());
-        for s in open {
+        let mut kept = Vec::new();
+        for s in self.set_by_others() {
             kept.push((s, std::mem::replace(&mut facts.states[s as usize], Known::nothing())));
-            self.touch(s, facts);
+            facts.reopen(|state| state == s);
         }
-        if !kept.is_empty() {
+        let veiled: Vec<u32> = kept.iter().map(|(s, _)| *s).filter(|s| self.rates_of.contains_key(s)).collect();
+        // What bounded the last time that passed beside them bounds this one too where nothing else has changed since.
+        if facts.barrier.as_ref().is_some_and(|barrier| barrier.veiled != veiled) {
             facts.barrier = None;
         }
+        if facts.barrier.is_none() {
+            veiled.iter().for_each(|s| self.touch(*s, facts));
+        }
+        let before = std::mem::replace(&mut self.veiled, veiled);
         pass(self, facts);
+        self.veiled = before;
         for (s, known) in kept {
             facts.states[s as usize] = known;
-            facts.barrier = None;
-            self.touch(s, facts);
+            facts.reopen(|state| state == s);
         }
     }
 

@@ -109,6 +109,10 @@ struct Flow<'l, 'a> {
     forms: FxHashMap<NodeId, Option<Rc<bonds::Form>>>,
     /// Operations of a node that depend on a state.
     parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
+    /// What nodes rest on, as far as that was asked for.
+    inputs: FxHashMap<NodeId, Rc<eval::Inputs>>,
+    /// Operations of a node that depend on another one; none where that was asked for once only.
+    above: FxHashMap<(NodeId, NodeId), Option<Rc<[NodeId]>>>,
     /// Values of the operations that were evaluated.
     values: eval::Values,
     /// Sums of states that may hang together, as far as they were evaluated.
@@ -129,6 +133,8 @@ struct Flow<'l, 'a> {
     clocked: Vec<u32>,
     /// While time passes: from when to when. An event comes about somewhere in it.
     meanwhile: Option<Known>,
+    /// While time passes: states that rates ask for and concurrent steps may set.
+    veiled: Vec<u32>,
     /// A law has broken a limit while time passed, and a handler takes that: the step goes no further.
     stopped: bool,
     /// A handler has taken the failure of a limit, which may still be passed behind it.
@@ -144,6 +150,8 @@ struct Flow<'l, 'a> {
     judged: in_time::Judged,
     /// Hazards that are looked for in the order of time.
     dangers: in_time::Dangers<'l>,
+    /// In the order of time: states that nothing asks for, which are not followed.
+    unheeded: BTreeSet<u32>,
     /// Failures raised inside each open body with handlers, innermost last.
     guards: Vec<Vec<Raised>>,
     /// Failures that devices may report inside each open body with handlers, innermost last.
@@ -320,6 +328,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             terms_known: FxHashMap::default(),
             forms: FxHashMap::default(),
             parts_on: FxHashMap::default(),
+            inputs: FxHashMap::default(),
+            above: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
             sums: FxHashMap::default(),
             rates_of: BTreeMap::new(),
@@ -330,6 +340,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             at_moments: Vec::new(),
             clocked: Vec::new(),
             meanwhile: None,
+            veiled: Vec::new(),
             stopped: false,
             limit_taken: false,
             amounts: lab.extensive.iter().filter(|(k, _)| k.matter).map(|(_, s)| *s).collect(),
@@ -338,6 +349,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             findings: Vec::new(),
             judged: in_time::Judged::default(),
             dangers: in_time::Dangers::default(),
+            unheeded: BTreeSet::new(),
             guards: Vec::new(),
             reported: Vec::new(),
             again: Vec::new(),
@@ -412,6 +424,8 @@ impl<'l, 'a> Flow<'l, 'a> {
         std::mem::swap(&mut self.terms_known, &mut other.terms_known);
         std::mem::swap(&mut self.forms, &mut other.forms);
         std::mem::swap(&mut self.parts_on, &mut other.parts_on);
+        std::mem::swap(&mut self.inputs, &mut other.inputs);
+        std::mem::swap(&mut self.above, &mut other.above);
     }
 
     /// Follows the plan from its start.
