@@ -648,9 +648,9 @@ impl<'l> Flow<'l, '_> {
             self.open += usize::from(i > 0);
             let after = self.walk(*step, entry.clone());
             self.open -= usize::from(i > 0);
-            let raised = self.guards.pop().unwrap_or_default();
             // A job does not outlast the alternative that began it.
-            let after = self.end_block(after);
+            let after = self.end_body(after);
+            let raised = self.guards.pop().unwrap_or_default();
             self.caught.pop();
             ends.extend(after);
             if last {
