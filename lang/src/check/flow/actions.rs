@@ -525,9 +525,7 @@ impl Flow<'_, '_> {
             (Some(time), None) => self.pass(&time, &mut facts),
             (None, None) => {}
         }
-        if operation.takes.is_some() || operation.until.is_some() {
-            self.still_goes_on(label, &mut facts);
-        }
+        self.still_goes_on(label, &mut facts);
         self.claimed.truncate(others);
         self.quiet -= usize::from(!met);
         if met {

@@ -248,7 +248,11 @@ impl<'l> Flow<'l, '_> {
     fn asks_of(&mut self, step: StepId) -> BTreeSet<u32> {
         let plan = self.plan;
         let mut out = BTreeSet::new();
-        for id in self.below(step) {
+        let below = self.below(step);
+        for condition in self.asked_before_fails(below.iter().copied()) {
+            out.extend(self.parts(condition.node).states.iter().copied());
+        }
+        for id in below {
             let asked: Vec<&Condition> = match &plan.get(id).step {
                 Step::Operation(o) => {
                     let limits = o.limits.iter().map(|i| &plan.limits[*i as usize].condition);
@@ -520,7 +524,16 @@ impl<'l> Flow<'l, '_> {
                 lines.asked += 1;
                 lines.all[at].state = State::Claim(claims, *body, lines.asked);
             }
-            Step::Fail { .. } | Step::Retry { .. } => lines.over = true,
+            Step::Fail { name, .. } => {
+                lines.over = true;
+                if !lines.loose
+                    && !takes(&self.caught, name)
+                    && let Some(condition) = self.asked_before(id)
+                {
+                    self.fails_for_certain(id, name, condition, &lines.facts);
+                }
+            }
+            Step::Retry { .. } => lines.over = true,
             Step::Expect(conditions) => {
                 for condition in conditions {
                     if self.eval(condition.node, &lines.facts).truth() == Some(false) {
