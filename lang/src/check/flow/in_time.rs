@@ -9,6 +9,7 @@
 mod dangers;
 mod judged;
 mod passing;
+mod windows;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -95,6 +96,8 @@ struct Line<'p> {
     kept: Vec<&'p Condition>,
     /// The uses of this moment that it comes behind, and its own, by index.
     behind: BTreeSet<usize>,
+    /// When it asked for what it claimed last, and how long it waited for that, s.
+    claim: (f64, f64),
 }
 
 impl Line<'_> {
@@ -126,6 +129,8 @@ struct Lines<'p> {
     lost: BTreeSet<u32>,
     /// Whether some time is not exact.
     loose: bool,
+    /// Whether that is for more than the order of claims.
+    left: bool,
     held: Vec<(InstanceId, usize)>,
     /// Where a step fails that uses what another one uses or has claimed, and where that is.
     clash: Option<[Span; 2]>,
@@ -293,6 +298,7 @@ impl<'l> Flow<'l, '_> {
             yields: false,
             lost: BTreeSet::new(),
             loose: false,
+            left: false,
             held: Vec::new(),
             clash: None,
             asked: 0,
@@ -330,7 +336,17 @@ impl<'l> Flow<'l, '_> {
         let block = Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: None };
         let frames = outer.is_none().then_some(block).into_iter().chain([Frame::One(root)]).collect();
         let (sites, caught) = (self.sites.clone(), self.caught.clone());
-        lines.all.push(Line { root, outer, state: State::Ready, frames, sites, caught, kept: Vec::new(), behind });
+        lines.all.push(Line {
+            root,
+            outer,
+            state: State::Ready,
+            frames,
+            sites,
+            caught,
+            kept: Vec::new(),
+            behind,
+            claim: (0.0, 0.0),
+        });
         lines.all.len() - 1
     }
 
@@ -506,7 +522,12 @@ impl<'l> Flow<'l, '_> {
                 lines.all[at].frames.extend([block(kept.len(), false), Frame::One(*body)]);
                 lines.all[at].kept.extend(kept);
             }
-            Step::Within { body, .. } => lines.all[at].frames.push(Frame::One(*body)),
+            Step::Within { limit, since, body } => {
+                lines.all[at].frames.push(Frame::One(*body));
+                if lines.all[at].claim.1 > 0.0 {
+                    self.judge_window(lines, at, (id, *limit, *since));
+                }
+            }
             Step::If { condition, then, otherwise } => match self.eval(condition.node, &lines.facts).truth() {
                 Some(true) => lines.all[at].frames.push(Frame::One(*then)),
                 Some(false) => lines.all[at].frames.extend(otherwise.map(Frame::One)),
@@ -522,6 +543,7 @@ impl<'l> Flow<'l, '_> {
             },
             Step::Claim { claims, body } => {
                 lines.asked += 1;
+                lines.all[at].claim = (lines.now(), 0.0);
                 lines.all[at].state = State::Claim(claims, *body, lines.asked);
             }
             Step::Fail { name, .. } => {
@@ -565,6 +587,7 @@ impl<'l> Flow<'l, '_> {
             (Some(takes), None) => {
                 let known = self.eval(takes.nominal, &lines.facts);
                 lines.loose |= takes.bounds.is_some();
+                lines.left |= takes.bounds.is_some();
                 lines.all[at].frames.push(Frame::End(operation, label));
                 self.waits(lines, at, &known);
             }
@@ -648,6 +671,7 @@ impl<'l> Flow<'l, '_> {
         let written = self.sets_going(self.writes(lines.all[at].root));
         lines.lost.extend(written);
         lines.loose = true;
+        lines.left = true;
         lines.all[at].state = State::Left;
         lines.all[at].kept.clear();
         self.doubt = 1;
@@ -759,6 +783,7 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
     let (_, at, claims, step) = granted?;
     let place = lines.all[at].sites.last().map(|site| site.span).unwrap_or_default();
     lines.held.extend(claims.iter().map(|i| (*i, at)));
+    lines.all[at].claim.1 = lines.now() - lines.all[at].claim.0;
     lines.all[at].state = State::Ready;
     lines.all[at].frames.extend([
         Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: Some((place, claims)) },
@@ -775,7 +800,7 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
         return;
     }
     let dangers = flow.dangers_between(&pairs, hazards);
-    if dangers.is_empty() && !flow.may_disturb(&pairs) {
+    if dangers.is_empty() && !flow.may_disturb(&pairs) && !flow.has_windows_behind_claims(&pairs) {
         return;
     }
     let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
@@ -803,6 +828,10 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     if errors {
         return;
     }
+    if let Some(finding) = windows::late_in_either(&first.findings, &second.findings) {
+        flow.findings.push(finding);
+        return;
+    }
     // The order of time decides between what comes up in one order only and what comes up in the other.
     if first.findings.iter().any(|f| f.is_error() && second.findings.iter().any(|o| o.is_like(f))) {
         flow.findings.retain(|f| !f.is_of_one_order());
@@ -810,5 +839,6 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     let is_new = |f: &Finding| !flow.findings.iter().any(|old| old.place() == f.place());
     let new: Vec<Finding> =
         first.findings.into_iter().filter(|f| second.findings.iter().any(|o| o.is_like(f)) && is_new(f)).collect();
-    flow.findings.extend(new);
+    // Another order of claims may be a schedule.
+    flow.findings.extend(new.into_iter().map(windows::softened));
 }

@@ -13,6 +13,7 @@ use super::value::{Known, Why};
 use super::{Flow, forbidden_on_any_way, only_advice};
 
 /// A finding, and how often it was made.
+#[derive(Clone)]
 pub struct Finding {
     diagnostic: Diagnostic,
     /// The condition or construct it is about.
@@ -59,6 +60,12 @@ impl Finding {
     /// Whether every run comes to it that comes to where so many choices and handlers are open, whatever order branches and jobs are done in.
     pub(super) fn is_come_to(&self, open: usize) -> bool {
         !self.turn && self.open <= open
+    }
+
+    /// The same as a warning.
+    pub(super) fn as_warning(mut self) -> Finding {
+        self.diagnostic.severity = Severity::Warning;
+        self
     }
 
     /// Notes that it comes up in one order of branches or jobs, and something else does in the other.
@@ -397,6 +404,20 @@ impl Flow<'_, '_> {
         let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, some || self.doubt > 0);
         let turn = self.turning > 0;
         self.found_on(d, about, open, turn);
+    }
+
+    /// Events set each other off for certain, more often at one moment than a run follows; this is one of them.
+    pub(super) fn cascades(&mut self, event: u32) {
+        let event = &self.events[event as usize];
+        let headline = format!("`{}` is one of events that set each other off at one moment without end", event.name);
+        let at = if self.in_library(event.span) { self.site() } else { event.span };
+        let mut d = Diagnostic::error(codes::EVENT_CASCADE, at, headline, "fires again and again");
+        d.severity = severity(codes::EVENT_CASCADE, self.doubt > 0);
+        if at != self.site() {
+            d = d.because(self.site(), "comes about in this step");
+        }
+        let d = d.help("give one of them a condition that stays false once the other has fired");
+        self.found(d, event.span);
     }
 
     /// A law takes more of an amount than there is, within the step that is followed now.
