@@ -804,7 +804,7 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
         return;
     }
     let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
-    let uncertain = errors || flow.findings.iter().any(Finding::is_of_one_order);
+    let uncertain = errors || flow.findings.iter().any(|f| f.is_of_one_order() || f.is_by_failure());
     let follow = |flow: &mut Flow<'l, 'a>, backward| {
         let mut follower = begin();
         follower.swap_known(flow);
@@ -821,7 +821,8 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     let (second, as_sound) = follow(flow, true);
     if sound && as_sound {
         let holds = |f: &Finding| first.judged.holds(f.place()) && second.judged.holds(f.place());
-        flow.findings.retain(|f| !(f.is_of_one_order() || f.is_error() && holds(f)));
+        // Where every wait has come to its end in time, none of them ends the workflow.
+        flow.findings.retain(|f| !(f.is_of_one_order() || f.is_by_failure() || f.is_error() && holds(f)));
         return;
     }
     // What is wrong in any order needs no other one.

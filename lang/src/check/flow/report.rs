@@ -27,6 +27,8 @@ pub struct Finding {
     open: usize,
     /// It comes up in one order of branches or jobs, and something else does in the other.
     one_order: bool,
+    /// It is what a written failure leaves that ends the workflow.
+    by_failure: bool,
 }
 
 /// The failure of a need that names none.
@@ -79,6 +81,11 @@ impl Finding {
         self.one_order
     }
 
+    /// Whether it is what a written failure leaves that ends the workflow.
+    pub(super) fn is_by_failure(&self) -> bool {
+        self.by_failure
+    }
+
     /// Whether it is of a kind.
     pub(super) fn is(&self, code: Code) -> bool {
         self.diagnostic.code == code
@@ -112,12 +119,21 @@ impl Flow<'_, '_> {
         self.found_on(diagnostic, about, None, turn);
     }
 
+    /// Adds what a written failure leaves that ends the workflow.
+    pub(super) fn found_by_failure(&mut self, diagnostic: Diagnostic, about: Span) {
+        let place = (diagnostic.span(), about);
+        let known = self.findings.len();
+        self.found(diagnostic, about);
+        self.findings.iter_mut().skip(known).filter(|f| f.place() == place).for_each(|f| f.by_failure = true);
+    }
+
     /// Adds a finding that is made on some ways, of which so many had met before.
     fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>, turn: bool) {
         if self.quiet > 0 {
             return;
         }
-        let new = Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false };
+        let new =
+            Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false, by_failure: false };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
                 old.count += 1;
@@ -273,7 +289,10 @@ impl Flow<'_, '_> {
         let d = Diagnostic::error(code, condition.span, headline, said);
         let d = Diagnostic { severity: severity(code, some), ..d };
         let d = self.with_history(d, condition, facts);
-        let d = if code == codes::NEVER_MADE { self.with_makers(d, condition) } else { d };
+        let d = match code == codes::NEVER_MADE {
+            true => self.with_makers(d, condition),
+            false => self.with_ions(d, condition, facts),
+        };
         self.found(d, condition.span);
     }
 
@@ -325,7 +344,10 @@ impl Flow<'_, '_> {
         let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
         let d = self.at_site(code, headline, said, self.doubt > 0);
         let d = self.with_history(d, condition, before);
-        let d = if absent.is_some() { self.with_makers(d, condition) } else { d };
+        let d = match absent.is_some() {
+            true => self.with_makers(d, condition),
+            false => self.with_ions(d, condition, before),
+        };
         self.found(d, condition.span);
     }
 
@@ -354,6 +376,23 @@ impl Flow<'_, '_> {
         });
         let name = &self.lab.tables.species.get(s).name;
         none.then(|| format!("nothing brings or makes `{name}` in `{}`", self.lab.spoken_name(mixture)))
+    }
+
+    /// Says where to look for a salt of which nothing is left as it has dissolved.
+    fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
+        let asked: BTreeSet<u32> = condition
+            .compared
+            .iter()
+            .flat_map(|c| self.parts(c.value).states.iter().copied().collect::<Vec<_>>())
+            .collect();
+        let gone = |state: &u32| facts.states[*state as usize].exact() == Some(0.0);
+        let amounts = self.lab.extensive.iter().filter(|(_, state)| asked.contains(state) && gone(state));
+        let species = &self.lab.tables.species;
+        let salt =
+            amounts.filter_map(|(key, _)| key.matter()).map(|s| species.get(s)).find(|s| !s.dissolves.is_empty());
+        let Some(salt) = salt else { return d };
+        let ions: Vec<String> = salt.dissolves.iter().map(|(ion, _)| format!("`{}`", species.get(*ion).name)).collect();
+        d.help(format!("once dissolved, `{}` counts as its ions: ask for {}", salt.name, ions.join(" or ")))
     }
 
     /// Adds the reactions that would make what is missing.
