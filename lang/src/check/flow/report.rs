@@ -65,7 +65,7 @@ impl Finding {
     }
 
     /// The same as a warning.
-    pub(super) fn as_warning(mut self) -> Finding {
+    pub(super) fn softened(mut self) -> Finding {
         self.diagnostic.severity = Severity::Warning;
         self
     }
@@ -380,11 +380,8 @@ impl Flow<'_, '_> {
 
     /// Says where to look for a salt of which nothing is left as it has dissolved.
     fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
-        let asked: BTreeSet<u32> = condition
-            .compared
-            .iter()
-            .flat_map(|c| self.parts(c.value).states.iter().copied().collect::<Vec<_>>())
-            .collect();
+        let asked: BTreeSet<u32> =
+            condition.compared.iter().flat_map(|c| self.parts(c.value).states.to_vec()).collect();
         let gone = |state: &u32| facts.states[*state as usize].exact() == Some(0.0);
         let amounts = self.lab.extensive.iter().filter(|(_, state)| asked.contains(state) && gone(state));
         let species = &self.lab.tables.species;

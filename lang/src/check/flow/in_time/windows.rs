@@ -88,5 +88,5 @@ pub(super) fn late_in_either(first: &[Finding], second: &[Finding]) -> Option<Fi
 
 /// A window that is too late in the order in which claims are asked for may come in time in another.
 pub(super) fn softened(finding: Finding) -> Finding {
-    if finding.is(codes::WINDOW_UNMEETABLE) { finding.as_warning() } else { finding }
+    if finding.is(codes::WINDOW_UNMEETABLE) { finding.softened() } else { finding }
 }
