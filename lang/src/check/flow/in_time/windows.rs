@@ -83,7 +83,7 @@ impl<'l> Flow<'l, '_> {
 pub(super) fn late_in_either(first: &[Finding], second: &[Finding]) -> Option<Finding> {
     let late = |found: &[Finding]| found.iter().position(|f| f.is(codes::WINDOW_UNMEETABLE));
     let (one, other) = (late(first)?, late(second)?);
-    (!first[one].is_like(&second[other])).then(|| first[one].clone().of_one_order())
+    (!first[one].is_like(&second[other])).then(|| first[one].clone().softened())
 }
 
 /// A window that is too late in the order in which claims are asked for may come in time in another.
