@@ -338,14 +338,7 @@ impl<'a> Elaborator<'a> {
             vec!["1/s".into()]
         } else {
             let Some(n) = Rational::approximate(order) else { return };
-            let less = Rational::new(n.num - n.den, n.den);
-            bases
-                .iter()
-                .map(|b| {
-                    let d = b.over(&self.tables.units.named("Amount")).power(less).over(&self.duration());
-                    self.tables.units.symbol(&d).replace("m^3", "L")
-                })
-                .collect()
+            bases.iter().map(|basis| self.rate_unit(n, basis)).collect()
         };
         let found = k.unit.as_ref().map_or_else(|| self.describe(&k), |u| u.symbol.clone());
         let mut d = Diagnostic::error(
@@ -366,5 +359,21 @@ impl<'a> Elaborator<'a> {
             d = d.because(f.span, format!("the orders sum to {}", matterix_ir::quantity::show_number(order)));
         }
         self.report(d);
+    }
+
+    /// The unit of a rate constant of this order on a basis, as it can be written: units have whole powers, so that a root stands beside them.
+    fn rate_unit(&self, order: Rational, basis: &Dimension) -> String {
+        let (amount, second) = (self.tables.units.named("Amount"), self.duration());
+        let less = Rational::new(order.num - order.den, order.den);
+        let symbol = |d: &Dimension| self.tables.units.symbol(d).replace("m^3", "L");
+        if less.den != 2 {
+            return symbol(&basis.over(&amount).power(less).over(&second));
+        }
+        let whole = match less.num / 2 {
+            0 => "1/s".to_owned(),
+            whole => symbol(&basis.over(&amount).power(Rational::new(whole, 1)).over(&second)),
+        };
+        let root = if less.num > 0 { basis.over(&amount) } else { amount.over(basis) };
+        format!("1e-3 {whole} * sqrt(1 {})", symbol(&root))
     }
 }

@@ -392,6 +392,11 @@ impl<'a> Planner<'a, '_> {
             "no step or skill declares this failure",
         );
         d = near::proposed(d, &near, name.span);
+        if near.is_empty() {
+            d = d.help(
+                "a run itself fails with `timeout`, `late`, `max` or `broken`; `on failure` takes whatever comes",
+            );
+        }
         self.lab.report(d);
     }
 }

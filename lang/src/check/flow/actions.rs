@@ -18,6 +18,9 @@ use super::value::{Known, Why};
 /// Events that set each other off at one instant before the rest is left to the run.
 const MOST_EVENTS: usize = 200;
 
+/// Events that a run fires at one instant, and no more.
+const MOST_AT_ONCE: usize = 1000;
+
 /// Two mixtures are the same where the shares of their species differ by less than this, relative to the larger.
 const SAME: f64 = 1e-9;
 
@@ -417,7 +420,11 @@ impl Flow<'_, '_> {
 
     /// Fires those of the events that became true, and what they set off, until none does.
     pub fn fire(&mut self, mut due: Vec<u32>, facts: &mut Facts) {
-        for _ in 0..MOST_EVENTS {
+        let (mut sure, mut last) = (true, None);
+        for round in 0..MOST_AT_ONCE {
+            if round >= MOST_EVENTS && !sure {
+                break;
+            }
             due.sort_unstable();
             due.dedup();
             let mut next = Vec::new();
@@ -428,6 +435,8 @@ impl Flow<'_, '_> {
                 if now == Some(false) || (now == Some(true) && before == Some(true)) {
                     continue;
                 }
+                sure &= (now, before) == (Some(true), Some(false));
+                last = Some(i);
                 let untouched = facts.clone();
                 let changed = self.happen(i, facts);
                 if (now, before) != (Some(true), Some(false)) {
@@ -446,8 +455,10 @@ impl Flow<'_, '_> {
             }
             due = next;
         }
-        let headline = format!("events set each other off more than {MOST_EVENTS} times");
-        self.not_analysed(Severity::Advice, headline, "what they change is unknown from here on");
+        match last.filter(|_| sure) {
+            Some(event) => self.cascades(event),
+            None => self.cascades_perhaps(),
+        }
         let mixtures = &self.mixtures;
         let states = |action: &Action| -> Vec<u32> {
             match action {
@@ -460,6 +471,11 @@ impl Flow<'_, '_> {
         let changed: BTreeSet<u32> =
             due.iter().flat_map(|i| &self.events[*i as usize].actions).flat_map(states).collect();
         self.forget(&changed.into_iter().collect::<Vec<_>>(), facts);
+    }
+
+    fn cascades_perhaps(&mut self) {
+        let headline = format!("events set each other off more than {MOST_EVENTS} times");
+        self.not_analysed(Severity::Advice, headline, "what they change is unknown from here on");
     }
 
     /// Does what an event does; the states that are no longer what they were.
@@ -525,9 +541,7 @@ impl Flow<'_, '_> {
             (Some(time), None) => self.pass(&time, &mut facts),
             (None, None) => {}
         }
-        if operation.takes.is_some() || operation.until.is_some() {
-            self.still_goes_on(label, &mut facts);
-        }
+        self.still_goes_on(label, &mut facts);
         self.claimed.truncate(others);
         self.quiet -= usize::from(!met);
         if met {

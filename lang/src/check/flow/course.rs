@@ -283,6 +283,8 @@ impl Flow<'_, '_> {
         due.extend(&timers.events);
         due.sort_unstable();
         due.dedup();
+        let mut sure = true;
+        let mut last = None;
         for _ in 0..MOST_CHANGES {
             let mut next = None;
             for i in &due {
@@ -291,14 +293,19 @@ impl Flow<'_, '_> {
                 if now != Some(true) {
                     *before = now;
                 } else if *before != Some(true) && next.is_none() {
+                    sure &= *before == Some(false);
                     next = Some(*i);
                 }
             }
             let Some(i) = next else { return };
+            last = Some(i);
             let changed = self.happen(i, facts);
-            facts.fired[i as usize] = Some(true);
+            facts.fired[i as usize] = self.truth_beyond(self.events[i as usize].when, even, facts).or(Some(true));
             let on = self.events_on(&changed).into_iter().filter(|e| !due.contains(e)).collect();
             self.fire(on, facts);
+        }
+        if let Some(last) = last.filter(|_| sure) {
+            self.cascades(last);
         }
         let changed = due.iter().flat_map(|i| self.changed_by(&self.events[*i as usize].actions)).collect::<Vec<u32>>();
         self.forget(&changed, facts);

@@ -1,13 +1,17 @@
 //! What the plan itself asks of its steps: conditions that are kept, promises of skills, loops that end.
 
-use matterix_ir::plan::{Comparison, Condition};
+use matterix_ir::plan::{Comparison, Condition, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{BinaryOp, Code, NodeId, Op, Span, codes};
 
 use super::Flow;
+use super::actions::Asked;
 use super::facts::Facts;
 use super::report::shown;
+
+/// Steps that a run takes at one moment, and no more.
+const MOST_AT_ONCE: f64 = 100_000.0;
 
 impl Flow<'_, '_> {
     /// Looks whether what is kept still holds after an operation.
@@ -35,6 +39,25 @@ impl Flow<'_, '_> {
                 self.forget(&states, facts);
             }
         }
+    }
+
+    /// Looks whether what a skill asks for all the time holds when it begins.
+    pub(super) fn begins_under(&mut self, label: &str, invariants: &[Condition], facts: &mut Facts) -> Asked {
+        for condition in invariants {
+            if self.eval(condition.node, facts).truth() != Some(false) || self.is_shared(condition.node) {
+                continue;
+            }
+            if self.is_taken("broken") {
+                self.raise("broken", facts.clone());
+                return Asked::Handled;
+            }
+            let label = self.called(label);
+            let headline = format!("`{label}` cannot begin: `{}` does not hold", condition.text);
+            let about = Some((condition.span, "asked for all the time"));
+            self.asked_in_vain(codes::EXPECTATION_FAILED, headline, condition, about, facts);
+            return Asked::Unmet;
+        }
+        Asked::Met
     }
 
     /// Reports a wait for something that cannot be while what is kept around it holds.
@@ -116,6 +139,18 @@ impl Flow<'_, '_> {
         true
     }
 
+    /// Whether neither the steps of a loop nor what goes on by itself change what a condition asks for.
+    pub(super) fn stays_so(&mut self, condition: &Condition, body: StepId, facts: &Facts) -> bool {
+        let parts = self.parts(condition.node);
+        if parts.timed || self.lab.graph.depends(condition.node, |op| matches!(op, Op::Local(_))) {
+            return false;
+        }
+        let mut changed = self.writes(body);
+        changed.extend(self.events.iter().flat_map(|event| self.changed_by(&event.actions)));
+        changed.extend(self.derivatives.iter().map(|d| d.state));
+        parts.states.iter().all(|s| !changed.contains(s)) && self.eval(condition.node, facts).truth() == Some(true)
+    }
+
     /// A loop that goes on at its last turn.
     pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &Facts) {
         if self.fails_not(condition, "max", facts) {
@@ -128,6 +163,20 @@ impl Flow<'_, '_> {
             let d = self.at_site(codes::NOT_REACHED, headline, said, self.doubt > 0);
             let d = self.with_history(d, condition, facts);
             self.found(d.help("allow more turns, or say what happens then: `on max { }`"), condition.span);
+        }
+    }
+
+    /// A loop of which each turn leaves all as it was.
+    pub(super) fn turns_alike(&mut self, condition: &Condition, most: f64, timeless: bool, facts: &Facts) {
+        if !timeless || most <= MOST_AT_ONCE {
+            return self.runs_out(condition, most, facts);
+        }
+        if self.fails_not(condition, "max", facts) {
+            let headline = format!("`{}` holds in every turn, and no time passes in any of them", condition.text);
+            let said = "goes on for ever at one moment".to_owned();
+            let d = self.at_site(codes::ENDLESS_INSTANT, headline, said, self.doubt > 0);
+            let d = self.with_history(d, condition, facts);
+            self.found(d.help("let the body wait, or change what the condition asks for"), condition.span);
         }
     }
 

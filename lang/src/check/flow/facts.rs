@@ -241,7 +241,7 @@ impl Facts {
 }
 
 /// The latest statement since `base` that changed a state.
-fn changed_by(history: &History, base: &History, state: u32) -> Option<Span> {
+pub(super) fn changed_by(history: &History, base: &History, state: u32) -> Option<Span> {
     let mut at = history.as_ref();
     while let Some(event) = at {
         if base.as_ref().is_some_and(|b| Rc::ptr_eq(b, event)) {

@@ -81,8 +81,8 @@ impl Flow<'_, '_> {
         self.caught.push(if guard.library { Vec::new() } else { names });
         self.guards.push(Vec::new());
         let mut after = self.walk(guard.body, facts);
+        after = self.end_body(after);
         let mut raised = self.guards.pop().unwrap_or_default();
-        after = self.end_block(after);
         self.caught.pop();
         let mut again = Vec::new();
         // What handlers raise leaves as well.

@@ -10,6 +10,7 @@ mod dangers;
 mod judged;
 mod passing;
 mod unheeded;
+mod windows;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -96,6 +97,8 @@ struct Line<'p> {
     kept: Vec<&'p Condition>,
     /// The uses of this moment that it comes behind, and its own, by index.
     behind: BTreeSet<usize>,
+    /// When it asked for what it claimed last, and how long it waited for that, s.
+    claim: (f64, f64),
 }
 
 impl Line<'_> {
@@ -127,6 +130,8 @@ struct Lines<'p> {
     lost: BTreeSet<u32>,
     /// Whether some time is not exact.
     loose: bool,
+    /// Whether that is for more than the order of claims.
+    left: bool,
     held: Vec<(InstanceId, usize)>,
     /// Where a step fails that uses what another one uses or has claimed, and where that is.
     clash: Option<[Span; 2]>,
@@ -249,7 +254,11 @@ impl<'l> Flow<'l, '_> {
     fn asks_of(&mut self, step: StepId) -> BTreeSet<u32> {
         let plan = self.plan;
         let mut out = BTreeSet::new();
-        for id in self.below(step) {
+        let below = self.below(step);
+        for condition in self.asked_before_fails(below.iter().copied()) {
+            out.extend(self.parts(condition.node).states.iter().copied());
+        }
+        for id in below {
             let asked: Vec<&Condition> = match &plan.get(id).step {
                 Step::Operation(o) => {
                     let limits = o.limits.iter().map(|i| &plan.limits[*i as usize].condition);
@@ -290,6 +299,7 @@ impl<'l> Flow<'l, '_> {
             yields: false,
             lost: BTreeSet::new(),
             loose: false,
+            left: false,
             held: Vec::new(),
             clash: None,
             asked: 0,
@@ -327,7 +337,17 @@ impl<'l> Flow<'l, '_> {
         let block = Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: None };
         let frames = outer.is_none().then_some(block).into_iter().chain([Frame::One(root)]).collect();
         let (sites, caught) = (self.sites.clone(), self.caught.clone());
-        lines.all.push(Line { root, outer, state: State::Ready, frames, sites, caught, kept: Vec::new(), behind });
+        lines.all.push(Line {
+            root,
+            outer,
+            state: State::Ready,
+            frames,
+            sites,
+            caught,
+            kept: Vec::new(),
+            behind,
+            claim: (0.0, 0.0),
+        });
         lines.all.len() - 1
     }
 
@@ -503,7 +523,12 @@ impl<'l> Flow<'l, '_> {
                 lines.all[at].frames.extend([block(kept.len(), false), Frame::One(*body)]);
                 lines.all[at].kept.extend(kept);
             }
-            Step::Within { body, .. } => lines.all[at].frames.push(Frame::One(*body)),
+            Step::Within { limit, since, body } => {
+                lines.all[at].frames.push(Frame::One(*body));
+                if lines.all[at].claim.1 > 0.0 {
+                    self.judge_window(lines, at, (id, *limit, *since));
+                }
+            }
             Step::If { condition, then, otherwise } => match self.eval(condition.node, &lines.facts).truth() {
                 Some(true) => lines.all[at].frames.push(Frame::One(*then)),
                 Some(false) => lines.all[at].frames.extend(otherwise.map(Frame::One)),
@@ -519,9 +544,19 @@ impl<'l> Flow<'l, '_> {
             },
             Step::Claim { claims, body } => {
                 lines.asked += 1;
+                lines.all[at].claim = (lines.now(), 0.0);
                 lines.all[at].state = State::Claim(claims, *body, lines.asked);
             }
-            Step::Fail { .. } | Step::Retry { .. } => lines.over = true,
+            Step::Fail { name, .. } => {
+                lines.over = true;
+                if !lines.loose
+                    && !takes(&self.caught, name)
+                    && let Some(condition) = self.asked_before(id)
+                {
+                    self.fails_for_certain(id, name, condition, &lines.facts);
+                }
+            }
+            Step::Retry { .. } => lines.over = true,
             Step::Expect(conditions) => {
                 for condition in conditions {
                     if self.eval(condition.node, &lines.facts).truth() == Some(false) {
@@ -553,6 +588,7 @@ impl<'l> Flow<'l, '_> {
             (Some(takes), None) => {
                 let known = self.eval(takes.nominal, &lines.facts);
                 lines.loose |= takes.bounds.is_some();
+                lines.left |= takes.bounds.is_some();
                 lines.all[at].frames.push(Frame::End(operation, label));
                 self.waits(lines, at, &known);
             }
@@ -636,6 +672,7 @@ impl<'l> Flow<'l, '_> {
         let written = self.sets_going(self.writes(lines.all[at].root));
         lines.lost.extend(written);
         lines.loose = true;
+        lines.left = true;
         lines.all[at].state = State::Left;
         lines.all[at].kept.clear();
         self.doubt = 1;
@@ -747,6 +784,7 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
     let (_, at, claims, step) = granted?;
     let place = lines.all[at].sites.last().map(|site| site.span).unwrap_or_default();
     lines.held.extend(claims.iter().map(|i| (*i, at)));
+    lines.all[at].claim.1 = lines.now() - lines.all[at].claim.0;
     lines.all[at].state = State::Ready;
     lines.all[at].frames.extend([
         Frame::Block { jobs: Vec::new(), kept: 0, caught: false, claims: Some((place, claims)) },
@@ -763,11 +801,11 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
         return;
     }
     let dangers = flow.dangers_between(&pairs, hazards);
-    if dangers.is_empty() && !flow.may_disturb(&pairs) {
+    if dangers.is_empty() && !flow.may_disturb(&pairs) && !flow.has_windows_behind_claims(&pairs) {
         return;
     }
     let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
-    let uncertain = errors || flow.findings.iter().any(Finding::is_of_one_order);
+    let uncertain = errors || flow.findings.iter().any(|f| f.is_of_one_order() || f.is_by_failure());
     let follow = |flow: &mut Flow<'l, 'a>, backward| {
         let mut follower = begin();
         follower.swap_known(flow);
@@ -785,11 +823,16 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     let (second, as_sound) = follow(flow, true);
     if sound && as_sound {
         let holds = |f: &Finding| first.judged.holds(f.place()) && second.judged.holds(f.place());
-        flow.findings.retain(|f| !(f.is_of_one_order() || f.is_error() && holds(f)));
+        // Where every wait has come to its end in time, none of them ends the workflow.
+        flow.findings.retain(|f| !(f.is_of_one_order() || f.is_by_failure() || f.is_error() && holds(f)));
         return;
     }
     // What is wrong in any order needs no other one.
     if errors {
+        return;
+    }
+    if let Some(finding) = windows::late_in_either(&first.findings, &second.findings) {
+        flow.findings.push(finding);
         return;
     }
     // The order of time decides between what comes up in one order only and what comes up in the other.
@@ -799,5 +842,6 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     let is_new = |f: &Finding| !flow.findings.iter().any(|old| old.place() == f.place());
     let new: Vec<Finding> =
         first.findings.into_iter().filter(|f| second.findings.iter().any(|o| o.is_like(f)) && is_new(f)).collect();
-    flow.findings.extend(new);
+    // Another order of claims may be a schedule.
+    flow.findings.extend(new.into_iter().map(windows::softened));
 }

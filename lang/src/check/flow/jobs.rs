@@ -8,13 +8,13 @@ use matterix_ir::plan::{Step, StepId};
 use matterix_ir::{BinaryOp, codes};
 
 use super::Flow;
-use super::facts::Facts;
+use super::facts::{Facts, changed_by};
 use super::interference::Rival;
 use super::points::at_least;
 use super::report::Finding;
 use super::stopped::{Beside, Course};
 use super::value::Known;
-use super::{left, parted};
+use super::{Raised, left, parted};
 
 /// A job that was started and not waited for yet.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ pub(super) struct Job {
     /// In how many jobs it was started.
     within: usize,
     /// It fails for certain, with one of these, where it is waited for.
-    fails: Option<Vec<String>>,
+    fails: Option<Vec<Raised>>,
 }
 
 impl Job {
@@ -140,8 +140,7 @@ impl Flow<'_, '_> {
                     None => {
                         facts = before;
                         self.widen(body, &mut facts);
-                        let raised = self.guards.last().into_iter().flatten().skip(raised);
-                        fails = Some(raised.map(|(name, _)| name.clone()).collect());
+                        fails = Some(self.guards.last().into_iter().flatten().skip(raised).cloned().collect());
                         Some(at_least(&start))
                     }
                 }
@@ -179,8 +178,12 @@ impl Flow<'_, '_> {
         let Some(Job { body, start, end, writes, raced, fails, .. }) = self.jobs.remove(name) else {
             return Some(facts);
         };
-        if let Some(names) = fails {
-            names.iter().for_each(|name| self.raise(name, facts.clone()));
+        if let Some(raised) = fails {
+            for (name, failed) in raised {
+                let mut failed_by_now = facts.clone();
+                self.left_by_job(body, &raced, &failed, &mut failed_by_now);
+                self.raise(&name, failed_by_now);
+            }
             return None;
         }
         let now = facts.time.clone();
@@ -203,6 +206,24 @@ impl Flow<'_, '_> {
         Some(facts)
     }
 
+    /// What a job that has failed alone sets stays as it was then until the failure is taken.
+    fn left_by_job(&mut self, body: StepId, raced: &BTreeSet<u32>, failed: &Facts, facts: &mut Facts) {
+        let beside: BTreeSet<u32> = self.concurrent(body).into_iter().flat_map(|id| self.writes(id)).collect();
+        let beside = self.sets_going(beside);
+        let set_by_events =
+            self.events.iter().flat_map(|event| self.changed_by(&event.actions)).collect::<BTreeSet<u32>>();
+        let lasts = |s: &u32| {
+            !raced.contains(s)
+                && !beside.contains(s)
+                && !set_by_events.contains(s)
+                && !self.derivatives.iter().any(|d| d.state == *s)
+        };
+        for state in self.writes(body).into_iter().filter(lasts).collect::<Vec<u32>>() {
+            let place = changed_by(&failed.history, &None, state).unwrap_or_else(|| self.site());
+            self.overwrite(place, vec![(state, failed.states[state as usize].clone())], facts);
+        }
+    }
+
     /// The jobs that nothing waits for: a run ends when they have.
     pub(super) fn await_all(&mut self, mut facts: Facts) -> Option<Facts> {
         while let Some(name) = self.jobs.keys().next().cloned() {
@@ -212,13 +233,13 @@ impl Flow<'_, '_> {
     }
 
     fn job(&mut self, body: StepId, raced: &BTreeSet<u32>, facts: Facts) -> Option<Facts> {
-        let mut others = self.sets_going(self.beside(body));
-        others.extend(raced);
+        let mut noted = self.sets_going(self.beside(body));
+        noted.extend(raced);
         let beside = self.concurrent(body);
         let met: BTreeSet<u32> = beside.into_iter().flat_map(|id| self.writes(id)).collect();
-        let met = self.sets_going(met).union(raced).copied().collect();
-        self.meets.push(met);
-        self.begin_job(&others);
+        let others: BTreeSet<u32> = self.sets_going(met).union(raced).copied().collect();
+        self.meets.push(others.clone());
+        self.begin_job(&noted);
         self.contested.push(others.intersection(&self.writes(body)).copied().collect());
         self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
@@ -241,8 +262,18 @@ impl Flow<'_, '_> {
     }
 
     /// A block ends: it waits for the jobs begun in it, or a failure has stopped them.
-    pub(super) fn end_block(&mut self, mut after: Option<Facts>) -> Option<Facts> {
-        let (depth, blocks) = (self.guards.len(), self.blocks);
+    pub(super) fn end_block(&mut self, after: Option<Facts>) -> Option<Facts> {
+        self.end_block_at(self.guards.len(), after)
+    }
+
+    /// The same of a body whose handlers still take what its jobs raise.
+    pub(super) fn end_body(&mut self, after: Option<Facts>) -> Option<Facts> {
+        self.end_block_at(self.guards.len().saturating_sub(1), after)
+    }
+
+    /// The same for jobs begun deeper than so many bodies with handlers.
+    fn end_block_at(&mut self, depth: usize, mut after: Option<Facts>) -> Option<Facts> {
+        let blocks = self.blocks;
         while let Some((name, _)) = self.jobs.iter().find(|(_, job)| job.depth > depth || job.blocks > blocks) {
             let name = name.clone();
             after = match after {

@@ -111,7 +111,7 @@ impl Flow<'_, '_> {
                 let Some(d) = self.unfinished(end, facts, &format!("can end with `{name}`")) else { continue };
                 let d = d.because(span, format!("`{name}` ends the workflow here, and nothing handles it"));
                 self.forks.left.insert(index, d.clone());
-                self.found(d, end.condition.span);
+                self.found_by_failure(d, end.condition.span);
             }
         }
     }

@@ -13,6 +13,7 @@ use super::value::{Known, Why};
 use super::{Flow, forbidden_on_any_way, only_advice};
 
 /// A finding, and how often it was made.
+#[derive(Clone)]
 pub struct Finding {
     diagnostic: Diagnostic,
     /// The condition or construct it is about.
@@ -26,6 +27,8 @@ pub struct Finding {
     open: usize,
     /// It comes up in one order of branches or jobs, and something else does in the other.
     one_order: bool,
+    /// It is what a written failure leaves that ends the workflow.
+    by_failure: bool,
 }
 
 /// The failure of a need that names none.
@@ -61,6 +64,12 @@ impl Finding {
         !self.turn && self.open <= open
     }
 
+    /// The same as a warning.
+    pub(super) fn softened(mut self) -> Finding {
+        self.diagnostic.severity = Severity::Warning;
+        self
+    }
+
     /// Notes that it comes up in one order of branches or jobs, and something else does in the other.
     pub(super) fn of_one_order(mut self) -> Finding {
         self.one_order = true;
@@ -70,6 +79,11 @@ impl Finding {
     /// Whether it comes up in one order of branches or jobs, and something else does in the other.
     pub(super) fn is_of_one_order(&self) -> bool {
         self.one_order
+    }
+
+    /// Whether it is what a written failure leaves that ends the workflow.
+    pub(super) fn is_by_failure(&self) -> bool {
+        self.by_failure
     }
 
     /// Whether it is of a kind.
@@ -105,12 +119,21 @@ impl Flow<'_, '_> {
         self.found_on(diagnostic, about, None, turn);
     }
 
+    /// Adds what a written failure leaves that ends the workflow.
+    pub(super) fn found_by_failure(&mut self, diagnostic: Diagnostic, about: Span) {
+        let place = (diagnostic.span(), about);
+        let known = self.findings.len();
+        self.found(diagnostic, about);
+        self.findings.iter_mut().skip(known).filter(|f| f.place() == place).for_each(|f| f.by_failure = true);
+    }
+
     /// Adds a finding that is made on some ways, of which so many had met before.
     fn found_on(&mut self, diagnostic: Diagnostic, about: Span, some: Option<usize>, turn: bool) {
         if self.quiet > 0 {
             return;
         }
-        let new = Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false };
+        let new =
+            Finding { diagnostic, about, count: 1, some, turn, open: self.open, one_order: false, by_failure: false };
         match self.findings.iter_mut().find(|f| f.is_like(&new)) {
             Some(old) => {
                 old.count += 1;
@@ -266,7 +289,10 @@ impl Flow<'_, '_> {
         let d = Diagnostic::error(code, condition.span, headline, said);
         let d = Diagnostic { severity: severity(code, some), ..d };
         let d = self.with_history(d, condition, facts);
-        let d = if code == codes::NEVER_MADE { self.with_makers(d, condition) } else { d };
+        let d = match code == codes::NEVER_MADE {
+            true => self.with_makers(d, condition),
+            false => self.with_ions(d, condition, facts),
+        };
         self.found(d, condition.span);
     }
 
@@ -318,7 +344,10 @@ impl Flow<'_, '_> {
         let said = if measured.is_empty() { "waited for here".to_string() } else { measured.join(", ") };
         let d = self.at_site(code, headline, said, self.doubt > 0);
         let d = self.with_history(d, condition, before);
-        let d = if absent.is_some() { self.with_makers(d, condition) } else { d };
+        let d = match absent.is_some() {
+            true => self.with_makers(d, condition),
+            false => self.with_ions(d, condition, before),
+        };
         self.found(d, condition.span);
     }
 
@@ -347,6 +376,20 @@ impl Flow<'_, '_> {
         });
         let name = &self.lab.tables.species.get(s).name;
         none.then(|| format!("nothing brings or makes `{name}` in `{}`", self.lab.spoken_name(mixture)))
+    }
+
+    /// Says where to look for a salt of which nothing is left as it has dissolved.
+    fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
+        let asked: BTreeSet<u32> =
+            condition.compared.iter().flat_map(|c| self.parts(c.value).states.to_vec()).collect();
+        let gone = |state: &u32| facts.states[*state as usize].exact() == Some(0.0);
+        let amounts = self.lab.extensive.iter().filter(|(_, state)| asked.contains(state) && gone(state));
+        let species = &self.lab.tables.species;
+        let salt =
+            amounts.filter_map(|(key, _)| key.matter()).map(|s| species.get(s)).find(|s| !s.dissolves.is_empty());
+        let Some(salt) = salt else { return d };
+        let ions: Vec<String> = salt.dissolves.iter().map(|(ion, _)| format!("`{}`", species.get(*ion).name)).collect();
+        d.help(format!("once dissolved, `{}` counts as its ions: ask for {}", salt.name, ions.join(" or ")))
     }
 
     /// Adds the reactions that would make what is missing.
@@ -397,6 +440,20 @@ impl Flow<'_, '_> {
         let d = self.at_site(codes::TRANSFER_FRACTION, headline, said, some || self.doubt > 0);
         let turn = self.turning > 0;
         self.found_on(d, about, open, turn);
+    }
+
+    /// Events set each other off for certain, more often at one moment than a run follows; this is one of them.
+    pub(super) fn cascades(&mut self, event: u32) {
+        let event = &self.events[event as usize];
+        let headline = format!("`{}` is one of events that set each other off at one moment without end", event.name);
+        let at = if self.in_library(event.span) { self.site() } else { event.span };
+        let mut d = Diagnostic::error(codes::EVENT_CASCADE, at, headline, "fires again and again");
+        d.severity = severity(codes::EVENT_CASCADE, self.doubt > 0);
+        if at != self.site() {
+            d = d.because(self.site(), "comes about in this step");
+        }
+        let d = d.help("give one of them a condition that stays false once the other has fired");
+        self.found(d, event.span);
     }
 
     /// A law takes more of an amount than there is, within the step that is followed now.

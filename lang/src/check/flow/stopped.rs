@@ -258,7 +258,7 @@ impl Flow<'_, '_> {
     }
 
     /// Sets states by a statement that is not the one followed now.
-    fn overwrite(&mut self, span: Span, states: Vec<(u32, Known)>, facts: &mut Facts) {
+    pub(super) fn overwrite(&mut self, span: Span, states: Vec<(u32, Known)>, facts: &mut Facts) {
         let changes: Vec<(u32, Known)> =
             states.into_iter().filter(|(s, known)| facts.states[*s as usize] != *known).collect();
         let changed: Vec<u32> = changes.iter().map(|(state, _)| *state).collect();

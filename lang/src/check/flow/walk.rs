@@ -106,6 +106,11 @@ impl<'l> Flow<'l, '_> {
                 if !met {
                     return Some(self.refused(*body, facts));
                 }
+                match self.begins_under(&node.label, invariants, &mut facts) {
+                    Asked::Met => {}
+                    Asked::Unmet => return Some(self.refused(*body, facts)),
+                    Asked::Handled => return None,
+                }
                 let mut after = self.walk_during(invariants, *body, facts);
                 if let Some(after) = after.as_mut() {
                     self.promised(&node.label, promises, after);
@@ -151,14 +156,27 @@ impl<'l> Flow<'l, '_> {
                         return None;
                     }
                 }
+                let began = facts.time.clone();
                 let mut facts = self.wait_until(id, condition, *timeout, facts)?;
                 if timeout.is_none() || !self.is_taken("timeout") {
                     self.waits_against_keep(&node.label, condition, &facts);
                 }
                 let time = self.duration(*duration, &facts);
                 let longest = timeout.map_or(f64::INFINITY, |node| self.duration(node, &facts).bounds().1);
-                let time =
-                    if self.goes_on_holding(condition.node, &time, &facts) { time } else { at_most(&time, longest) };
+                let holds = self.goes_on_holding(condition.node, &time, &facts);
+                if let Some(lasts) = time.exact().filter(|_| !holds)
+                    && let Some(after) =
+                        self.breaks_off(condition.node, lasts, longest - waited(&began, &facts), &facts)
+                {
+                    // Only the way of the handler goes on.
+                    if timeout.is_some() && self.is_taken("timeout") {
+                        self.pass(&Known::point(longest - waited(&began, &facts)), &mut facts);
+                        self.raise_written("timeout", node.span, facts);
+                        return None;
+                    }
+                    self.never_held(condition, (lasts, after), timeout.is_some());
+                }
+                let time = if holds { time } else { at_most(&time, longest) };
                 self.pass(&time, &mut facts);
                 self.assume(condition.node, true, &mut facts);
                 Some(facts)
@@ -223,6 +241,7 @@ impl<'l> Flow<'l, '_> {
             Step::Start { job, body } => self.start_job(job, *body, facts),
             Step::Await { job } => self.await_job(job, facts),
             Step::Fail { name, .. } => {
+                self.comes_to_fail(id, name, &facts);
                 self.raise_written(name, node.span, facts);
                 None
             }
@@ -457,10 +476,21 @@ impl<'l> Flow<'l, '_> {
             if self.rests(body, &mut facts, &before) {
                 self.more_turns(body, true, &facts);
                 self.raise_written("max", self.plan.get(id).span, facts.clone());
+                let further = later(facts.clone(), &Moment::of(&before));
+                if ends.is_empty() && self.eval(condition.node, &further).truth() == Some(true) {
+                    let timeless = facts.time.exact().is_some() && facts.time == before.time;
+                    self.turns_alike(condition, most, timeless, &facts);
+                    if !self.is_shared(condition.node) {
+                        return None;
+                    }
+                }
                 // A loop that changes nothing it looks at ends by what only a run can tell.
-                ends.push(later(facts, &Moment::of(&before)));
+                ends.push(further);
                 return self.meet(id, &start, ends);
             }
+        }
+        if ends.is_empty() && self.stays_so(condition, body, &facts) {
+            self.runs_out(condition, most, &facts);
         }
         self.more_turns(body, false, &facts);
         self.turns_not_followed(body);
@@ -648,9 +678,9 @@ impl<'l> Flow<'l, '_> {
             self.open += usize::from(i > 0);
             let after = self.walk(*step, entry.clone());
             self.open -= usize::from(i > 0);
-            let raised = self.guards.pop().unwrap_or_default();
             // A job does not outlast the alternative that began it.
-            let after = self.end_block(after);
+            let after = self.end_body(after);
+            let raised = self.guards.pop().unwrap_or_default();
             self.caught.pop();
             ends.extend(after);
             if last {
@@ -682,4 +712,9 @@ impl<'l> Flow<'l, '_> {
 fn at_most(time: &Known, longest: f64) -> Known {
     let (low, high) = time.bounds();
     Known::Range(low, high.max(longest), Why::Unknown)
+}
+
+/// How long something has taken at least, s.
+fn waited(began: &Known, facts: &Facts) -> f64 {
+    (facts.time.bounds().0 - began.bounds().1).max(0.0)
 }
