@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use matterix_ir::model::Action;
-use matterix_ir::plan::{Condition, Operation, Presumption};
+use matterix_ir::plan::{Condition, Operation, Presumption, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::Flow;
@@ -479,12 +479,13 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a command or a primitive skill; nothing where it fails for certain and a handler takes that.
-    pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
+    pub fn operation(&mut self, id: StepId, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
         self.presumptions(label, &operation.presumes, &mut facts);
         let met = match self.needs(label, &operation.needs, &mut facts) {
             Asked::Handled => return None,
             asked => asked == Asked::Met,
         };
+        self.come_to(id);
         let began = facts.time.clone();
         if !met {
             // Said already: what it would have done is not known.

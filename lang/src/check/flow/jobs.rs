@@ -85,6 +85,7 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         late.swap_known(&mut flow);
         late.follow();
         late.swap_known(&mut flow);
+        flow.reaches_also(&late);
         left::on_some_way(&mut late, &begin);
         let first = std::mem::take(&mut flow.findings);
         let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));

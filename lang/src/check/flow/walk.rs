@@ -37,6 +37,10 @@ impl<'l> Flow<'l, '_> {
             return None;
         }
         let node = self.plan.get(id);
+        // An operation that is refused uses nothing.
+        if !matches!(node.step, Step::Operation(_)) {
+            self.come_to(id);
+        }
         let block = matches!(node.step, Step::Sequence(_) | Step::Guarded { .. } | Step::Parallel(_) | Step::Try(_));
         let own = !block && !node.span.is_empty() && !self.in_library(node.span);
         if own {
@@ -90,7 +94,7 @@ impl<'l> Flow<'l, '_> {
             Step::Operation(operation) => {
                 self.note_duration(id, operation, &facts);
                 self.may_report(operation, &facts);
-                self.operation(&node.label, operation, facts)
+                self.operation(id, &node.label, operation, facts)
             }
             Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
             Step::Retry { times } => {
@@ -196,8 +200,12 @@ impl<'l> Flow<'l, '_> {
                 self.raise("broken", broken);
                 self.walk_during(invariants, *body, facts)
             }
-            Step::Within { body, .. } => {
+            Step::Within { limit, since, body } => {
                 self.raise("late", facts.clone());
+                // Only the way of the handler goes on.
+                if self.is_taken("late") && self.is_too_late(*since, *limit, &facts) {
+                    return None;
+                }
                 self.walk(*body, facts)
             }
             Step::If { condition, then, otherwise } => self.choice(id, condition, *then, *otherwise, facts),
@@ -240,6 +248,13 @@ impl<'l> Flow<'l, '_> {
             }
             Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
         }
+    }
+
+    /// Whether a block that must begin within a time of a moment begins later on every way.
+    fn is_too_late(&mut self, since: NodeId, limit: NodeId, facts: &Facts) -> bool {
+        let due = Known::binary(BinaryOp::Add, &self.eval(since, facts), &self.eval(limit, facts));
+        let late = Known::binary(BinaryOp::Lt, &due, &facts.time);
+        late.truth() == Some(true)
     }
 
     /// Follows the body of a skill that is refused, which was said: of what it would have done nothing is known, and whether it would have
