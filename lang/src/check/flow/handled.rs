@@ -3,6 +3,7 @@
 use matterix_ir::plan::{Caught, PlanStep, Step, StepId};
 use matterix_ir::{NodeId, Span};
 
+use super::clashing::CLAIMED;
 use super::facts::Facts;
 use super::value::{Known, Why};
 use super::{Flow, Raised};
@@ -80,8 +81,14 @@ impl Flow<'_, '_> {
         let names = guard.handlers.iter().filter(takes).map(name).collect();
         self.caught.push(if guard.library { Vec::new() } else { names });
         self.guards.push(Vec::new());
+        let takes_clashes = guard.handlers.iter().any(|(caught, _)| match caught {
+            Caught::Named(name) => name == CLAIMED,
+            Caught::Any => !guard.library,
+        });
+        let clashed = if takes_clashes { self.clashed(guard.body, &facts) } else { None };
         let mut after = self.walk(guard.body, facts);
         let mut raised = self.guards.pop().unwrap_or_default();
+        raised.extend(clashed.map(|facts| (CLAIMED.to_owned(), facts)));
         after = self.end_block(after);
         self.caught.pop();
         let mut again = Vec::new();

@@ -11,6 +11,7 @@ mod beside;
 mod bonds;
 mod bracket;
 mod cases;
+mod clashing;
 mod course;
 mod demands;
 mod dual;

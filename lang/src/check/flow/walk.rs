@@ -7,6 +7,7 @@ use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::actions::Asked;
+use super::clashing::CLAIMED;
 use super::course::Course;
 use super::facts::Facts;
 use super::interference::Rival;
@@ -663,7 +664,7 @@ impl<'l> Flow<'l, '_> {
             self.open += usize::from(i > 0);
             let after = self.walk(*step, entry.clone());
             self.open -= usize::from(i > 0);
-            let raised = self.guards.pop().unwrap_or_default();
+            let mut raised = self.guards.pop().unwrap_or_default();
             // A job does not outlast the alternative that began it.
             let after = self.end_block(after);
             self.caught.pop();
@@ -673,6 +674,9 @@ impl<'l> Flow<'l, '_> {
                     outer.extend(raised);
                 }
                 break;
+            }
+            if !raised.is_empty() {
+                raised.extend(self.clashed(*step, &entry).map(|facts| (CLAIMED.to_owned(), facts)));
             }
             match self.entry(id, &facts, raised) {
                 Some(next) => entry = Facts { written: None, ..next },
