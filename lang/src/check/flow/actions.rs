@@ -72,6 +72,8 @@ impl Flow<'_, '_> {
                             self.go_on_after(need, facts);
                         } else if taken && !shared {
                             self.assume(need.node, true, facts);
+                        } else if !taken && !shared {
+                            self.leaves_open(need.node, (self.site(), need.span));
                         }
                     }
                 }
@@ -262,6 +264,8 @@ impl Flow<'_, '_> {
                         self.go_on_after(condition, facts);
                     } else if on_some {
                         self.assume(condition.node, true, facts);
+                    } else if !taken && !self.is_shared(condition.node) {
+                        self.leaves_open(condition.node, (self.site(), condition.span));
                     }
                 }
             }
@@ -291,6 +295,9 @@ impl Flow<'_, '_> {
             }
             Action::Move { fraction, from, to, .. } => {
                 let share = self.eval(*fraction, facts);
+                if share.bounds().1 > 1.0 + TOO_MUCH && share.bounds().0 <= 1.0 && !self.is_beside(*from) {
+                    self.leaves_open(*fraction, (self.site(), self.site()));
+                }
                 let ends = if share.exact().is_none() { self.shares(*fraction, *from, facts) } else { None };
                 let told = self.share_by_case(*fraction, &share, facts);
                 self.transfer(&share, (ends, told), *from, *to, facts)

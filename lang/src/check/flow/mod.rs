@@ -7,6 +7,7 @@
 //! run can tell is left to the run.
 
 mod actions;
+mod apart;
 mod beside;
 mod bonds;
 mod bracket;

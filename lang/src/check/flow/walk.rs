@@ -326,6 +326,9 @@ impl<'l> Flow<'l, '_> {
                 return Some(facts);
             }
         }
+        if value.truth() == Some(false) && !shared && !self.is_taken("timeout") {
+            self.leaves_open(condition.node, (self.site(), condition.span));
+        }
         // Another branch may do what is waited for.
         if value.truth() == Some(false) && shared {
             self.needs_jobs |= self.late && !self.jobs.is_empty();
