@@ -81,6 +81,8 @@ pub struct Execution {
     pub world: World,
     /// Whether the text says what happens: no two threads came to one thing at the same moment, nothing was decided by rounding.
     pub certain: bool,
+    /// Whether no other order of what happens at one moment leads elsewhere: none was stopped that was about to do something.
+    pub alone: bool,
 }
 
 /// A block that a thread is in.
@@ -216,6 +218,7 @@ struct Machine<'p, 'o> {
     violations: Vec<Violation>,
     vain: Vec<Violation>,
     certain: bool,
+    alone: bool,
     last_on: BTreeMap<Thing, Id>,
     /// When steps with a name ended, s, and how many moves an arm had made by then.
     ended: BTreeMap<usize, (f64, usize)>,
@@ -243,6 +246,7 @@ pub fn execute(plan: &Plan, oracle: &mut dyn Oracle) -> Execution {
         violations: Vec::new(),
         vain: Vec::new(),
         certain: true,
+        alone: true,
         last_on: BTreeMap::new(),
         ended: BTreeMap::new(),
         moves: 0,
@@ -262,6 +266,7 @@ pub fn execute(plan: &Plan, oracle: &mut dyn Oracle) -> Execution {
         steps: machine.out,
         world: machine.world,
         certain: machine.certain,
+        alone: machine.alone,
     }
 }
 
@@ -1119,8 +1124,8 @@ impl<'p> Machine<'p, '_> {
 
     fn stop(&mut self, t: usize) {
         if !matches!(self.threads[t].state, State::Ended) {
-            // What it could do at this moment it may have done before: the text does not say in which order.
-            self.certain &= self.threads[t].stopped || !self.is_about_to_act(t);
+            // What it could do at this moment it may have done before: another execution does so.
+            self.alone &= self.threads[t].stopped || !self.is_about_to_act(t);
             self.threads[t].stopped = true;
         }
     }

@@ -384,7 +384,7 @@ impl Verdict {
                 }
             }
         }
-        if !self.summary.complete || !self.summary.certain || has_open_moments(plan) {
+        if !self.summary.complete || !self.summary.certain || !self.summary.alone || has_open_moments(plan) {
             return;
         }
         let passed = outcome.status == RunStatus::Passed || outcome.failure.is_none() && !outcome.unfinished.is_empty();

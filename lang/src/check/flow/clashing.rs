@@ -13,7 +13,7 @@ use super::points::at_least;
 pub(super) const CLAIMED: &str = "claimed";
 
 impl Flow<'_, '_> {
-    /// What is known where a body may have failed because it uses what something beside it uses.
+    /// What is known where a body that was followed may have failed because it uses what something beside it uses.
     pub(super) fn clashed(&mut self, body: StepId, facts: &Facts) -> Option<Facts> {
         if !self.may_clash(body) {
             return None;
@@ -39,11 +39,11 @@ impl Flow<'_, '_> {
         })
     }
 
-    /// What steps use without a `claim` around it among them.
+    /// What steps that were followed use without a `claim` around it among them.
     fn used_by(&self, step: StepId) -> BTreeSet<InstanceId> {
         let node = &self.plan.get(step).step;
         let mut out: BTreeSet<InstanceId> = match node {
-            Step::Operation(operation) => operation.claims.iter().copied().collect(),
+            Step::Operation(operation) if self.is_come_to(step) => operation.claims.iter().copied().collect(),
             _ => BTreeSet::new(),
         };
         out.extend(node.children().into_iter().flat_map(|child| self.used_by(child)));

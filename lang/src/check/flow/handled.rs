@@ -85,10 +85,11 @@ impl Flow<'_, '_> {
             Caught::Named(name) => name == CLAIMED,
             Caught::Any => !guard.library,
         });
-        let clashed = if takes_clashes { self.clashed(guard.body, &facts) } else { None };
         let mut after = self.walk(guard.body, facts);
         let mut raised = self.guards.pop().unwrap_or_default();
-        raised.extend(clashed.map(|facts| (CLAIMED.to_owned(), facts)));
+        if takes_clashes {
+            raised.extend(self.clashed(guard.body, guard.base).map(|facts| (CLAIMED.to_owned(), facts)));
+        }
         after = self.end_block(after);
         self.caught.pop();
         let mut again = Vec::new();

@@ -14,6 +14,11 @@ impl Flow<'_, '_> {
         }
     }
 
+    /// Whether a step was followed, or an operation done.
+    pub(super) fn is_come_to(&self, id: StepId) -> bool {
+        self.reached.get(id.0 as usize).copied().unwrap_or(true)
+    }
+
     /// Takes over what another flow of the same plan comes to.
     pub(super) fn reaches_also(&mut self, other: &Self) {
         self.reached.iter_mut().zip(&other.reached).for_each(|(own, other)| *own |= other);
@@ -26,15 +31,14 @@ impl Flow<'_, '_> {
         if self.steps > MOST_STEPS {
             return out;
         }
-        let is_reached = |id: StepId| self.reached.get(id.0 as usize).copied().unwrap_or(true);
         for (i, node) in self.plan.steps.iter().enumerate() {
             let inner = match &node.step {
                 Step::Sequence(steps) => steps.as_slice(),
                 Step::Within { body, .. } | Step::Skill { body, .. } => std::slice::from_ref(body),
                 _ => continue,
             };
-            if is_reached(StepId(i as u32)) {
-                let behind = inner.iter().filter(|id| !is_reached(**id));
+            if self.is_come_to(StepId(i as u32)) {
+                let behind = inner.iter().filter(|id| !self.is_come_to(**id));
                 out.extend(behind.flat_map(|id| self.below(*id)));
             }
         }
