@@ -214,16 +214,15 @@ impl Flow<'_, '_> {
     }
 
     fn job(&mut self, body: StepId, raced: &BTreeSet<u32>, facts: Facts) -> Option<Facts> {
-        let mut others = self.sets_going(self.beside(body));
-        others.extend(raced);
-        self.begin_job(&others);
-        // What is done before it begins, or once it was waited for, does not disturb it.
+        let mut noted = self.sets_going(self.beside(body));
+        noted.extend(raced);
         let beside = self.concurrent(body);
         let met: BTreeSet<u32> = beside.into_iter().flat_map(|id| self.writes(id)).collect();
-        let met: BTreeSet<u32> = self.sets_going(met).union(raced).copied().collect();
-        self.meets.push(met.clone());
-        self.contested.push(met.intersection(&self.writes(body)).copied().collect());
-        self.shared.push(met);
+        let others: BTreeSet<u32> = self.sets_going(met).union(raced).copied().collect();
+        self.meets.push(others.clone());
+        self.begin_job(&noted);
+        self.contested.push(others.intersection(&self.writes(body)).copied().collect());
+        self.shared.push(others);
         let rival = Rival { steps: self.after_start(body), start: facts.time.clone(), later: false };
         self.rivals.push(vec![rival]);
         self.in_jobs += 1;
