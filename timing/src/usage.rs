@@ -17,17 +17,21 @@ pub struct Use {
 }
 
 /// The uses of a plan, outermost steps: a skill whose every step uses the arm is one use of it. Handlers and `finally`
-/// are left out: there, what is in use is waited for.
-pub fn uses(plan: &Plan, timing: &Timing) -> Vec<Use> {
+/// are left out: there, what is in use is waited for. So are steps in `never`, which no run does.
+pub fn uses(plan: &Plan, timing: &Timing, never: &BTreeSet<StepId>) -> Vec<Use> {
     let mut below: BTreeMap<StepId, BTreeSet<InstanceId>> = BTreeMap::new();
     gather(plan, plan.root, &mut below);
+    let mut partly: BTreeSet<StepId> = BTreeSet::new();
+    if !never.is_empty() {
+        is_partly(plan, plan.root, never, &mut partly);
+    }
     let mut out = Vec::new();
     let mut open = vec![(plan.root, BTreeSet::new())];
     while let Some((step, covered)) = open.pop() {
-        let aside = timing.visit(step).is_none_or(|v| v.aside);
+        let aside = timing.visit(step).is_none_or(|v| v.aside) || never.contains(&step);
         let Some(instances) = below.get(&step).filter(|_| !aside) else { continue };
         let node = &plan.get(step).step;
-        let block = matches!(node, Step::Sequence(_) | Step::Parallel(_));
+        let block = matches!(node, Step::Sequence(_) | Step::Parallel(_)) || partly.contains(&step);
         let whole = |i: &InstanceId| !block && all_along(plan, step, *i) && surely(plan, timing, step, *i);
         let (own, other): (BTreeSet<InstanceId>, BTreeSet<InstanceId>) =
             instances.difference(&covered).partition(|i| whole(i));
@@ -53,6 +57,18 @@ fn gather(plan: &Plan, step: StepId, below: &mut BTreeMap<StepId, BTreeSet<Insta
     }
     below.insert(step, all.clone());
     all
+}
+
+/// Whether no run does some of what is below a step; notes all steps of which that is so.
+fn is_partly(plan: &Plan, step: StepId, never: &BTreeSet<StepId>, partly: &mut BTreeSet<StepId>) -> bool {
+    let mut some = never.contains(&step);
+    for child in plan.get(step).step.children() {
+        some |= is_partly(plan, child, never, partly);
+    }
+    if some {
+        partly.insert(step);
+    }
+    some
 }
 
 /// Whether every way through a step uses an instance all the time.

@@ -49,6 +49,8 @@ pub struct Summary {
     pub complete: bool,
     /// Whether all of them are certain.
     pub certain: bool,
+    /// Whether these are all as far as the order of what happens at one moment goes.
+    pub alone: bool,
     /// By statement.
     pub fates: BTreeMap<Id, Fate>,
     /// What went wrong in executions that are certain.
@@ -89,7 +91,7 @@ impl Oracle for Ways {
 
 /// Follows a plan in all the ways the text leaves open: up to half of the budget one after the other, the rest by lot.
 pub fn explore(plan: &Plan, budget: usize, seed: u64) -> Summary {
-    let mut summary = Summary { certain: true, ..Summary::default() };
+    let mut summary = Summary { certain: true, alone: true, ..Summary::default() };
     let loops = loops(plan);
     let mut prefix = Vec::new();
     let mut random = Random::new(seed ^ 0x5eed);
@@ -181,6 +183,7 @@ impl Summary {
     fn take(&mut self, execution: Execution, loops: &BTreeMap<Id, Vec<Id>>) {
         self.executions += 1;
         self.certain &= execution.certain && execution.end != End::Unfinished;
+        self.alone &= execution.alone;
         let certain = execution.certain;
         let mut failed: BTreeMap<Id, Vec<&'static str>> = BTreeMap::new();
         let mut done = BTreeSet::new();

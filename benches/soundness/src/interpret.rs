@@ -81,6 +81,8 @@ pub struct Execution {
     pub world: World,
     /// Whether the text says what happens: no two threads came to one thing at the same moment, nothing was decided by rounding.
     pub certain: bool,
+    /// Whether no other order of what happens at one moment leads elsewhere: none was stopped that was about to do something.
+    pub alone: bool,
 }
 
 /// A block that a thread is in.
@@ -216,9 +218,12 @@ struct Machine<'p, 'o> {
     violations: Vec<Violation>,
     vain: Vec<Violation>,
     certain: bool,
+    alone: bool,
     last_on: BTreeMap<Thing, Id>,
-    /// When steps with a name ended, s.
-    ended: BTreeMap<usize, f64>,
+    /// When steps with a name ended, s, and how many moves an arm had made by then.
+    ended: BTreeMap<usize, (f64, usize)>,
+    /// Moves of an arm, whose times are a matter of its skills.
+    moves: usize,
 }
 
 /// Follows a plan once.
@@ -241,8 +246,10 @@ pub fn execute(plan: &Plan, oracle: &mut dyn Oracle) -> Execution {
         violations: Vec::new(),
         vain: Vec::new(),
         certain: true,
+        alone: true,
         last_on: BTreeMap::new(),
         ended: BTreeMap::new(),
+        moves: 0,
     };
     let root = Frame::Root { jobs: Vec::new(), finally: false, failed: None };
     machine.spawn(None, vec![root, Frame::Block { stmts: &plan.body, next: 0 }]);
@@ -259,6 +266,7 @@ pub fn execute(plan: &Plan, oracle: &mut dyn Oracle) -> Execution {
         steps: machine.out,
         world: machine.world,
         certain: machine.certain,
+        alone: machine.alone,
     }
 }
 
@@ -569,7 +577,7 @@ impl<'p> Machine<'p, '_> {
             Frame::Named { stmt, name } => {
                 let (stmt, name) = (*stmt, *name);
                 self.threads[t].frames.pop();
-                self.ended.insert(name, self.now);
+                self.ended.insert(name, (self.now, self.moves));
                 self.done(stmt);
             }
             Frame::Parallel { .. } => self.threads[t].state = State::Joins,
@@ -748,8 +756,11 @@ impl<'p> Machine<'p, '_> {
                 self.push(t, body);
             }
             Kind::Within(name, ms, body, handler) => {
-                let limit = self.ended.get(name).map_or(f64::INFINITY, |end| end + f64::from(*ms) / 1000.0);
-                self.certain &= limit.is_finite() && (self.now - limit).abs() > 1e-6;
+                let ended = self.ended.get(name).copied();
+                let limit = ended.map_or(f64::INFINITY, |(end, _)| end + f64::from(*ms) / 1000.0);
+                // How long an arm has moved since then is not known.
+                let timed = ended.is_some_and(|(_, moves)| moves == self.moves);
+                self.certain &= timed && (self.now - limit).abs() > 1e-6;
                 let late = self.now > limit;
                 let handler = handler.as_ref();
                 self.threads[t].frames.push(Frame::Window {
@@ -930,6 +941,7 @@ impl<'p> Machine<'p, '_> {
             Action::Pick(_) => drop(self.last_on.insert(Thing::Arm, stmt)),
             _ => {}
         }
+        self.moves += usize::from(action.uses().contains(&Thing::Arm));
     }
 
     fn end_action(&mut self, t: usize, action: &Action, stmt: Id, whole: bool) {
@@ -1112,8 +1124,26 @@ impl<'p> Machine<'p, '_> {
 
     fn stop(&mut self, t: usize) {
         if !matches!(self.threads[t].state, State::Ended) {
+            // What it could do at this moment it may have done before: another execution does so.
+            self.alone &= self.threads[t].stopped || !self.is_about_to_act(t);
             self.threads[t].stopped = true;
         }
+    }
+
+    /// Whether a thread goes on at this moment with something other than a wait, or has just begun that.
+    fn is_about_to_act(&self, t: usize) -> bool {
+        let ready = match self.threads[t].state {
+            State::Ready => true,
+            State::Waits { until, .. } => until <= self.now,
+            State::Acts { until, ref action, .. } => return until - World::duration(action) >= self.now,
+            _ => false,
+        };
+        let next = match self.threads[t].frames.as_slice() {
+            [] => return false,
+            [.., Frame::Block { stmts, next }] => stmts.get(*next).map(|stmt| &stmt.kind),
+            _ => return ready,
+        };
+        ready && !matches!(next, Some(Kind::Wait(_) | Kind::Until(..) | Kind::Hold(..)))
     }
 
     /// Leaves the innermost block with a failure, or because the thread is stopped.

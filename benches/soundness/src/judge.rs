@@ -13,7 +13,7 @@ use matterix_runtime::run::{RunOptions, run};
 
 use crate::explore::{Summary, explore, same};
 use crate::interpret::Violation;
-use crate::plan::{Id, LIQUIDS, Plan, Stmt, Theme};
+use crate::plan::{Condition, Id, Kind, LIQUIDS, Plan, Stmt, Theme};
 use crate::print::{Text, print, well};
 use crate::world::{DROP, World};
 
@@ -257,12 +257,13 @@ impl Verdict {
             }
             // Where it goes wrong in the same way in every order, the place is a matter of which order is told of. Behind another
             // error nothing is certain.
-            // Where no order ends well, what is told of those beside each other is what comes first in one of them.
+            // Where no order ends well, what is told of those beside each other is what comes first in one of them; so it is where none of
+            // those ends well that come to the statement.
             let beside = jobs || finding.at.is_some_and(|id| places.of(id).contains("parallel"));
             if beside && !self.summary.well && self.summary.complete {
                 continue;
             }
-            let nowhere = self.summary.certain && !self.goes_wrong(finding.code) && alone;
+            let nowhere = self.summary.certain && !self.goes_wrong(finding.code) && alone && !beside;
             let clean = match first.and_then(|id| self.summary.fates.get(id)) {
                 None => first.is_none() && self.summary.clean,
                 // Where an execution leaves a loop early, the finding may be about a turn that it did not come to.
@@ -383,7 +384,7 @@ impl Verdict {
                 }
             }
         }
-        if !self.summary.complete || !self.summary.certain {
+        if !self.summary.complete || !self.summary.certain || !self.summary.alone || has_open_moments(plan) {
             return;
         }
         let passed = outcome.status == RunStatus::Passed || outcome.failure.is_none() && !outcome.unfinished.is_empty();
@@ -419,6 +420,13 @@ impl Verdict {
             self.differ(Sort::Run, "end", format!("{:?}", plan.theme), what);
         }
     }
+}
+
+/// Whether what laws move depends on when noise ends a wait: the executions have some of the moments only.
+fn has_open_moments(plan: &Plan) -> bool {
+    let mut open = false;
+    plan.each(&mut |stmt| open |= matches!(stmt.kind, Kind::Until(Condition::Dial(_), ..)));
+    open && matches!(plan.theme, Theme::Heat | Theme::Reaction)
 }
 
 /// A quantity of a vessel's contents in SI, by its name in `--contents`.

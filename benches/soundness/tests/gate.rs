@@ -11,8 +11,8 @@ const PLANS: u64 = 500;
 
 /// Disagreements that are not mended yet: the seed, and what it is about.
 const KNOWN: &[(u64, &str)] = &[
-    // Two steps that meet in a block of which a failure is taken.
-    (396, "FalseError claimed-twice"),
+    // What a job that fails for certain leaves as it was is unknown where its failure is taken.
+    (259, "Missed volume-underflow"),
 ];
 
 /// Families of checks that the machine must miss when they are switched off.

@@ -92,7 +92,7 @@ pub fn plan(
     let hazards = ready.as_ref().map(mixing::Ready::hazards);
     let about = &*lab;
     let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
-    let takes = || time::plan(about, plan, derivatives, events, &BTreeMap::new(), &[]);
+    let takes = || time::plan(about, plan, derivatives, events, time::Told::default());
     let dangers = hazards.as_deref().unwrap_or_default();
     let follow = || is_whole.then(|| flow::check(about, sources, plan, (events, derivatives), dangers, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
@@ -106,12 +106,16 @@ pub fn plan(
     }
     let about = &*lab;
     let follow = || flow::check(about, sources, plan, (events, derivatives), dangers, asked);
-    let flow::Followed { found, windows, seen, lasting } = followed.unwrap_or_else(follow);
+    let flow::Followed { found, windows, seen, lasting, never } = followed.unwrap_or_else(follow);
     // Times are compared again where following the plan tells how long steps last.
-    let again = |met: &[[Span; 2]]| time::plan(about, plan, derivatives, events, &lasting, met);
-    let mut taken = if lasting.is_empty() { taken } else { again(&[]) };
+    let again = |met: &[[Span; 2]]| {
+        time::plan(about, plan, derivatives, events, time::Told { lasting: &lasting, met, never: &never })
+    };
+    let clashes = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE;
+    let vain = !never.is_empty() && taken.iter().any(clashes);
+    let mut taken = if lasting.is_empty() && !vain { taken } else { again(&[]) };
     // Where the order of all steps is known, nothing is in doubt.
-    let doubted = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE && !d.is_error();
+    let doubted = |d: &Diagnostic| clashes(d) && !d.is_error();
     if taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted) {
         match flow::turns(about, sources, plan, events, derivatives) {
             flow::Turns::Taken => taken.retain(|d| !doubted(d)),

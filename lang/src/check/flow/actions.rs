@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use matterix_ir::model::Action;
-use matterix_ir::plan::{Condition, Operation, Presumption};
+use matterix_ir::plan::{Condition, Operation, Presumption, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::Flow;
@@ -75,6 +75,8 @@ impl Flow<'_, '_> {
                             self.go_on_after(need, facts);
                         } else if taken && !shared {
                             self.assume(need.node, true, facts);
+                        } else if !taken && !shared {
+                            self.leaves_open(need.node, (self.site(), need.span));
                         }
                     }
                 }
@@ -265,6 +267,8 @@ impl Flow<'_, '_> {
                         self.go_on_after(condition, facts);
                     } else if on_some {
                         self.assume(condition.node, true, facts);
+                    } else if !taken && !self.is_shared(condition.node) {
+                        self.leaves_open(condition.node, (self.site(), condition.span));
                     }
                 }
             }
@@ -294,6 +298,9 @@ impl Flow<'_, '_> {
             }
             Action::Move { fraction, from, to, .. } => {
                 let share = self.eval(*fraction, facts);
+                if share.bounds().1 > 1.0 + TOO_MUCH && share.bounds().0 <= 1.0 && !self.is_beside(*from) {
+                    self.leaves_open(*fraction, (self.site(), self.site()));
+                }
                 let ends = if share.exact().is_none() { self.shares(*fraction, *from, facts) } else { None };
                 let told = self.share_by_case(*fraction, &share, facts);
                 self.transfer(&share, (ends, told), *from, *to, facts)
@@ -495,12 +502,13 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a command or a primitive skill; nothing where it fails for certain and a handler takes that.
-    pub fn operation(&mut self, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
+    pub fn operation(&mut self, id: StepId, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
         self.presumptions(label, &operation.presumes, &mut facts);
         let met = match self.needs(label, &operation.needs, &mut facts) {
             Asked::Handled => return None,
             asked => asked == Asked::Met,
         };
+        self.come_to(id);
         let began = facts.time.clone();
         if !met {
             // Said already: what it would have done is not known.

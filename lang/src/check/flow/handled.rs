@@ -3,6 +3,7 @@
 use matterix_ir::plan::{Caught, PlanStep, Step, StepId};
 use matterix_ir::{NodeId, Span};
 
+use super::clashing::CLAIMED;
 use super::facts::Facts;
 use super::value::{Known, Why};
 use super::{Flow, Raised};
@@ -80,9 +81,16 @@ impl Flow<'_, '_> {
         let names = guard.handlers.iter().filter(takes).map(name).collect();
         self.caught.push(if guard.library { Vec::new() } else { names });
         self.guards.push(Vec::new());
+        let takes_clashes = guard.handlers.iter().any(|(caught, _)| match caught {
+            Caught::Named(name) => name == CLAIMED,
+            Caught::Any => !guard.library,
+        });
         let mut after = self.walk(guard.body, facts);
         after = self.end_body(after);
         let mut raised = self.guards.pop().unwrap_or_default();
+        if takes_clashes {
+            raised.extend(self.clashed(guard.body, guard.base).map(|facts| (CLAIMED.to_owned(), facts)));
+        }
         self.caught.pop();
         let mut again = Vec::new();
         // What handlers raise leaves as well.

@@ -200,7 +200,7 @@ fn same(a: f64, b: f64) -> bool {
 
 impl<'l> Flow<'l, '_> {
     /// Steps, each with those that go on beside it.
-    fn side_by_side(&self) -> Vec<(StepId, Vec<StepId>)> {
+    pub(super) fn side_by_side(&self) -> Vec<(StepId, Vec<StepId>)> {
         let plan = self.plan;
         let mut pairs: Vec<(StepId, Vec<StepId>)> = Vec::new();
         for step in &plan.steps {

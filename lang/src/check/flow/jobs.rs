@@ -14,7 +14,7 @@ use super::points::at_least;
 use super::report::Finding;
 use super::stopped::{Beside, Course};
 use super::value::Known;
-use super::{Raised, left, parted};
+use super::{Raised, apart, left, parted};
 
 /// A job that was started and not waited for yet.
 #[derive(Clone, Debug)]
@@ -77,6 +77,7 @@ pub(super) type Jobs = BTreeMap<String, Job>;
 /// Follows a plan way by way, and in both orders where it starts jobs; `begin` gives one that was not followed yet.
 pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
     let mut flow = parted::follow(&begin);
+    apart::add_findings(&mut flow, &begin);
     left::on_some_way(&mut flow, &begin);
     if flow.plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. })) {
         let mut late = begin();
@@ -85,6 +86,7 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
         late.swap_known(&mut flow);
         late.follow();
         late.swap_known(&mut flow);
+        flow.reaches_also(&late);
         left::on_some_way(&mut late, &begin);
         let first = std::mem::take(&mut flow.findings);
         let unsearched = |f: &Finding| f.is(codes::NOT_ANALYSED) && !first.iter().any(|o| o.is_like(f));

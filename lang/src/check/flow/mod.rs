@@ -7,10 +7,12 @@
 //! run can tell is left to the run.
 
 mod actions;
+mod apart;
 mod beside;
 mod bonds;
 mod bracket;
 mod cases;
+mod clashing;
 mod course;
 mod demands;
 mod dual;
@@ -34,6 +36,7 @@ mod parted;
 mod points;
 mod polytope;
 mod raced;
+mod reached;
 mod report;
 mod reported;
 mod stopped;
@@ -218,6 +221,8 @@ struct Flow<'l, 'a> {
     in_jobs: usize,
     /// Whether the plan was followed to its end, and that looked at.
     ended: bool,
+    /// By step: whether it was followed.
+    reached: Vec<bool>,
     steps: usize,
     /// What is known after each statement, where it is asked for.
     notes: Option<points::Notes>,
@@ -233,6 +238,8 @@ pub struct Followed {
     pub seen: Vec<Seen>,
     /// How long operations last of which that follows from states, s, by step.
     pub lasting: BTreeMap<StepId, (f64, f64)>,
+    /// Steps that no run comes to.
+    pub never: BTreeSet<StepId>,
 }
 
 /// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement. `hazards` are
@@ -258,6 +265,7 @@ pub fn check(
     let seen = flow.seen();
     let windows = std::mem::take(&mut flow.windows);
     let lasting = flow.durations();
+    let never = flow.never_reached();
     let others = otherwise::other_values(&mut flow);
     let mut found = flow.diagnostics();
     for other in others {
@@ -271,7 +279,7 @@ pub fn check(
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);
     }
-    Followed { found, windows, seen, lasting }
+    Followed { found, windows, seen, lasting, never }
 }
 
 /// Whether branches and jobs use things one after the other.
@@ -384,6 +392,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             stops_jobs: false,
             in_jobs: 0,
             ended: false,
+            reached: vec![false; plan.steps.len()],
             steps: 0,
             notes: None,
         };

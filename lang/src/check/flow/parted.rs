@@ -8,6 +8,7 @@ use matterix_ir::Span;
 use matterix_ir::plan::StepId;
 
 use super::Flow;
+use super::apart::{Meeting, Open};
 use super::facts::Facts;
 use super::value::Why;
 
@@ -32,8 +33,10 @@ pub(super) type Place = (Span, Span);
 /// Ways that have met, and which of them is followed alone.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ways {
-    /// How many met, meeting by meeting.
-    met: Vec<usize>,
+    /// What met, meeting by meeting.
+    pub(super) met: Vec<Meeting>,
+    /// What is open behind meetings.
+    pub(super) open: Vec<Open>,
     /// A meeting, and the one of its ways that is followed.
     chosen: Option<(usize, usize)>,
     /// Findings that come up on none of the ways.
@@ -44,6 +47,17 @@ impl Ways {
     /// The same for a plan that is followed again: what was cleared stays so.
     pub(super) fn again(self) -> Ways {
         Ways { cleared: self.cleared, ..Ways::default() }
+    }
+
+    /// Follows one way of a meeting alone, and finds nothing that `other` has cleared.
+    pub(super) fn follow_alone(&mut self, other: &Ways, meeting: usize, way: usize) {
+        self.cleared.clone_from(&other.cleared);
+        self.chosen = Some((meeting, way));
+    }
+
+    /// Whether one way of a meeting is followed alone.
+    pub(super) fn is_alone(&self) -> bool {
+        self.chosen.is_some()
     }
 
     /// How many meetings there were by now.
@@ -77,7 +91,7 @@ fn in_vain<'l, 'a>(flow: &Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>, left:
     let before = |meetings: usize| meetings.saturating_sub(NEAR)..meetings;
     let meetings: BTreeSet<usize> = open.iter().flat_map(|(_, meetings)| before(*meetings)).collect();
     for number in meetings.into_iter().rev().take(MOST_MEETINGS) {
-        let ways = flow.ways.met[number];
+        let ways = flow.ways.met[number].ways();
         if open.iter().all(|(_, meetings)| *meetings <= number) || *left < ways * flow.steps {
             continue;
         }
@@ -86,8 +100,7 @@ fn in_vain<'l, 'a>(flow: &Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>, left:
         for way in 0..ways {
             let mut one = begin();
             one.notes = None;
-            one.ways.cleared.clone_from(&flow.ways.cleared);
-            one.ways.chosen = Some((number, way));
+            one.ways.follow_alone(&flow.ways, number, way);
             one.follow();
             sites.extend(one.findings.iter().map(|f| f.place().0));
         }
@@ -116,7 +129,7 @@ impl Flow<'_, '_> {
         // In a loop a meeting is many: the ways of one turn are not those of the next.
         if differ && self.turning == 0 {
             let number = self.ways.met.len();
-            self.ways.met.push(ways.len());
+            self.ways.met.push(Meeting::of(&ways));
             if let Some((_, way)) = self.ways.chosen.filter(|(chosen, way)| *chosen == number && *way < ways.len()) {
                 return Some(ways.swap_remove(way));
             }

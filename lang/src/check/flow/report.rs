@@ -86,6 +86,13 @@ impl Finding {
         self.by_failure
     }
 
+    /// The same on some of the ways that lead there.
+    pub(super) fn on_some_ways(mut self) -> Finding {
+        self.diagnostic.severity = Severity::Warning;
+        self.diagnostic.headline.push_str(", on some ways through the plan");
+        self
+    }
+
     /// Whether it is of a kind.
     pub(super) fn is(&self, code: Code) -> bool {
         self.diagnostic.code == code

@@ -7,6 +7,7 @@ use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
 use super::actions::Asked;
+use super::clashing::CLAIMED;
 use super::course::Course;
 use super::facts::Facts;
 use super::interference::Rival;
@@ -37,6 +38,10 @@ impl<'l> Flow<'l, '_> {
             return None;
         }
         let node = self.plan.get(id);
+        // An operation that is refused uses nothing.
+        if !matches!(node.step, Step::Operation(_)) {
+            self.come_to(id);
+        }
         let block = matches!(node.step, Step::Sequence(_) | Step::Guarded { .. } | Step::Parallel(_) | Step::Try(_));
         let own = !block && !node.span.is_empty() && !self.in_library(node.span);
         if own {
@@ -90,7 +95,7 @@ impl<'l> Flow<'l, '_> {
             Step::Operation(operation) => {
                 self.note_duration(id, operation, &facts);
                 self.may_report(operation, &facts);
-                self.operation(&node.label, operation, facts)
+                self.operation(id, &node.label, operation, facts)
             }
             Step::Guarded { body, handlers, finally } => self.guarded(id, *body, handlers, *finally, facts),
             Step::Retry { times } => {
@@ -214,8 +219,12 @@ impl<'l> Flow<'l, '_> {
                 self.raise("broken", broken);
                 self.walk_during(invariants, *body, facts)
             }
-            Step::Within { body, .. } => {
+            Step::Within { limit, since, body } => {
                 self.raise("late", facts.clone());
+                // Only the way of the handler goes on.
+                if self.is_taken("late") && self.is_too_late(*since, *limit, &facts) {
+                    return None;
+                }
                 self.walk(*body, facts)
             }
             Step::If { condition, then, otherwise } => self.choice(id, condition, *then, *otherwise, facts),
@@ -259,6 +268,13 @@ impl<'l> Flow<'l, '_> {
             }
             Step::Record { .. } | Step::Note(_) | Step::Ask(_) => Some(facts),
         }
+    }
+
+    /// Whether a block that must begin within a time of a moment begins later on every way.
+    fn is_too_late(&mut self, since: NodeId, limit: NodeId, facts: &Facts) -> bool {
+        let due = Known::binary(BinaryOp::Add, &self.eval(since, facts), &self.eval(limit, facts));
+        let late = Known::binary(BinaryOp::Lt, &due, &facts.time);
+        late.truth() == Some(true)
     }
 
     /// Follows the body of a skill that is refused, which was said: of what it would have done nothing is known, and whether it would have
@@ -328,6 +344,9 @@ impl<'l> Flow<'l, '_> {
                 self.forget(&states, &mut facts);
                 return Some(facts);
             }
+        }
+        if value.truth() == Some(false) && !shared && !self.is_taken("timeout") {
+            self.leaves_open(condition.node, (self.site(), condition.span));
         }
         // Another branch may do what is waited for.
         if value.truth() == Some(false) && shared {
@@ -680,7 +699,7 @@ impl<'l> Flow<'l, '_> {
             self.open -= usize::from(i > 0);
             // A job does not outlast the alternative that began it.
             let after = self.end_body(after);
-            let raised = self.guards.pop().unwrap_or_default();
+            let mut raised = self.guards.pop().unwrap_or_default();
             self.caught.pop();
             ends.extend(after);
             if last {
@@ -688,6 +707,9 @@ impl<'l> Flow<'l, '_> {
                     outer.extend(raised);
                 }
                 break;
+            }
+            if !raised.is_empty() {
+                raised.extend(self.clashed(*step, &entry).map(|facts| (CLAIMED.to_owned(), facts)));
             }
             match self.entry(id, &facts, raised) {
                 Some(next) => entry = Facts { written: None, ..next },

@@ -73,7 +73,7 @@ fn shared(times: &Times<'_>) -> BTreeMap<InstanceId, Vec<StepId>> {
 /// Blocks that may have to wait for a step without a `claim` of its own.
 fn delayed_by_uses(times: &Times<'_>, holds: &[Use]) -> BTreeSet<StepId> {
     let mut uses: BTreeMap<InstanceId, Vec<Use>> = BTreeMap::new();
-    for used in usage::uses(times.plan, &times.timing) {
+    for used in usage::uses(times.plan, &times.timing, &BTreeSet::new()) {
         uses.entry(used.instance).or_default().push(used);
     }
     let waits = |hold: &&Use| uses.get(&hold.instance).into_iter().flatten().any(|used| may_delay(times, hold, used));

@@ -31,16 +31,32 @@ const MOST_WORK: usize = 2_000_000_000;
 /// Rounds in which single blocks are found to wait; after them, all wait that others contend with.
 const MOST_ROUNDS: usize = 6;
 
-/// Reports contradictions in the times of a plan and in the use of instances; `lasting` says how long steps last, s, where that
-/// follows from states. Steps in `met`, by their places in the text, are known to use one thing at the same time.
+/// What following the plan tells about its times.
+#[derive(Clone, Copy)]
+pub struct Told<'t> {
+    /// How long steps last, s, where that follows from states.
+    pub lasting: &'t BTreeMap<StepId, (f64, f64)>,
+    /// Statements that are known to use one thing at the same time, by their places in the text.
+    pub met: &'t [[Span; 2]],
+    /// Steps that no run comes to.
+    pub never: &'t BTreeSet<StepId>,
+}
+
+impl Default for Told<'_> {
+    fn default() -> Self {
+        Told { lasting: const { &BTreeMap::new() }, met: &[], never: const { &BTreeSet::new() } }
+    }
+}
+
+/// Reports contradictions in the times of a plan and in the use of instances.
 pub fn plan(
     lab: &Elaborator<'_>,
     plan: &Plan,
     derivatives: &[Derivative],
     events: &[Event],
-    lasting: &BTreeMap<StepId, (f64, f64)>,
-    met: &[[Span; 2]],
+    told: Told<'_>,
 ) -> Vec<Diagnostic> {
+    let Told { lasting, met, never } = told;
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
     let mut known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
     known.lasting = lasting.iter().map(|(id, (min, max))| (*id, Interval { min: *min, max: *max })).collect();
@@ -52,7 +68,7 @@ pub fn plan(
     let name = |i: matterix_ir::scene::InstanceId| {
         lab.instances.get(i.0 as usize).map_or_else(String::new, |i| i.name.clone())
     };
-    found.extend(twice::findings(&times, met, &name));
+    found.extend(twice::findings(&times, met, never, &name));
     found.extend(again::findings(&times, &known));
     found.extend(deadlock::findings(&times, &name));
     if times.work.get() > MOST_WORK {

@@ -17,10 +17,16 @@ const MOST: usize = 2_000_000;
 const MOST_CALLS: usize = 2;
 
 /// Uses that overlap, or may, where nothing makes them take turns. Between two lines of steps one clash over an instance is said,
-/// a certain one before one that may be. Of steps whose places are in `met` it is known that they do.
-pub(super) fn findings(times: &Times<'_>, met: &[[Span; 2]], name: &dyn Fn(InstanceId) -> String) -> Vec<Diagnostic> {
-    let mut uses = usage::uses(times.plan, &times.timing);
+/// a certain one before one that may be. Of steps whose places are in `met` it is known that they do; no run comes to those in `never`.
+pub(super) fn findings(
+    times: &Times<'_>,
+    met: &[[Span; 2]],
+    never: &BTreeSet<StepId>,
+    name: &dyn Fn(InstanceId) -> String,
+) -> Vec<Diagnostic> {
+    let mut uses = usage::uses(times.plan, &times.timing, never);
     uses.extend(held::holds(times));
+    uses.retain(|used| !never.contains(&used.step));
     uses.sort_unstable();
     let mut clashes: Vec<(&Use, &Use, bool)> = Vec::new();
     let mut unfinished: Option<&Use> = None;
