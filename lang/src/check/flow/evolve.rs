@@ -787,7 +787,7 @@ impl Flow<'_, '_> {
     }
 
     /// The atoms of each element in what an amount counts.
-    fn atoms(&self, state: u32) -> Vec<(Element, f64)> {
+    pub(super) fn atoms(&self, state: u32) -> Vec<(Element, f64)> {
         let counted = self.mixtures.iter().flatten().find(|(_, s)| *s == state).and_then(|(key, _)| key.species);
         let formula = counted.and_then(|species| self.lab.tables.species.get(species).formula.as_ref());
         formula.map_or(Vec::new(), |f| f.elements.iter().map(|(element, n)| (*element, n.to_f64())).collect())
