@@ -79,7 +79,8 @@ impl Flow<'_, '_> {
                 return Course::Left(left);
             }
             let timers = self.timers(&even, left, facts);
-            if timers.unsure || (even.slopes.is_empty() && timers.events.is_empty()) {
+            let still = even.slopes.is_empty() && timers.events.is_empty();
+            if timers.unsure || (still && (changes == 0 || !self.rests_at_thresholds(&even, facts))) {
                 break;
             }
             // What only a run can tell may come about at any moment.

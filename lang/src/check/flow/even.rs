@@ -271,6 +271,11 @@ impl Flow<'_, '_> {
         })
     }
 
+    /// Whether a condition of a flow stands at its threshold, where only how it came there tells how it comes out.
+    pub(super) fn rests_at_thresholds(&mut self, even: &Even, facts: &Facts) -> bool {
+        even.truths.keys().any(|node| self.rests_at_threshold(*node, even, facts))
+    }
+
     /// What moves evenly from here on, where the conditions it goes by come out as it moves; none where they change each other, as that
     /// of a flow that empties what fills only while it does not go on.
     pub(super) fn settled(&mut self, facts: &Facts, last: &Even) -> Option<Even> {
