@@ -17,6 +17,12 @@ use crate::mesh::{self, hull};
 use crate::place::isometry;
 use crate::turned;
 
+/// A contact nearer to nothing than this may be that of pieces that are placed alike, m.
+const ALIGNED: f64 = 1e-9;
+
+/// By how much such a piece is moved, along none of the axes, m.
+const NUDGE: [f64; 3] = [1.1e-6, 2.3e-6, 1.7e-6];
+
 /// Something rigid, of one or more convex pieces.
 #[derive(Clone)]
 pub struct Body {
@@ -145,25 +151,41 @@ impl Body {
 /// is still said deeper than it is, by 2 mm in 20.
 fn contact(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, within: f64) -> Option<query::Contact> {
     // Only pairs of convex pieces are asked about, which all are supported.
-    let one = query::contact(&mine.at, mine.shape.as_ref(), theirs_at, theirs.shape.as_ref(), within).ok().flatten();
+    let one = one_way((&mine.at, mine), (theirs_at, theirs), within);
     if one.is_some_and(|c| c.dist >= 0.0) {
         return one;
     }
-    let other = query::contact(theirs_at, theirs.shape.as_ref(), &mine.at, mine.shape.as_ref(), within).ok().flatten();
-    let other = other.map(query::Contact::flipped);
+    let other = one_way((theirs_at, theirs), (&mine.at, mine), within).map(query::Contact::flipped);
     match (one, other) {
         (Some(a), Some(b)) => Some(if a.dist < b.dist { b } else { a }),
         (a, b) => a.or(b),
     }
 }
 
+/// The contact of two pieces, the first one's own side first.
+///
+/// Pieces that are placed alike, so that faces and corners of both lie in one plane, leave the expansion without a direction: it may stop at a
+/// distance of nothing however deep they are in each other. Such an answer counts only if the same pieces a little apart give it too.
+fn one_way(one: (&Isometry, &Convex), other: (&Isometry, &Convex), within: f64) -> Option<query::Contact> {
+    let ask = |other_at: &Isometry, within: f64| {
+        query::contact(one.0, one.1.shape.as_ref(), other_at, other.1.shape.as_ref(), within).ok().flatten()
+    };
+    let found = ask(other.0, within.max(ALIGNED))?;
+    if found.dist.abs() > ALIGNED {
+        return Some(found);
+    }
+    let nudged = Isometry::from_translation(Vector::from(NUDGE)) * *other.0;
+    let deep = ask(&nudged, within).filter(|c| c.dist < -2.0 * NUDGE[1]);
+    deep.or(Some(found).filter(|c| c.dist <= within))
+}
+
 /// Whether [`contact`] is deeper than this, m.
 fn is_deep(mine: &Convex, theirs: &Convex, theirs_at: &Isometry, deeper: f64) -> bool {
-    let one = query::contact(&mine.at, mine.shape.as_ref(), theirs_at, theirs.shape.as_ref(), 0.0).ok().flatten();
+    let one = one_way((&mine.at, mine), (theirs_at, theirs), 0.0);
     if one.is_some_and(|c| c.dist >= -deeper) {
         return false;
     }
-    let other = query::contact(theirs_at, theirs.shape.as_ref(), &mine.at, mine.shape.as_ref(), 0.0).ok().flatten();
+    let other = one_way((theirs_at, theirs), (&mine.at, mine), 0.0);
     other.map_or(one.is_some(), |c| c.dist < -deeper)
 }
 

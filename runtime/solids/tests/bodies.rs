@@ -120,3 +120,21 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn vessels_placed_alike_are_in_each_other() {
+    let beaker = body(&beaker());
+    let still = Isometry::identity();
+    // Walls and floors of both lie in the same planes, and their corners in one line.
+    for far in (2..60).step_by(2) {
+        for there in [at(f64::from(far) * 1e-3, 0.0, 0.0), at(0.0, f64::from(far) * 1e-3, 0.0)] {
+            let depth = -apart(&beaker, &beaker, there);
+            assert!(depth > 3e-4 && beaker.meets(&still, &beaker, &there, 3e-4), "{depth} m at {far} mm");
+        }
+    }
+    let beside = at(0.06, 0.0, 0.0);
+    assert!(apart(&beaker, &beaker, beside) > -1e-6 && !beaker.meets(&still, &beaker, &beside, 1e-6));
+    // What stands on something only touches it.
+    let block = body(&Shape::Box([0.06, 0.06, 0.02]));
+    assert!(apart(&block, &block, at(0.0, 0.0, 0.02)).abs() < 1e-6);
+}

@@ -167,6 +167,38 @@ impl Bonds {
         self.extents.iter().find(|e| alike(&e.direction, direction)).map(|e| e.range)
     }
 
+    /// Takes the extents that alone change one of these states for what each has come to, and adds what they brought to the bases of all
+    /// states that they change. The states that nothing else changes, with what they are; none where no extent is known so.
+    pub fn come_to(&mut self, ends: &[(u32, f64)]) -> Option<Vec<(u32, Known)>> {
+        let mut gone: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+        for (state, end) in ends {
+            let Some(base) = self.states.get(state).and_then(|bond| bond.base.exact()) else { continue };
+            let coefficient = |e: &Extent| e.direction.iter().find(|(s, _)| s == state).map(|(_, c)| *c);
+            let mut of = self.extents.iter().enumerate().filter_map(|(i, e)| coefficient(e).map(|c| (i, c)));
+            let (Some((extent, c)), None) = (of.next(), of.next()) else { continue };
+            let (far, slack) = ((end - base) / c, SAME * base.abs().max(end.abs()) / c.abs());
+            gone.entry(extent).or_insert((far - slack, far + slack));
+        }
+        if gone.is_empty() {
+            return None;
+        }
+        for (extent, range) in &gone {
+            for (state, c) in self.extents[*extent].direction.clone().iter() {
+                if let Some(bond) = self.states.get_mut(state) {
+                    let (low, high) = scaled(*c, *range);
+                    bond.base = Known::binary(BinaryOp::Add, &bond.base, &Known::Range(low, high, Why::Unknown));
+                }
+            }
+        }
+        let mut place = 0..;
+        self.extents.retain(|_| !place.next().is_some_and(|at: usize| gone.contains_key(&at)));
+        let moves = |state: &u32| self.extents.iter().any(|e| e.direction.iter().any(|(s, _)| s == state));
+        let still = self.states.iter().filter(|(state, _)| !moves(state));
+        let still = still.map(|(state, bond)| (*state, bond.base.clone())).collect();
+        self.forget_still();
+        Some(still)
+    }
+
     /// Brings extents in as far as no amount falls below nothing; the bounds of each amount. Where too many hang together for the
     /// corners of what extents can be, the atoms that are there bound the amounts.
     pub fn tighten(

@@ -2,6 +2,7 @@
 //! events that happen there and the limits that are passed on the way.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, Leaves, NodeId, Op, Severity, UnaryOp};
 
@@ -9,7 +10,7 @@ use super::Flow;
 use super::dual::{Along, Dual};
 use super::eval::Exact;
 use super::even::{Even, Tracks};
-use super::facts::Facts;
+use super::facts::{Facts, same_history};
 use super::timers::{Timers, comes_before};
 use super::value::{CLOSE, Known, Why};
 
@@ -71,9 +72,15 @@ impl Flow<'_, '_> {
         let mut changes = 0;
         let begun = facts.clone();
         for _ in 0..MOST_CHANGES {
-            let even = self.even(facts, &last);
+            let Some(even) = self.settled(facts, &last) else { break };
+            if let Some(state) = even.empty.filter(|_| left > 0.0) {
+                self.takes_from_nothing(state);
+                self.forget(&even.slopes.iter().map(|(s, ..)| *s).collect::<Vec<u32>>(), facts);
+                return Course::Left(left);
+            }
             let timers = self.timers(&even, left, facts);
-            if timers.unsure || (even.slopes.is_empty() && timers.events.is_empty()) {
+            let still = even.slopes.is_empty() && timers.events.is_empty();
+            if timers.unsure || (still && (changes == 0 || !self.rests_at_thresholds(&even, facts))) {
                 break;
             }
             // What only a run can tell may come about at any moment.
@@ -107,7 +114,9 @@ impl Flow<'_, '_> {
                 self.runs_dry(&even, step, facts);
                 return Course::Left(left);
             }
+            let history = facts.history.clone();
             self.events_along(&even, &timers, facts);
+            let jumped = !same_history(&history, &facts.history);
             let reached = until.iter().filter(|(node, truth)| self.truth_beyond(*node, &even, facts) == Some(*truth));
             let reached: Vec<NodeId> = reached.map(|(node, _)| *node).collect();
             if !reached.is_empty() {
@@ -117,6 +126,9 @@ impl Flow<'_, '_> {
                 return Course::Passed;
             }
             last = even;
+            if jumped {
+                last.truths.clear();
+            }
             changes += 1;
         }
         if changes == MOST_CHANGES {
@@ -210,7 +222,13 @@ impl Flow<'_, '_> {
     }
 
     /// The difference of two sides after a time, how fast it changes, and the size of the larger one.
-    fn difference(&mut self, (a, b): Sides, even: &Even, time: f64, facts: &Facts) -> Option<(f64, f64, f64)> {
+    pub(super) fn difference(
+        &mut self,
+        (a, b): Sides,
+        even: &Even,
+        time: f64,
+        facts: &Facts,
+    ) -> Option<(f64, f64, f64)> {
         let a = self.along_at(a, even, time, facts)?;
         let b = b.map_or(Some(Dual::default()), |b| self.along_at(b, even, time, facts))?;
         let known = |v: f64| if v.is_nan() { 0.0 } else { v };
@@ -234,7 +252,13 @@ impl Flow<'_, '_> {
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let mut events = self.events_on(&followed);
         events.extend(&timers.events);
+        events.extend(self.events_at_rest(even, facts));
         self.at_moments.clone_from(&timers.events);
+        for event in &events {
+            if self.comes_at_its_moment(*event, even, facts) {
+                self.at_moments.push(*event);
+            }
+        }
         self.unheard(|flow| flow.drift(&Known::Point(step), facts));
         self.at_moments.clear();
         // What the events that are followed do is done at their moment.
@@ -243,6 +267,7 @@ impl Flow<'_, '_> {
         let kept = set.into_iter().filter(|s| !even.open.contains(s)).chain(followed.iter().copied());
         let kept: Vec<u32> =
             kept.chain(self.tracks().list.iter().map(|t| t.state).filter(|s| !even.open.contains(s))).collect();
+        self.narrow_by_streams(step, even, facts);
         let back: Vec<(u32, Known)> = kept.iter().map(|s| (*s, before.states[*s as usize].clone())).collect();
         facts.rebind(|bonds, _| bonds.release(&kept));
         back.into_iter().for_each(|(s, known)| facts.states[s as usize] = known);
@@ -257,6 +282,46 @@ impl Flow<'_, '_> {
         }
         self.write(changes, facts);
         facts.barrier = None;
+    }
+
+    /// Whether all that an event asks for is known at every moment while states move so: it comes about between two steps of them only.
+    fn comes_at_its_moment(&mut self, event: u32, even: &Even, facts: &Facts) -> bool {
+        let parts = self.parts(self.events[event as usize].when);
+        let known = |s: &u32| !even.open.contains(s) && facts.states[*s as usize].exact().is_some();
+        !parts.timed && parts.states.iter().all(known)
+    }
+
+    /// Events of states that are known to stay as they are where flows balance each other: they do not come about.
+    fn events_at_rest(&mut self, even: &Even, facts: &Facts) -> Vec<u32> {
+        let rest = |s: u32| !even.moves(s) && !even.open.contains(&s) && facts.states[s as usize].exact().is_some();
+        let tracks = self.tracks();
+        let resting: Vec<u32> = tracks.list.iter().map(|t| t.state).filter(|s| rest(*s)).collect();
+        let mut events = self.events_on(&resting);
+        events.retain(|i| {
+            let parts = self.parts(self.events[*i as usize].when);
+            !parts.timed && parts.states.iter().all(|s| rest(*s))
+        });
+        events
+    }
+
+    /// Brings in how far streams have gone by what they have taken evenly, and with it the amounts where they end: of a reagent no more
+    /// reacts than was dosed.
+    fn narrow_by_streams(&mut self, step: f64, even: &Even, facts: &mut Facts) {
+        let Some(mut bonds) = facts.bonds.as_deref().cloned() else { return };
+        bonds.settle(facts);
+        let ends: Vec<(u32, f64)> = even.slopes.iter().map(|(s, value, slope)| (*s, value + slope * step)).collect();
+        let Some(still) = bonds.come_to(&ends) else { return };
+        let amounts = bonds.tighten(|state| self.amounts.contains(&state), |state| self.atoms(state));
+        let still = still.into_iter().map(|(state, base)| (state, base.bounds()));
+        for (state, (low, high)) in still.chain(amounts) {
+            let (least, most) = facts.states[state as usize].bounds();
+            let (low, high) = (low.max(least), high.min(most));
+            if low <= high {
+                facts.states[state as usize] = Known::Range(low, high, Why::Unknown);
+            }
+        }
+        bonds.stamp(facts);
+        facts.bonds = Some(Rc::new(bonds)).filter(|bonds| !bonds.is_empty());
     }
 
     /// A state that has come to a number, give or take rounding, is that number.

@@ -5,17 +5,27 @@
 //! amount over volume stays as it is, and the stream brings the same amounts at every moment; whether it does is read off the
 //! rates themselves.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, NodeId, Op};
 
 use super::Flow;
 use super::facts::Facts;
-use super::value::Known;
+use super::value::{CLOSE, Known};
 
 /// Rates that differ by less than this share of them are in proportion.
 const ALIKE: f64 = 1e-9;
+
+/// Terms whose sum is below this share of them cancel.
+const CANCELS: f64 = 1e-12;
+
+/// Shares of the shortest time in which a state would double or vanish at which a term is compared with what it is now: more of them than a
+/// difference of two temperatures can have zeros.
+const MOMENTS: [f64; 4] = [0.09, 0.23, 0.52, 0.88];
+
+/// Times that conditions may change each other where states stand at a threshold, before what follows is left open.
+const MOST_TURNS: usize = 4;
 
 /// A state whose rate is a sum that may be even.
 #[derive(Debug)]
@@ -58,6 +68,10 @@ pub(super) struct Even {
     pub slopes: Vec<(u32, f64, f64)>,
     /// States that are not known to be at rest or to move evenly.
     pub open: BTreeSet<u32>,
+    /// How the conditions of terms come out from then on.
+    pub truths: BTreeMap<NodeId, bool>,
+    /// A state of a mixture that is empty, from which a stream takes.
+    pub empty: Option<u32>,
 }
 
 impl Even {
@@ -151,22 +165,25 @@ impl Flow<'_, '_> {
         let tracks = self.tracks();
         let mut open: BTreeSet<u32> = tracks.wild.iter().copied().collect();
         let others = self.but_for_others(facts);
+        let mut empty = None;
         loop {
             let mut veiled = others.as_ref().unwrap_or(facts).clone();
             open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
             let mut found = Vec::new();
             let mut new = BTreeSet::new();
+            let mut even = Even::default();
             for track in tracks.list.iter().filter(|t| !open.contains(&t.state)) {
-                match self.slope(track, last, &veiled) {
+                match self.slope(track, last, &veiled, &mut even) {
                     Some((value, slope, terms)) => found.push((track, value, slope, terms)),
                     None => _ = new.insert(track.state),
                 }
             }
             let slopes = found.iter().filter(|(_, _, slope, _)| *slope != 0.0).map(|(t, v, s, _)| (t.state, *v, *s));
-            let even = Even { slopes: slopes.collect(), open: BTreeSet::new() };
+            even.slopes = slopes.collect();
+            empty = empty.or(even.empty);
             if new.is_empty() {
                 for (track, _, _, terms) in &found {
-                    if !terms.iter().all(|i| self.stays(&track.terms[*i], &even, &open, facts)) {
+                    if !terms.iter().all(|i| self.stays(track.state, &track.terms[*i], &even, &open, facts)) {
                         new.insert(track.state);
                     }
                 }
@@ -175,20 +192,25 @@ impl Flow<'_, '_> {
                 new = self.disturbed(&tracks, &even, &veiled);
             }
             if new.is_empty() {
-                return Even { open, ..even };
+                return Even { open, empty, ..even };
             }
             open.extend(new);
         }
     }
 
     /// The value and rate of a state, with the terms that go on; none where one of them is not known.
-    fn slope(&mut self, track: &Track, last: &Even, veiled: &Facts) -> Option<(f64, f64, Vec<usize>)> {
-        let mut slope = 0.0;
+    fn slope(&mut self, track: &Track, last: &Even, veiled: &Facts, even: &mut Even) -> Option<(f64, f64, Vec<usize>)> {
+        let (mut slope, mut most) = (0.0, 0.0_f64);
         let mut on = Vec::new();
         for (i, term) in track.terms.iter().enumerate() {
             let mut holds = Some(true);
             for (node, as_is) in &term.conditions {
-                match self.truth_beyond(*node, last, veiled) {
+                let truth = match even.truths.get(node) {
+                    Some(known) => Some(*known),
+                    None => self.comes_out(*node, last, veiled),
+                };
+                even.truths.extend(truth.map(|truth| (*node, truth)));
+                match truth {
                     Some(truth) if truth != *as_is => holds = Some(false),
                     None if holds == Some(true) => holds = None,
                     _ => {}
@@ -203,7 +225,14 @@ impl Flow<'_, '_> {
                 Value::Share { state, quantity, size, .. } => {
                     let quantity = self.eval(*quantity, veiled).exact()?;
                     match (quantity, veiled.states[*state as usize].exact()?) {
-                        (0.0, _) | (_, 0.0) => 0.0,
+                        (0.0, _) => 0.0,
+                        (_, 0.0) => {
+                            if self.eval(*size, veiled).exact() == Some(0.0) {
+                                even.empty = Some(*state);
+                                return None;
+                            }
+                            0.0
+                        }
                         (quantity, there) => there * quantity / self.eval(*size, veiled).exact()?,
                     }
                 }
@@ -212,7 +241,11 @@ impl Flow<'_, '_> {
                 return None;
             }
             slope += term.factor * value;
+            most = most.max((term.factor * value).abs());
             on.push(i);
+        }
+        if slope.abs() <= CANCELS * most {
+            slope = 0.0;
         }
         if on.is_empty() {
             return Some((0.0, 0.0, on));
@@ -220,16 +253,76 @@ impl Flow<'_, '_> {
         Some((veiled.states[track.state as usize].exact()?, slope, on))
     }
 
-    /// Whether a term stays as it is while states move so.
-    fn stays(&mut self, term: &Term, even: &Even, open: &BTreeSet<u32>, facts: &Facts) -> bool {
-        let mut rests = |node: NodeId| {
-            let parts = self.parts(node);
-            !parts.timed && !parts.states.iter().any(|s| even.moves(*s) || open.contains(s))
-        };
+    /// How a condition comes out from now on. What stands at its threshold and rests there comes out as it did when it came to it.
+    fn comes_out(&mut self, node: NodeId, last: &Even, facts: &Facts) -> Option<bool> {
+        match last.truths.get(&node) {
+            Some(before) if self.rests_at_threshold(node, last, facts) => Some(*before),
+            _ => self.truth_beyond(node, last, facts),
+        }
+    }
+
+    /// Whether two sides of a comparison are equal and stay so.
+    fn rests_at_threshold(&mut self, node: NodeId, even: &Even, facts: &Facts) -> bool {
+        let order = self.order(node);
+        order.iter().any(|n| {
+            let Op::Binary(BinaryOp::Lt | BinaryOp::Le, a, b) = self.lab.graph.op(*n) else { return false };
+            let difference = self.difference((a, Some(b)), even, 0.0, facts);
+            difference.is_some_and(|(now, slope, size)| slope == 0.0 && now.abs() <= CLOSE * size)
+        })
+    }
+
+    /// Whether a condition of a flow stands at its threshold, where only how it came there tells how it comes out.
+    pub(super) fn rests_at_thresholds(&mut self, even: &Even, facts: &Facts) -> bool {
+        even.truths.keys().any(|node| self.rests_at_threshold(*node, even, facts))
+    }
+
+    /// What moves evenly from here on, where the conditions it goes by come out as it moves; none where they change each other, as that
+    /// of a flow that empties what fills only while it does not go on.
+    pub(super) fn settled(&mut self, facts: &Facts, last: &Even) -> Option<Even> {
+        let mut even = self.even(facts, last);
+        for _ in 0..MOST_TURNS {
+            let conditions: Vec<(NodeId, bool)> = even.truths.iter().map(|(node, truth)| (*node, *truth)).collect();
+            let as_it_moves = |(node, truth): &(NodeId, bool)| {
+                self.comes_out(*node, &even, facts).is_none_or(|beyond| beyond == *truth)
+            };
+            if even.slopes.is_empty() || conditions.iter().all(as_it_moves) {
+                return Some(even);
+            }
+            even = self.even(facts, &even);
+        }
+        None
+    }
+
+    /// Whether a term is what it is now while states that it rests on move so, as what flows between two of the same temperature. What it
+    /// may add to its `state` otherwise is rounding.
+    fn is_constant(&mut self, state: u32, node: NodeId, even: &Even, facts: &Facts) -> bool {
+        let Some(now) = self.along_at(node, even, 0.0, facts) else { return false };
+        let scale = |(_, value, slope): &(u32, f64, f64)| (value / slope).abs();
+        let horizon = even.slopes.iter().map(scale).filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min);
+        let Some(size) = facts.states[state as usize].exact() else { return false };
+        let slack = ALIKE * size.abs() / horizon;
+        horizon.is_finite()
+            && MOMENTS.iter().all(|share| {
+                let then = self.along_at(node, even, share * horizon, facts);
+                then.is_some_and(|then| (then.value - now.value).abs() <= slack)
+            })
+    }
+
+    /// Whether a term of the rate of a `state` stays as it is while states move so.
+    fn stays(&mut self, state: u32, term: &Term, even: &Even, open: &BTreeSet<u32>, facts: &Facts) -> bool {
         match &term.value {
-            Value::Plain(node) => rests(*node),
+            Value::Plain(node) => {
+                let (mut at_rest, mut known) = (true, true);
+                let parts = self.parts(*node);
+                for s in &parts.states {
+                    (at_rest, known) = (at_rest && !even.moves(*s), known && !open.contains(s));
+                }
+                known && !parts.timed && (at_rest || self.is_constant(state, *node, even, facts))
+            }
             Value::Share { state, quantity, members, .. } => {
-                if !rests(*quantity) || open.contains(state) || members.iter().any(|(s, _)| open.contains(s)) {
+                let parts = self.parts(*quantity);
+                let rests = !parts.timed && !parts.states.iter().any(|s| even.moves(*s) || open.contains(s));
+                if !rests || open.contains(state) || members.iter().any(|(s, _)| open.contains(s)) {
                     return false;
                 }
                 let pair = |s: u32| Some((facts.states[s as usize].exact()?, even.slope(s)));

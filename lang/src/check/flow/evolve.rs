@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use matterix_ir::{BinaryOp, Op, UnaryOp};
+use matterix_ir::{BinaryOp, Op, Severity, UnaryOp};
 
 use super::Flow;
 use super::actions::Asked;
@@ -57,8 +57,11 @@ const CLOSE_STEPS: usize = 16;
 /// So often the rates of such a step are taken within the bounds that the last ones gave.
 const REFINEMENTS: usize = 4;
 
-/// So many moving states are bounded; more are only known to move.
+/// Moving states that are always bounded.
 const MOST_MOVING: usize = 48;
+
+/// Rates asked for to bound more of them, in a whole plan, before the rest counts as without bound.
+const MOST_RATES: usize = 2_000_000;
 
 /// Rounds of events and laws that change each other, before what they change counts as unknown.
 const ROUNDS: usize = 8;
@@ -459,7 +462,9 @@ impl Flow<'_, '_> {
             }
         }
         self.narrow_together(facts, &mut box_);
-        if box_.faces <= MOST_MOVING {
+        if self.is_too_much(&box_) {
+            self.say_unbounded();
+        } else {
             self.narrow(facts, &mut box_);
         }
         facts.moving = box_.moving;
@@ -469,6 +474,20 @@ impl Flow<'_, '_> {
         };
         let states = facts.moving.iter().map(bounds).collect();
         Barrier { states, bonds: box_.within.bonds, veiled: self.veiled.clone() }
+    }
+
+    /// Whether so many states move that bounding them takes more than a plan may ask for.
+    fn is_too_much(&self, making: &Making) -> bool {
+        making.faces > MOST_MOVING && self.rates_asked > MOST_RATES
+    }
+
+    /// Says once from which step on what moves is not bounded.
+    fn say_unbounded(&mut self) {
+        if self.quiet == 0 && !self.unbounded_said {
+            self.unbounded_said = true;
+            let headline = format!("more than {MOST_MOVING} things change at the same time, over a long plan");
+            self.not_analysed(Severity::Advice, headline, "from here on what they come to is not bounded");
+        }
     }
 
     /// Lets the fluxes that change an amount go as far as they can.
@@ -560,7 +579,7 @@ impl Flow<'_, '_> {
             making.moving.insert(derivative);
             making.faces += 1;
         }
-        let far = late || making.faces > MOST_MOVING;
+        let far = late || self.is_too_much(making);
         let apart = matches!(kind, Kind::Mixed(_)) && making.within.hangs(state);
         if apart {
             // A flux of matter may have been found since.
@@ -766,6 +785,7 @@ impl Flow<'_, '_> {
                 Known::Range(low, high, Why::Unknown)
             }
         };
+        self.rates_asked += 1;
         let before = std::mem::replace(&mut making.within.states[state as usize], there);
         let bounds = match (wall, self.kind(i)) {
             (Wall::Apart(_), Kind::Mixed(row)) => self.rest_again(&row, state, &making.within),
@@ -793,7 +813,7 @@ impl Flow<'_, '_> {
     }
 
     /// The atoms of each element in what an amount counts.
-    fn atoms(&self, state: u32) -> Vec<(Element, f64)> {
+    pub(super) fn atoms(&self, state: u32) -> Vec<(Element, f64)> {
         let counted = self.mixtures.iter().flatten().find(|(_, s)| *s == state).and_then(|(key, _)| key.species);
         let formula = counted.and_then(|species| self.lab.tables.species.get(species).formula.as_ref());
         formula.map_or(Vec::new(), |f| f.elements.iter().map(|(element, n)| (*element, n.to_f64())).collect())

@@ -240,6 +240,15 @@ impl Facts {
     }
 }
 
+/// Whether nothing was written between two histories.
+pub fn same_history(one: &History, other: &History) -> bool {
+    match (one, other) {
+        (None, None) => true,
+        (Some(one), Some(other)) => Rc::ptr_eq(one, other),
+        _ => false,
+    }
+}
+
 /// The latest statement since `base` that changed a state.
 pub(super) fn changed_by(history: &History, base: &History, state: u32) -> Option<Span> {
     let mut at = history.as_ref();

@@ -134,6 +134,10 @@ struct Flow<'l, 'a> {
     timed: Vec<u32>,
     /// Those that are followed at their moments now: what bounds the passing of time leaves them out.
     at_moments: Vec<u32>,
+    /// Rates asked for to bound what moves.
+    rates_asked: usize,
+    /// Whether it was said that so many states move that they are not bounded any more.
+    unbounded_said: bool,
     /// Derivatives that depend on the time itself.
     clocked: Vec<u32>,
     /// While time passes: from when to when. An event comes about somewhere in it.
@@ -348,6 +352,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
             at_moments: Vec::new(),
+            rates_asked: 0,
+            unbounded_said: false,
             clocked: Vec::new(),
             meanwhile: None,
             veiled: Vec::new(),

@@ -478,6 +478,19 @@ impl Flow<'_, '_> {
         self.found(d, about);
     }
 
+    /// A law takes from a mixture in which nothing is, within the step that is followed now.
+    pub(super) fn takes_from_nothing(&mut self, state: u32) {
+        let of = self.mixtures.iter().find_map(|all| all.iter().find(|(_, s)| *s == state));
+        let name = of.map_or_else(String::new, |(key, _)| self.lab.spoken_name(key.instance));
+        let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
+        let headline = format!("`{name}` is empty, and a law takes from it during `{label}`");
+        let d =
+            self.at_site(codes::TRANSFER_FRACTION, headline, "there is nothing to take".to_string(), self.doubt > 0);
+        let d = d.help("fill it first, or give the law a `while` that waits for it");
+        let about = d.span();
+        self.found(d, about);
+    }
+
     /// A transfer takes something along that the mixture where it ends has no place for. Where there may be none of it, that is
     /// left to the run.
     pub fn no_place(&mut self, state: u32, from: u32, to: u32, share: &Known, facts: &Facts) {

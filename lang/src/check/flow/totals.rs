@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use super::Flow;
-use super::facts::Facts;
+use super::facts::{Facts, same_history};
 use super::fluxes::Flux;
 use super::polytope::scaled;
 use super::value::{Known, Why};
@@ -26,11 +26,7 @@ impl Flow<'_, '_> {
     /// Brings in what is known after at most `longest` s by the sums of what moves. Not where an event has changed something
     /// meanwhile.
     pub(super) fn by_totals(&mut self, longest: f64, before: &Facts, facts: &mut Facts) {
-        let untouched = match (&before.history, &facts.history) {
-            (None, None) => true,
-            (Some(a), Some(b)) => Rc::ptr_eq(a, b),
-            _ => false,
-        };
+        let untouched = same_history(&before.history, &facts.history);
         if !longest.is_finite() || !untouched {
             return;
         }
