@@ -17,7 +17,7 @@ const NEAR: usize = 4;
 const MOST_MEETINGS: usize = 8;
 
 /// So many steps are followed again in all.
-const MOST_STEPS: usize = 100_000;
+const MOST_STEPS: usize = 20_000;
 
 /// Something that may fail, and only bounds tell.
 #[derive(Clone, Debug)]

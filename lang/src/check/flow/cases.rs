@@ -163,7 +163,7 @@ impl Flow<'_, '_> {
         if open.is_empty() {
             return None;
         }
-        let formula = self.formulas.of(&self.lab.graph, node);
+        let formula = self.nodes.formulas.of(&self.lab.graph, node);
         let mut out = Vec::with_capacity(ways);
         for way in 0..ways {
             let states: Vec<(u32, f64)> = open.iter().map(|(state, values)| (*state, values[way])).collect();

@@ -237,7 +237,7 @@ impl Flow<'_, '_> {
 
     pub(super) fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &Facts) -> Option<Dual> {
         let along = Along { exact: Exact { params: &self.params, facts }, even, time };
-        self.formulas.of(&self.lab.graph, node).value(&along, &mut self.duals)
+        self.nodes.formulas.of(&self.lab.graph, node).value(&along, &mut self.duals)
     }
 
     /// Whether a condition holds from now on while states move so, even where what it compares has just become equal.

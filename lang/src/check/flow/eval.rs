@@ -204,7 +204,7 @@ impl Values {
 impl Flow<'_, '_> {
     /// What a node depends on; found once.
     pub fn parts(&mut self, node: NodeId) -> Rc<Parts> {
-        if let Some(parts) = &self.parts[node.0 as usize] {
+        if let Some(parts) = &self.nodes.parts[node.0 as usize] {
             return parts.clone();
         }
         let graph = &self.lab.graph;
@@ -224,14 +224,14 @@ impl Flow<'_, '_> {
         parts.states.sort_unstable();
         parts.states.dedup();
         let parts = Rc::new(parts);
-        self.parts[node.0 as usize] = Some(parts.clone());
+        self.nodes.parts[node.0 as usize] = Some(parts.clone());
         parts
     }
 
     /// The operations below a node, operands first; found once.
     pub fn order(&mut self, node: NodeId) -> Rc<[NodeId]> {
         let find = || self.lab.graph.schedule([node]).into();
-        self.orders[node.0 as usize].get_or_insert_with(find).clone()
+        self.nodes.orders[node.0 as usize].get_or_insert_with(find).clone()
     }
 
     /// The value of a node: where all that it rests on is known exactly, by numbers alone.
@@ -239,7 +239,7 @@ impl Flow<'_, '_> {
         if let Op::State(state) = self.lab.graph.op(node) {
             return facts.states[state as usize].clone();
         }
-        let formula = self.formulas.of(&self.lab.graph, node);
+        let formula = self.nodes.formulas.of(&self.lab.graph, node);
         let exact = Exact { params: &self.params, facts };
         match formula.value(&exact, &mut self.numbers) {
             Some(value) => Known::Point(value),
@@ -272,7 +272,7 @@ impl Flow<'_, '_> {
         if !(2..=MOST_CASES).contains(&cases.len()) {
             return None;
         }
-        let formula = self.formulas.of(&self.lab.graph, node);
+        let formula = self.nodes.formulas.of(&self.lab.graph, node);
         let mut values = Vec::with_capacity(cases.len());
         for states in &cases {
             let exact = Exact { params: &self.params, facts };
@@ -346,7 +346,7 @@ impl Flow<'_, '_> {
             };
             order.iter().filter(depends).copied().collect::<Rc<[NodeId]>>()
         };
-        match self.above.entry((node, leaf)) {
+        match self.nodes.above.entry((node, leaf)) {
             Entry::Occupied(mut known) => Some(known.get_mut().get_or_insert_with(find).clone()),
             Entry::Vacant(place) => {
                 place.insert(None);
@@ -357,7 +357,7 @@ impl Flow<'_, '_> {
 
     /// What a node rests on; found once.
     fn inputs(&mut self, node: NodeId) -> Rc<Inputs> {
-        if let Some(known) = self.inputs.get(&node) {
+        if let Some(known) = self.nodes.inputs.get(&node) {
             return known.clone();
         }
         let order = self.order(node);
@@ -366,7 +366,7 @@ impl Flow<'_, '_> {
         let leaves = order.iter().copied().filter(is_leaf).collect();
         let sums = order.iter().copied().filter(|n| self.is_outer_sum(*n)).collect();
         let inputs = Rc::new(Inputs { leaves, sums });
-        self.inputs.insert(node, inputs.clone());
+        self.nodes.inputs.insert(node, inputs.clone());
         inputs
     }
 
@@ -385,7 +385,7 @@ impl Flow<'_, '_> {
 
     /// The operations of a node that depend on a state, those without operands first; found once.
     fn parts_on(&mut self, node: NodeId, state: u32) -> Rc<[NodeId]> {
-        if let Some(known) = self.parts_on.get(&(node, state)) {
+        if let Some(known) = self.nodes.parts_on.get(&(node, state)) {
             return known.clone();
         }
         let order = self.order(node);
@@ -404,7 +404,7 @@ impl Flow<'_, '_> {
         let depend = || order.iter().copied().filter(|n| on.contains(n));
         let is_leaf = |n: &NodeId| self.lab.graph.op(*n).operands().next().is_none();
         let found: Rc<[NodeId]> = depend().filter(is_leaf).chain(depend().filter(|n| !is_leaf(n))).collect();
-        self.parts_on.insert((node, state), found.clone());
+        self.nodes.parts_on.insert((node, state), found.clone());
         found
     }
 

@@ -90,11 +90,11 @@ impl Even {
 impl Flow<'_, '_> {
     /// The states that may move evenly; found once.
     pub(super) fn tracks(&mut self) -> Rc<Tracks> {
-        if let Some(known) = &self.tracks {
+        if let Some(known) = &self.nodes.tracks {
             return known.clone();
         }
         let found = Rc::new(self.find_tracks());
-        self.tracks = Some(found.clone());
+        self.nodes.tracks = Some(found.clone());
         found
     }
 

@@ -48,13 +48,13 @@ pub struct Stoichiometry {
 impl Flow<'_, '_> {
     /// What goes on by the laws; read off them once.
     pub fn stoichiometry(&mut self) -> Rc<Stoichiometry> {
-        if let Some(known) = &self.stoichiometry {
+        if let Some(known) = &self.nodes.stoichiometry {
             return known.clone();
         }
         let found = Rc::new(self.read_off());
-        self.stoichiometry = Some(found.clone());
+        self.nodes.stoichiometry = Some(found.clone());
         // Only now is it known which sums hang on how states hang together.
-        self.inputs.clear();
+        self.nodes.inputs.clear();
         found
     }
 
@@ -220,12 +220,12 @@ impl Flow<'_, '_> {
 
     /// Whether a node is a sum of states that stands in something that is none.
     pub fn is_outer_sum(&self, node: NodeId) -> bool {
-        self.stoichiometry.as_ref().is_some_and(|s| s.outer.get(node.0 as usize) == Some(&true))
+        self.nodes.stoichiometry.as_ref().is_some_and(|s| s.outer.get(node.0 as usize) == Some(&true))
     }
 
     /// A node as a sum of states; none where it is something else.
     pub fn form(&mut self, node: NodeId) -> Option<Rc<Form>> {
-        if let Some(known) = self.forms.get(&node) {
+        if let Some(known) = self.nodes.forms.get(&node) {
             return known.clone();
         }
         let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
@@ -257,7 +257,7 @@ impl Flow<'_, '_> {
             }
         }
         let form = is.then(|| Rc::new(Form { constant, terms: sums.into_iter().collect() }));
-        self.forms.insert(node, form.clone());
+        self.nodes.forms.insert(node, form.clone());
         form
     }
 

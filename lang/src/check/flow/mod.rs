@@ -31,6 +31,7 @@ mod jobs;
 mod lasting;
 mod left;
 mod meantime;
+mod nodes;
 mod otherwise;
 mod parted;
 mod points;
@@ -54,7 +55,6 @@ use std::rc::Rc;
 use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Condition, Plan, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::values::Formulas;
 use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span, codes};
 use rustc_hash::FxHashMap;
 
@@ -94,30 +94,12 @@ struct Flow<'l, 'a> {
     /// The pairs of states that transfers between two of them change.
     passages: Passages,
     params: Vec<Known>,
-    /// The states that a node depends on.
-    parts: Vec<Option<Rc<eval::Parts>>>,
-    /// The operations below a node, operands first.
-    orders: Vec<Option<Rc<[NodeId]>>>,
-    /// What nodes are made of, as far as they were asked for.
-    formulas: Formulas,
+    /// What is known of nodes by themselves.
+    nodes: nodes::Nodes,
     /// Room for exact values.
     numbers: Vec<f64>,
     /// Room for numbers with their rates.
     duals: Vec<dual::Dual>,
-    /// What goes on by the laws, where that was asked for.
-    stoichiometry: Option<Rc<fluxes::Stoichiometry>>,
-    /// What may move evenly, where that was asked for.
-    tracks: Option<Rc<even::Tracks>>,
-    /// Derivatives as sums of what goes on, as far as they were asked for.
-    terms_known: FxHashMap<u32, totals::Terms>,
-    /// Nodes as sums of states, as far as they were asked for.
-    forms: FxHashMap<NodeId, Option<Rc<bonds::Form>>>,
-    /// Operations of a node that depend on a state.
-    parts_on: FxHashMap<(NodeId, u32), Rc<[NodeId]>>,
-    /// What nodes rest on, as far as that was asked for.
-    inputs: FxHashMap<NodeId, Rc<eval::Inputs>>,
-    /// Operations of a node that depend on another one; none where that was asked for once only.
-    above: FxHashMap<(NodeId, NodeId), Option<Rc<[NodeId]>>>,
     /// Values of the operations that were evaluated.
     values: eval::Values,
     /// Sums of states that may hang together, as far as they were evaluated.
@@ -332,18 +314,9 @@ impl<'l, 'a> Flow<'l, 'a> {
             mixtures: lab.extensive_by_mixture(),
             passages: Passages::default(),
             params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
-            parts: vec![None; lab.graph.ops().len()],
-            orders: vec![None; lab.graph.ops().len()],
-            formulas: Formulas::default(),
+            nodes: nodes::Nodes::new(lab.graph.ops().len()),
             numbers: Vec::new(),
             duals: Vec::new(),
-            stoichiometry: None,
-            tracks: None,
-            terms_known: FxHashMap::default(),
-            forms: FxHashMap::default(),
-            parts_on: FxHashMap::default(),
-            inputs: FxHashMap::default(),
-            above: FxHashMap::default(),
             values: eval::Values::new(lab.graph.ops().len()),
             sums: FxHashMap::default(),
             rates_of: BTreeMap::new(),
@@ -433,16 +406,7 @@ impl<'l, 'a> Flow<'l, 'a> {
 
     /// Exchanges with another flow of the same plan what is known of nodes and derivatives by themselves, so that it is found once.
     fn swap_known(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.parts, &mut other.parts);
-        std::mem::swap(&mut self.orders, &mut other.orders);
-        std::mem::swap(&mut self.formulas, &mut other.formulas);
-        std::mem::swap(&mut self.stoichiometry, &mut other.stoichiometry);
-        std::mem::swap(&mut self.tracks, &mut other.tracks);
-        std::mem::swap(&mut self.terms_known, &mut other.terms_known);
-        std::mem::swap(&mut self.forms, &mut other.forms);
-        std::mem::swap(&mut self.parts_on, &mut other.parts_on);
-        std::mem::swap(&mut self.inputs, &mut other.inputs);
-        std::mem::swap(&mut self.above, &mut other.above);
+        std::mem::swap(&mut self.nodes, &mut other.nodes);
     }
 
     /// Follows the plan from its start.

@@ -88,11 +88,11 @@ impl Flow<'_, '_> {
     }
 
     fn terms_of(&mut self, derivative: u32) -> Terms {
-        if let Some(known) = self.terms_known.get(&derivative) {
+        if let Some(known) = self.nodes.terms.get(&derivative) {
             return known.clone();
         }
         let found = self.terms(self.derivatives[derivative as usize].rate).map(Rc::new);
-        self.terms_known.insert(derivative, found.clone());
+        self.nodes.terms.insert(derivative, found.clone());
         found
     }
 }
