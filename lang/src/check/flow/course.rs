@@ -74,7 +74,9 @@ impl Flow<'_, '_> {
         for _ in 0..MOST_CHANGES {
             let Some(even) = self.settled(facts, &last) else { break };
             if let Some(state) = even.empty.filter(|_| left > 0.0) {
-                self.takes_from_nothing(state);
+                if passed.is_empty() {
+                    self.takes_from_nothing(state);
+                }
                 self.forget(&even.slopes.iter().map(|(s, ..)| *s).collect::<Vec<u32>>(), facts);
                 return Course::Left(left);
             }
@@ -111,7 +113,8 @@ impl Flow<'_, '_> {
                 left = end - to;
             }
             if dry.is_some_and(|dry| dry <= step) {
-                self.runs_dry(&even, step, facts);
+                // A limit that was passed before ends the step there.
+                self.runs_dry(&even, step, passed.is_empty(), facts);
                 return Course::Left(left);
             }
             let history = facts.history.clone();
@@ -412,13 +415,13 @@ impl Flow<'_, '_> {
         self.stopped |= !goes_on;
     }
 
-    /// A stream takes more than there is.
-    fn runs_dry(&mut self, even: &Even, step: f64, facts: &mut Facts) {
+    /// A stream takes more than there is, which is reported where the run comes to it.
+    fn runs_dry(&mut self, even: &Even, step: f64, comes: bool, facts: &mut Facts) {
         let empty = even.slopes.iter().filter(|(s, value, slope)| {
             self.amounts.contains(s) && *slope < 0.0 && value + slope * step <= STRAIGHT * value
         });
         let empty: Vec<u32> = empty.map(|(s, ..)| *s).collect();
-        if let Some(amount) = empty.first() {
+        if let Some(amount) = empty.first().filter(|_| comes) {
             self.used_up(*amount, facts);
         }
         let moved: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use matterix_ir::model::{Action, Domain};
 use matterix_ir::plan::{Condition, Limit, Step};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Code, Diagnostic, Severity, Span, codes};
+use matterix_ir::{Code, Diagnostic, NodeId, Severity, Span, codes};
 
 use super::facts::Facts;
 use super::parted::Place;
@@ -387,8 +387,10 @@ impl Flow<'_, '_> {
 
     /// Says where to look for a salt of which nothing is left as it has dissolved.
     fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
-        let asked: BTreeSet<u32> =
-            condition.compared.iter().flat_map(|c| self.parts(c.value).states.to_vec()).collect();
+        // A value that is not zero rests on the salt in another way, as a concentration on the volume of all.
+        let mut zero: Vec<NodeId> = condition.compared.iter().map(|c| c.value).collect();
+        zero.retain(|value| self.eval(*value, facts).exact() == Some(0.0));
+        let asked: BTreeSet<u32> = zero.into_iter().flat_map(|value| self.parts(value).states.to_vec()).collect();
         let gone = |state: &u32| facts.states[*state as usize].exact() == Some(0.0);
         let amounts = self.lab.extensive.iter().filter(|(_, state)| asked.contains(state) && gone(state));
         let species = &self.lab.tables.species;

@@ -148,6 +148,9 @@ impl Flow<'_, '_> {
 
 /// Whether a moment comes before the end of a step, s; none where rounding decides, which may come out otherwise in a run.
 pub(super) fn comes_before(moment: f64, end: f64) -> Option<bool> {
+    if end == f64::INFINITY {
+        return moment.is_finite().then_some(true);
+    }
     let apart = (moment - end).abs() > CLOSE * moment.abs().max(end.abs());
     let exact = |time: f64| (time * TICKS).fract() == 0.0;
     (apart || (exact(moment) && exact(end))).then_some(moment <= end)
@@ -164,5 +167,6 @@ mod tests {
         assert_eq!(comes_before(0.1 + 0.2, 0.3), None);
         assert_eq!(comes_before(0.3, 0.3), None);
         assert_eq!(comes_before(0.3, 0.4), Some(true));
+        assert_eq!(comes_before(0.3, f64::INFINITY), Some(true));
     }
 }
