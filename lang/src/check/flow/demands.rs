@@ -13,7 +13,39 @@ use super::report::shown;
 /// Steps that a run takes at one moment, and no more.
 const MOST_AT_ONCE: f64 = 100_000.0;
 
+/// A moment behind another one, as a share of the time or of 1 s.
+const BEHIND: f64 = 1e-6;
+
 impl Flow<'_, '_> {
+    /// Conditions that are asked for all the time and hold now: they end the step that is followed where they break.
+    pub(super) fn may_break_here(&mut self, facts: &Facts) -> Vec<(NodeId, bool)> {
+        // What is followed aside, or more closely, is no step that goes on.
+        if self.unbroken.is_empty() || self.refinements > 0 || self.guards.is_empty() {
+            return Vec::new();
+        }
+        let mut nodes: Vec<NodeId> = self.unbroken.iter().map(|(condition, _)| condition.node).collect();
+        nodes.retain(|node| !self.is_shared(*node) && self.eval(*node, facts).truth() == Some(true));
+        nodes.into_iter().map(|node| (node, false)).collect()
+    }
+
+    /// Some of these are broken now: where a handler takes that, the step goes no further. Otherwise it ends just behind that moment,
+    /// where what asks for them is found broken.
+    pub(super) fn ends_broken(&mut self, broken: &[NodeId], facts: &mut Facts) {
+        if self.is_taken("broken") {
+            // Handlers within the body do not take it; for those around it counts as broken at any time.
+            let open = self.guards.len();
+            if self.unbroken.iter().any(|(condition, guards)| *guards == open && broken.contains(&condition.node)) {
+                self.raise("broken", facts.clone());
+            }
+            self.stopped = true;
+            return;
+        }
+        let behind = BEHIND * facts.time.bounds().1.max(1.0);
+        let mut beyond = facts.clone();
+        self.unheard(|flow| flow.course(behind, &[], &mut beyond));
+        *facts = beyond;
+    }
+
     /// Looks whether what is kept still holds after an operation.
     pub(super) fn still_kept(&mut self, label: &str, facts: &Facts) {
         for condition in self.kept.clone() {

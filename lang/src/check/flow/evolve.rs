@@ -121,9 +121,11 @@ impl Flow<'_, '_> {
         if longest <= 0.0 {
             return;
         }
-        let course = duration.exact().map(|exact| self.course(exact, &[], facts));
+        let watched = self.may_break_here(facts);
+        let course = duration.exact().map(|exact| self.course(exact, &watched, facts));
         let rest = match course {
-            Some(Course::Passed | Course::Reached(_)) => return,
+            Some(Course::Passed) => return,
+            Some(Course::Reached(nodes)) => return self.ends_broken(&nodes, facts),
             Some(Course::Left(left)) if left < longest => Known::Point(left),
             _ => duration.clone(),
         };

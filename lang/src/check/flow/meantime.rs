@@ -157,7 +157,9 @@ impl Flow<'_, '_> {
         let Some(meantime) = self.meantime(written, facts) else { return };
         let mut later = facts.clone();
         if let (Some(now), Some(end)) = (facts.time.exact(), end.exact()) {
+            let unbroken = std::mem::take(&mut self.unbroken);
             self.pass(&Known::Point(end - now), &mut later);
+            self.unbroken = unbroken;
         } else {
             later.time = Known::nothing();
         }

@@ -179,6 +179,8 @@ struct Flow<'l, 'a> {
     kept: Vec<&'l Condition>,
     /// Conditions that commands and skills around ask for while they go on.
     during: Vec<&'l Condition>,
+    /// Of both, in the order in which they were begun, with the bodies with handlers that were open then.
+    unbroken: Vec<(&'l Condition, usize)>,
     /// Jobs that go on.
     jobs: jobs::Jobs,
     /// Steps of jobs are followed when these are waited for, not when they are started.
@@ -357,6 +359,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             claimed: Vec::new(),
             kept: Vec::new(),
             during: Vec::new(),
+            unbroken: Vec::new(),
             jobs: jobs::Jobs::new(),
             late: false,
             needs_jobs: false,

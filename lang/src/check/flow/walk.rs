@@ -74,10 +74,13 @@ impl<'l> Flow<'l, '_> {
 
     /// Walks a body all through which conditions must hold.
     fn walk_during(&mut self, invariants: &'l [Condition], body: StepId, facts: Facts) -> Option<Facts> {
-        let around = self.during.len();
+        let around = (self.during.len(), self.unbroken.len());
         self.during.extend(invariants);
+        let guards = self.guards.len();
+        self.unbroken.extend(invariants.iter().map(|condition| (condition, guards)));
         let after = self.walk(body, facts);
-        self.during.truncate(around);
+        self.during.truncate(around.0);
+        self.unbroken.truncate(around.1);
         after
     }
 
@@ -204,11 +207,13 @@ impl<'l> Flow<'l, '_> {
                     self.forget(&states, &mut facts);
                 }
                 self.kept.push(condition);
+                self.unbroken.push((condition, self.guards.len()));
                 let after = match self.is_taken("broken") && !plan.ends.is_empty() {
                     true => self.may_break(condition, *body, facts),
                     false => self.walk(*body, facts),
                 };
                 self.kept.pop();
+                self.unbroken.pop();
                 after
             }
             Step::During { body, invariants } => {
@@ -314,10 +319,15 @@ impl<'l> Flow<'l, '_> {
             self.stopped_meanwhile(condition, longest, &facts);
         }
         let before = facts.clone();
-        let course =
-            if shared { Course::Left(longest) } else { self.course(longest, &[(condition.node, true)], &mut facts) };
+        let mut watched = if self.is_taken("broken") { self.may_break_here(&facts) } else { Vec::new() };
+        watched.push((condition.node, true));
+        let course = if shared { Course::Left(longest) } else { self.course(longest, &watched, &mut facts) };
         match course {
-            Course::Reached(_) => return Some(facts),
+            Course::Reached(nodes) if nodes.contains(&condition.node) => return Some(facts),
+            Course::Reached(nodes) => {
+                self.ends_broken(&nodes, &mut facts);
+                return None;
+            }
             Course::Passed => {}
             Course::Left(left) => self.pass(&Known::Range(0.0, left, Why::Unknown), &mut facts),
         }
