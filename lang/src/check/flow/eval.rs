@@ -94,13 +94,6 @@ impl Rules for Supposed<'_> {
     }
 }
 
-/// A sum of states that may hang together, as it was done last.
-#[derive(Debug)]
-pub struct Sum {
-    /// How states hung together then. It is kept, so that no other one is taken for it.
-    bonds: Option<Rc<Bonds>>,
-}
-
 /// What the value of a node rests on besides numbers that never change; found once.
 #[derive(Debug)]
 pub struct Inputs {
@@ -302,7 +295,7 @@ impl Flow<'_, '_> {
         } else {
             let is_new = |n: &&NodeId| self.values.changed(**n) > since;
             let is_new_sum =
-                |n: &&NodeId| is_new(n) || !self.sums.get(n).is_some_and(|s| alike(&s.bonds, &facts.bonds));
+                |n: &&NodeId| is_new(n) || !self.sums.get(n).is_some_and(|bonds| alike(bonds, &facts.bonds));
             let sums = inputs.sums.iter().filter(is_new_sum);
             let changed: Vec<NodeId> = inputs.leaves.iter().filter(is_new).chain(sums).copied().collect();
             if changed.is_empty() {
@@ -373,10 +366,7 @@ impl Flow<'_, '_> {
     /// The value of a node that was enclosed just before, now that of what is known one state alone has changed.
     pub fn enclose_again(&mut self, node: NodeId, state: u32, facts: &Facts) -> Known {
         let order = self.parts_on(node, state);
-        for n in order.iter() {
-            if self.lab.graph.op(*n).operands().next().is_some() {
-                break;
-            }
+        for n in order.iter().take_while(|n| self.lab.graph.op(**n).operands().next().is_none()) {
             self.take(*n, facts);
         }
         self.work_out(&order, facts);
@@ -462,14 +452,14 @@ impl Flow<'_, '_> {
     /// Does a sum of states that may hang together if one of them or how they hang together has changed since.
     fn outer_sum(&mut self, node: NodeId, op: BinaryOp, [a, b]: [NodeId; 2], facts: &Facts) {
         let inputs = self.inputs(node);
-        let is_same = self.sums.get(&node).is_some_and(|sum| alike(&sum.bonds, &facts.bonds));
+        let is_same = self.sums.get(&node).is_some_and(|bonds| alike(bonds, &facts.bonds));
         if is_same && !self.values.is_stale(node, &inputs.leaves) {
             return;
         }
         let apart = Known::binary(op, self.values.of(a), self.values.of(b));
         let value = self.together(node, apart, facts);
         self.values.redo(node, value);
-        self.sums.insert(node, Sum { bonds: facts.bonds.clone() });
+        self.sums.insert(node, facts.bonds.clone());
     }
 
     /// What a device shows: the true value, give or take its imperfection.

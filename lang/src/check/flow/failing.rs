@@ -44,13 +44,18 @@ impl<'l> Flow<'l, '_> {
     /// The condition of the innermost `if` around a step, where that does not ask for parameters alone.
     pub(super) fn asked_before(&mut self, id: StepId) -> Option<&'l Condition> {
         let plan = self.plan;
-        let around = (0..plan.steps.len() as u32).map(StepId).filter_map(|other| match &plan.get(other).step {
-            Step::If { condition, .. } => Some((other, condition)),
-            _ => None,
-        });
-        let around = around.map(|(other, condition)| (self.below(other), condition));
-        let innermost = around.filter(|(below, _)| below.contains(&id)).min_by_key(|(below, _)| below.len());
-        innermost.map(|(_, condition)| condition).filter(|c| {
+        let mut todo: Vec<(StepId, Option<&'l Condition>)> = vec![(plan.root, None)];
+        let mut innermost = None;
+        while let Some((at, around)) = todo.pop() {
+            if at == id {
+                innermost = around;
+                break;
+            }
+            let step = &plan.get(at).step;
+            let around = if let Step::If { condition, .. } = step { Some(condition) } else { around };
+            todo.extend(step.children().into_iter().map(|child| (child, around)));
+        }
+        innermost.filter(|c| {
             let parts = self.parts(c.node);
             let constant = self.lab.graph.constant(c.node).is_some() && !self.lab.by_parameters.contains(&c.span);
             !parts.timed && (constant || !parts.states.is_empty())

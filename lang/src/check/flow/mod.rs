@@ -102,8 +102,9 @@ struct Flow<'l, 'a> {
     duals: Vec<dual::Dual>,
     /// Values of the operations that were evaluated.
     values: eval::Values,
-    /// Sums of states that may hang together, as far as they were evaluated.
-    sums: FxHashMap<NodeId, eval::Sum>,
+    /// Sums of states that may hang together, as far as they were evaluated: how they hung together then. It is kept, so that no other one
+    /// is taken for it.
+    sums: FxHashMap<NodeId, Option<Rc<bonds::Bonds>>>,
     /// Derivatives that depend on a state.
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
