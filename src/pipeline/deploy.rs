@@ -3,14 +3,17 @@
 // A fault ends the run: how many bytes it is returned in is of no account.
 #![allow(clippy::result_large_err)]
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::rc::Rc;
+use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
 use matterix_hardware::deploy::{
-    Binding, Carrier, Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, digest, preflight,
+    Binding, Carrier, Control, Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, VERSION, digest,
+    preflight,
 };
 use matterix_hardware::link::Trouble;
+use matterix_hardware::world::World;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
@@ -32,14 +35,28 @@ pub struct Plan<'p> {
     pub seed: u64,
     /// Shows all bytes.
     pub trace: bool,
-    /// The journal, with what an earlier process wrote into it.
-    pub journal: Option<(Journal, Vec<Entry>)>,
-    /// Ends it early.
-    pub cancel: &'p AtomicBool,
-    /// Asks a person.
-    pub person: &'p dyn Fn(&str) -> bool,
+    /// The journal.
+    pub journal: Kept,
+    /// What people say meanwhile.
+    pub control: &'p Control,
+    /// Who carries it out.
+    pub who: &'p str,
+    /// Clocks and ports.
+    pub world: Rc<dyn World>,
     /// Kept up to date with what is told to devices.
     pub exposed: &'p Exposed,
+}
+
+/// The journal of a deployment.
+pub enum Kept {
+    /// None is kept.
+    Not,
+    /// A new one.
+    New(Journal),
+    /// One that an earlier process has left, and what it says.
+    Left(Journal, Vec<Entry>),
+    /// One that an earlier process has left, and that is not as it was written: why.
+    Damaged(String),
 }
 
 /// What came of it.
@@ -73,12 +90,17 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     {
         return Ok(Deployed::not_begun(vec![d]));
     }
+    let digest = digest(program, &binding::canonical(program, &bindings))?;
     let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
-    let digest = digest(program, plan.bindings.1)?;
-    let (journal, before) = plan.journal.unwrap_or((Journal::none(), Vec::new()));
-    if let Some(d) = unfit(&before, &digest, plan.speed) {
-        return Ok(Deployed::not_begun(vec![d]));
-    }
+    let (journal, before, unfit) = match plan.journal {
+        Kept::Not => (Journal::none(), None, None),
+        Kept::New(journal) => (journal, None, None),
+        Kept::Left(journal, before) => {
+            let unfit = unfit(&before, &digest, plan.speed, plan.seed);
+            (journal, Some(before), unfit)
+        }
+        Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),
+    };
     let prepared = Prepared::new(program);
     let params = program.model.params.iter().map(|p| p.value).collect();
     let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
@@ -90,9 +112,13 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let twin = Sim::new(engine, &prepared, plan.seed);
     let shows = plan.trace || plan.mode == Mode::Dry;
     let trace = traced(shows);
-    let Plan { mode, speed, cancel, person, exposed, .. } = plan;
-    let settings = Settings { mode, speed, cancel, person, exposed };
+    let Plan { mode, speed, control, exposed, world, .. } = plan;
+    let ended = AtomicBool::new(false);
+    let settings = Settings { mode, speed, control, ended: &ended, world, exposed };
     let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
+    if let Some(unfit) = unfit {
+        return Ok(Deployed::not_begun(made_safe(hardware, unfit)));
+    }
     let found = {
         let (observed, devices) = hardware.view();
         preflight(program, devices, observed)
@@ -100,34 +126,32 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     if !found.is_empty() {
         return Ok(Deployed::not_begun(found));
     }
-    let is_open = before.iter().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
-    let (begins, goes_on) = (before.is_empty(), !before.is_empty());
-    if is_open {
-        hardware.follow_journal(before);
+    let goes_on = before.is_some();
+    let is_open = before.iter().flatten().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
+    if let Some(before) = before.filter(|_| is_open) {
+        hardware.follow_journal(before, plan.who);
     }
     let unreached = hardware.connect();
     if !unreached.is_empty() {
         return Ok(Deployed::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
     }
-    if begins && let Err(fault) = hardware.begin_journal(&digest) {
+    if !goes_on && let Err(fault) = hardware.begin_journal(&digest, plan.seed, plan.who) {
         return Ok(Deployed::not_begun(vec![of_fault(fault)]));
     }
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
         let mut found = vec![not_opened(failed, sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
-        let stopped = plan.cancel.load(Ordering::Relaxed);
-        return Ok(Deployed { stopped, ..Deployed::not_begun(found) });
+        return Ok(Deployed { stopped: control.is_stopped(), ..Deployed::not_begun(found) });
     }
-    let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
-    let mut told = Told { person: plan.person, cancel: plan.cancel };
-    let mut told = Tee(&mut screen, &mut told);
+    let limits = Limits { cancel: Some(&ended), ..Limits::default() };
+    let mut told = Tee(&mut screen, &mut Told);
     let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
     if let Some(unreached) = hardware.unreached() {
         return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
     }
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
-    let stopped = !well && plan.cancel.load(Ordering::Relaxed);
+    let stopped = !well && control.is_stopped();
     let mut found = findings(&execution, sources);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     if !well {
@@ -168,21 +192,44 @@ fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
 }
 
 /// Why a journal is of another deployment, or of one that has ended.
-fn unfit(before: &[Entry], digest: &str, speed: f64) -> Option<Diagnostic> {
-    let wrong = |headline: &str| {
-        let d = Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on");
-        Some(d.help("begin anew, with a journal of its own"))
-    };
+fn unfit(before: &[Entry], digest: &str, speed: f64, seed: u64) -> Option<Diagnostic> {
+    let this = env!("CARGO_PKG_VERSION");
     match (before.first(), before.last()) {
-        (None, _) => None,
-        (_, Some(Entry::End { .. })) => wrong("the deployment of this journal has come to its end"),
-        (Some(Entry::Begin { digest: of, speed: at, .. }), _) => match () {
-            () if of != digest => wrong("the journal is of another program, or of other bindings"),
-            () if *at != speed => wrong("the journal is of a deployment at another speed"),
+        (_, Some(Entry::End { .. })) => {
+            let d = mismatch("the deployment of this journal has come to its end");
+            Some(d.help("begin anew, with a journal of its own"))
+        }
+        (Some(Entry::Begin { version, tool, digest: of, speed: at, seed: from, .. }), _) => match () {
+            () if *version != VERSION || tool != this => {
+                Some(refused(&format!("the journal was written by version {tool} of this program, not by {this}")))
+            }
+            () if of != digest => Some(refused("the journal is of another program, or of other bindings")),
+            () if *at != speed => Some(refused("the journal is of a deployment at another speed")),
+            () if *from != seed => Some(refused("the journal is of a deployment with another seed")),
             () => None,
         },
-        _ => wrong("the journal does not begin as one"),
+        _ => Some(refused("the journal says nothing of a deployment")),
     }
+}
+
+fn mismatch(headline: &str) -> Diagnostic {
+    Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on")
+}
+
+/// That a journal is not gone on with, though what it is about may still be on.
+fn refused(why: &str) -> Diagnostic {
+    mismatch(why).help("see what the devices have done, and begin anew with a journal of its own")
+}
+
+/// What an earlier process has left on is made safe, as it is not known what that was.
+fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Diagnostic) -> Vec<Diagnostic> {
+    if !hardware.abandon() {
+        return vec![unfit];
+    }
+    let left = hardware.secure();
+    let names = hardware.secured().join(", ");
+    let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
+    std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
 }
 
 /// Shows what goes over lines, where that is wanted.
@@ -238,27 +285,17 @@ fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
     found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
 }
 
-/// Says what is noted, and asks what is asked.
-struct Told<'p> {
-    person: &'p dyn Fn(&str) -> bool,
-    cancel: &'p AtomicBool,
-}
+/// Says what is noted.
+struct Told;
 
-impl Observer for Told<'_> {
+impl Observer for Told {
     fn sample(&mut self, _: f64, _: &Engine<'_>) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }
 
-impl Listener for Told<'_> {
+impl Listener for Told {
     fn note(&mut self, time: f64, _: matterix_ir::plan::StepId, text: &str) {
         print(Stream::Err, &format!("{time:10.3} s  {text}\n"));
-    }
-
-    fn ask(&mut self, _: f64, _: matterix_ir::plan::StepId, text: &str) {
-        // Who does not agree wants it to end.
-        if !(self.person)(text) {
-            self.cancel.store(true, Ordering::Relaxed);
-        }
     }
 }

@@ -19,3 +19,4 @@ pub mod serve;
 #[cfg(feature = "sila")]
 mod sila;
 pub mod template;
+pub mod world;

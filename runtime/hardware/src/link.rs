@@ -1,14 +1,16 @@
 //! A device at the other end of a line: exchanges as its driver declares them.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::rc::Rc;
+use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
 use crate::pattern::written;
 use crate::place::{self, Place};
-use crate::port::{self, Port};
+use crate::port::Port;
+use crate::world::World;
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,12 +99,17 @@ pub trait Line {
 }
 
 /// Opens the line to a device.
-pub fn open(place: &Place, driver: &Driver, address: Option<&str>) -> Result<Box<dyn Line>, Trouble> {
+pub fn open(
+    world: &Rc<dyn World>,
+    place: &Place,
+    driver: &Driver,
+    address: Option<&str>,
+) -> Result<Box<dyn Line>, Trouble> {
     if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
         return sila(server, feature, driver.timeout);
     }
-    let opened = port::open(place, driver).map_err(|e| place::trouble(place, &e));
-    let link = opened.and_then(|port| Link::new(port, driver, address)).map_err(Trouble::Lost)?;
+    let opened = world.open(place, driver).map_err(|e| place::trouble(place, &e));
+    let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(Trouble::Lost)?;
     Ok(Box::new(link))
 }
 
@@ -119,6 +126,7 @@ fn sila(server: &str, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
 
 /// An open line to a device.
 pub struct Link {
+    world: Rc<dyn World>,
     port: Box<dyn Port>,
     codec: Codec,
     timeout: Duration,
@@ -127,11 +135,16 @@ pub struct Link {
 
 impl Link {
     /// A line in use by a driver.
-    pub fn new(port: Box<dyn Port>, driver: &Driver, address: Option<&str>) -> Result<Self, String> {
+    pub fn new(
+        world: Rc<dyn World>,
+        port: Box<dyn Port>,
+        driver: &Driver,
+        address: Option<&str>,
+    ) -> Result<Self, String> {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { port, codec, timeout, buffer: Vec::new() })
+        Ok(Link { world, port, codec, timeout, buffer: Vec::new() })
     }
 
     fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -148,9 +161,8 @@ impl Link {
         self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices answer by the wall clock")]
     fn reply(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
-        let begun = Instant::now();
+        let begun = self.world.elapsed();
         let mut most = self.timeout;
         let mut hurried = false;
         loop {
@@ -160,9 +172,9 @@ impl Link {
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;
-                most = most.min(begun.elapsed() + patience);
+                most = most.min(self.passed(begun) + patience);
             }
-            let left = most.saturating_sub(begun.elapsed());
+            let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
@@ -181,6 +193,10 @@ impl Link {
             }
             self.buffer.extend(bytes);
         }
+    }
+
+    fn passed(&self, since: Duration) -> Duration {
+        self.world.elapsed().saturating_sub(since)
     }
 
     /// The numbers of an answer, unless it is a refusal or says something else.

@@ -2,6 +2,7 @@
 
 mod bindings;
 mod faulty;
+mod journal;
 mod kills;
 mod server;
 mod stop;
@@ -129,6 +130,11 @@ fn serve(stream: TcpStream, end: u8, heard: &Mutex<Vec<String>>, answer: &dyn Fn
             Answer::HangsUp => return,
         }
     }
+}
+
+/// The lines of a journal after its head.
+pub fn lines(journal: &str) -> &str {
+    journal.split_once('\n').map_or("", |(_, rest)| rest)
 }
 
 /// A folder with a program and bindings of its one device.
