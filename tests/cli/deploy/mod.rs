@@ -1,5 +1,6 @@
 //! Workflows on devices: emulators and devices that misbehave, what is sent, what is refused, what is left safe.
 
+mod ask;
 mod bindings;
 mod faulty;
 mod journal;
