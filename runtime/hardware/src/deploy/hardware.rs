@@ -191,6 +191,11 @@ impl<'m, 't> Hardware<'m, 't> {
         self.unreached.as_ref()
     }
 
+    /// Whether a person has ended it.
+    pub fn is_stopped(&self) -> bool {
+        self.settings.control.is_stopped()
+    }
+
     /// The twin.
     pub fn twin(&mut self) -> &mut Sim<'m> {
         &mut self.twin
