@@ -106,6 +106,7 @@ impl Hardware<'_, '_> {
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
+        self.answers = 0;
         self.ask_again();
         Ok(())
     }
