@@ -47,6 +47,7 @@ mod reacting;
 mod reference;
 mod science;
 mod screening;
+mod servers;
 mod sila;
 mod sizes;
 mod slips;
