@@ -22,6 +22,7 @@ mod formatting;
 mod grids;
 mod gripping;
 mod harness;
+mod hidden;
 mod hollow;
 mod joints;
 mod laws;
