@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Sources};
 use crate::args::{BillArgs, BillFormat, Color};
 use crate::pipeline::{self, Input, Prices};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes once and prints what that uses up; findings go to standard error.
@@ -53,6 +53,6 @@ pub(super) fn show(sources: &Sources, found: Vec<Diagnostic>, color: Color) {
     }
     let mut reporter = Reporter::new(Format::Human, terminal::look(Stream::Err, color));
     let text = reporter.render(sources, found);
-    print(Stream::Err, &text);
+    paint(Stream::Err, &text);
     print(Stream::Err, &reporter.summary());
 }

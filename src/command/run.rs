@@ -13,7 +13,7 @@ use crate::cache;
 use crate::pipeline::{self, Choices, Input, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes and reports; findings and progress go to standard error, the report to standard output.
@@ -107,7 +107,7 @@ impl Findings {
     }
 
     pub(super) fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<matterix_ir::Diagnostic>) {
-        print(Stream::Err, &self.reporter.render(sources, diagnostics));
+        paint(Stream::Err, &self.reporter.render(sources, diagnostics));
     }
 
     pub(super) fn end(&self) {

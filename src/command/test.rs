@@ -10,7 +10,7 @@ use crate::args::{Color, Fidelity, TestArgs, TestFormat};
 use crate::pipeline::{self, Choices, Input, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, complain, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Runs every test of the files, a line each, and counts them; what failed is shown below its line.
@@ -129,7 +129,7 @@ impl Trial {
     fn show(&self, sources: &Sources, found: Vec<Diagnostic>) {
         if self.format == TestFormat::Human {
             let text = Reporter::new(Format::Human, self.look).render(sources, found);
-            print(Stream::Out, &format!("\n{text}"));
+            paint(Stream::Out, &format!("\n{text}"));
         } else {
             for finding in self.findings(sources, found) {
                 print(Stream::Out, &format!("{finding}\n"));

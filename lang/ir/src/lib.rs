@@ -21,6 +21,7 @@ pub mod diagnostic;
 pub mod extent;
 pub mod footing;
 pub mod graph;
+pub mod hidden;
 pub mod inertia;
 pub mod interval;
 pub mod math;

@@ -112,6 +112,11 @@ impl<'m> Emulator<'m> {
         Ok(out)
     }
 
+    /// Changes to the line of another master, and takes from the caller what has come in over that of a request that is not whole.
+    pub fn change_line(&mut self, input: &mut Vec<u8>) {
+        std::mem::swap(&mut self.input, input);
+    }
+
     /// An answer to what is no message at all; none where the driver knows none.
     pub fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
         let reply = self.refuse(NOT_UNDERSTOOD, why)?;

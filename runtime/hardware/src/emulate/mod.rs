@@ -3,9 +3,14 @@
 mod device;
 mod form;
 mod http;
+mod pty;
 mod serve;
 mod solve;
+mod symlink;
+mod tcp;
 
 pub use device::Emulator;
 pub use http::serve_http;
-pub use serve::{Stop, serve_pty, serve_tcp};
+pub use pty::serve_pty;
+pub use serve::Stop;
+pub use tcp::serve_tcp;
