@@ -199,6 +199,7 @@ impl<'m, 't> Hardware<'m, 't> {
         let code = match trouble {
             Trouble::Lost(_) => codes::DEVICE_LOST,
             Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+            Trouble::Unsaid(_) => codes::UNSENDABLE,
             Trouble::Refused { .. } => codes::DEVICE_REFUSED,
         };
         if matches!(trouble, Trouble::Lost(_)) {
