@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::terminal::{Stream, print};
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Set when a command is to end early.
+pub static ASKED: AtomicBool = AtomicBool::new(false);
 
 static LAST_WORDS: OnceLock<fn() -> String> = OnceLock::new();
 

@@ -37,6 +37,27 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
     (bindings, reader.found)
 }
 
+/// What a plan rests on of its bindings, as a text: who speaks to what, by which driver, under which address of its line and with
+/// which tolerances; not where lines are, as a device may be moved to another port.
+pub fn canonical(program: &Program, bindings: &[Binding]) -> String {
+    let mut lines: Vec<String> = bindings.iter().map(|b| line(program, b)).collect();
+    lines.sort();
+    lines.concat()
+}
+
+fn line(program: &Program, binding: &Binding) -> String {
+    let name = &program.scene.get(binding.instance).name;
+    let driver = |index: usize| program.drivers.get(index).map_or("", |d| d.name.as_str());
+    let by = match &binding.carrier {
+        Carrier::Line { driver: index, address, .. } => {
+            format!("{} {}", driver(*index), address.as_deref().unwrap_or_default())
+        }
+        Carrier::Shared { driver: index, .. } => driver(*index).to_owned(),
+        Carrier::Hand => HAND.to_owned(),
+    };
+    format!("{name}: {by} {:?}\n", binding.tolerances)
+}
+
 struct Reader<'p> {
     program: &'p Program,
     file: FileId,

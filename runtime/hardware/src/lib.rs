@@ -10,6 +10,7 @@ pub mod deploy;
 pub mod emulate;
 pub mod http;
 pub mod link;
+mod lock;
 pub mod pattern;
 pub mod place;
 pub mod play;
@@ -19,3 +20,4 @@ pub mod serve;
 #[cfg(feature = "sila")]
 mod sila;
 pub mod template;
+pub mod world;

@@ -1,14 +1,16 @@
 //! A device at the other end of a line: exchanges as its driver declares them.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::rc::Rc;
+use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
 use crate::pattern::written;
 use crate::place::{self, Place};
-use crate::port::{self, Port};
+use crate::port::Port;
+use crate::world::World;
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,12 +109,17 @@ pub trait Line {
 }
 
 /// Opens the line to a device.
-pub fn open(place: &Place, driver: &Driver, address: Option<&str>) -> Result<Box<dyn Line>, Trouble> {
+pub fn open(
+    world: &Rc<dyn World>,
+    place: &Place,
+    driver: &Driver,
+    address: Option<&str>,
+) -> Result<Box<dyn Line>, Trouble> {
     if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
         return sila(server, feature, driver.timeout);
     }
-    let opened = port::open(place, driver).map_err(|e| place::trouble(place, &e));
-    let link = opened.and_then(|port| Link::new(port, driver, address)).map_err(Trouble::Lost)?;
+    let opened = world.open(place, driver).map_err(|e| place::trouble(place, &e));
+    let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(Trouble::Lost)?;
     Ok(Box::new(link))
 }
 
@@ -129,21 +136,27 @@ fn sila(server: &str, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
 
 /// An open line to a device.
 pub struct Link {
+    world: Rc<dyn World>,
     port: Box<dyn Port>,
     codec: Codec,
     timeout: Duration,
     buffer: Vec<u8>,
     /// What the device said by itself, by the line of its driver: when, and the value.
-    heard: BTreeMap<usize, (Instant, f64)>,
+    heard: BTreeMap<usize, (Duration, f64)>,
 }
 
 impl Link {
     /// A line in use by a driver.
-    pub fn new(port: Box<dyn Port>, driver: &Driver, address: Option<&str>) -> Result<Self, String> {
+    pub fn new(
+        world: Rc<dyn World>,
+        port: Box<dyn Port>,
+        driver: &Driver,
+        address: Option<&str>,
+    ) -> Result<Self, String> {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new() })
+        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new() })
     }
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -173,9 +186,8 @@ impl Link {
         self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices answer by the wall clock")]
     fn reply(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
-        let begun = Instant::now();
+        let begun = self.world.elapsed();
         let mut most = self.timeout;
         let mut hurried = false;
         loop {
@@ -188,9 +200,9 @@ impl Link {
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;
-                most = most.min(begun.elapsed() + patience);
+                most = most.min(self.passed(begun) + patience);
             }
-            let left = most.saturating_sub(begun.elapsed());
+            let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
@@ -212,15 +224,18 @@ impl Link {
     }
 
     /// Takes what the device says by itself; false of an answer.
-    #[allow(clippy::disallowed_methods, reason = "devices speak by the wall clock")]
     fn overheard(&mut self, reply: &Reply, driver: &Driver) -> bool {
         for (line, told) in driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some()) {
             if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
-                self.heard.insert(line, (Instant::now(), value));
+                self.heard.insert(line, (self.world.elapsed(), value));
                 return true;
             }
         }
         driver.ignores.iter().any(|pattern| self.codec.matched(pattern, &reply.text).is_some())
+    }
+
+    fn passed(&self, since: Duration) -> Duration {
+        self.world.elapsed().saturating_sub(since)
     }
 
     /// The numbers of an answer, unless it is a refusal or says something else.
@@ -313,20 +328,19 @@ impl Line for Link {
         })
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices speak by the wall clock")]
     fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
-        let begun = Instant::now();
+        let begun = self.world.elapsed();
         loop {
             while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
                 if let Ok(reply) = reply {
                     self.overheard(&reply, driver);
                 }
             }
-            if let Some((_, value)) = self.heard.get(&line).filter(|(when, _)| when.elapsed() <= self.timeout) {
+            if let Some((_, value)) = self.heard.get(&line).filter(|(when, _)| self.passed(*when) <= self.timeout) {
                 return Ok(*value);
             }
             let most = ear.patience().map_or(self.timeout, |patience| self.timeout.min(patience));
-            let left = most.saturating_sub(begun.elapsed());
+            let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
                 let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());

@@ -60,10 +60,28 @@ impl<'m> Hardware<'m, '_> {
         self.over(index, |link, driver, ear| link.say(texts, expects, driver, ear))
     }
 
-    /// Does something over the line of a device.
+    /// Does something over the line of a device, with all that goes over it in the journal.
     pub(super) fn over<T>(
         &mut self,
         index: usize,
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.over_line(index, None, act)
+    }
+
+    /// Asks something over the line of a device; what went over it is in the journal where that came to nothing.
+    pub(super) fn inquire<T>(
+        &mut self,
+        index: usize,
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.over_line(index, Some(Vec::new()), act)
+    }
+
+    fn over_line<T>(
+        &mut self,
+        index: usize,
+        unsaid: Option<Vec<Entry>>,
         act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
     ) -> Result<T, Trouble> {
         let (time, line) = (self.twin.now(), self.line_of(index));
@@ -71,9 +89,13 @@ impl<'m> Hardware<'m, '_> {
         let (Some(link), Some(driver)) = (self.devices[line].link.as_deref_mut(), driver) else {
             return Err(Trouble::Lost("its line is not open".to_owned()));
         };
-        let (cancel, securing) = (self.settings.cancel, self.securing);
+        let (cancel, securing) = (self.settings.control.cancel(), self.securing);
         let (journal, trace) = (&mut self.journal, &mut *self.trace);
-        act(link, driver, &mut Ear { time, device, journal, trace, cancel, securing })
+        let mut ear = Ear { time, device, journal, trace, cancel, securing, unsaid };
+        let done = act(link, driver, &mut ear);
+        let unsaid = ear.unsaid.take().filter(|_| done.is_err());
+        unsaid.iter().flatten().for_each(|entry| self.journal.note(entry));
+        done
     }
 
     /// Asks a device for a quantity, SI.
@@ -97,7 +119,7 @@ impl<'m> Hardware<'m, '_> {
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let asked = self.over(index, |link, driver, ear| match told.heard {
+        let asked = self.inquire(index, |link, driver, ear| match told.heard {
             Some(_) => link.hear(line, driver, ear).map(|value| vec![value]),
             None => link.ask(&text, &told.expects, driver, ear),
         });
