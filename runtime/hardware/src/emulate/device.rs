@@ -1,4 +1,4 @@
-//! One emulated device: requests in, answers out, the twin in between.
+//! One emulated device at a line: requests in, answers out, the twin in between.
 
 use std::collections::BTreeMap;
 
@@ -21,9 +21,8 @@ const BUSY: &str = "busy";
 /// Most characters of a message that is not understood.
 const SHOWN: usize = 200;
 
-/// A device in its lab.
-pub struct Emulator<'m> {
-    sim: Sim<'m>,
+/// A device at a line.
+pub(super) struct Unit<'m> {
     /// The device's, then those over its line.
     drivers: Vec<&'m Driver>,
     codec: Codec,
@@ -33,72 +32,89 @@ pub struct Emulator<'m> {
     /// What was answered last.
     last: Vec<u8>,
     input: Vec<u8>,
+    /// When it says next what it says by itself, in the order of its lines, s.
+    due: Vec<(&'m Told, f64)>,
 }
 
-impl<'m> Emulator<'m> {
-    /// The device of the first of these drivers in a lab that has been started; the others speak over its line.
-    pub fn new(sim: Sim<'m>, drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
+impl<'m> Unit<'m> {
+    /// The device of the first of these drivers; the others speak over its line.
+    pub(super) fn new(drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
         let first = drivers.first().ok_or("no driver says how it is spoken to")?;
         let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
-        Ok(Emulator {
-            sim,
-            drivers,
-            codec,
-            running: Vec::new(),
-            heard: BTreeMap::new(),
-            last: Vec::new(),
-            input: Vec::new(),
-        })
+        let told = drivers.iter().flat_map(|d| &d.told).filter_map(|t| t.heard.map(|every| (t, every)));
+        let (due, running, heard) = (told.collect(), Vec::new(), BTreeMap::new());
+        Ok(Unit { drivers, codec, running, heard, last: Vec::new(), input: Vec::new(), due })
     }
 
-    /// The model behind it.
-    pub fn sim(&mut self) -> &mut Sim<'m> {
-        &mut self.sim
+    /// The device with what stands behind it.
+    pub(super) fn with<'e>(&'e mut self, sim: &'e mut Sim<'m>) -> Device<'e, 'm> {
+        let Unit { drivers, codec, running, heard, last, input, due } = self;
+        Device { sim, drivers, codec, running, heard, last, input, due }
     }
 
-    /// Lets lab time pass until then, s.
-    pub fn pass(&mut self, until: f64) -> Result<(), Fault> {
-        loop {
-            self.sweep()?;
-            let now = self.sim.now();
-            if now >= until {
-                return Ok(());
-            }
-            let ends =
-                self.running.clone().into_iter().filter_map(|(ticket, _)| match self.sim.poll(ticket, &mut ()) {
-                    Ok(Status::Running { until, watch }) => Some((until, watch)),
-                    _ => None,
-                });
-            let (mut next, mut watches) = (until, Vec::new());
-            for (end, watch) in ends.collect::<Vec<_>>() {
-                next = end.unwrap_or(f64::INFINITY).clamp(now, next);
-                watches.extend(watch.map(|node| matterix_runtime::process::Watch { node, value: true }));
-            }
-            self.sim.advance(next, &watches, &mut ())?;
-        }
+    /// What it does.
+    pub(super) fn running(&self) -> impl Iterator<Item = Ticket> {
+        self.running.iter().map(|(ticket, _)| *ticket)
     }
 
+    /// When it says something by itself at the earliest, s.
+    pub(super) fn next_due(&self) -> f64 {
+        self.due.iter().fold(f64::INFINITY, |next, (_, due)| next.min(*due))
+    }
+}
+
+/// A device at a line, with the model behind it.
+pub(super) struct Device<'e, 'm> {
+    sim: &'e mut Sim<'m>,
+    drivers: &'e [&'m Driver],
+    codec: &'e mut Codec,
+    running: &'e mut Vec<(Ticket, &'m Operation)>,
+    heard: &'e mut BTreeMap<(usize, usize, usize), Vec<Found>>,
+    last: &'e mut Vec<u8>,
+    input: &'e mut Vec<u8>,
+    due: &'e mut Vec<(&'m Told, f64)>,
+}
+
+impl<'m> Device<'_, 'm> {
     /// What is over is forgotten.
-    fn sweep(&mut self) -> Result<(), Fault> {
+    pub(super) fn sweep(&mut self) -> Result<(), Fault> {
         let mut left = Vec::new();
-        for (ticket, operation) in std::mem::take(&mut self.running) {
+        for (ticket, operation) in std::mem::take(self.running) {
             if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
                 left.push((ticket, operation));
             }
         }
-        self.running = left;
+        *self.running = left;
         Ok(())
     }
 
+    /// What it says by itself now.
+    pub(super) fn speak(&mut self) -> Result<Vec<u8>, Fault> {
+        let mut out = Vec::new();
+        for at in 0..self.due.len() {
+            let (told, due) = self.due[at];
+            if due > self.sim.now() {
+                continue;
+            }
+            self.due[at].1 = self.sim.now() + told.heard.unwrap_or(f64::INFINITY);
+            if told.condition.is_some_and(|c| self.sim.engine().eval(c) == 0.0) {
+                continue;
+            }
+            let reply = Reply::of(self.tells(told)?);
+            out.extend(self.codec.answer(&reply).map_err(|why| untold(told.span, self.sim.now(), why))?);
+        }
+        Ok(out)
+    }
+
     /// Bytes that have come in; the bytes that are answered.
-    pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
+    pub(super) fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
         self.input.extend_from_slice(bytes);
         let mut out = Vec::new();
-        while let Some(request) = self.codec.take_request(&mut self.input) {
+        while let Some(request) = self.codec.take_request(self.input) {
             let reply = match request {
                 Ok(Request::Says(words)) => self.obey(&words)?,
                 Ok(Request::Again) => {
-                    out.extend_from_slice(&self.last);
+                    out.extend_from_slice(self.last);
                     continue;
                 }
                 Ok(Request::Other) => continue,
@@ -106,15 +122,15 @@ impl<'m> Emulator<'m> {
             };
             if let Some(reply) = reply {
                 let reply = Reply { busy: !self.running.is_empty(), ..reply };
-                self.last = self.codec.answer(&reply).map_err(|why| untold(Span::default(), self.sim.now(), why))?;
-                out.extend_from_slice(&self.last);
+                *self.last = self.codec.answer(&reply).map_err(|why| untold(Span::default(), self.sim.now(), why))?;
+                out.extend_from_slice(self.last);
             }
         }
         Ok(out)
     }
 
     /// An answer to what is no message at all; none where the driver knows none.
-    pub fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
+    pub(super) fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
         let reply = self.refuse(NOT_UNDERSTOOD, why)?;
         self.codec.answer(&reply).ok()
     }
@@ -194,7 +210,7 @@ impl<'m> Emulator<'m> {
         let asked = told.filter(|t| t.heard.is_none() && self.codec.found(&t.asks, word).is_some());
         let all: Vec<&Told> = asked.collect();
         let holds = |sim: &mut Sim<'m>, t: &Told| t.condition.is_none_or(|c| sim.engine().eval(c) != 0.0);
-        all.iter().find(|t| t.condition.is_some() && holds(&mut self.sim, t)).or_else(|| all.first()).copied()
+        all.iter().find(|t| t.condition.is_some() && holds(self.sim, t)).or_else(|| all.first()).copied()
     }
 
     fn tells(&mut self, told: &'m Told) -> Result<String, Fault> {
