@@ -93,7 +93,7 @@ impl Backend for Hardware<'_, '_> {
             return;
         }
         for exchange in &driver.halt {
-            let texts = self.texts(&exchange.sends);
+            let Ok(texts) = self.texts(&exchange.sends) else { continue };
             // What goes wrong here ends what is ending already.
             if let Err(trouble) = self.try_say(running.device, &texts, exchange.expects.as_ref()) {
                 self.trouble(running.device, &trouble, exchange.span);
@@ -171,7 +171,7 @@ impl Hardware<'_, '_> {
             self.eval(node, out)?;
         }
         // What is said goes by what was before: which tip is next, how much is in a syringe.
-        let texts = exchange.map(|e| self.texts(&e.sends)).unwrap_or_default();
+        let texts = exchange.map(|e| self.texts(&e.sends)).transpose()?.unwrap_or_default();
         let replayed = match exchange {
             Some(_) => self.replayed_start(number, step, label, &texts)?,
             None => None,
@@ -258,7 +258,7 @@ impl Hardware<'_, '_> {
                 Some(_) => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
                 None => {
                     self.go_live(out)?;
-                    let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+                    let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
                     let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {
                         Ok(true) => self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?,

@@ -274,6 +274,7 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let code = match trouble {
         Trouble::Lost(_) => codes::DEVICE_LOST,
         Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+        Trouble::Unsaid(_) => codes::UNSENDABLE,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
     };
     let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };

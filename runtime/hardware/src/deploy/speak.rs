@@ -13,9 +13,12 @@ use crate::link::{Line, Overhear, Trouble};
 use crate::template;
 
 impl<'m> Hardware<'m, '_> {
-    pub(super) fn texts(&mut self, sends: &[Template]) -> Vec<String> {
+    /// Messages with the values that they have now; a fault where one does not fit its form.
+    pub(super) fn texts(&mut self, sends: &[Template]) -> Result<Vec<String>, Fault> {
         let engine = self.twin.engine();
-        sends.iter().map(|t| template::filled(t, |n| Some(engine.eval(n))).unwrap_or_default()).collect()
+        let filled = |t: &Template| template::filled(t, |n| Some(engine.eval(n))).map_err(|why| (t.span, why));
+        let texts: Result<_, _> = sends.iter().map(filled).collect();
+        texts.map_err(|(span, why)| self.fault(codes::UNSENDABLE, span, why))
     }
 
     /// Says commands to a device.
@@ -45,7 +48,8 @@ impl<'m> Hardware<'m, '_> {
         }
         let device = &mut self.devices[index];
         if is_dry {
-            for frame in device.codec.iter_mut().flat_map(|codec| codec.say(texts)) {
+            let frames = device.codec.as_mut().map(|codec| codec.say(texts)).transpose().map_err(Trouble::Unsaid)?;
+            for frame in frames.into_iter().flatten() {
                 (self.trace)(time, device.name, true, &frame);
             }
             return Ok(Vec::new());
@@ -103,17 +107,22 @@ impl<'m> Hardware<'m, '_> {
             let message = format!("`{}` cannot be told now: its driver says so", told.name);
             return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
         }
-        let text = self.texts(std::slice::from_ref(&told.asks)).concat();
+        let text = self.texts(std::slice::from_ref(&told.asks))?.concat();
         let (time, is_dry) = (self.twin.now(), self.is_dry());
         let device = &mut self.devices[index];
         if is_dry {
-            if let Some(codec) = &mut device.codec {
-                let frame = codec.ask(&text);
-                (self.trace)(time, device.name, true, &frame);
+            if let Some(codec) = device.codec.as_mut().filter(|_| told.heard.is_none()) {
+                match codec.ask(&text) {
+                    Ok(frame) => (self.trace)(time, device.name, true, &frame),
+                    Err(why) => return Err(self.fault(codes::UNSENDABLE, told.span, why)),
+                }
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let asked = self.inquire(index, |link, driver, ear| link.ask(&text, &told.expects, driver, ear));
+        let asked = self.inquire(index, |link, driver, ear| match told.heard {
+            Some(_) => link.hear(line, driver, ear).map(|value| vec![value]),
+            None => link.ask(&text, &told.expects, driver, ear),
+        });
         let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
         numbers
             .first()
