@@ -8,7 +8,8 @@ use matterix_runtime::record::give_up;
 use crate::terminal::{Stream, print};
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Set when a command is to end early.
+pub static ASKED: AtomicBool = AtomicBool::new(false);
 
 static LAST_WORDS: OnceLock<fn() -> String> = OnceLock::new();
 

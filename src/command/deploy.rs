@@ -1,23 +1,33 @@
 //! `matterixc deploy`.
 
-use std::cell::RefCell;
 use std::path::Path;
+use std::rc::Rc;
+use std::time::Duration;
 
 use matterix_hardware::calibration::{self, Calibrated};
-use matterix_hardware::deploy::{Exposed, Journal, Mode};
+use matterix_hardware::deploy::{Answer, Chain, Control, Exposed, Journal, JournalError, Kept, Mode};
+use matterix_hardware::world::Machine;
 use matterix_ir::Diagnostic;
 use matterix_ir::quantity::show_number;
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
-use crate::keys::Keys;
 use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::terminal::{Stream, print};
-use crate::{Exit, cancel, files};
+use crate::{Exit, cancel, files, keys};
 
 /// Devices that are left as they are when a person cannot wait.
 pub(super) static EXPOSED: Exposed = Exposed::new();
+
+/// What people say meanwhile.
+pub(super) static CONTROL: Control = Control::new(&cancel::ASKED, keys::show);
+
+/// The number of the question that is put before the plan begins.
+const BEFORE: u64 = u64::MAX;
+
+/// How often it is looked whether that has been answered.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// Compiles, looks whether devices can do it, and lets them do it.
 pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
@@ -65,28 +75,28 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         DeployMode::Shadow => Mode::Shadow,
         DeployMode::Real | DeployMode::SimFirst => Mode::Real,
     };
-    let yes = args.yes || mode == Mode::Dry;
-    let keys = RefCell::new((mode != Mode::Dry).then(Keys::listen).flatten());
-    let person = |text: &str| confirmed(text, yes, keys.borrow_mut().as_mut());
-    if mode != Mode::Dry && !args.resume && !stands(&measured, &person) {
+    let who = keys::person();
+    if args.yes || mode == Mode::Dry {
+        CONTROL.answer_all(Answer { yes: true, who: format!("{who}, by `--yes`") });
+    }
+    if mode != Mode::Dry && !keys::listen(&CONTROL) && !args.yes {
+        CONTROL.answer_all(Answer::of_nobody());
+    }
+    if mode != Mode::Dry && !args.resume && !stands(&measured) {
         findings.end();
         print(Stream::Err, "what was measured is not confirmed: nothing was sent\n");
         return Ok(Exit::Findings);
     }
-    let journal = match (&args.journal, args.resume) {
-        (Some(path), true) => Some(Journal::reopen(path)?),
-        (Some(path), false) if args.mode != DeployMode::Dry => Some((Journal::create(path)?, Vec::new())),
-        _ => None,
-    };
     let plan = DeployPlan {
         bindings: (file, &bindings),
         mode,
         speed: args.speed,
         seed: args.seed,
         trace: args.trace,
-        journal,
-        cancel,
-        person: &person,
+        journal: journal(args)?,
+        control: &CONTROL,
+        who: &who,
+        world: Rc::new(Machine::new()),
         exposed: &EXPOSED,
     };
     cancel::last_words(left_exposed);
@@ -98,7 +108,14 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if let (Some(path), false) = (&args.journal, args.resume) {
         forget_empty(path);
     }
-    let deployed = deployed?;
+    let deployed = match deployed? {
+        Ok(deployed) => deployed,
+        Err(found) => {
+            findings.show(&sources, found);
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    };
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     if let Some(end) = deployed.end {
@@ -123,12 +140,35 @@ fn measured(args: &DeployArgs, bindings: &str) -> Measured {
     Measured { name: args.bind.display().to_string(), text: bindings.to_owned(), given }
 }
 
+/// The journal that is asked for.
+fn journal(args: &DeployArgs) -> Result<Kept, String> {
+    let Some(path) = args.journal.as_ref().filter(|_| args.mode != DeployMode::Dry) else { return Ok(Kept::Not) };
+    if !args.resume {
+        return Journal::create(path).map(Kept::New).map_err(|e| e.text().to_owned());
+    }
+    match Journal::reopen(path) {
+        Ok((journal, before)) => Ok(Kept::Left(journal, before)),
+        Err(JournalError::Damaged(why)) => Ok(Kept::Damaged(why)),
+        Err(other) => Err(other.text().to_owned()),
+    }
+}
+
 /// Whether a person says that it is still so.
-fn stands(measured: &Measured, person: &dyn Fn(&str) -> bool) -> bool {
+fn stands(measured: &Measured) -> bool {
     let value = |g: &Gauged| measured.text.get(g.value.clone()).unwrap_or_default().to_owned();
     let all: Vec<String> =
         measured.given.iter().map(|g| format!("  {}.{}: {}\n", g.thing.0, g.field.0, value(g))).collect();
-    all.is_empty() || person(&format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()))
+    if all.is_empty() {
+        return true;
+    }
+    CONTROL.ask(BEFORE, &format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()));
+    while !CONTROL.is_stopped() {
+        if let Some(answer) = CONTROL.answered(BEFORE) {
+            return answer.yes;
+        }
+        std::thread::sleep(LOOK);
+    }
+    false
 }
 
 /// What is said where nothing more is done.
@@ -140,24 +180,12 @@ pub(super) fn left_exposed() -> String {
     }
 }
 
-/// Removes a new journal into which nothing was written: what was refused beforehand may be tried again with it.
+/// Removes a new journal into which nothing was written but its head: what was refused beforehand may be tried again with it.
 pub(super) fn forget_empty(journal: &Path) {
-    if std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() == 0) {
+    let head = Chain::default().head().len() as u64;
+    let is_empty = std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() <= head);
+    if is_empty {
         // It stays where it cannot be removed, which the next attempt says.
         let _ = std::fs::remove_file(journal);
     }
-}
-
-/// Whether a person agrees; nobody does where nobody can be asked.
-fn confirmed(text: &str, yes: bool, keys: Option<&mut Keys>) -> bool {
-    print(Stream::Err, &format!("{text}\n"));
-    if yes {
-        return true;
-    }
-    let Some(keys) = keys else {
-        print(Stream::Err, "nobody is there to confirm: run it on a terminal, or with `--yes`\n");
-        return false;
-    };
-    print(Stream::Err, "type y and Enter to confirm: ");
-    keys.ask().is_some_and(|line| line.trim().eq_ignore_ascii_case("y"))
 }

@@ -1,7 +1,9 @@
 //! Workflows on devices: emulators and devices that misbehave, what is sent, what is refused, what is left safe.
 
+mod ask;
 mod bindings;
 mod faulty;
+mod journal;
 mod kills;
 mod server;
 mod stop;
@@ -129,6 +131,11 @@ fn serve(stream: TcpStream, end: u8, heard: &Mutex<Vec<String>>, answer: &dyn Fn
             Answer::HangsUp => return,
         }
     }
+}
+
+/// The lines of a journal after its head.
+pub fn lines(journal: &str) -> &str {
+    journal.split_once('\n').map_or("", |(_, rest)| rest)
 }
 
 /// A folder with a program and bindings of its one device.

@@ -1,5 +1,6 @@
 //! A device that answers as a real one would: the model of the library behind the wire of its driver, read the other way round.
 
+mod bus;
 mod device;
 mod form;
 mod http;
@@ -9,7 +10,7 @@ mod solve;
 mod symlink;
 mod tcp;
 
-pub use device::Emulator;
+pub use bus::Emulator;
 pub use http::serve_http;
 pub use pty::serve_pty;
 pub use serve::Stop;

@@ -36,5 +36,9 @@ impl Clock {
 /// Lets time pass to now and answers.
 pub(super) fn turn(emulator: &mut Emulator<'_>, clock: &Clock, came: &[u8]) -> Result<Vec<u8>, String> {
     emulator.pass(clock.now()).map_err(|f| f.message)?;
-    if came.is_empty() { Ok(Vec::new()) } else { emulator.receive(came).map_err(|f| f.message) }
+    let mut out = emulator.spoken();
+    if !came.is_empty() {
+        out.extend(emulator.receive(came).map_err(|f| f.message)?);
+    }
+    Ok(out)
 }
