@@ -1,12 +1,12 @@
 //! `matterixc run`.
 
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::{Diagnostic, Program};
 use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::perturb;
+use matterix_runtime::record::Folder;
 
 use crate::args::{Color, Fidelity, RunArgs, RunFormat};
 use crate::cache;
@@ -25,7 +25,7 @@ pub fn run(args: &RunArgs, color: Color) -> Exit {
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
-        create(dir)?;
+        is_writable(dir)?;
     }
     let mut findings = Findings::new(args.format, color);
     let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
@@ -125,9 +125,10 @@ fn kind(format: RunFormat) -> Kind {
     }
 }
 
-pub(super) fn create(dir: &Path) -> Result<(), String> {
+/// Whether the files of a run can be written there, before it is run.
+pub(super) fn is_writable(dir: &Path) -> Result<(), String> {
     if dir.exists() && !dir.is_dir() {
         return Err(format!("`{}` is a file, not a directory", dir.display()));
     }
-    fs::create_dir_all(dir).map_err(|e| format!("cannot create `{}`: {}", dir.display(), files::reason(&e)))
+    Folder::check(dir).map_err(|e| e.to_string())
 }
