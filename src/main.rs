@@ -15,6 +15,7 @@ mod mcp;
 mod pipeline;
 mod progress;
 mod reads;
+mod record;
 mod report;
 mod terminal;
 mod uri;

@@ -143,6 +143,8 @@ pub struct Link {
     buffer: Vec<u8>,
     /// What the device said by itself, by the line of its driver: when, and the value.
     heard: BTreeMap<usize, (Duration, f64)>,
+    /// What answers said last that is kept, by its name.
+    texts: BTreeMap<String, String>,
 }
 
 impl Link {
@@ -156,7 +158,7 @@ impl Link {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new() })
+        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new(), texts: BTreeMap::new() })
     }
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -256,7 +258,12 @@ impl Link {
             let is = self.codec.shown_reply(None, &reply.text);
             Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
         })?;
-        said.kept.iter().for_each(|(word, text)| ear.kept(word, text));
+        for (word, text) in said.kept {
+            if self.texts.get(&word) != Some(&text) {
+                ear.kept(&word, &text);
+                self.texts.insert(word, text);
+            }
+        }
         Ok(said.numbers)
     }
 

@@ -195,10 +195,14 @@ impl<'a> Planner<'a, '_> {
     fn addressed(&mut self, framing: &Framing, address: Option<&str>, at: Span) -> Option<()> {
         let form = match framing {
             Framing::CavroDt | Framing::CavroOem => Some(None),
-            Framing::Frames(frames) => frames.request.iter().chain(&frames.reply).find_map(|part| match part {
-                Part::Address(form) => Some(form.as_ref()),
-                _ => None,
-            }),
+            Framing::Frames(frames) => {
+                let forms = frames.request.iter().chain(&frames.reply).filter_map(|part| match part {
+                    Part::Address(form) => Some(form.as_ref()),
+                    _ => None,
+                });
+                let forms: Vec<_> = forms.collect();
+                forms.iter().find(|form| form.is_some()).or(forms.first()).copied()
+            }
             Framing::Json | Framing::Calls => return Some(()),
         };
         match (form, address) {

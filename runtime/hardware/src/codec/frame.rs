@@ -13,8 +13,8 @@ use super::{Garbled, LONGEST, Reply, Request, modbus, shown};
 #[derive(Clone, Debug)]
 pub struct Frame {
     frames: Frames,
-    /// The device's, as it stands in a frame.
-    address: Vec<u8>,
+    /// The device's, as it stands in requests and in replies.
+    addresses: [Vec<u8>; 2],
     /// The number of the last request that was put together.
     number: u64,
     /// The number of the last request that was sent.
@@ -45,23 +45,12 @@ enum Taken {
 impl Frame {
     /// A line with a device at this address; in words why it can have none.
     pub(super) fn new(frames: Frames, address: Option<&str>) -> Result<Self, String> {
-        let parts = || frames.request.iter().chain(&frames.reply);
-        let form = parts().find_map(|p| match p {
-            Part::Address(form) => Some(form.as_ref()),
-            _ => None,
-        });
-        let address = match (form, address) {
-            (None, None) => String::new(),
-            (None, Some(_)) => return Err(format!("the framing `{}` has no address", frames.name)),
-            (Some(_), None) => return Err(format!("the framing `{}` has an address", frames.name)),
-            (Some(None), Some(text)) => text.to_owned(),
-            (Some(Some(form)), Some(text)) => {
-                let number = text.parse::<f64>().map_err(|_| format!("`{text}` is no number"))?;
-                form.write(number).map_err(|why| format!("`{text}` is no address here: {why}"))?
-            }
-        };
-        let address = bytes(&address).filter(|a| a.len() <= LONGEST).ok_or("an address is some bytes")?;
-        Ok(Frame { frames, address, number: 0, awaited: None, asked: None, heard: 0 })
+        let addresses = [written(&frames, &frames.request, address)?, written(&frames, &frames.reply, address)?];
+        if addresses.iter().all(Option::is_none) && address.is_some() {
+            return Err(format!("the framing `{}` has no address", frames.name));
+        }
+        let addresses = addresses.map(Option::unwrap_or_default);
+        Ok(Frame { frames, addresses, number: 0, awaited: None, asked: None, heard: 0 })
     }
 
     /// How long the line is quiet before something is sent, s.
@@ -112,7 +101,7 @@ impl Frame {
                 Err(garbled) => return Some(Err(garbled)),
             };
             // What another device says, or what answers an earlier question, is no answer to this one.
-            let is_other = address.is_some_and(|a| a != self.address);
+            let is_other = address.is_some_and(|a| a != self.addresses[Way::Reply as usize]);
             let is_late = number.is_some_and(|n| self.awaited.is_some_and(|awaited| awaited != n));
             if is_other || is_late {
                 continue;
@@ -130,7 +119,7 @@ impl Frame {
             Ok(whole) => whole,
             Err(garbled) => return Some(Err(garbled)),
         };
-        if address.is_some_and(|a| a != self.address) {
+        if address.is_some_and(|a| a != self.addresses[Way::Request as usize]) {
             return Some(Ok(Request::Other));
         }
         self.heard = number.unwrap_or_default();
@@ -157,22 +146,22 @@ impl Frame {
         }
     }
 
-    fn width(&self, part: &Part) -> usize {
+    fn width(&self, way: Way, part: &Part) -> usize {
         match part {
             Part::Fixed(bytes) => bytes.len(),
             Part::Data => 0,
-            Part::Address(None) => self.address.len(),
-            Part::Address(Some(form)) | Part::Length(form) | Part::Check(form) | Part::Number(form) => {
+            Part::Address(_) => self.addresses[way as usize].len(),
+            Part::Length(form) | Part::Check(form) | Part::Number(form) => {
                 form.width().unwrap_or_default()
             }
         }
     }
 
     /// Where each part stands in a frame with a message of this size.
-    fn places(&self, layout: &[Part], size: usize) -> Vec<Range<usize>> {
+    fn places(&self, way: Way, layout: &[Part], size: usize) -> Vec<Range<usize>> {
         let mut at = 0;
         let mut place = |part: &Part| {
-            let width = if *part == Part::Data { size } else { self.width(part) };
+            let width = if *part == Part::Data { size } else { self.width(way, part) };
             at += width;
             at - width..at
         };
@@ -182,14 +171,14 @@ impl Frame {
     /// A message as a frame.
     fn put(&self, way: Way, data: &[u8], number: u64) -> Result<Vec<u8>, String> {
         let layout = self.layout(way);
-        let places = self.places(layout, data.len());
+        let places = self.places(way, layout, data.len());
         let long = || format!("a message of {} bytes has no room in a frame", data.len());
         let mut out = Vec::new();
         for part in layout {
             match part {
                 Part::Fixed(fixed) => out.extend_from_slice(fixed),
                 Part::Data => out.extend_from_slice(data),
-                Part::Address(_) => out.extend_from_slice(&self.address),
+                Part::Address(_) => out.extend_from_slice(&self.addresses[way as usize]),
                 Part::Length(form) => {
                     let counted = self.counted(layout, &places).ok_or_else(long)?;
                     let written = form.write(counted as f64).map_err(|_| long())?;
@@ -274,9 +263,9 @@ impl Frame {
     fn first(&self, way: Way, buffer: &[u8]) -> Taken {
         let layout = self.layout(way);
         let head = layout.iter().position(|p| *p == Part::Data).unwrap_or_default();
-        let begins: usize = layout[..head].iter().map(|p| self.width(p)).sum();
+        let begins: usize = layout[..head].iter().map(|p| self.width(way, p)).sum();
         // A frame that has not begun as one does is none, however much is still to come.
-        let known = self.places(&layout[..head], 0);
+        let known = self.places(way, &layout[..head], 0);
         for (part, place) in layout[..head].iter().zip(&known) {
             if let Part::Fixed(fixed) = part
                 && let Some(is) = buffer.get(place.start..place.end.min(buffer.len()))
@@ -298,7 +287,7 @@ impl Frame {
             Ok(None) => return Taken::More,
             Err(why) => return Taken::Bad(1, why),
         };
-        let places = self.places(layout, size);
+        let places = self.places(way, layout, size);
         let length = places.last().map_or(0, |p| p.end);
         if length > LONGEST {
             return Taken::Bad(1, Garbled::new(format!("a frame of {length} bytes")));
@@ -330,7 +319,7 @@ impl Frame {
         if let Some((form, place)) = length {
             let is = read(form, &head[place.clone()]);
             let is = is.ok_or_else(|| Garbled::new(format!("`{}` is no length", shown(&head[place.clone()]))))?;
-            let without = self.counted(layout, &self.places(layout, 0)).unwrap_or_default();
+            let without = self.counted(layout, &self.places(way, layout, 0)).unwrap_or_default();
             let size = is as i64 - without;
             return match usize::try_from(size) {
                 Ok(size) if size <= LONGEST => Ok(Some(size)),
@@ -347,7 +336,7 @@ impl Frame {
         }
         let (before, mark) = match &layout[at + 1..] {
             [Part::Fixed(mark), ..] => (0, mark),
-            [check, Part::Fixed(mark), ..] => (self.width(check), mark),
+            [check, Part::Fixed(mark), ..] => (self.width(way, check), mark),
             _ => return Err(Garbled::new("nothing says where a message ends")),
         };
         let Some(end) = rest.windows(mark.len()).position(|w| w == mark) else { return Ok(None) };
@@ -397,6 +386,27 @@ impl Frame {
         });
         form.is_some_and(|form| read(form, is).is_some() && read(form, is) == read(form, right))
     }
+}
+
+/// An address as it stands in frames of this layout; none where they have none.
+fn written(frames: &Frames, layout: &[Part], address: Option<&str>) -> Result<Option<Vec<u8>>, String> {
+    let form = layout.iter().find_map(|p| match p {
+        Part::Address(form) => Some(form.as_ref()),
+        _ => None,
+    });
+    let (form, text) = match (form, address) {
+        (None, _) => return Ok(None),
+        (Some(_), None) => return Err(format!("the framing `{}` has an address", frames.name)),
+        (Some(form), Some(text)) => (form, text),
+    };
+    let written = match form {
+        None => text.to_owned(),
+        Some(form) => {
+            let number = text.parse::<f64>().map_err(|_| format!("`{text}` is no number"))?;
+            form.write(number).map_err(|why| format!("`{text}` is no address here: {why}"))?
+        }
+    };
+    bytes(&written).filter(|a| (1..=LONGEST).contains(&a.len())).map(Some).ok_or_else(|| "an address is some bytes".to_owned())
 }
 
 /// A number as often as its form comes round again.
