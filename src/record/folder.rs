@@ -5,7 +5,7 @@ use std::io::Write;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use matterix_hardware::deploy::{Ending, read, sha256};
+use matterix_hardware::deploy::{Chain, Ending, read, sha256};
 use serde::{Deserialize, Serialize};
 
 use super::report::{About, Report};
@@ -68,21 +68,34 @@ impl Folder {
         }
     }
 
+    /// Removes it again where its journal says nothing: what was refused beforehand may be tried again with it.
+    pub fn forget_unused(&self) {
+        let head = Chain::default().head().len() as u64;
+        if std::fs::metadata(self.journal()).is_ok_and(|there| there.len() <= head) {
+            // It stays where it cannot be removed, which the next attempt says.
+            let _ = std::fs::remove_dir_all(&self.dir);
+        }
+    }
+
     /// Where the journal is.
     pub fn journal(&self) -> PathBuf {
         self.dir.join(JOURNAL)
     }
 
-    /// Keeps the text of a program and its bindings; the path of its first file below that of the program.
+    /// Keeps the text of a program and its bindings, unless they are there from an earlier process; the path of its first file below
+    /// that of the program.
     pub fn keep(&self, main: &Path, read: &[Taken], bindings: &str) -> Result<String, String> {
-        let whole = |path: &Path| path.canonicalize().map_err(|e| format!("`{}`: {}", path.display(), files::reason(&e)));
+        let whole =
+            |path: &Path| path.canonicalize().map_err(|e| format!("`{}`: {}", path.display(), files::reason(&e)));
         let paths = read.iter().map(|t| whole(&t.path)).collect::<Result<Vec<_>, _>>()?;
         let main = whole(main)?;
         let root = paths.iter().fold(main.parent().unwrap_or(&main).to_path_buf(), |root, path| common(&root, path));
-        for (path, taken) in paths.iter().zip(read) {
-            self.write(&Path::new(PROGRAM).join(below(&root, path)), &taken.bytes)?;
+        if !self.dir.join(BINDINGS).exists() {
+            for (path, taken) in paths.iter().zip(read) {
+                self.write(&Path::new(PROGRAM).join(below(&root, path)), &taken.bytes)?;
+            }
+            self.write(Path::new(BINDINGS), bindings.as_bytes())?;
         }
-        self.write(Path::new(BINDINGS), bindings.as_bytes())?;
         Ok(below(&root, &main).display().to_string())
     }
 
@@ -115,13 +128,8 @@ impl Folder {
             DirBuilder::new().recursive(true).mode(0o700).create(parent).map_err(failed)?;
         }
         let beside = path.with_extension("part");
-        let mut file: File = File::options()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .mode(0o600)
-            .open(&beside)
-            .map_err(failed)?;
+        let mut file: File =
+            File::options().write(true).create(true).truncate(true).mode(0o600).open(&beside).map_err(failed)?;
         file.write_all(bytes).and_then(|()| file.sync_all()).map_err(failed)?;
         std::fs::rename(&beside, &path).map_err(failed)
     }
@@ -139,7 +147,8 @@ fn below<'p>(root: &Path, path: &'p Path) -> &'p Path {
 /// The files below a folder, in order.
 pub fn gather(root: &Path, dir: &Path, out: &mut Vec<PathBuf>) -> Result<(), String> {
     let failed = |e: std::io::Error| format!("cannot read `{}`: {}", dir.display(), files::reason(&e));
-    let mut paths = std::fs::read_dir(dir).and_then(|all| all.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>());
+    let mut paths =
+        std::fs::read_dir(dir).and_then(|all| all.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>());
     paths.iter_mut().for_each(|p| p.sort());
     for path in paths.map_err(failed)? {
         match path.is_dir() && !path.is_symlink() {

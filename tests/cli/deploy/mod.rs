@@ -5,6 +5,7 @@ mod bindings;
 mod faulty;
 mod journal;
 mod kills;
+mod record;
 mod server;
 mod stop;
 mod unreached;

@@ -178,7 +178,7 @@ fn ready(
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
         let mut found = vec![not_opened(failed)];
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
         return Some(Ending { stopped: hardware.is_stopped(), ..Ending::not_begun(found) });
     }
     None
@@ -194,7 +194,7 @@ fn concluded(mut hardware: Hardware<'_, '_>, execution: Execution, screen: Scree
     let mut found = findings(&execution);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     if !well {
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
@@ -268,7 +268,7 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
         Unfit::Unknown(d) if !hardware.abandon() => return vec![d],
         Unfit::Unknown(d) => d,
     };
-    let left = hardware.secure();
+    let left = hardware.secure_all();
     let names = hardware.secured().join(", ");
     let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
     std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
