@@ -3,7 +3,7 @@
 use std::os::unix::ffi::OsStringExt;
 
 use crate::deploy::{Answer, Device, HEAT, bench, deploy};
-use crate::harness::{Ended, command, folder, matterixc_in, write};
+use crate::harness::{Ended, command, folder, matterixc_in, root, write};
 
 /// What a terminal obeys.
 fn is_clean(ended: &Ended) {
@@ -91,5 +91,18 @@ fn what_a_device_answers_does_not_reach_the_terminal_as_it_is() {
     let ended = deploy(&dir, &["--mode", "real"]);
     assert_ne!(ended.code, 0);
     assert!(ended.err.contains("owned"), "{}", ended.err);
+    is_clean(&ended);
+}
+
+#[test]
+fn the_description_of_a_feature_is_shown_in_letters_and_no_fault_of_the_reader() {
+    let dir = folder("hidden_feature");
+    let read = |name: &str| std::fs::read_to_string(root().join("tests/deploy").join(name)).expect("it is there");
+    write(&dir, "lab.mtx", read("hotplate.mtx"));
+    let feature =
+        read("hotplate.sila.xml").replacen("A plate that heats", "\u{202b}A plate&#13; that heats\u{202c}", 1);
+    write(&dir, "hotplate.sila.xml", feature);
+    let ended = matterixc_in(&dir, &["check", "lab.mtx"]);
+    assert_eq!(ended.code, 0, "{}", ended.out);
     is_clean(&ended);
 }
