@@ -21,9 +21,9 @@ const LIMITS: Limits = Limits {
 
 /// The same with little patience.
 const HASTY: Limits = Limits {
-    request: Duration::from_millis(300),
-    idle: Duration::from_millis(300),
-    stalled: Duration::from_millis(300),
+    request: Duration::from_secs(1),
+    idle: Duration::from_secs(1),
+    stalled: Duration::from_secs(1),
     ..LIMITS
 };
 
