@@ -151,9 +151,7 @@ impl Frame {
             Part::Fixed(bytes) => bytes.len(),
             Part::Data => 0,
             Part::Address(_) => self.addresses[way as usize].len(),
-            Part::Length(form) | Part::Check(form) | Part::Number(form) => {
-                form.width().unwrap_or_default()
-            }
+            Part::Length(form) | Part::Check(form) | Part::Number(form) => form.width().unwrap_or_default(),
         }
     }
 
@@ -406,7 +404,10 @@ fn written(frames: &Frames, layout: &[Part], address: Option<&str>) -> Result<Op
             form.write(number).map_err(|why| format!("`{text}` is no address here: {why}"))?
         }
     };
-    bytes(&written).filter(|a| (1..=LONGEST).contains(&a.len())).map(Some).ok_or_else(|| "an address is some bytes".to_owned())
+    bytes(&written)
+        .filter(|a| (1..=LONGEST).contains(&a.len()))
+        .map(Some)
+        .ok_or_else(|| "an address is some bytes".to_owned())
 }
 
 /// A number as often as its form comes round again.
