@@ -24,6 +24,7 @@ pub mod footing;
 pub mod form;
 pub mod framing;
 pub mod graph;
+pub mod hidden;
 pub mod inertia;
 pub mod interval;
 pub mod math;

@@ -6,6 +6,7 @@ mod faulty;
 mod framed;
 mod journal;
 mod kills;
+mod record;
 mod server;
 mod stop;
 mod unreached;

@@ -65,6 +65,8 @@ pub struct Ending {
     pub passed: bool,
     /// Whether a person ended it early.
     pub stopped: bool,
+    /// The same in a word, as the journal has it.
+    pub status: &'static str,
     /// s of lab time; nothing where it did not begin.
     pub end: Option<f64>,
     /// Expectations that were judged, met and not observed.
@@ -78,7 +80,16 @@ pub struct Ending {
 impl Ending {
     fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
         let (passed, stopped, end, execution) = (false, false, None, None);
-        Ending { diagnostics, passed, stopped, end, counts: [0; 3], execution, states: String::new() }
+        Ending {
+            diagnostics,
+            passed,
+            stopped,
+            status: "not begun",
+            end,
+            counts: [0; 3],
+            execution,
+            states: String::new(),
+        }
     }
 }
 
@@ -167,7 +178,7 @@ fn ready(
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
         let mut found = vec![not_opened(failed)];
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
         return Some(Ending { stopped: hardware.is_stopped(), ..Ending::not_begun(found) });
     }
     None
@@ -183,7 +194,7 @@ fn concluded(mut hardware: Hardware<'_, '_>, execution: Execution, screen: Scree
     let mut found = findings(&execution);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     if !well {
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
@@ -196,7 +207,7 @@ fn concluded(mut hardware: Hardware<'_, '_>, execution: Execution, screen: Scree
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
     let (end, states) = (Some(execution.end_time), hardware.states());
-    Ending { diagnostics: found, passed, stopped, end, counts, execution: Some(execution), states }
+    Ending { diagnostics: found, passed, stopped, status, end, counts, execution: Some(execution), states }
 }
 
 /// That a shadow has nothing to go by: no device that tells something has a tolerance.
@@ -257,7 +268,7 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
         Unfit::Unknown(d) if !hardware.abandon() => return vec![d],
         Unfit::Unknown(d) => d,
     };
-    let left = hardware.secure();
+    let left = hardware.secure_all();
     let names = hardware.secured().join(", ");
     let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
     std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()

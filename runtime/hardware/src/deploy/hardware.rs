@@ -94,6 +94,8 @@ pub struct Hardware<'m, 't> {
     pub(super) dated: f64,
     /// What may begin.
     pub(super) gate: Gate,
+    /// Answers that were waiting when it was last looked; while a journal is gone through, lines that were left then.
+    pub(super) answers: usize,
     /// Questions that are open, as they were put.
     pub(super) questions: BTreeMap<Ticket, String>,
     /// An earlier process is followed, and devices have not been asked yet.
@@ -172,6 +174,7 @@ impl<'m, 't> Hardware<'m, 't> {
             origin,
             dated: f64::NEG_INFINITY,
             gate: Gate::Go,
+            answers: 0,
             questions: BTreeMap::new(),
             running: BTreeMap::new(),
             tickets: 0,
@@ -225,6 +228,11 @@ impl<'m, 't> Hardware<'m, 't> {
 
     pub(super) fn is_dry(&self) -> bool {
         self.settings.mode == Mode::Dry
+    }
+
+    /// Whether anything goes over lines.
+    pub(super) fn speaks(&self) -> bool {
+        !matches!(self.settings.mode, Mode::Dry | Mode::Replay)
     }
 
     pub(super) fn fault(&self, code: Code, span: Span, message: String) -> Fault {

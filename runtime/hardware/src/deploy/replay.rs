@@ -32,6 +32,7 @@ impl Hardware<'_, '_> {
                 | Entry::Out { .. }
                 | Entry::Back { .. }
                 | Entry::Begin { .. }
+                | Entry::Safe { .. }
                 | Entry::End { .. } => {
                     self.replay.pop_front();
                 }

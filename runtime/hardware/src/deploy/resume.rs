@@ -23,6 +23,19 @@ impl Hardware<'_, '_> {
         self.keep(&Entry::Begin { version: VERSION, tool, digest, workflow, wall, speed, seed, pid, who })
     }
 
+    /// Makes devices safe, and notes what became of each.
+    pub(super) fn secure_all(&mut self) -> Vec<(matterix_ir::Span, String)> {
+        let troubles = self.secure();
+        let t = self.twin.now();
+        let names = |at: matterix_ir::Span| self.devices.iter().find(|d| d.binding.at == at).map_or("", |d| d.name);
+        let left = troubles.iter().map(|(at, why)| (names(*at).to_owned(), Some(why.clone())));
+        let safe = self.made_safe.iter().map(|index| (self.devices[*index].name.to_owned(), None));
+        for (device, trouble) in safe.chain(left).collect::<Vec<_>>() {
+            self.journal.note(&Entry::Safe { t, device, trouble });
+        }
+        troubles
+    }
+
     /// The last line of a journal.
     pub fn end_journal(&mut self, status: &str) -> Result<(), Fault> {
         let (t, wall, states) = (self.twin.now(), self.wall(), self.states());
@@ -106,6 +119,7 @@ impl Hardware<'_, '_> {
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
+        self.answers = 0;
         self.ask_again();
         Ok(())
     }

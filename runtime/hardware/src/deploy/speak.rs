@@ -7,7 +7,7 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
 
 use super::device::Ear;
-use super::hardware::Hardware;
+use super::hardware::{Hardware, Mode};
 use super::journal::Entry;
 use crate::link::{Line, Overhear, Trouble};
 use crate::template;
@@ -40,7 +40,7 @@ impl<'m> Hardware<'m, '_> {
     ) -> Result<Vec<f64>, Trouble> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
-        if self.devices[index].driver.is_none() {
+        if self.devices[index].driver.is_none() || self.settings.mode == Mode::Replay {
             return Ok(Vec::new());
         }
         if let Some(why) = &self.devices[self.line_of(index)].lost {

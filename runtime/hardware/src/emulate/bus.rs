@@ -62,6 +62,13 @@ impl<'m> Emulator<'m> {
         std::mem::take(&mut self.spoken)
     }
 
+    /// Changes to the line of another master: takes from the caller what has come in over that for each device of a request that is
+    /// not whole, and gives back what has come in over the line before.
+    pub fn change_line(&mut self, inputs: &mut Vec<Vec<u8>>) {
+        inputs.resize(self.units.len(), Vec::new());
+        self.units.iter_mut().zip(inputs).for_each(|(unit, input)| unit.change_line(input));
+    }
+
     /// Bytes that have come in; the bytes that are answered.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
         let mut out = Vec::new();

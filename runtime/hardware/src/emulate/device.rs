@@ -52,6 +52,11 @@ impl<'m> Unit<'m> {
         Device { sim, drivers, codec, running, heard, last, input, due }
     }
 
+    /// Changes to the line of another master, and takes what has come in over that of a request that is not whole.
+    pub(super) fn change_line(&mut self, input: &mut Vec<u8>) {
+        std::mem::swap(&mut self.input, input);
+    }
+
     /// What it does.
     pub(super) fn running(&self) -> impl Iterator<Item = Ticket> {
         self.running.iter().map(|(ticket, _)| *ticket)

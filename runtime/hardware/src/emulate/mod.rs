@@ -4,9 +4,14 @@ mod bus;
 mod device;
 mod form;
 mod http;
+mod pty;
 mod serve;
 mod solve;
+mod symlink;
+mod tcp;
 
 pub use bus::Emulator;
 pub use http::serve_http;
-pub use serve::{Stop, serve_pty, serve_tcp};
+pub use pty::serve_pty;
+pub use serve::Stop;
+pub use tcp::serve_tcp;

@@ -1,5 +1,5 @@
 //! What decoders do with bytes nobody has seen before: they end, do not panic, and read back what they wrote. The fuzz targets
-//! `wire`, `http` and `journal` are these functions, too.
+//! `wire`, `http`, `request` and `journal` are these functions, too.
 
 use matterix_hardware::codec::{Codec, Reply, Request};
 use matterix_hardware::deploy::Entry;
@@ -10,6 +10,7 @@ use matterix_ir::framing::{CHECKSUMS, Carries, Check, Checksum, Counted, Frames,
 use matterix_ir::message;
 use matterix_ir::wire::{Choice, Framing, Pattern, Piece, Slot, Template};
 use matterix_ir::{NodeId, Unit};
+use matterix_net::http::{Body, head};
 
 fn plain(text: &str) -> Slot {
     Slot::Plain(text.into())
@@ -168,6 +169,31 @@ pub fn http(bytes: &[u8]) {
                 }
             }
         }
+    }
+}
+
+/// A request as it comes in to a server: whole or in pieces, it is the same one.
+pub fn request(bytes: &[u8]) {
+    const LIMIT: usize = 64;
+    let end = bytes.windows(4).position(|w| w == b"\r\n\r\n").map_or(bytes.len(), |at| at + 4);
+    let Ok(head) = head(&bytes[..end]) else { return };
+    let read = |size: usize| {
+        let mut body = Body::new(head.framing, LIMIT)?;
+        let mut input = Vec::new();
+        for piece in bytes[end..].chunks(size.max(1)) {
+            input.extend_from_slice(piece);
+            let used = body.take(&input)?;
+            input.drain(..used);
+        }
+        assert!(body.len() <= LIMIT, "more is kept than may be");
+        Ok::<_, matterix_net::http::Refusal>(body.is_whole().then(|| (body.into_content(), input)))
+    };
+    let whole = read(bytes.len());
+    assert_eq!(read(1), whole);
+    assert_eq!(read(7), whole);
+    if let Ok(Some((body, _))) = whole {
+        let request = matterix_net::http::Request { head, body };
+        let _ = (request.is_for_this_machine(), request.is_of_own_origin(), request.path().len());
     }
 }
 
