@@ -144,7 +144,7 @@ fn readings_are_heard_where_nobody_asks() {
         "framing: packet",
         "    heat to(t) sends \"SP{t as degC :.1}\" expects \"OK\"
     stop heating sends \"OFF\" expects \"OK\"
-    reading temperature hears \"T {degC}\" every 2 s
+    reading temperature hears \"T {degC}\" every 4 s
     safe sends \"OFF\" expects \"OK\"",
     );
     let dir = bench("heard", &text, "bath", "");
