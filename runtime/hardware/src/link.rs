@@ -288,14 +288,14 @@ impl Line for Link {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
-        for frame in self.codec.say(texts).map_err(Trouble::Unsaid)? {
+        for (place, frame) in self.codec.say(texts).map_err(Trouble::Unsaid)?.into_iter().enumerate() {
             self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
             }
             let reply = self.reply(&frame, driver, ear)?;
             let before = self.kept();
-            numbers = self.judged(&frame, &reply, expects, driver, ear)?;
+            numbers = self.judged(&frame, &reply, expects.map(|e| e.of(place)), driver, ear)?;
             for (word, text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
                 ear.kept(word, text);
             }

@@ -53,7 +53,10 @@ impl<'a> Planner<'a, '_> {
 
     fn check_exchange(&mut self, exchange: &Exchange, known: &BTreeSet<String>) {
         exchange.sends.iter().for_each(|sent| self.check_request(sent, known));
-        exchange.expects.iter().for_each(|expected| self.check_answer(expected));
+        if let Some(expected) = &exchange.expects {
+            self.check_answer(expected);
+            expected.then.iter().for_each(|expected| self.check_answer(expected));
+        }
         if let Some(until) = &exchange.until {
             self.check_request(&until.asks, known);
             match &until.expects {
@@ -99,6 +102,9 @@ fn kept_by(wire: &Wire) -> Vec<String> {
         WireKind::Fixed { exchange, .. } | WireKind::Command { exchange, .. } => exchange,
         _ => return Vec::new(),
     };
-    let Some(expects) = &exchange.expects else { return Vec::new() };
-    message::answer(&expects.text).map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
+    let kept = |expects: &crate::ast::Pattern| -> Vec<String> {
+        let answer = message::answer(&expects.text);
+        answer.map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
+    };
+    exchange.expects.iter().chain(&exchange.then).flat_map(kept).collect()
 }
