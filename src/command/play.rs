@@ -63,7 +63,7 @@ pub fn play(
         Err(Unplayed::Trouble(trouble)) => trouble,
     };
     let (headline, code) = match &code {
-        Trouble::Lost(why) => (why.clone(), codes::DEVICE_LOST),
+        Trouble::Lost(why) | Trouble::Silent(why) => (why.clone(), codes::DEVICE_LOST),
         Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
         Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };

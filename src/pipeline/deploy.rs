@@ -3,6 +3,7 @@
 // A fault ends the run: how many bytes it is returned in is of no account.
 #![allow(clippy::result_large_err)]
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
@@ -141,12 +142,22 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
         let mut found = vec![not_opened(failed, sources)];
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+        found.extend(secured(&mut hardware, exposed));
         return Ok(Deployed { stopped: control.is_stopped(), ..Deployed::not_begun(found) });
     }
     let limits = Limits { cancel: Some(&ended), ..Limits::default() };
     let mut told = Tee(&mut screen, &mut Told);
-    let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
+    let executed = unbroken(|| exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told));
+    let execution = match executed {
+        Ok(execution) => execution,
+        Err(why) => {
+            let mut found = vec![broken(&why)];
+            found.extend(secured(&mut hardware, exposed));
+            // It says what happened as far as it goes.
+            let _ = hardware.end_journal("failed");
+            return Ok(Deployed::not_begun(found));
+        }
+    };
     if let Some(unreached) = hardware.unreached() {
         return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
     }
@@ -154,8 +165,9 @@ pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<De
     let stopped = !well && control.is_stopped();
     let mut found = findings(&execution, sources);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
-    if !well {
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
+    found.extend(hardware.unhalted().iter().cloned().map(not_halted));
+    if !well || !hardware.unhalted().is_empty() {
+        found.extend(secured(&mut hardware, exposed));
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
@@ -250,7 +262,7 @@ pub(super) fn of_fault(fault: Fault) -> Diagnostic {
 pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let Unreached { device, at, trouble } = unreached;
     let code = match trouble {
-        Trouble::Lost(_) => codes::DEVICE_LOST,
+        Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
         Trouble::Garbled(_) => codes::DEVICE_GARBLED,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
     };
@@ -267,6 +279,36 @@ pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
 /// What went wrong when drivers said what they say first, with the place where the device is bound.
 pub(super) fn not_opened((fault, at): (Fault, Span), sources: &Sources) -> Diagnostic {
     super::run::led_by_the_user(of_fault(fault).because(at, "bound here"), sources)
+}
+
+/// What comes of something that may break down: an error in this program leaves no device as it is.
+fn unbroken<T>(act: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(act)).map_err(|panic| {
+        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it does not say why".to_owned())
+    })
+}
+
+fn broken(why: &str) -> Diagnostic {
+    let headline = format!("this program broke down: {why}");
+    Diagnostic::error(codes::RUN_FAILED, Span::default(), headline, "an error in matterixc, not in the workflow")
+}
+
+/// Makes devices safe; what could not be.
+fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic> {
+    match unbroken(|| hardware.secure()) {
+        Ok(left) => left.into_iter().map(unsafe_left).collect(),
+        Err(why) => {
+            let all = exposed.names().into_iter().map(|name| unsafe_left((Span::default(), format!("`{name}`"))));
+            std::iter::once(broken(&why)).chain(all).collect()
+        }
+    }
+}
+
+/// That a device did not break off what it did, whatever made it safe afterwards.
+fn not_halted((at, why): (Span, String)) -> Diagnostic {
+    let headline = format!("a device did not stop when it was told to: {why}");
+    Diagnostic::error(codes::DEVICE_REFUSED, at, headline, "bound here")
 }
 
 pub(super) fn unsafe_left((at, why): (Span, String)) -> Diagnostic {

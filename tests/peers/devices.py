@@ -149,8 +149,7 @@ def drivers():
         out.write(DOSE)
     process, path = emulator("pump", "--file", file, "--driver", "CavroDt", "--pty", "--speed", str(SPEED))
     try:
-        # Its other resolution is not one of the emulated pump.
-        pump = TecanXCPump(com_port=path, address=0, syringe_volume=5e-3, num_valve_port=9, fine_pos=False)
+        pump = TecanXCPump(com_port=path, address=0, syringe_volume=5e-3, num_valve_port=9, fine_pos=True)
         drawn = (pump.draw(2, valve_port=1), pump.volume, pump.port)[1:]
         pushed = (pump.dispense(1, valve_port=3), pump.volume, pump.port)[1:]
         good = drawn == (2.0, 1) and pushed == (1.0, 3)

@@ -166,8 +166,28 @@ pub struct Told {
     pub asks: Template,
     /// What comes back.
     pub expects: Pattern,
+    /// The least and the most that its instrument can show, SI, where its line says so.
+    pub shows: Option<[f64; 2]>,
+    /// What may come back instead, where more lines ask the same.
+    pub also: Vec<Form>,
     /// Its line.
     pub span: Span,
+}
+
+impl Told {
+    /// What may come back, in the order of the lines, each with what its instrument can show.
+    pub fn forms(&self) -> impl Iterator<Item = (&Pattern, Option<[f64; 2]>)> {
+        std::iter::once((&self.expects, self.shows)).chain(self.also.iter().map(|f| (&f.expects, f.shows)))
+    }
+}
+
+/// One more form of an answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Form {
+    /// What comes back.
+    pub expects: Pattern,
+    /// The least and the most that its instrument can show, SI, where its line says so.
+    pub shows: Option<[f64; 2]>,
 }
 
 /// A reply that means a failure.
@@ -228,6 +248,8 @@ pub struct Driver {
     pub halt: Vec<Exchange>,
     /// To leave it safe after a run that did not end well.
     pub safe: Vec<Exchange>,
+    /// One of its commands brings its device into a state that it stays in, heating, moving or pumping.
+    pub stays_on: bool,
     /// To let it run a file by itself, from giving it the file to its end.
     pub play: Vec<Exchange>,
     /// What keeps its watchdog quiet.

@@ -57,7 +57,7 @@ pub fn play(
     if played.is_err() {
         for exchange in &driver.safe {
             let texts = texts(&exchange.sends);
-            if !player.link.lacks(&texts) {
+            if !player.link.lacks(driver, &texts) {
                 // What goes wrong here ends what is ending already.
                 let _ = player.link.say(&texts, exchange.expects.as_ref(), driver, ear);
             }

@@ -5,6 +5,8 @@ mod bindings;
 mod faulty;
 mod journal;
 mod kills;
+mod reads;
+mod safe;
 mod server;
 mod stop;
 mod unreached;

@@ -5,7 +5,7 @@ mod json;
 mod line;
 
 use cavro::Cavro;
-pub use json::{Json, LONGEST as LONGEST_JSON};
+pub use json::{Json, Kept, LONGEST as LONGEST_JSON};
 use line::Line;
 use matterix_ir::Unit;
 use matterix_ir::wire::{JSON, Pattern, Slot, Template};
@@ -95,7 +95,7 @@ impl Codec {
     pub fn say(&mut self, texts: &[String]) -> Vec<Vec<u8>> {
         match self {
             Codec::Line(line) => texts.iter().map(|t| line.request(t)).collect(),
-            Codec::Cavro(cavro) => vec![cavro.request(&format!("{}R", texts.concat()))],
+            Codec::Cavro(cavro) => vec![cavro.request(&cavro::string(texts))],
             Codec::Json(json) => texts.iter().map(|t| json.request(t)).collect(),
         }
     }

@@ -67,6 +67,7 @@ impl Hardware<'_, '_> {
         if !self.is_live() && !self.is_dry() {
             return Ok(());
         }
-        self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
+        let said = self.say_again(device, &texts, served.exchange.expects.as_ref());
+        said.map(|_| ()).map_err(|trouble| self.trouble(device, &trouble, served.exchange.span))
     }
 }

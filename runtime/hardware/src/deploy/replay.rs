@@ -31,6 +31,7 @@ impl Hardware<'_, '_> {
                 | Entry::Kept { .. }
                 | Entry::Out { .. }
                 | Entry::Back { .. }
+                | Entry::Again { .. }
                 | Entry::Begin { .. }
                 | Entry::End { .. } => {
                     self.replay.pop_front();

@@ -30,18 +30,26 @@ impl Hardware<'_, '_> {
 
     /// Goes through what an earlier process wrote before anything is said; `who` goes on after it.
     pub fn follow_journal(&mut self, entries: Vec<Entry>, who: &str) {
+        let mut begins = None;
         for entry in &entries {
-            let Entry::Kept { device, word, text, .. } = entry else { continue };
-            if let Some(index) = self.devices.iter().position(|d| d.name == device) {
-                self.kept.push((self.line_of(index), word.clone(), text.clone()));
+            match entry {
+                Entry::Starting { ticket, .. } => begins = Some(*ticket),
+                Entry::Started { .. } | Entry::Ended { .. } => begins = None,
+                Entry::Kept { device, word, text, .. } => {
+                    if let Some(ticket) = begins {
+                        self.begun_with.entry(ticket).or_default().push((word.clone(), text.clone()));
+                    }
+                    if let Some(index) = self.devices.iter().position(|d| d.name == device) {
+                        let instance = self.devices[index].binding.instance;
+                        self.kept.push((self.line_of(index), instance, word.clone(), text.clone()));
+                    }
+                }
+                _ => {}
             }
         }
         self.left_at = self.last_seen(&entries);
         if self.settings.mode != Mode::Replay {
-            for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
-                device.said = true;
-                self.settings.exposed.told(device.name);
-            }
+            self.expose();
         }
         self.replay = entries.into();
         self.resuming = true;

@@ -29,6 +29,8 @@ pub struct Emulator<'m> {
     running: Vec<(Ticket, &'m Operation)>,
     /// The last message of each form, by driver, command and its place among what that sends.
     heard: BTreeMap<(usize, usize, usize), Vec<Found>>,
+    /// What was said last: what is asked then is asked about it.
+    said: Option<&'m Exchange>,
     /// What was answered last.
     last: Vec<u8>,
     input: Vec<u8>,
@@ -45,6 +47,7 @@ impl<'m> Emulator<'m> {
             codec,
             running: Vec::new(),
             heard: BTreeMap::new(),
+            said: None,
             last: Vec::new(),
             input: Vec::new(),
         })
@@ -136,6 +139,7 @@ impl<'m> Emulator<'m> {
         }
         let endings =
             self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open).chain(&d.play));
+        let endings = self.said.into_iter().chain(endings.chain(self.drivers.iter().flat_map(|d| &d.safe)));
         let endings: Vec<_> = endings.filter_map(|e| e.until.as_ref()).collect();
         let answer = self.answer(word);
         for until in endings {
@@ -148,18 +152,19 @@ impl<'m> Emulator<'m> {
                 return Ok(Some(Reply::of(text)));
             }
         }
-        if let Some(text) = answer {
-            return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
-        }
         if let Some(reply) = self.command(word)? {
             return Ok(reply);
         }
-        for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<_>>() {
+        if let Some(text) = answer {
+            return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
+        }
+        for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<(&'m Exchange, bool)>>() {
             let mut is_it = |t: &Template| self.codec.is_word(&template::written(t), word) || self.says(t, word);
             if exchange.sends.iter().any(&mut is_it) {
                 if halts {
                     self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
                 }
+                self.said = Some(exchange);
                 return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p))));
             }
         }
@@ -254,21 +259,23 @@ impl<'m> Emulator<'m> {
             if served.exchange.until.is_some() && !self.running.is_empty() {
                 return Ok(Some(self.refuse(BUSY, "it is busy")));
             }
-            return self.begin(served, &all).map(Some);
+            return self.begin(served, &all, word).map(Some);
         }
         Ok(Some(self.refuse(why.0, &why.1)))
     }
 
-    fn begin(&mut self, served: &'m Served, found: &[Found]) -> Result<Option<Reply>, Fault> {
+    fn begin(&mut self, served: &'m Served, found: &[Found], word: &str) -> Result<Option<Reply>, Fault> {
         let reply = match &served.exchange.expects {
             Some(pattern) => Some(Reply::of(self.echo(pattern, found)?)),
             None => None,
         };
+        self.said = Some(&served.exchange);
         let ticket = self.sim.start(&served.operation, &mut ())?;
         if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
             self.running.push((ticket, &served.operation));
         }
-        Ok(reply)
+        // What the driver says that is answered comes before what it expects.
+        Ok(self.answer(word).filter(|text| !text.is_empty()).map(Reply::of).or(reply))
     }
 
     /// An answer that says numbers as they were sent, or else as they are told.
@@ -313,7 +320,7 @@ fn cut(word: &str) -> &str {
 }
 
 /// What is said apart from commands, and whether it breaks off what the device does.
-fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
+fn fixed<'m>(driver: &'m Driver) -> impl Iterator<Item = (&'m Exchange, bool)> {
     let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).chain(&driver.play).map(|e| (e, false));
     driver.halt.iter().map(|e| (e, true)).chain(quiet)
 }
