@@ -5,14 +5,14 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use matterix_hardware::calibration::{self, Calibrated};
-use matterix_hardware::deploy::{Answer, Chain, Control, Exposed, Journal, JournalError, Mode};
+use matterix_hardware::deploy::{Answer, Chain, Control, Exposed, Journal, JournalError, Kept, Mode};
 use matterix_hardware::world::Machine;
 use matterix_ir::Diagnostic;
 use matterix_ir::quantity::show_number;
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
-use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Kept, Measured, Options, Wires};
+use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::terminal::{Stream, print};
 use crate::{Exit, cancel, files, keys};
@@ -108,7 +108,14 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if let (Some(path), false) = (&args.journal, args.resume) {
         forget_empty(path);
     }
-    let deployed = deployed?;
+    let deployed = match deployed? {
+        Ok(deployed) => deployed,
+        Err(found) => {
+            findings.show(&sources, found);
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    };
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     if let Some(end) = deployed.end {

@@ -1,26 +1,14 @@
-//! A program on devices: bindings, checks before anything moves, execution, what is left safe.
+//! A program on devices: bindings, what is shown meanwhile, and what was found.
 
-// A fault ends the run: how many bytes it is returned in is of no account.
-#![allow(clippy::result_large_err)]
-
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
-use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
-use matterix_hardware::deploy::{
-    Binding, Carrier, Control, Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, VERSION, digest,
-    preflight,
-};
-use matterix_hardware::link::Trouble;
+use matterix_hardware::deploy::{Control, Course, Ending, Exposed, Kept, Mode, carry_out};
 use matterix_hardware::world::World;
-use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
-use matterix_runtime::backend::{Prepared, Sim};
-use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
-use matterix_runtime::fault::Fault;
-use matterix_runtime::process::{Engine, Observer, Options};
-use matterix_runtime::run::Screen;
+use matterix_ir::{Diagnostic, FileId, Program, Sources};
+use matterix_runtime::exec::Listener;
+use matterix_runtime::process::{Engine, Observer};
 
 use crate::terminal::{Stream, print};
 
@@ -48,200 +36,19 @@ pub struct Plan<'p> {
     pub exposed: &'p Exposed,
 }
 
-/// The journal of a deployment.
-pub enum Kept {
-    /// None is kept.
-    Not,
-    /// A new one.
-    New(Journal),
-    /// One that an earlier process has left, and what it says.
-    Left(Journal, Vec<Entry>),
-    /// One that an earlier process has left, and that is not as it was written: why.
-    Damaged(String),
-}
-
-/// What came of it.
-pub struct Deployed {
-    /// What was found before or went wrong after.
-    pub diagnostics: Vec<Diagnostic>,
-    /// Whether it came to its end with all expectations met or not observed.
-    pub passed: bool,
-    /// Whether a person ended it early.
-    pub stopped: bool,
-    /// s of lab time; nothing where it did not begin.
-    pub end: Option<f64>,
-    /// Expectations that were judged, met and not observed.
-    pub counts: [usize; 3],
-}
-
-impl Deployed {
-    fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
-        Deployed { diagnostics, passed: false, stopped: false, end: None, counts: [0; 3] }
-    }
-}
-
-/// Carries a program out.
-pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Deployed, String> {
+/// Carries a program out; what was wrong with the bindings, or how it ended.
+pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Result<Ending, Vec<Diagnostic>>, String> {
+    let Plan { mode, speed, seed, trace, journal, control, who, world, exposed, .. } = plan;
     let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
     if found.iter().any(Diagnostic::is_error) {
-        return Ok(Deployed::not_begun(found));
+        return Ok(Err(found));
     }
-    if plan.mode == Mode::Shadow
-        && let Some(d) = unmeasured(program, &bindings)
-    {
-        return Ok(Deployed::not_begun(vec![d]));
-    }
-    let digest = digest(program, &binding::canonical(program, &bindings))?;
-    let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
-    let (journal, before, unfit) = match plan.journal {
-        Kept::Not => (Journal::none(), None, None),
-        Kept::New(journal) => (journal, None, None),
-        Kept::Left(journal, before) => {
-            let unfit = unfit(&before, &digest, plan.speed, plan.seed);
-            (journal, Some(before), unfit)
-        }
-        Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),
-    };
-    let prepared = Prepared::new(program);
-    let params = program.model.params.iter().map(|p| p.value).collect();
-    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
-    let mut screen = Screen::new(program);
-    let engine = match engine.and_then(|mut engine| engine.start(&mut screen).map(|()| engine)) {
-        Ok(engine) => engine,
-        Err(fault) => return Ok(Deployed::not_begun(vec![of_fault(fault)])),
-    };
-    let twin = Sim::new(engine, &prepared, plan.seed);
-    let shows = plan.trace || plan.mode == Mode::Dry;
-    let trace = traced(shows);
-    let Plan { mode, speed, control, exposed, world, .. } = plan;
-    let ended = AtomicBool::new(false);
-    let settings = Settings { mode, speed, control, ended: &ended, world, exposed };
-    let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
-    if let Some(unfit) = unfit {
-        return Ok(Deployed::not_begun(made_safe(hardware, unfit)));
-    }
-    let found = {
-        let (observed, devices) = hardware.view();
-        preflight(program, devices, observed)
-    };
-    if !found.is_empty() {
-        return Ok(Deployed::not_begun(found));
-    }
-    let goes_on = before.is_some();
-    let is_open = before.iter().flatten().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
-    if let Some(before) = before.filter(|_| is_open) {
-        hardware.follow_journal(before, plan.who);
-    }
-    let unreached = hardware.connect();
-    if !unreached.is_empty() {
-        return Ok(Deployed::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
-    }
-    if !goes_on && let Err(fault) = hardware.begin_journal(&digest, plan.seed, plan.who) {
-        return Ok(Deployed::not_begun(vec![of_fault(fault)]));
-    }
-    // One that was cut off before anything of the plan was begun opens its lines as a new one does.
-    if !is_open && let Err(failed) = hardware.open() {
-        let mut found = vec![not_opened(failed, sources)];
-        found.extend(secured(&mut hardware, exposed));
-        return Ok(Deployed { stopped: control.is_stopped(), ..Deployed::not_begun(found) });
-    }
-    let limits = Limits { cancel: Some(&ended), ..Limits::default() };
-    let mut told = Tee(&mut screen, &mut Told);
-    let executed = unbroken(|| exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told));
-    let execution = match executed {
-        Ok(execution) => execution,
-        Err(why) => {
-            let mut found = vec![broken(&why)];
-            found.extend(secured(&mut hardware, exposed));
-            // It says what happened as far as it goes.
-            let _ = hardware.end_journal("failed");
-            return Ok(Deployed::not_begun(found));
-        }
-    };
-    if let Some(unreached) = hardware.unreached() {
-        return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
-    }
-    let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
-    let stopped = !well && control.is_stopped();
-    let mut found = findings(&execution, sources);
-    found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
-    found.extend(hardware.unhalted().iter().cloned().map(not_halted));
-    if !well || !hardware.unhalted().is_empty() {
-        found.extend(secured(&mut hardware, exposed));
-    }
-    found.extend(hardware.close().err().map(of_fault));
-    let status = match (well, stopped) {
-        (_, true) => "stopped by a person",
-        (true, false) => "ended",
-        (false, false) => "failed",
-    };
-    found.extend(hardware.end_journal(status).err().map(of_fault));
-    let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
-    let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
-    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
-    Ok(Deployed { diagnostics: found, passed, stopped, end: Some(execution.end_time), counts })
-}
-
-/// That a shadow has nothing to go by: no device that tells something has a tolerance.
-fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
-    let is_measured = bindings.iter().any(|b| !b.tolerances.is_empty());
-    let telling = bindings.iter().find_map(|b| match &b.carrier {
-        Carrier::Line { driver, .. } => program.drivers[*driver].told.first().map(|told| (b, told)),
-        _ => None,
-    });
-    let at = telling.map(|(b, _)| b).or(bindings.first()).filter(|_| !is_measured)?.at;
-    let d = Diagnostic::error(codes::BINDING, at, "nothing is compared with the twin", "no device has a `tolerance`");
-    Some(match telling {
-        Some((_, told)) => {
-            let member = told.name.rsplit('.').next().unwrap_or(&told.name);
-            d.help(format!(
-                "say how far from the twin it may be: `tolerance = {{ {member} = \"2 {}\" }}`",
-                told.difference.symbol
-            ))
-        }
-        None => d.help("no device of these tells anything: take another mode"),
-    })
-}
-
-/// Why a journal is of another deployment, or of one that has ended.
-fn unfit(before: &[Entry], digest: &str, speed: f64, seed: u64) -> Option<Diagnostic> {
-    let this = env!("CARGO_PKG_VERSION");
-    match (before.first(), before.last()) {
-        (_, Some(Entry::End { .. })) => {
-            let d = mismatch("the deployment of this journal has come to its end");
-            Some(d.help("begin anew, with a journal of its own"))
-        }
-        (Some(Entry::Begin { version, tool, digest: of, speed: at, seed: from, .. }), _) => match () {
-            () if *version != VERSION || tool != this => {
-                Some(refused(&format!("the journal was written by version {tool} of this program, not by {this}")))
-            }
-            () if of != digest => Some(refused("the journal is of another program, or of other bindings")),
-            () if *at != speed => Some(refused("the journal is of a deployment at another speed")),
-            () if *from != seed => Some(refused("the journal is of a deployment with another seed")),
-            () => None,
-        },
-        _ => Some(refused("the journal says nothing of a deployment")),
-    }
-}
-
-fn mismatch(headline: &str) -> Diagnostic {
-    Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on")
-}
-
-/// That a journal is not gone on with, though what it is about may still be on.
-fn refused(why: &str) -> Diagnostic {
-    mismatch(why).help("see what the devices have done, and begin anew with a journal of its own")
-}
-
-/// What an earlier process has left on is made safe, as it is not known what that was.
-fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Diagnostic) -> Vec<Diagnostic> {
-    if !hardware.abandon() {
-        return vec![unfit];
-    }
-    let left = hardware.secure();
-    let names = hardware.secured().join(", ");
-    let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
-    std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
+    let trace = Box::new(traced(trace || mode == Mode::Dry));
+    let course = Course { bindings, mode, speed, seed, trace, journal, control, who, world, exposed };
+    let ending = carry_out(program, sources, course, &mut Told)?;
+    let led = |d: Diagnostic| super::run::led_by_the_user(d, sources);
+    let diagnostics = ending.diagnostics.into_iter().map(led).collect();
+    Ok(Ok(Ending { diagnostics, ..ending }))
 }
 
 /// Shows what goes over lines, where that is wanted.
@@ -252,79 +59,6 @@ pub(super) fn traced(shows: bool) -> impl Fn(f64, &str, bool, &[u8]) {
             print(Stream::Out, &format!("{time:10.3} s  {device} {way} {}\n", shown(bytes)));
         }
     }
-}
-
-pub(super) fn of_fault(fault: Fault) -> Diagnostic {
-    exec::diagnostic(&FailureTrace::of_fault(fault))
-}
-
-/// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
-pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
-    let Unreached { device, at, trouble } = unreached;
-    let code = match trouble {
-        Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
-        Trouble::Garbled(_) => codes::DEVICE_GARBLED,
-        Trouble::Refused { .. } => codes::DEVICE_REFUSED,
-    };
-    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
-    let headline = format!("`{device}` {what}: {}", trouble.text());
-    let d = Diagnostic::error(code, *at, headline, "bound here");
-    d.help(if goes_on {
-        "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
-    } else {
-        "nothing was said to any device"
-    })
-}
-
-/// What went wrong when drivers said what they say first, with the place where the device is bound.
-pub(super) fn not_opened((fault, at): (Fault, Span), sources: &Sources) -> Diagnostic {
-    super::run::led_by_the_user(of_fault(fault).because(at, "bound here"), sources)
-}
-
-/// What comes of something that may break down: an error in this program leaves no device as it is.
-fn unbroken<T>(act: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(act)).map_err(|panic| {
-        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
-        text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it does not say why".to_owned())
-    })
-}
-
-fn broken(why: &str) -> Diagnostic {
-    let headline = format!("this program broke down: {why}");
-    Diagnostic::error(codes::RUN_FAILED, Span::default(), headline, "an error in matterixc, not in the workflow")
-}
-
-/// Makes devices safe; what could not be.
-fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic> {
-    match unbroken(|| hardware.secure()) {
-        Ok(left) => left.into_iter().map(unsafe_left).collect(),
-        Err(why) => {
-            let all = exposed.names().into_iter().map(|name| unsafe_left((Span::default(), format!("`{name}`"))));
-            std::iter::once(broken(&why)).chain(all).collect()
-        }
-    }
-}
-
-/// That a device did not break off what it did, whatever made it safe afterwards.
-fn not_halted((at, why): (Span, String)) -> Diagnostic {
-    let headline = format!("a device did not stop when it was told to: {why}");
-    Diagnostic::error(codes::DEVICE_REFUSED, at, headline, "bound here")
-}
-
-pub(super) fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
-    let headline = format!("a device could not be made safe: {why}");
-    Diagnostic::error(codes::DEVICE_LOST, at, headline, "see to it").help("go and look at it now")
-}
-
-fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
-    let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
-    let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
-    found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
-    // That nothing more was said after it was refused to go on follows from that.
-    let others = execution.suppressed.iter().filter(|trace| trace.code != codes::JOURNAL_MISMATCH);
-    let others = others.map(exec::diagnostic);
-    found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
-    found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
 }
 
 /// Says what is noted.

@@ -28,7 +28,7 @@ use crate::args::Fidelity;
 use matterix_runtime::motion::{Store, overlaps, preflight};
 
 pub use bill::{Prices, bill};
-pub use deploy::{Kept, Plan as DeployPlan, deploy};
+pub use deploy::{Plan as DeployPlan, deploy};
 pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};

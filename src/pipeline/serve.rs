@@ -7,7 +7,9 @@ use std::net::SocketAddr;
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::deploy::{Control, Device, Exposed, Hardware, Journal, Mode, Settings, digest};
+use matterix_hardware::deploy::{
+    Control, Device, Exposed, Hardware, Journal, Mode, Settings, digest, not_opened, not_reached, of_fault, unsafe_left,
+};
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
 use matterix_hardware::world::Machine;
 use matterix_hardware::{binding, calibration};
@@ -19,7 +21,7 @@ use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
 use matterix_sila_wire::serve as answer;
 
-use super::deploy::{not_opened, not_reached, of_fault, traced, unsafe_left};
+use super::deploy::traced;
 use crate::terminal::{Stream, print};
 
 /// What a server is given beside a program.
@@ -104,7 +106,7 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         return Ok(vec![of_fault(fault)]);
     }
     if let Err(failed) = hardware.open() {
-        let mut found = vec![not_opened(failed, sources)];
+        let mut found = vec![super::run::led_by_the_user(not_opened(failed), sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
         return Ok(found);
     }

@@ -10,6 +10,7 @@ pub mod deploy;
 pub mod emulate;
 pub mod http;
 pub mod link;
+mod lock;
 pub mod pattern;
 pub mod place;
 pub mod play;

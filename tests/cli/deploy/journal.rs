@@ -130,6 +130,25 @@ fn two_processes_do_not_write_one_journal() {
 }
 
 #[test]
+fn two_processes_do_not_speak_over_one_line() {
+    let dir = bench("one_line", &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut first = deployed(&dir);
+    until(&dir, "\"told\"", 2);
+    let mut other = DEPLOY;
+    other[7] = "another";
+    let second = matterixc_in(&dir, &other);
+    assert_eq!(second.code, 1, "{}", second.err);
+    let said = second.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains(&format!("is taken: process {} (", first.id())) && said.contains("nothing was said"),
+        "{said}"
+    );
+    assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
+}
+
+#[test]
 fn a_journal_is_its_users_own_and_small() {
     let dir = bench("own", &text(), "plate", "");
     let emulated = Emulated::at("40", &dir, &["plate", "--file", "lab.mtx"]);

@@ -103,9 +103,9 @@ impl Control {
         self.said().answers.remove(&question)
     }
 
-    /// Whether a question has been answered that nobody has taken note of.
-    pub fn has_answers(&self) -> bool {
-        !self.said().answers.is_empty()
+    /// Answers that nobody has taken note of.
+    pub fn answers(&self) -> usize {
+        self.said().answers.len()
     }
 
     /// A question is open no longer.

@@ -96,6 +96,8 @@ pub struct Hardware<'m, 't> {
     pub(super) dated: f64,
     /// What may begin.
     pub(super) gate: Gate,
+    /// Answers that were waiting when it was last looked; while a journal is gone through, lines that were left then.
+    pub(super) answers: usize,
     /// Questions that are open, as they were put.
     pub(super) questions: BTreeMap<Ticket, String>,
     /// An earlier process is followed, and devices have not been asked yet.
@@ -181,6 +183,7 @@ impl<'m, 't> Hardware<'m, 't> {
             origin,
             dated: f64::NEG_INFINITY,
             gate: Gate::Go,
+            answers: 0,
             questions: BTreeMap::new(),
             running: BTreeMap::new(),
             tickets: 0,
@@ -201,6 +204,11 @@ impl<'m, 't> Hardware<'m, 't> {
     /// The device that did not answer when a journal was to be gone on with: nothing was said to any, and nothing may be.
     pub fn unreached(&self) -> Option<&Unreached> {
         self.unreached.as_ref()
+    }
+
+    /// Whether a person has ended it.
+    pub fn is_stopped(&self) -> bool {
+        self.settings.control.is_stopped()
     }
 
     /// The twin.

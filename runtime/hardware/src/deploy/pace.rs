@@ -23,6 +23,9 @@ const DATED: f64 = 60.0;
 /// Longest time in which nobody looks at the clock, or at what people say.
 const NAP: Duration = Duration::from_millis(10);
 
+/// Shortest of these: what is left may be less than a clock can show.
+const LEAST: Duration = Duration::from_micros(1);
+
 impl Hardware<'_, '_> {
     pub(super) fn pass(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
@@ -43,7 +46,7 @@ impl Hardware<'_, '_> {
             };
             if is_live && !self.is_dry() && target > self.clock() {
                 let left = Duration::try_from_secs_f64((target - self.clock()) / self.settings.speed);
-                self.settings.world.sleep(left.unwrap_or(NAP).min(NAP));
+                self.settings.world.sleep(left.unwrap_or(NAP).clamp(LEAST, NAP));
                 continue;
             }
             let advance = self.twin.advance(target, watches, out)?;
@@ -116,13 +119,17 @@ impl Hardware<'_, '_> {
             self.journal.note(&Entry::Gate { t, to, who, wall });
             return self.set_gate(to);
         }
-        self.settings.control.has_answers()
+        let answers = self.settings.control.answers();
+        std::mem::replace(&mut self.answers, answers) < answers
     }
 
     fn heeded_before(&mut self) -> bool {
         match self.front() {
             Some(entry) if entry.time() > self.twin.now() => false,
-            Some(Entry::Answered { .. }) => true,
+            // Who asked for it takes it at this moment, or it is none that was asked for.
+            Some(Entry::Answered { .. }) => {
+                std::mem::replace(&mut self.answers, self.replay.len()) != self.replay.len()
+            }
             Some(Entry::Stop { who, .. }) => {
                 self.replay.pop_front();
                 self.settings.control.stop(&who);

@@ -8,6 +8,7 @@ use matterix_runtime::fault::Fault;
 
 use super::hardware::{Hardware, Mode};
 use super::journal::{Entry, VERSION};
+use super::preflight::asked_for;
 use crate::link::Trouble;
 
 /// So much may the clock of the machine have been set back, s, before nobody knows how long devices were alone.
@@ -113,6 +114,7 @@ impl Hardware<'_, '_> {
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
+        self.answers = 0;
         self.ask_again();
         Ok(())
     }
@@ -141,13 +143,15 @@ impl Hardware<'_, '_> {
         Ok(())
     }
 
-    /// All devices answer, and are as they were told to be.
+    /// Devices answer what the workflow asks of them, and are as they were told to be.
     fn check_devices(&mut self) -> Result<(), Fault> {
+        let used = asked_for(self.program, &self.observed);
         for device in 0..self.devices.len() {
             let Some(driver) = self.devices[device].driver else { continue };
             for (line, told) in driver.told.iter().enumerate() {
                 let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
-                if !holds {
+                let was_set = told.state.is_some_and(|s| self.commanded.contains(&s));
+                if !holds || !(was_set || used.contains(&told.value)) {
                     continue;
                 }
                 let value = match self.tell(device, line) {
@@ -159,7 +163,7 @@ impl Hardware<'_, '_> {
                     }
                     told => told?,
                 };
-                if told.state.is_some_and(|s| !self.commanded.contains(&s)) {
+                if told.state.is_some() && !was_set {
                     continue;
                 }
                 if told.reading.is_none()
