@@ -5,6 +5,7 @@ mod bindings;
 mod faulty;
 mod journal;
 mod kills;
+mod modules;
 mod reads;
 mod safe;
 mod server;

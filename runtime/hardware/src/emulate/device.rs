@@ -137,9 +137,9 @@ impl<'m> Emulator<'m> {
         if let Some(told) = self.asked(word) {
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
-        let endings =
-            self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open).chain(&d.play));
-        let endings = self.said.into_iter().chain(endings.chain(self.drivers.iter().flat_map(|d| &d.safe)));
+        // What is asked for the end of something that was never said asks for something else.
+        let endings = self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open));
+        let endings = self.said.into_iter().chain(endings);
         let endings: Vec<_> = endings.filter_map(|e| e.until.as_ref()).collect();
         let answer = self.answer(word);
         for until in endings {
@@ -321,8 +321,8 @@ fn cut(word: &str) -> &str {
 
 /// What is said apart from commands, and whether it breaks off what the device does.
 fn fixed<'m>(driver: &'m Driver) -> impl Iterator<Item = (&'m Exchange, bool)> {
-    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).chain(&driver.play).map(|e| (e, false));
-    driver.halt.iter().map(|e| (e, true)).chain(quiet)
+    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.play).map(|e| (e, false));
+    driver.halt.iter().chain(&driver.safe).map(|e| (e, true)).chain(quiet)
 }
 
 fn number(unit: &Unit, si: f64, digits: Option<u8>) -> String {
