@@ -404,8 +404,10 @@ pub enum DeployMode {
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("line").required(true).args(["pty", "tcp"]))]
 pub struct EmulateArgs {
-    /// An asset of the library with a driver, or with `--file` an instance of its lab.
-    pub device: String,
+    /// An asset of the library with a driver, or with `--file` an instance of its lab; several instances, each with its address as
+    /// in `pump@2`, answer at one line.
+    #[arg(required = true)]
+    pub device: Vec<String>,
     /// The lab the device stands in, with what is around it.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,

@@ -3,6 +3,8 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use matterix_runtime::record::give_up;
+
 use crate::terminal::{Stream, print};
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
@@ -42,6 +44,8 @@ fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
             if let Some(say) = LAST_WORDS.get() {
                 print(Stream::Err, &say());
             }
+            // Files that belong together are all there or none.
+            let _given_up = give_up();
             std::process::exit(INTERRUPTED);
         }
         print(Stream::Err, said);

@@ -17,6 +17,7 @@ pub mod play;
 pub mod port;
 #[cfg(feature = "sila")]
 pub mod serve;
+pub mod shared;
 #[cfg(feature = "sila")]
 mod sila;
 pub mod template;

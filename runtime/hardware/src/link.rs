@@ -1,5 +1,6 @@
 //! A device at the other end of a line: exchanges as its driver declares them.
 
+use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -22,6 +23,8 @@ pub enum Trouble {
     Silent(String),
     /// What came is no answer to what was said.
     Garbled(String),
+    /// A frame has no room for what was to be said, and nothing was.
+    Unsaid(String),
     /// The device says no: the failure its driver names, and in words.
     Refused {
         /// As in `reply "..." fails NAME`.
@@ -35,9 +38,11 @@ impl Trouble {
     /// In words.
     pub fn text(&self) -> &str {
         match self {
-            Trouble::Lost(text) | Trouble::Silent(text) | Trouble::Garbled(text) | Trouble::Refused { text, .. } => {
-                text
-            }
+            Trouble::Lost(text)
+            | Trouble::Silent(text)
+            | Trouble::Garbled(text)
+            | Trouble::Unsaid(text)
+            | Trouble::Refused { text, .. } => text,
         }
     }
 }
@@ -89,8 +94,14 @@ pub trait Line {
     fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
     -> Result<bool, Trouble>;
 
+    /// The newest of what the device says by itself, SI, by its line of the driver; one that is older than the driver waits for
+    /// an answer is none, and the next is waited for as long.
+    fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+        Err(Trouble::Lost("nothing is heard over this line".to_owned()))
+    }
+
     /// Lets go by what may still come in answer to a question that is given up, before it is put again.
-    fn settle(&mut self, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn settle(&mut self, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
         Ok(())
     }
 
@@ -143,6 +154,10 @@ pub struct Link {
     buffer: Vec<u8>,
     /// A question was not answered in time, and its answer may still come.
     owed: bool,
+    /// What the device said by itself, by the line of its driver: when, and the value.
+    heard: BTreeMap<usize, (Duration, f64)>,
+    /// What answers said last that is kept, by its name.
+    texts: BTreeMap<String, String>,
 }
 
 impl Link {
@@ -156,29 +171,46 @@ impl Link {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), owed: false })
+        let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
+        Ok(Link { world, port, codec, timeout, buffer, owed: false, heard, texts })
     }
 
-    fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
         // What is still there answers nothing that will be asked.
         loop {
-            match self.port.receive(Duration::ZERO) {
+            match self.port.receive(self.codec.silence()) {
                 Ok(late) if late.is_empty() => break,
-                Ok(late) => ear.back(&late),
+                Ok(late) => {
+                    ear.back(&late);
+                    self.buffer.extend(late);
+                }
                 Err(e) => return Err(Trouble::Lost(format!("the line is gone: {e}"))),
             }
         }
-        self.buffer.clear();
+        if speaks_up(driver) {
+            // A line that the device has begun by itself goes on.
+            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if let Ok(reply) = reply {
+                    self.overheard(&reply, driver);
+                }
+            }
+        } else {
+            self.buffer.clear();
+        }
         ear.out(frame);
+        self.codec.sent(frame);
         self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
     }
 
-    fn reply(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+    fn reply(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
         let begun = self.world.elapsed();
         let mut most = self.timeout;
         let mut hurried = false;
         loop {
             if let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if reply.as_ref().is_ok_and(|reply| self.overheard(reply, driver)) {
+                    continue;
+                }
                 return reply
                     .map_err(|g| Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why)));
             }
@@ -223,7 +255,7 @@ impl Link {
     fn hush(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
         let begun = self.world.elapsed();
         let mut heard = begun;
-        while self.world.elapsed().saturating_sub(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+        while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
             if self.listen(LOOK.min(self.timeout), ear)? {
                 heard = self.world.elapsed();
             }
@@ -232,17 +264,34 @@ impl Link {
     }
 
     /// The answer to a question. Where the one before was not answered in time, what comes last is: the first may be late.
-    fn answer(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
-        let mut reply = self.reply(to, ear)?;
+    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+        let mut reply = self.reply(to, driver, ear)?;
         if std::mem::take(&mut self.owed) {
             self.hush(ear)?;
             while let Some(later) = self.codec.take_reply(&mut self.buffer) {
-                reply = later.map_err(|g| {
+                let later = later.map_err(|g| {
                     Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
                 })?;
+                if !self.overheard(&later, driver) {
+                    reply = later;
+                }
             }
         }
         Ok(reply)
+    }
+
+    /// Takes what the device says by itself; false of an answer.
+    fn overheard(&mut self, reply: &Reply, driver: &Driver) -> bool {
+        for (line, told) in driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some()) {
+            if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
+                // What its instrument cannot show is nothing that was said.
+                if showable(told, &[value], &told.expects, told.shows).is_ok() {
+                    self.heard.insert(line, (self.world.elapsed(), value));
+                }
+                return true;
+            }
+        }
+        driver.ignores.iter().any(|pattern| self.codec.matched(pattern, &reply.text).is_some())
     }
 
     fn passed(&self, since: Duration) -> Duration {
@@ -256,16 +305,29 @@ impl Link {
         reply: &Reply,
         expects: Option<&Pattern>,
         driver: &Driver,
+        ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         if let Some(refused) = self.refusal(driver, reply) {
             return Err(refused);
         }
         let Some(pattern) = expects else { return Ok(Vec::new()) };
-        self.codec.matched(pattern, &reply.text).ok_or_else(|| {
+        let said = self.codec.said(pattern, &reply.text).ok_or_else(|| {
             let (to, expected) = (shown(frame), written(pattern));
             let is = self.codec.shown_reply(None, &reply.text);
             Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
-        })
+        })?;
+        self.note_texts(said.kept, ear);
+        Ok(said.numbers)
+    }
+
+    /// Tells what an answer said that a journal keeps, where it is new.
+    fn note_texts(&mut self, kept: Vec<(String, String)>, ear: &mut dyn Overhear) {
+        for (word, text) in kept {
+            if self.texts.get(&word) != Some(&text) {
+                ear.kept(&word, &text);
+                self.texts.insert(word, text);
+            }
+        }
     }
 
     /// Who speaks from here on, where the framing puts in what answers said.
@@ -304,14 +366,14 @@ impl Line for Link {
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
         self.speak_for(driver);
-        for frame in self.codec.say(texts) {
-            self.send(&frame, ear)?;
+        for frame in self.codec.say(texts).map_err(Trouble::Unsaid)? {
+            self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
             }
-            let reply = self.reply(&frame, ear)?;
+            let reply = self.reply(&frame, driver, ear)?;
             let before = self.kept();
-            numbers = self.judged(&frame, &reply, expects, driver)?;
+            numbers = self.judged(&frame, &reply, expects, driver, ear)?;
             self.note_kept(&before, ear);
         }
         Ok(numbers)
@@ -319,23 +381,29 @@ impl Line for Link {
 
     fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
         self.speak_for(driver);
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.answer(&frame, ear)?;
+        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        self.send(&frame, driver, ear)?;
+        let reply = self.answer(&frame, driver, ear)?;
         if let Some(refused) = self.refusal(driver, &reply) {
             return Err(refused);
         }
         let codec = &mut self.codec;
-        let found = told.forms().find_map(|(form, shows)| Some((codec.matched(form, &reply.text)?, form, shows)));
-        let Some((numbers, form, shows)) = found else {
+        let found = told.forms().find_map(|(form, shows)| Some((codec.said(form, &reply.text)?, form, shows)));
+        let Some((said, form, shows)) = found else {
             let (to, is) = (shown(&frame), self.codec.shown_reply(None, &reply.text));
             return Err(Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{}`", forms(told))));
         };
-        showable(told, &numbers, form, shows)
+        self.note_texts(said.kept, ear);
+        showable(told, &said.numbers, form, shows)
     }
 
-    fn settle(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn settle(&mut self, driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
         self.hush(ear)?;
+        while let Some(late) = self.codec.take_reply(&mut self.buffer) {
+            if let Ok(late) = late {
+                self.overheard(&late, driver);
+            }
+        }
         self.buffer.clear();
         Ok(())
     }
@@ -348,9 +416,9 @@ impl Line for Link {
         ear: &mut dyn Overhear,
     ) -> Result<bool, Trouble> {
         self.speak_for(driver);
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.answer(&frame, ear)?;
+        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        self.send(&frame, driver, ear)?;
+        let reply = self.answer(&frame, driver, ear)?;
         // What is waited for may be what else means a failure: that a run is stopped, where it is to stop.
         let before = self.kept();
         if let Some(pattern) = &until.expects
@@ -362,6 +430,28 @@ impl Line for Link {
         match self.refusal(driver, &reply) {
             Some(refused) => Err(refused),
             None => Ok(until.expects.is_none() && !reply.busy),
+        }
+    }
+
+    fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+        let begun = self.world.elapsed();
+        loop {
+            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if let Ok(reply) = reply {
+                    self.overheard(&reply, driver);
+                }
+            }
+            if let Some((_, value)) = self.heard.get(&line).filter(|(when, _)| self.passed(*when) <= self.timeout) {
+                return Ok(*value);
+            }
+            let most = ear.patience().map_or(self.timeout, |patience| self.timeout.min(patience));
+            let left = most.saturating_sub(self.passed(begun));
+            if left.is_zero() {
+                let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
+                let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());
+                return Err(Trouble::Silent(why));
+            }
+            self.listen(left.min(LOOK), ear)?;
         }
     }
 
@@ -396,7 +486,7 @@ pub(crate) fn showable(told: &Told, numbers: &[f64], form: &Pattern, shows: Opti
         return Ok(value);
     };
     let unit = form.slots.iter().find_map(|s| match s {
-        Slot::Number(unit) => Some(unit),
+        Slot::Number(unit, _) => Some(unit),
         _ => None,
     });
     let unit = unit.unwrap_or(&told.unit);
@@ -406,4 +496,9 @@ pub(crate) fn showable(told: &Told, numbers: &[f64], form: &Pattern, shows: Opti
         _ => format!("at most {}", show_number(unit.of_si(most))),
     };
     Err(Trouble::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, unit.show(value))))
+}
+
+/// Whether a device says something by itself.
+fn speaks_up(driver: &Driver) -> bool {
+    !driver.ignores.is_empty() || driver.told.iter().any(|told| told.heard.is_some())
 }

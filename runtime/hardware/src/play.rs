@@ -134,5 +134,5 @@ impl Player<'_> {
 
 /// Texts that have no values in them.
 fn texts(sends: &[Template]) -> Vec<String> {
-    sends.iter().map(|t| template::filled(t, |_| None).unwrap_or_else(|| template::written(t))).collect()
+    sends.iter().map(|t| template::filled(t, |_| None).unwrap_or_else(|_| template::written(t))).collect()
 }

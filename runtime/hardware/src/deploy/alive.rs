@@ -62,7 +62,7 @@ impl Hardware<'_, '_> {
 
     /// A command apart from the plan.
     fn serve(&mut self, device: usize, served: &Served, out: &mut dyn Listener) -> Result<(), Fault> {
-        let texts = self.texts(&served.exchange.sends);
+        let texts = self.texts(&served.exchange.sends)?;
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
         if !self.is_live() && !self.is_dry() {

@@ -161,7 +161,7 @@ impl Hardware<'_, '_> {
             self.eval(node, out)?;
         }
         // What is said goes by what was before: which tip is next, how much is in a syringe.
-        let texts = exchange.map(|e| self.texts(&e.sends)).unwrap_or_default();
+        let texts = exchange.map(|e| self.texts(&e.sends)).transpose()?.unwrap_or_default();
         let replayed = match exchange {
             Some(_) => self.replayed_start(number, step, label, &texts)?,
             None => None,
@@ -252,7 +252,7 @@ impl Hardware<'_, '_> {
                 Some(_) => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
                 None => {
                     self.go_live(out)?;
-                    let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+                    let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
                     self.recall(ticket);
                     let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {

@@ -66,6 +66,8 @@ pub struct Ending {
     pub passed: bool,
     /// Whether a person ended it early.
     pub stopped: bool,
+    /// The same in a word, as the journal has it.
+    pub status: &'static str,
     /// s of lab time; nothing where it did not begin.
     pub end: Option<f64>,
     /// Expectations that were judged, met and not observed.
@@ -79,7 +81,16 @@ pub struct Ending {
 impl Ending {
     fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
         let (passed, stopped, end, execution) = (false, false, None, None);
-        Ending { diagnostics, passed, stopped, end, counts: [0; 3], execution, states: String::new() }
+        Ending {
+            diagnostics,
+            passed,
+            stopped,
+            status: "not begun",
+            end,
+            counts: [0; 3],
+            execution,
+            states: String::new(),
+        }
     }
 }
 
@@ -212,7 +223,7 @@ fn concluded(
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
     let (end, states) = (Some(execution.end_time), hardware.states());
-    Ending { diagnostics: found, passed, stopped, end, counts, execution: Some(execution), states }
+    Ending { diagnostics: found, passed, stopped, status, end, counts, execution: Some(execution), states }
 }
 
 /// That a shadow has nothing to go by: no device that tells something has a tolerance.
@@ -290,6 +301,7 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let code = match trouble {
         Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
         Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+        Trouble::Unsaid(_) => codes::UNSENDABLE,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
     };
     let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };

@@ -19,6 +19,7 @@ use super::exposed::Exposed;
 use super::journal::{Entry, Gate, Journal, sha256};
 use super::observe::Observed;
 use crate::link::Trouble;
+use crate::shared::Shared;
 use crate::world::World;
 
 /// What a deployment does with devices.
@@ -158,6 +159,7 @@ impl<'m, 't> Hardware<'m, 't> {
             Step::Operation(operation) => Some((address(operation), StepId(i as u32))),
             _ => None,
         });
+        let settings = Settings { world: Rc::new(Shared::new(settings.world)), ..settings };
         let origin = (0.0, settings.world.elapsed());
         Hardware {
             observed: Observed::new(&program.model, told),
@@ -249,6 +251,7 @@ impl<'m, 't> Hardware<'m, 't> {
         let code = match trouble {
             Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
             Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+            Trouble::Unsaid(_) => codes::UNSENDABLE,
             Trouble::Refused { .. } => codes::DEVICE_REFUSED,
         };
         if matches!(trouble, Trouble::Lost(_) | Trouble::Silent(_)) {

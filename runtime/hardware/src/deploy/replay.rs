@@ -33,6 +33,7 @@ impl Hardware<'_, '_> {
                 | Entry::Back { .. }
                 | Entry::Again { .. }
                 | Entry::Begin { .. }
+                | Entry::Safe { .. }
                 | Entry::End { .. } => {
                     self.replay.pop_front();
                 }

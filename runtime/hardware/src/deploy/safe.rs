@@ -3,10 +3,13 @@
 use std::time::Duration;
 
 use matterix_ir::Span;
-use matterix_ir::wire::{CALLS, Driver, Exchange, Until};
+use matterix_ir::wire::{Driver, Exchange, Framing, Template, Until};
+
+use matterix_runtime::backend::Backend;
 
 use super::device::Carrier;
 use super::hardware::{Hardware, Mode, Running};
+use super::journal::Entry;
 use crate::link::Trouble;
 
 /// Longest time until a device that took what makes it safe says that it is.
@@ -48,11 +51,14 @@ impl Hardware<'_, '_> {
             return;
         }
         for exchange in &driver.halt {
-            let texts = self.texts(&exchange.sends);
-            if let Err(trouble) = self.try_say(running.device, &texts, exchange.expects.as_ref()) {
-                let why = self.trouble(running.device, &trouble, exchange.span).message;
-                self.unhalted.push((self.devices[running.device].binding.at, why));
-            }
+            let why = match self.texts(&exchange.sends) {
+                Err(fault) => fault.message,
+                Ok(texts) => match self.try_say(running.device, &texts, exchange.expects.as_ref()) {
+                    Ok(_) => continue,
+                    Err(trouble) => self.trouble(running.device, &trouble, exchange.span).message,
+                },
+            };
+            self.unhalted.push((self.devices[running.device].binding.at, why));
         }
     }
 
@@ -87,8 +93,13 @@ impl Hardware<'_, '_> {
             return Ok(());
         }
         if driver.safe.is_empty() {
-            let is_left = driver.stays_on && self.devices[index].told && !self.is_dry();
-            return if is_left { Err(named("its driver has no line `safe`", name)) } else { Ok(()) };
+            if !driver.stays_on || !self.devices[index].told || self.is_dry() {
+                return Ok(());
+            }
+            let why = "its driver has no line `safe`";
+            let (t, device, trouble) = (self.twin.now(), name.to_owned(), Some(why.to_owned()));
+            self.journal.note(&Entry::Safe { t, device, trouble });
+            return Err(named(why, name));
         }
         self.relink(line);
         let mut done = self.say_safe(index, driver);
@@ -101,6 +112,11 @@ impl Hardware<'_, '_> {
                 self.relink(line);
             }
             done = self.say_safe(index, driver);
+        }
+        let (t, device) = (self.twin.now(), name.to_owned());
+        if done != Ok(false) {
+            let trouble = done.as_ref().err().map(|trouble| trouble.text().to_owned());
+            self.journal.note(&Entry::Safe { t, device, trouble });
         }
         match done {
             Ok(true) => {
@@ -136,7 +152,7 @@ impl Hardware<'_, '_> {
         let line = self.line_of(index);
         let (mut said, mut heard) = (false, false);
         for exchange in &driver.safe {
-            let texts = self.texts(&exchange.sends);
+            let texts = self.sayable(&exchange.sends)?;
             if self.devices[line].link.as_mut().is_some_and(|link| link.lacks(driver, &texts)) {
                 continue;
             }
@@ -148,6 +164,11 @@ impl Hardware<'_, '_> {
             self.prove(index, driver)?;
         }
         Ok(said)
+    }
+
+    /// Messages with the values that they have now.
+    fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, Trouble> {
+        self.texts(sends).map_err(|fault| Trouble::Unsaid(fault.message))
     }
 
     /// With `until` it counts what the device tells in the end, not whether it took the command: a run that a person has stopped
@@ -163,7 +184,7 @@ impl Hardware<'_, '_> {
     }
 
     fn wait_for(&mut self, index: usize, until: &Until) -> Result<(), Trouble> {
-        let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+        let text = self.sayable(std::slice::from_ref(&until.asks))?.concat();
         let timeout = Duration::try_from_secs_f64(self.twin.engine().eval(until.timeout)).unwrap_or(SECURED);
         let begun = self.settings.world.elapsed();
         loop {
@@ -182,7 +203,9 @@ impl Hardware<'_, '_> {
 
     /// Nothing answered what makes the device safe: it is asked for anything that it tells, to know that it hears.
     fn prove(&mut self, index: usize, driver: &Driver) -> Result<(), Trouble> {
-        if driver.framing == CALLS || self.devices[index].codec.as_ref().is_some_and(|codec| codec.acknowledges()) {
+        if driver.framing == Framing::Calls
+            || self.devices[index].codec.as_ref().is_some_and(|codec| codec.acknowledges())
+        {
             return Ok(());
         }
         let applies = driver.told.iter().find(|told| match told.condition {
@@ -193,8 +216,13 @@ impl Hardware<'_, '_> {
             let why = "nothing that it answers says that it heard what makes it safe".to_owned();
             return Err(Trouble::Silent(why));
         };
-        let text = self.texts(std::slice::from_ref(&told.asks)).concat();
-        match self.over(index, |link, driver, ear| link.ask(&text, told, driver, ear)) {
+        let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
+        let line = driver.told.iter().position(|t| std::ptr::eq(t, told)).unwrap_or_default();
+        let asked = self.over(index, |link, driver, ear| match told.heard {
+            Some(_) => link.hear(line, driver, ear),
+            None => link.ask(&text, told, driver, ear),
+        });
+        match asked {
             Ok(_) | Err(Trouble::Refused { .. }) => Ok(()),
             Err(other) => Err(other),
         }

@@ -1,6 +1,6 @@
 //! Opening lines, holding what devices tell against the twin, and closing lines.
 
-use matterix_ir::wire::{Driver, Exchange};
+use matterix_ir::wire::{Driver, Exchange, Piece, Slot};
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
@@ -49,10 +49,10 @@ impl Hardware<'_, '_> {
     }
 
     fn first(&mut self, index: usize, exchange: &Exchange) -> Result<(), Fault> {
-        let texts = self.texts(&exchange.sends);
+        let texts = self.texts(&exchange.sends)?;
         self.say(index, &texts, exchange.expects.as_ref(), exchange.span)?;
         let Some(until) = exchange.until.as_ref().filter(|_| !self.is_dry()) else { return Ok(()) };
-        let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+        let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
         let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
         for _ in 0..tries {
             let asked = self.inquire(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
@@ -92,30 +92,38 @@ impl Hardware<'_, '_> {
     pub(super) fn settled(&mut self, device: usize, line: usize, value: f64) -> Result<(), Fault> {
         let Some(told) = self.devices[device].driver.and_then(|d| d.told.get(line)) else { return Ok(()) };
         let wanted = self.twin.engine().eval(told.value);
-        let unit = told.expects.slots.iter().find_map(|s| match s {
-            matterix_ir::wire::Slot::Number(unit) => Some(unit),
-            _ => None,
-        });
-        let Some(unit) = unit else { return Ok(()) };
-        let step = 10f64.powi(-i32::from(self.digits_sent(device, unit)));
+        let one = matterix_ir::Unit::one();
+        let (unit, step) = told
+            .expects
+            .slots
+            .iter()
+            .find_map(|s| match s {
+                Slot::Number(unit, form) => {
+                    Some((unit, form.step(unit.of_si(wanted)).max(self.step_sent(device, unit, wanted))))
+                }
+                Slot::Word(_) => Some((&one, 1.0)),
+                _ => None,
+            })
+            .unwrap_or((&one, 0.0));
         if (unit.of_si(value) - unit.of_si(wanted)).abs() <= ROUNDING * step {
             return Ok(());
         }
-        let (name, is, was) = (&told.name, unit.show(value), unit.show(wanted));
+        let (name, is, was) = (&told.name, told.show(value), told.show(wanted));
         let message = format!("`{name}` is {is} on the device, not {was} as it was told");
         let span = told.span;
         Err(self.fault(codes::DIVERGED, span, message))
     }
 
-    /// Digits after the point with which a device is sent numbers in this unit.
-    fn digits_sent(&self, device: usize, unit: &matterix_ir::Unit) -> u8 {
+    /// How far apart two numbers near this one are, SI, that a device is sent in this unit: the finest of all forms; 1 where it is
+    /// sent none.
+    fn step_sent(&self, device: usize, unit: &matterix_ir::Unit, near: f64) -> f64 {
         let calls = self.devices[device].driver.into_iter().flat_map(|d| &d.calls);
         let pieces = calls.flat_map(|(_, e)| &e.sends).flat_map(|t| &t.pieces);
-        let digits = pieces.filter_map(|p| match p {
-            matterix_ir::wire::Piece::Number { unit: sent, digits, .. } if sent.symbol == unit.symbol => *digits,
+        let steps = pieces.filter_map(|p| match p {
+            Piece::Number { unit: sent, form, .. } if sent.symbol == unit.symbol => Some(form.step(unit.of_si(near))),
             _ => None,
         });
-        digits.max().unwrap_or(0)
+        steps.fold(f64::INFINITY, f64::min).min(1.0)
     }
 
     /// Where devices are shadowed, what is told may not be far from what the twin supposes.
@@ -155,7 +163,7 @@ impl Hardware<'_, '_> {
             };
             for exchange in &driver.close {
                 let texts = self.texts(&exchange.sends);
-                let said = self.say(index, &texts, exchange.expects.as_ref(), exchange.span);
+                let said = texts.and_then(|t| self.say(index, &t, exchange.expects.as_ref(), exchange.span));
                 first = first.and(said.map(|_| ()));
             }
             self.devices[index].link = None;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use matterix_ir::plan::{Operation, StepId};
-use matterix_ir::wire::{Driver, Exchange, JSON, Pattern, Template};
+use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Template};
 use matterix_ir::{Span, codes, message};
 use matterix_runtime::backend::{Backend, Ticket};
 use matterix_runtime::fault::Fault;
@@ -24,9 +24,12 @@ const BUSY: &str = "busy";
 const PATIENCE: f64 = 30.0;
 
 impl<'m> Hardware<'m, '_> {
-    pub(super) fn texts(&mut self, sends: &[Template]) -> Vec<String> {
+    /// Messages with the values that they have now; a fault where one does not fit its form.
+    pub(super) fn texts(&mut self, sends: &[Template]) -> Result<Vec<String>, Fault> {
         let engine = self.twin.engine();
-        sends.iter().map(|t| template::filled(t, |n| Some(engine.eval(n))).unwrap_or_default()).collect()
+        let filled = |t: &Template| template::filled(t, |n| Some(engine.eval(n))).map_err(|why| (t.span, why));
+        let texts: Result<_, _> = sends.iter().map(filled).collect();
+        texts.map_err(|(span, why)| self.fault(codes::UNSENDABLE, span, why))
     }
 
     /// Says commands to a device.
@@ -56,7 +59,8 @@ impl<'m> Hardware<'m, '_> {
         }
         let device = &mut self.devices[index];
         if is_dry {
-            for frame in device.codec.iter_mut().flat_map(|codec| codec.say(texts)) {
+            let frames = device.codec.as_mut().map(|codec| codec.say(texts)).transpose().map_err(Trouble::Unsaid)?;
+            for frame in frames.into_iter().flatten() {
                 (self.trace)(time, device.name, true, &frame);
             }
             return Ok(Vec::new());
@@ -101,7 +105,7 @@ impl<'m> Hardware<'m, '_> {
         let Some(driver) = self.devices[index].driver.filter(|_| is_open && !self.is_dry()) else {
             return self.try_say(index, texts, expects);
         };
-        let only_asks = driver.framing == JSON && texts.iter().all(|text| message::only_asks(text));
+        let only_asks = driver.framing == Framing::Json && texts.iter().all(|text| message::only_asks(text));
         self.again(index, only_asks, |link, driver, ear| link.say(texts, expects, driver, ear))
     }
 
@@ -128,7 +132,7 @@ impl<'m> Hardware<'m, '_> {
             asked += 1;
             let (t, device) = (self.twin.now(), self.devices[index].name.to_owned());
             self.journal.note(&Entry::Again { t, device, why: trouble.text().to_owned() });
-            self.over_line(index, None, |link, _, ear| link.settle(ear))?;
+            self.over_line(index, None, |link, driver, ear| link.settle(driver, ear))?;
         }
     }
 
@@ -168,17 +172,22 @@ impl<'m> Hardware<'m, '_> {
             let message = format!("`{}` cannot be told now: its driver says so", told.name);
             return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
         }
-        let text = self.texts(std::slice::from_ref(&told.asks)).concat();
+        let text = self.texts(std::slice::from_ref(&told.asks))?.concat();
         let (time, is_dry) = (self.twin.now(), self.is_dry());
         let device = &mut self.devices[index];
         if is_dry {
-            if let Some(codec) = &mut device.codec {
-                let frame = codec.ask(&text);
-                (self.trace)(time, device.name, true, &frame);
+            if let Some(codec) = device.codec.as_mut().filter(|_| told.heard.is_none()) {
+                match codec.ask(&text) {
+                    Ok(frame) => (self.trace)(time, device.name, true, &frame),
+                    Err(why) => return Err(self.fault(codes::UNSENDABLE, told.span, why)),
+                }
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let asked = self.inquire(index, |link, driver, ear| link.ask(&text, told, driver, ear));
+        let asked = self.inquire(index, |link, driver, ear| match told.heard {
+            Some(_) => link.hear(line, driver, ear),
+            None => link.ask(&text, told, driver, ear),
+        });
         asked.map_err(|trouble| self.trouble(index, &trouble, told.span))
     }
 

@@ -186,6 +186,15 @@ pub enum Entry {
         /// In words.
         text: String,
     },
+    /// What became of a device that was to be made safe.
+    Safe {
+        /// s.
+        t: f64,
+        /// Its name.
+        device: String,
+        /// Why it could not be.
+        trouble: Option<String>,
+    },
     /// From here on another process has gone on.
     Resumed {
         /// s.
@@ -244,6 +253,7 @@ impl Entry {
             | Entry::Gate { t, .. }
             | Entry::Stop { t, .. }
             | Entry::Fault { t, .. }
+            | Entry::Safe { t, .. }
             | Entry::Resumed { t, .. }
             | Entry::End { t, .. } => *t,
         }
