@@ -370,8 +370,11 @@ pub struct DeployArgs {
     /// Where to keep the journal; needed unless nothing is sent.
     #[arg(long, value_name = "FILE")]
     pub journal: Option<PathBuf>,
+    /// Where to keep the journal with program, bindings and report: a folder that `matterixc verify` checks.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "journal")]
+    pub record: Option<PathBuf>,
     /// Go on with a deployment that was cut off, from its journal.
-    #[arg(long, requires = "journal")]
+    #[arg(long)]
     pub resume: bool,
     /// Show all bytes that go out and come in.
     #[arg(long)]
@@ -494,7 +497,7 @@ pub struct EmitArgs {
 /// `matterixc verify`.
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// The recording that a run has written, or the folder it is in.
+    /// The recording that a run has written, the folder it is in, or the record of a deployment.
     #[arg(value_name = "RUN")]
     pub recording: PathBuf,
     /// Form of the verdict.

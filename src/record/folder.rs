@@ -5,7 +5,7 @@ use std::io::Write;
 use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
-use matterix_hardware::deploy::{Ending, read, sha256};
+use matterix_hardware::deploy::{Chain, Ending, read, sha256};
 use serde::{Deserialize, Serialize};
 
 use super::report::{About, Report};
@@ -68,22 +68,34 @@ impl Folder {
         }
     }
 
+    /// Removes it again where its journal says nothing: what was refused beforehand may be tried again with it.
+    pub fn forget_unused(&self) {
+        let head = Chain::default().head().len() as u64;
+        if std::fs::metadata(self.journal()).is_ok_and(|there| there.len() <= head) {
+            // It stays where it cannot be removed, which the next attempt says.
+            let _ = std::fs::remove_dir_all(&self.dir);
+        }
+    }
+
     /// Where the journal is.
     pub fn journal(&self) -> PathBuf {
         self.dir.join(JOURNAL)
     }
 
-    /// Keeps the text of a program and its bindings; the path of its first file below that of the program.
+    /// Keeps the text of a program and its bindings, unless they are there from an earlier process; the path of its first file below
+    /// that of the program.
     pub fn keep(&self, main: &Path, read: &[Taken], bindings: &str) -> Result<String, String> {
         let whole =
             |path: &Path| path.canonicalize().map_err(|e| format!("`{}`: {}", path.display(), files::reason(&e)));
         let paths = read.iter().map(|t| whole(&t.path)).collect::<Result<Vec<_>, _>>()?;
         let main = whole(main)?;
         let root = paths.iter().fold(main.parent().unwrap_or(&main).to_path_buf(), |root, path| common(&root, path));
-        for (path, taken) in paths.iter().zip(read) {
-            self.write(&Path::new(PROGRAM).join(below(&root, path)), &taken.bytes)?;
+        if !self.dir.join(BINDINGS).exists() {
+            for (path, taken) in paths.iter().zip(read) {
+                self.write(&Path::new(PROGRAM).join(below(&root, path)), &taken.bytes)?;
+            }
+            self.write(Path::new(BINDINGS), bindings.as_bytes())?;
         }
-        self.write(Path::new(BINDINGS), bindings.as_bytes())?;
         Ok(below(&root, &main).display().to_string())
     }
 

@@ -8,7 +8,7 @@ mod verify;
 
 pub use folder::{Folder, Taken};
 pub use report::{About, Bound, Gauge};
-pub use verify::{Checked, verify};
+pub use verify::verify;
 
 /// The file that says what the others hold.
 pub const MANIFEST: &str = "record.json";

@@ -23,7 +23,7 @@ use crate::files;
 use crate::pipeline::{self, Gauged, Input, Measured, Options, Wires};
 
 /// What was found of a record.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize)]
 pub struct Checked {
     /// What holds, a line each.
     pub holds: Vec<String>,

@@ -7,6 +7,7 @@ mod journal;
 mod kills;
 mod modules;
 mod reads;
+mod record;
 mod safe;
 mod server;
 mod stop;

@@ -169,15 +169,15 @@ impl Hardware<'_, '_> {
         let twin = self.twin.start(operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
-            match replayed {
-                Some(outcome) => failed = outcome,
-                None => {
-                    self.go_live(out)?;
-                    self.beat(false, out)?;
-                    failed = self.begin(device, exchange, texts, operation, step, number)?;
-                    self.beat(true, out)?;
-                }
+            if replayed.is_none() {
+                self.go_live(out)?;
             }
+            self.beat(false, out)?;
+            failed = match replayed {
+                Some(outcome) => outcome,
+                None => self.begin(device, exchange, texts, operation, step, number)?,
+            };
+            self.beat(true, out)?;
         }
         let until = exchange.and_then(|e| e.until.as_ref());
         let deadline = self.twin.now() + until.map_or(0.0, |u| self.twin.engine().eval(u.timeout));

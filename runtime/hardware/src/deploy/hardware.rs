@@ -242,6 +242,11 @@ impl<'m, 't> Hardware<'m, 't> {
         self.settings.mode == Mode::Dry
     }
 
+    /// Whether anything goes over lines.
+    pub(super) fn speaks(&self) -> bool {
+        !matches!(self.settings.mode, Mode::Dry | Mode::Replay)
+    }
+
     pub(super) fn fault(&self, code: Code, span: Span, message: String) -> Fault {
         Fault { code, span: Some(span), time: self.twin.now(), message, help: Vec::new() }
     }

@@ -89,11 +89,12 @@ impl Hardware<'_, '_> {
         let (Some(driver), line) = (self.devices[index].driver, self.line_of(index)) else { return Ok(()) };
         let named = |why: &str, name: &str| format!("`{name}`: {why}");
         let name = self.devices[index].name;
-        if !self.devices[line].said && !self.is_dry() {
+        let was_told = self.devices[line].said && self.speaks();
+        if !was_told && self.settings.mode != Mode::Dry {
             return Ok(());
         }
         if driver.safe.is_empty() {
-            if !driver.stays_on || !self.devices[index].told || self.is_dry() {
+            if !driver.stays_on || !self.devices[index].told || !self.speaks() {
                 return Ok(());
             }
             let why = "its driver has no line `safe`";
@@ -138,7 +139,7 @@ impl Hardware<'_, '_> {
             self.devices[line].binding.carrier.clone(),
             self.devices[line].driver,
             &self.devices[line].link,
-            self.is_dry(),
+            !self.speaks(),
         ) {
             match self.linked(line, driver, &place, address.as_deref()) {
                 Ok(link) => (self.devices[line].link, self.devices[line].lost) = (Some(link), None),
@@ -160,7 +161,7 @@ impl Hardware<'_, '_> {
             heard |= exchange.expects.is_some() || exchange.until.is_some();
             self.say_one(index, exchange, &texts)?;
         }
-        if said && !heard && !self.is_dry() {
+        if said && !heard && self.speaks() {
             self.prove(index, driver)?;
         }
         Ok(said)
@@ -175,7 +176,7 @@ impl Hardware<'_, '_> {
     /// refuses to be stopped.
     fn say_one(&mut self, index: usize, exchange: &Exchange, texts: &[String]) -> Result<(), Trouble> {
         let said = self.try_say(index, texts, exchange.expects.as_ref());
-        let Some(until) = exchange.until.as_ref().filter(|_| !self.is_dry()) else { return said.map(|_| ()) };
+        let Some(until) = exchange.until.as_ref().filter(|_| self.speaks()) else { return said.map(|_| ()) };
         match said {
             Ok(_) => self.wait_for(index, until),
             Err(refused @ Trouble::Refused { .. }) => self.wait_for(index, until).map_err(|_| refused),

@@ -19,7 +19,7 @@ impl Hardware<'_, '_> {
     pub fn connect(&mut self) -> Vec<Unreached> {
         let mut unreached = Vec::new();
         for index in 0..self.devices.len() {
-            let Some(driver) = self.devices[index].driver.filter(|_| !self.is_dry()) else { continue };
+            let Some(driver) = self.devices[index].driver.filter(|_| self.speaks()) else { continue };
             let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() else { continue };
             match self.linked(index, driver, &place, address.as_deref()) {
                 Ok(link) => self.devices[index].link = Some(link),

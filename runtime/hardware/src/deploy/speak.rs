@@ -9,7 +9,7 @@ use matterix_runtime::backend::{Backend, Ticket};
 use matterix_runtime::fault::Fault;
 
 use super::device::Ear;
-use super::hardware::Hardware;
+use super::hardware::{Hardware, Mode};
 use super::journal::Entry;
 use crate::link::{Line, Overhear, Trouble};
 use crate::template;
@@ -51,7 +51,7 @@ impl<'m> Hardware<'m, '_> {
     ) -> Result<Vec<f64>, Trouble> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
-        if self.devices[index].driver.is_none() {
+        if self.devices[index].driver.is_none() || self.settings.mode == Mode::Replay {
             return Ok(Vec::new());
         }
         if let Some(why) = &self.devices[self.line_of(index)].lost {
@@ -102,7 +102,7 @@ impl<'m> Hardware<'m, '_> {
         expects: Option<&Pattern>,
     ) -> Result<Vec<f64>, Trouble> {
         let is_open = self.devices[self.line_of(index)].lost.is_none();
-        let Some(driver) = self.devices[index].driver.filter(|_| is_open && !self.is_dry()) else {
+        let Some(driver) = self.devices[index].driver.filter(|_| is_open && self.speaks()) else {
             return self.try_say(index, texts, expects);
         };
         let only_asks = driver.framing == Framing::Json && texts.iter().all(|text| message::only_asks(text));

@@ -218,9 +218,10 @@ fn next_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> Result<bool, Stri
     Ok(line.last() == Some(&b'\n'))
 }
 
-/// What tells one program from another, as hexadecimal digits.
+/// What tells one program from another, as hexadecimal digits: what its text means, not in which folder it is.
 pub fn digest(program: &Program, bindings: &str) -> Result<String, String> {
-    let mut text = serde_json::to_vec(program).map_err(|e| e.to_string())?;
+    let program = Program { files: Vec::new(), ..program.clone() };
+    let mut text = serde_json::to_vec(&program).map_err(|e| e.to_string())?;
     text.extend(bindings.bytes());
     Ok(sha256(&text))
 }
