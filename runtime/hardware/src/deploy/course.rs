@@ -365,3 +365,15 @@ fn findings(execution: &Execution) -> Vec<Diagnostic> {
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::unbroken;
+
+    #[test]
+    fn what_breaks_down_says_why_and_takes_nothing_with_it() {
+        assert_eq!(unbroken(|| 7), Ok(7));
+        assert_eq!(unbroken(|| -> u8 { panic!("index {} of {}", 3, 2) }), Err("index 3 of 2".to_owned()));
+        assert_eq!(unbroken(|| -> u8 { std::panic::panic_any(1.5) }), Err("it does not say why".to_owned()));
+    }
+}
