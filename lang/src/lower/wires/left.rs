@@ -110,7 +110,7 @@ fn is_bool(ty: &Type) -> bool {
     ty.paths.iter().any(|path| path.segments.last().is_some_and(|s| s.text == "Bool"))
 }
 
-fn assignments<'a>(clause: &'a Clause) -> Vec<(&'a Expr, &'a Expr)> {
+fn assignments(clause: &Clause) -> Vec<(&Expr, &Expr)> {
     let ClauseKind::Effect(effects) = &clause.kind else { return Vec::new() };
     let assigned = effects.iter().filter_map(|effect| match effect {
         Effect::Assign(target, value) => Some((target, value)),

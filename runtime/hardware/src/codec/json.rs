@@ -9,7 +9,7 @@ use matterix_ir::wire::{Driver, Pattern, Piece, Slot, Template};
 use serde_json::{Map, Value};
 
 use super::{Garbled, Reply, Request};
-use crate::pattern;
+use crate::pattern::{self, Said};
 use crate::template::{self, Found};
 
 /// Longest answer, bytes.
@@ -105,7 +105,7 @@ impl Json {
 
     /// The numbers of an answer that looks like this, SI; what drivers keep of it is kept.
     pub(super) fn matched(&mut self, pattern: &Pattern, reply: &str) -> Option<Vec<f64>> {
-        let (numbers, kept) = self.look(pattern, reply)?;
+        let Said { numbers, kept } = self.look(pattern, reply)?;
         if let Some((own, _)) = self.speaker {
             self.kept.extend(kept.into_iter().map(|(word, text)| ((own, word), text)));
         }
@@ -212,7 +212,7 @@ impl Json {
     }
 
     /// The numbers of an answer that looks like this, and what is kept of it.
-    fn look(&self, pattern: &Pattern, reply: &str) -> Option<(Vec<f64>, Vec<(String, String)>)> {
+    fn look(&self, pattern: &Pattern, reply: &str) -> Option<Said> {
         let (status, body) = parts(reply)?;
         let text = pattern.with(MARK);
         let answer = message::answer(&text).ok()?;
@@ -238,7 +238,7 @@ impl Json {
             }
             numbers.extend(pattern::matched(&Pattern { slots, ..Pattern::default() }, &is)?);
         }
-        Some((numbers, kept))
+        Some(Said { numbers, kept })
     }
 
     fn filled(&self, target: &str) -> String {

@@ -339,7 +339,7 @@ fn cut(word: &str) -> &str {
 }
 
 /// What is said apart from commands, and whether it breaks off what the device does.
-fn fixed<'m>(driver: &'m Driver) -> impl Iterator<Item = (&'m Exchange, bool)> {
+fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
     let quiet = driver.open.iter().chain(&driver.close).chain(&driver.play).map(|e| (e, false));
     driver.halt.iter().chain(&driver.safe).map(|e| (e, true)).chain(quiet)
 }
