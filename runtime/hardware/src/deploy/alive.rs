@@ -66,7 +66,7 @@ impl Hardware<'_, '_> {
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
         if !self.is_live() && !self.is_dry() {
-            return Ok(());
+            return self.replayed_fault().map_or(Ok(()), Err);
         }
         let said = self.say_again(device, &texts, served.exchange.expects.as_ref());
         said.map(|_| ()).map_err(|trouble| {

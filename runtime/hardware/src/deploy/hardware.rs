@@ -89,6 +89,8 @@ pub struct Hardware<'m, 't> {
     pub(super) settings: Settings<'t>,
     pub(super) journal: Journal,
     pub(super) trace: Box<Trace<'t>>,
+    /// When the journal that is gone through again ends, s.
+    pub(super) ends_at: f64,
     /// What an earlier process wrote, as far as it has not been gone through again.
     pub(super) replay: VecDeque<Entry>,
     /// Lab time and the clock at one moment.
@@ -130,6 +132,8 @@ pub struct Hardware<'m, 't> {
     pub(super) who: String,
     /// It is known by now that the journal cannot be written.
     pub(super) is_unwritten: bool,
+    /// The device whose line was lost last, until that is noted.
+    pub(super) losing: Option<String>,
     /// The last fault that was noted.
     pub(super) noted: Option<String>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
@@ -171,6 +175,7 @@ impl<'m, 't> Hardware<'m, 't> {
             settings,
             journal,
             trace,
+            ends_at: f64::INFINITY,
             replay: VecDeque::new(),
             resuming: false,
             refused: std::cell::Cell::new(false),
@@ -193,6 +198,7 @@ impl<'m, 't> Hardware<'m, 't> {
             cancelled: false,
             who: String::new(),
             is_unwritten: false,
+            losing: None,
             noted: None,
             caught_up: None,
         }
@@ -262,6 +268,7 @@ impl<'m, 't> Hardware<'m, 't> {
         if matches!(trouble, Trouble::Lost(_) | Trouble::Silent(_)) {
             let line = self.line_of(device);
             self.devices[line].lost = Some(trouble.text().to_owned());
+            self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
                 let kept = link.kept().into_iter();
                 self.kept.extend(kept.map(|((device, word), text)| (line, device, word, text)));
@@ -295,7 +302,8 @@ impl<'m, 't> Hardware<'m, 't> {
         if is_theirs && self.is_live() && !self.is_dry() && self.noted.as_ref() != Some(&fault.message) {
             let (t, code, text) = (self.twin.now(), fault.code.name.to_owned(), fault.message.clone());
             self.noted = Some(fault.message.clone());
-            self.journal.note(&Entry::Fault { t, code, text });
+            let lost = self.losing.take();
+            self.journal.note(&Entry::Fault { t, lost, code, text });
         }
         fault
     }

@@ -86,7 +86,8 @@ impl Hardware<'_, '_> {
                     _ => Ok(false),
                 }
             }
-            None if self.settings.mode == Mode::Replay => Ok(false),
+            None if self.settings.mode == Mode::Replay && self.twin.now() < self.ends_at.min(until) => Ok(false),
+            None if self.settings.mode == Mode::Replay && until <= self.ends_at => Ok(false),
             None if self.resuming && until <= self.catches_up_to() => Ok(false),
             None => {
                 self.go_live(out)?;

@@ -48,6 +48,10 @@ impl Hardware<'_, '_> {
                 _ => {}
             }
         }
+        self.ends_at = match entries.last() {
+            Some(Entry::End { t, .. }) => *t,
+            _ => f64::INFINITY,
+        };
         self.left_at = self.last_seen(&entries);
         if self.settings.mode != Mode::Replay {
             self.expose();
