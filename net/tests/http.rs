@@ -20,12 +20,8 @@ const LIMITS: Limits = Limits {
 };
 
 /// The same with little patience.
-const HASTY: Limits = Limits {
-    request: Duration::from_secs(1),
-    idle: Duration::from_secs(1),
-    stalled: Duration::from_secs(1),
-    ..LIMITS
-};
+const HASTY: Limits =
+    Limits { request: Duration::from_secs(1), idle: Duration::from_secs(1), stalled: Duration::from_secs(1), ..LIMITS };
 
 /// Long enough for a busy machine, short enough that nothing waits for an evil client.
 const SOON: Duration = Duration::from_secs(20);

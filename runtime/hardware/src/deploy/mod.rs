@@ -14,6 +14,7 @@ mod people;
 mod preflight;
 mod replay;
 mod resume;
+mod safe;
 mod sense;
 mod speak;
 mod unbound;

@@ -30,6 +30,9 @@ impl Hardware<'_, '_> {
     pub(super) fn pass(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
             let is_live = self.join(until, out)?;
+            if is_live && let Some(fault) = self.unwritten() {
+                return Err(fault);
+            }
             if self.heeded(is_live) {
                 return Ok(Advance::Watch(Vec::new()));
             }
@@ -81,6 +84,13 @@ impl Hardware<'_, '_> {
                 Ok(true)
             }
         }
+    }
+
+    /// That nothing more can be written down, once: what ends then is not held up by it.
+    fn unwritten(&mut self) -> Option<Fault> {
+        let why = self.journal.broken.clone().filter(|_| !std::mem::replace(&mut self.is_unwritten, true))?;
+        let message = format!("the journal cannot be written: {why}");
+        Some(self.fault(matterix_ir::codes::JOURNAL_MISMATCH, matterix_ir::Span::default(), message))
     }
 
     /// Heeds what people say at this moment, or said to the earlier process; whether that lets something go on or end.

@@ -39,6 +39,7 @@ impl Hardware<'_, '_> {
                 | Entry::Kept { .. }
                 | Entry::Out { .. }
                 | Entry::Back { .. }
+                | Entry::Again { .. }
                 | Entry::Begin { .. }
                 | Entry::Safe { .. }
                 | Entry::End { .. } => {
