@@ -284,7 +284,7 @@ impl Report {
                 self.came_to(outcomes.get(ticket), format!("{name}: {text}"));
             }
             Entry::Told { name, value, .. } => self.told(name, *value),
-            Entry::Fault { t, code, text } => {
+            Entry::Fault { t, code, text, .. } => {
                 self.faults.push(Fault { lab_time: *t, code: code.clone(), text: text.clone() });
             }
             Entry::Safe { device, trouble, .. } => {

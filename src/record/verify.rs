@@ -85,8 +85,8 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
         checked.wrong.push(text);
         return Ok(());
     }
-    let (Some(Entry::Begin { digest: before, seed, speed, .. }), Some((end, entries))) =
-        (past.entries.first(), past.entries.split_last())
+    let (Some(Entry::Begin { digest: before, seed, speed, .. }), Some(end)) =
+        (past.entries.first(), past.entries.last())
     else {
         checked.wrong.push("the journal says nothing of a deployment".to_owned());
         return Ok(());
@@ -123,7 +123,7 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
         speed: *speed,
         seed: *seed,
         trace: Box::new(|_, _, _, _| {}),
-        journal: Kept::Left(Journal::none(), entries.to_vec()),
+        journal: Kept::Left(Journal::none(), past.entries.clone()),
         control,
         who: "",
         world: Rc::new(Nowhere::default()),

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use matterix_hardware::binding;
-use matterix_hardware::deploy::{Control, Course, Ending, Exposed, Journal, Kept, Mode, Past, carry_out, read};
+use matterix_hardware::deploy::{Control, Course, Ending, Entry, Exposed, Journal, Kept, Mode, Past, carry_out, read};
 use matterix_ir::Sources;
 use matterix_soundness::random::Random;
 
@@ -62,7 +62,10 @@ pub fn trial(seed: u64) -> Verdict {
     let room = Room::new(lab, random.clone(), fate.clone(), control);
     room.note(format!("{fate:?}"));
     let (ending, processes) = carried_out(lab, &room, control, &mut random);
-    judged(lab, calm, &room, ending, processes)
+    let mut verdict = judged(lab, calm, &room, ending, processes);
+    verdict.wrong.extend(replayed(lab, &room));
+    verdict.log = room.log();
+    verdict
 }
 
 /// What people say; it lives as long as the process, as that of a command does.
@@ -116,7 +119,7 @@ fn carried_out(
                 Err(why) => Kept::Damaged(why),
             },
         };
-        let ending = one(lab, room, control, kept);
+        let ending = one(lab, room, control, Mode::Real, kept);
         let away = Duration::from_millis(random.below(2000) as u64);
         let whole = |bytes: &[u8]| read(bytes).map_or(bytes.len(), |Past { whole, .. }| whole as usize);
         if !room.revived(away, whole) {
@@ -133,7 +136,26 @@ fn carried_out(
     (None, PROCESSES)
 }
 
-fn one(lab: &'static Compiled, room: &Rc<Room>, control: &'static Control, journal: Kept) -> Ending {
+/// What is different when a journal with an end is gone through again.
+fn replayed(lab: &'static Compiled, room: &Rc<Room>) -> Option<String> {
+    let past = read(&room.disk().bytes()[..]).ok()?;
+    let Some(Entry::End { status, states, .. }) = past.entries.last() else { return None };
+    for entry in past.entries.iter().filter(|e| !matches!(e, Entry::Out { .. } | Entry::Back { .. })) {
+        room.note(format!("journal: {entry:?}"));
+    }
+    let kept = Kept::Left(Journal::none(), past.entries.clone());
+    let ending = one(lab, room, fresh(), Mode::Replay, kept);
+    if ending.execution.is_none() {
+        return None;
+    }
+    let same = ending.status == *status && ending.states == *states;
+    (!same).then(|| {
+        let (is, log) = (ending.status, room.log().last().cloned().unwrap_or_default());
+        format!("gone through again it is `{is}`, not `{status}`, or comes to other states: {log}")
+    })
+}
+
+fn one(lab: &'static Compiled, room: &Rc<Room>, control: &'static Control, mode: Mode, journal: Kept) -> Ending {
     let mut sources: Sources = lab.sources.clone();
     let file = sources.add("lab.toml", lab.bindings.clone());
     let (bindings, found) = binding::read(&lab.deployed, file, &lab.bindings);
@@ -141,7 +163,7 @@ fn one(lab: &'static Compiled, room: &Rc<Room>, control: &'static Control, journ
     let exposed = Exposed::new();
     let course = Course {
         bindings,
-        mode: Mode::Real,
+        mode,
         speed: SPEED,
         seed: 0,
         trace: Box::new(|_, _, _, _| {}),

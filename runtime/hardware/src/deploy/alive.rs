@@ -65,7 +65,7 @@ impl Hardware<'_, '_> {
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
         if !self.is_live() && !self.is_dry() {
-            return Ok(());
+            return self.replayed_fault().map_or(Ok(()), Err);
         }
         self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
     }

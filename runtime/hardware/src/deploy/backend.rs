@@ -13,6 +13,7 @@ use super::control::Answer;
 use super::hardware::{Hardware, Running, address};
 use super::journal::{Entry, Gate};
 use super::preflight::carrier;
+use super::replay::Begun;
 use crate::link::Trouble;
 
 /// How often devices are asked whether they are ready, and quantities without a period of their own are asked for, s.
@@ -73,11 +74,13 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        self.noted = None;
         let begun = self.start_operation(operation, out);
         begun.map_err(|fault| self.from_outside(fault))
     }
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+        self.noted = None;
         let status = self.poll_operation(ticket, out);
         status.map_err(|fault| self.from_outside(fault))
     }
@@ -118,12 +121,16 @@ impl Backend for Hardware<'_, '_> {
         }
         let ticket = Ticket(self.tickets);
         self.tickets += 1;
-        self.put(ticket, step, text.to_owned(), out)?;
+        self.noted = None;
+        let put = self.put(ticket, step, text.to_owned(), out);
+        put.map_err(|fault| self.from_outside(fault))?;
         Ok(Some(ticket))
     }
 
     fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
-        match self.answer(ticket)? {
+        self.noted = None;
+        let answer = self.answer(ticket);
+        match answer.map_err(|fault| self.from_outside(fault))? {
             Some(Answer { yes: false, who }) => {
                 // Who does not agree wants it to end.
                 self.settings.control.stop(&who);
@@ -134,6 +141,7 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        self.noted = None;
         let advance = self.pass(until, watches, out);
         advance.map_err(|fault| self.from_outside(fault))
     }
@@ -144,6 +152,10 @@ impl Hardware<'_, '_> {
         if self.refused.get() {
             let message = format!("`{}` is not said: it was refused to go on", operation.verb);
             return Err(self.fault(codes::JOURNAL_MISMATCH, Span::default(), message));
+        }
+        // What begins now begins where the clock is by now, on the twin too.
+        if self.next_entry().is_none() {
+            self.go_live(out)?;
         }
         let step = self.steps.get(&address(operation)).copied();
         let step =
@@ -179,12 +191,10 @@ impl Hardware<'_, '_> {
         let twin = self.twin.start(operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
-            if replayed.is_none() {
-                self.go_live(out)?;
-            }
             self.beat(false, out)?;
             failed = match replayed {
-                Some(outcome) => outcome,
+                Some(Begun::Told(outcome)) => outcome,
+                Some(Begun::Fault(fault)) => return Err(fault),
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
             self.beat(true, out)?;

@@ -120,7 +120,7 @@ pub fn carry_out(
         Kept::Not => (Journal::none(), None, None),
         Kept::New(journal) => (journal, None, None),
         Kept::Left(journal, before) => {
-            let unfit = unfit(&before, &digest, speed, seed);
+            let unfit = unfit(&before, &digest, speed, seed).filter(|_| mode != Mode::Replay);
             (journal, Some(before), unfit)
         }
         Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),

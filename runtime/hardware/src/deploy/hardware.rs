@@ -86,6 +86,8 @@ pub struct Hardware<'m, 't> {
     pub(super) settings: Settings<'t>,
     pub(super) journal: Journal,
     pub(super) trace: Box<Trace<'t>>,
+    /// When the journal that is gone through again ends, s.
+    pub(super) ends_at: f64,
     /// What an earlier process wrote, as far as it has not been gone through again.
     pub(super) replay: VecDeque<Entry>,
     /// Lab time and the clock at one moment.
@@ -121,6 +123,8 @@ pub struct Hardware<'m, 't> {
     pub(super) cancelled: bool,
     /// Who goes on after a journal.
     pub(super) who: String,
+    /// The device whose line was lost last, until that is noted.
+    pub(super) losing: Option<String>,
     /// The last fault that was noted.
     pub(super) noted: Option<String>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
@@ -162,6 +166,7 @@ impl<'m, 't> Hardware<'m, 't> {
             settings,
             journal,
             trace,
+            ends_at: f64::INFINITY,
             replay: VecDeque::new(),
             resuming: false,
             refused: std::cell::Cell::new(false),
@@ -181,6 +186,7 @@ impl<'m, 't> Hardware<'m, 't> {
             fresh: BTreeMap::new(),
             cancelled: false,
             who: String::new(),
+            losing: None,
             noted: None,
             caught_up: None,
         }
@@ -250,6 +256,7 @@ impl<'m, 't> Hardware<'m, 't> {
         if matches!(trouble, Trouble::Lost(_)) {
             let line = self.line_of(device);
             self.devices[line].lost = Some(trouble.text().to_owned());
+            self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
                 self.kept.extend(link.kept().into_iter().map(|(word, text)| (line, word, text)));
             }
@@ -282,7 +289,8 @@ impl<'m, 't> Hardware<'m, 't> {
         if is_theirs && self.is_live() && !self.is_dry() && self.noted.as_ref() != Some(&fault.message) {
             let (t, code, text) = (self.twin.now(), fault.code.name.to_owned(), fault.message.clone());
             self.noted = Some(fault.message.clone());
-            self.journal.note(&Entry::Fault { t, code, text });
+            let lost = self.losing.take();
+            self.journal.note(&Entry::Fault { t, lost, code, text });
         }
         fault
     }

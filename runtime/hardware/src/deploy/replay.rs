@@ -10,6 +10,14 @@ use matterix_runtime::fault::Fault;
 use super::hardware::Hardware;
 use super::journal::Entry;
 
+/// What became of an operation that an earlier process began.
+pub(super) enum Begun {
+    /// Its device was told, or refused: the failure and what it says.
+    Told(Option<(String, String)>),
+    /// It could not be told.
+    Fault(Fault),
+}
+
 impl Hardware<'_, '_> {
     /// The next line of the earlier process that says what came from outside. Where it was gone on with in between, the lab has
     /// come to the time of that.
@@ -44,11 +52,14 @@ impl Hardware<'_, '_> {
 
     /// The fault that the earlier process met at this moment.
     pub(super) fn replayed_fault(&mut self) -> Option<Fault> {
-        let Some(Entry::Fault { t, code, text }) = self.front() else { return None };
+        let Some(Entry::Fault { t, lost, code, text }) = self.front() else { return None };
         if t > self.twin.now() {
             return None;
         }
         self.replay.pop_front();
+        if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
+            device.lost = Some(text.clone());
+        }
         let code = codes::find(&code).unwrap_or(codes::RUN_FAILED);
         Some(self.fault(code, Span::default(), text))
     }
@@ -75,7 +86,7 @@ impl Hardware<'_, '_> {
         step: StepId,
         label: &str,
         texts: &[String],
-    ) -> Result<Option<Option<(String, String)>>, Fault> {
+    ) -> Result<Option<Begun>, Fault> {
         let Some(entry) = self.next_entry() else { return Ok(None) };
         if let Some(fault) = self.replayed_fault() {
             return Err(fault);
@@ -95,16 +106,16 @@ impl Hardware<'_, '_> {
         self.replay.pop_front();
         let next = self.next_entry();
         if let Some(fault) = self.replayed_fault() {
-            return Err(fault);
+            return Ok(Some(Begun::Fault(fault)));
         }
         match next {
             Some(Entry::Started { ticket: t, .. }) if t == ticket => {
                 self.replay.pop_front();
-                Ok(Some(None))
+                Ok(Some(Begun::Told(None)))
             }
             Some(Entry::Ended { ticket: t, failed, .. }) if t == ticket => {
                 self.replay.pop_front();
-                Ok(Some(failed))
+                Ok(Some(Begun::Told(failed)))
             }
             None => {
                 // It was cut off while this was being said: said once more only where that changes nothing.

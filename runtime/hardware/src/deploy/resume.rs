@@ -50,6 +50,10 @@ impl Hardware<'_, '_> {
                 self.kept.push((self.line_of(index), word.clone(), text.clone()));
             }
         }
+        self.ends_at = match entries.last() {
+            Some(Entry::End { t, .. }) => *t,
+            _ => f64::INFINITY,
+        };
         self.left_at = self.last_seen(&entries);
         if self.settings.mode != Mode::Replay {
             for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {

@@ -21,6 +21,7 @@ impl Hardware<'_, '_> {
         let told = self.devices[device].driver.map(|d| &d.told[line]);
         let name = told.map(|t| t.name.clone()).unwrap_or_default();
         let next = self.next_entry();
+        let now = self.twin.now();
         if let Some(fault) = self.replayed_fault() {
             return Err(fault);
         }

@@ -172,6 +172,8 @@ pub enum Entry {
     Fault {
         /// s.
         t: f64,
+        /// The device whose line is lost by it.
+        lost: Option<String>,
         /// The code.
         code: String,
         /// In words.
