@@ -47,7 +47,7 @@ macro_rules! codes {
 
 codes! {
     SYNTAX "syntax" "P0" "the text is not what the grammar expects here";
-    TEXT_DIRECTION "text-direction" "P0" "a hidden character changes the order in which a text is shown";
+    HIDDEN_CHARACTER "hidden-character" "P0" "a hidden character changes how a text is shown";
     BUDGET_SPENT "budget-spent" "P0" "a text asks for more work than a check does";
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";

@@ -134,11 +134,18 @@ pub struct Choice {
 pub struct Pattern {
     /// In order.
     pub slots: Vec<Slot>,
+    /// What the replies to the second frame and those after it look like, where each has its own.
+    pub then: Vec<Pattern>,
     /// Where it is declared.
     pub span: Span,
 }
 
 impl Pattern {
+    /// What the reply to a frame looks like, by its place among those that are sent.
+    pub fn of(&self, place: usize) -> &Pattern {
+        place.checked_sub(1).and_then(|later| self.then.get(later)).unwrap_or(self)
+    }
+
     /// The text with the same in place of all that may differ.
     pub fn with(&self, value: &str) -> String {
         let slot = |slot: &Slot| match slot {
@@ -154,7 +161,7 @@ impl Pattern {
 pub struct Exchange {
     /// What goes out, in order.
     pub sends: Vec<Template>,
-    /// What comes back to each.
+    /// What comes back to each; see [`Pattern::of`].
     pub expects: Option<Pattern>,
     /// How its end is known.
     pub until: Option<Until>,

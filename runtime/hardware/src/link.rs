@@ -366,14 +366,14 @@ impl Line for Link {
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
         self.speak_for(driver);
-        for frame in self.codec.say(texts).map_err(Trouble::Unsaid)? {
+        for (place, frame) in self.codec.say(texts).map_err(Trouble::Unsaid)?.into_iter().enumerate() {
             self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
             }
             let reply = self.reply(&frame, driver, ear)?;
             let before = self.kept();
-            numbers = self.judged(&frame, &reply, expects, driver, ear)?;
+            numbers = self.judged(&frame, &reply, expects.map(|e| e.of(place)), driver, ear)?;
             self.note_kept(&before, ear);
         }
         Ok(numbers)

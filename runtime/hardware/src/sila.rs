@@ -66,12 +66,12 @@ impl Line for Server {
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
         self.0.wait_at_most(ear.patience());
-        for text in texts {
+        for (place, text) in texts.iter().enumerate() {
             ear.out(text.as_bytes());
             let reply = self.0.say(text, !goes_on(driver, text)).map_err(|f| trouble(f, driver, ear))?;
             ear.back(reply.as_bytes());
             if let Some(expects) = expects {
-                numbers = understood(text, &reply, expects)?;
+                numbers = understood(text, &reply, expects.of(place))?;
             }
         }
         Ok(numbers)

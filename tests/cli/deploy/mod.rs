@@ -3,6 +3,7 @@
 mod ask;
 mod bindings;
 mod faulty;
+mod framed;
 mod journal;
 mod kills;
 mod modules;

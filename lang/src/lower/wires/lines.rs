@@ -18,10 +18,19 @@ impl<'a> Planner<'a, '_> {
         for text in &of.sends {
             sends.push(self.template(text, scope)?);
         }
-        let expects = match &of.expects {
+        let mut expects = match &of.expects {
             Some(pattern) => Some(self.pattern(pattern)?.0),
             None => None,
         };
+        if !of.then.is_empty() && of.then.len() + 1 != of.sends.len() {
+            let headline = format!("{} replies are expected to {} messages", of.then.len() + 1, of.sends.len());
+            self.wrong(of.then[0].span, &headline, "not one for each", "expect one for all of them, or one for each");
+            return None;
+        }
+        for pattern in &of.then {
+            let (pattern, _) = self.pattern(pattern)?;
+            expects.iter_mut().for_each(|first| first.then.push(pattern.clone()));
+        }
         let until = match &of.until {
             Some(until) => {
                 let asks = self.template(&until.asks, scope)?;

@@ -53,7 +53,10 @@ impl<'a> Planner<'a, '_> {
 
     fn check_exchange(&mut self, exchange: &Exchange, known: &BTreeSet<String>) {
         exchange.sends.iter().for_each(|sent| self.check_request(sent, known));
-        exchange.expects.iter().for_each(|expected| self.check_answer(expected, known));
+        if let Some(expected) = &exchange.expects {
+            self.check_answer(expected, known);
+            expected.then.iter().for_each(|expected| self.check_answer(expected, known));
+        }
         if let Some(until) = &exchange.until {
             self.check_request(&until.asks, known);
             match &until.expects {
@@ -111,6 +114,7 @@ fn kept_by(wire: &Wire) -> Vec<String> {
         _ => return Vec::new(),
     };
     let until = exchange.until.iter().filter_map(|until| until.expects.as_ref());
-    let said = exchange.expects.iter().chain(until).filter_map(|expects| message::answer(&expects.text).ok());
+    let all = exchange.expects.iter().chain(&exchange.then).chain(until);
+    let said = all.filter_map(|expects| message::answer(&expects.text).ok());
     said.flat_map(|answer| put_in(&answer.fields).map(str::to_owned).collect::<Vec<_>>()).collect()
 }

@@ -228,7 +228,7 @@ impl Codec {
             Slot::Any => Slot::Plain(failure.to_owned()),
             other => other.clone(),
         });
-        let worded = Pattern { slots: worded.collect(), span: pattern.span };
+        let worded = Pattern { slots: worded.collect(), ..Pattern::default() };
         json.named(&pattern::rendered(&worded, nothing).unwrap_or_default())
     }
 

@@ -111,12 +111,16 @@ impl Backend for Hardware<'_, '_> {
         }
         let ticket = Ticket(self.tickets);
         self.tickets += 1;
-        self.put(ticket, step, text.to_owned(), out)?;
+        self.noted = None;
+        let put = self.put(ticket, step, text.to_owned(), out);
+        put.map_err(|fault| self.from_outside(fault))?;
         Ok(Some(ticket))
     }
 
     fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
-        match self.answer(ticket)? {
+        self.noted = None;
+        let answer = self.answer(ticket);
+        match answer.map_err(|fault| self.from_outside(fault))? {
             Some(Answer { yes: false, who }) => {
                 // Who does not agree wants it to end.
                 self.settings.control.stop(&who);

@@ -30,9 +30,6 @@ impl Hardware<'_, '_> {
     pub(super) fn pass(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
             let is_live = self.join(until, out)?;
-            if let Some(fault) = self.replayed_fault() {
-                return Err(fault);
-            }
             if is_live && let Some(fault) = self.unwritten() {
                 return Err(fault);
             }
@@ -51,9 +48,6 @@ impl Hardware<'_, '_> {
             }
             let advance = self.twin.advance(target, watches, out)?;
             self.beat(true, out)?;
-            if let Some(fault) = self.replayed_fault() {
-                return Err(fault);
-            }
             if is_live {
                 self.date();
             }
@@ -80,11 +74,7 @@ impl Hardware<'_, '_> {
                     Entry::Answered { .. } | Entry::Gate { .. } | Entry::Stop { .. } | Entry::Leap { .. }
                 );
                 let comes_too_soon = other.time() < until && other.time() <= self.twin.now() && !is_said_between;
-                match other {
-                    Entry::Fault { .. } => Ok(false),
-                    other if comes_too_soon => Err(self.mismatch("time passes", &other)),
-                    _ => Ok(false),
-                }
+                if comes_too_soon { Err(self.mismatch("time passes", &other)) } else { Ok(false) }
             }
             None if self.settings.mode == Mode::Replay && self.twin.now() < self.ends_at.min(until) => Ok(false),
             None if self.settings.mode == Mode::Replay && until <= self.ends_at => Ok(false),

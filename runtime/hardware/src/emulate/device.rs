@@ -182,12 +182,12 @@ impl<'m> Device<'_, 'm> {
         }
         for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<(&'m Exchange, bool)>>() {
             let mut is_it = |t: &Template| self.codec.is_word(&template::written(t), word) || self.says(t, word);
-            if exchange.sends.iter().any(&mut is_it) {
+            if let Some(place) = exchange.sends.iter().position(&mut is_it) {
                 if halts {
                     self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
                 }
                 *self.said = Some(exchange);
-                return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p))));
+                return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p.of(place)))));
             }
         }
         Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver says nothing like `{}`", cut(word))))
@@ -251,7 +251,7 @@ impl<'m> Device<'_, 'm> {
         for (driver, index, served) in served {
             for (place, template) in served.exchange.sends.iter().enumerate() {
                 let Some(found) = self.codec.found(template, word) else { continue };
-                part = part.or(Some(served));
+                part = part.or_else(|| Some((served, place, found.clone())));
                 self.heard.insert((driver, index, place), found);
                 let whole = place + 1 == served.exchange.sends.len();
                 let all: Option<Vec<Found>> = (0..served.exchange.sends.len())
@@ -263,11 +263,11 @@ impl<'m> Device<'_, 'm> {
                 }
             }
         }
-        let Some(part) = part else { return Ok(None) };
+        let Some((part, place, found)) = part else { return Ok(None) };
         if complete.is_empty() {
             // The first part of something.
-            let expects = part.exchange.expects.as_ref();
-            return Ok(Some(expects.map(|p| Reply::of(self.plain(p)))));
+            let Some(expects) = &part.exchange.expects else { return Ok(Some(None)) };
+            return Ok(Some(Some(Reply::of(self.echo(expects.of(place), &found)?))));
         }
         let mut why = (NOT_UNDERSTOOD, format!("nothing here is meant by `{}`", cut(word)));
         for (served, all) in complete {
@@ -290,7 +290,10 @@ impl<'m> Device<'_, 'm> {
 
     fn begin(&mut self, served: &'m Served, found: &[Found], word: &str) -> Result<Option<Reply>, Fault> {
         let reply = match &served.exchange.expects {
-            Some(pattern) => Some(Reply::of(self.echo(pattern, found)?)),
+            Some(pattern) => {
+                let last = pattern.of(served.exchange.sends.len().saturating_sub(1));
+                Some(Reply::of(self.echo(last, found)?))
+            }
             None => None,
         };
         *self.said = Some(&served.exchange);
@@ -309,11 +312,11 @@ impl<'m> Device<'_, 'm> {
         for slot in pattern.slots.iter().filter(is_value) {
             let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(slot));
             let shown = match (found.first(), told) {
-                (Some(sent), _) => Shown { value: sent.value, digits: None },
-                (None, Some(told)) => {
+                (Some(sent), _) if matches!(slot, Slot::Number(..)) => Shown { value: sent.value, digits: None },
+                (_, Some(told)) => {
                     Shown { value: self.sim.value(told.value, &mut ())?.unwrap_or(0.0), digits: self.digits(told) }
                 }
-                (None, None) => Shown::default(),
+                (_, None) => Shown::default(),
             };
             values.push((slot, shown));
         }
