@@ -184,7 +184,10 @@ impl Hardware<'_, '_> {
             self.beat(false, out)?;
             failed = match replayed {
                 Some(Begun::Told(outcome)) => outcome,
-                Some(Begun::Fault(fault)) => return Err(fault),
+                Some(Begun::Fault(fault, lost)) => {
+                    self.lose(lost, &fault);
+                    return Err(fault);
+                }
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
             self.beat(true, out)?;

@@ -22,6 +22,9 @@ use crate::binding;
 use crate::link::Trouble;
 use crate::world::World;
 
+/// How a journal ends that was not gone on with.
+pub const REFUSED: &str = "refused";
+
 /// What a deployment is given beside a program.
 pub struct Course<'p> {
     /// Where devices are.
@@ -205,6 +208,7 @@ fn concluded(
         return Ending::not_begun(vec![not_reached(unreached, true)]);
     }
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    hardware.stop_late();
     let stopped = !well && control.is_stopped();
     let mut found = findings(&execution);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
@@ -214,6 +218,7 @@ fn concluded(
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
+        _ if hardware.is_refused() => REFUSED,
         (_, true) => "stopped by a person",
         (true, false) => "ended",
         (false, false) => "failed",

@@ -214,6 +214,11 @@ impl<'m, 't> Hardware<'m, 't> {
         self.unreached.as_ref()
     }
 
+    /// Whether it was refused to go on.
+    pub(super) fn is_refused(&self) -> bool {
+        self.refused.get()
+    }
+
     /// Whether a person has ended it.
     pub fn is_stopped(&self) -> bool {
         self.settings.control.is_stopped()

@@ -115,23 +115,37 @@ impl Hardware<'_, '_> {
     }
 
     fn heeded_before(&mut self) -> bool {
-        match self.front() {
-            Some(entry) if entry.time() > self.twin.now() => false,
-            // Who asked for it takes it at this moment, or it is none that was asked for.
-            Some(Entry::Answered { .. }) => {
-                std::mem::replace(&mut self.answers, self.replay.len()) != self.replay.len()
+        loop {
+            match self.front() {
+                Some(entry) if entry.time() > self.twin.now() => return false,
+                // Who asked for it takes it at this moment, or it is none that was asked for.
+                Some(Entry::Answered { .. }) => {
+                    let left = self.replay.len();
+                    return std::mem::replace(&mut self.answers, left) != left;
+                }
+                Some(Entry::Stop { who, .. }) => {
+                    self.replay.pop_front();
+                    self.settings.control.stop(&who);
+                    self.stop();
+                    return true;
+                }
+                Some(Entry::Gate { to, .. }) => {
+                    self.replay.pop_front();
+                    if self.set_gate(to) {
+                        return true;
+                    }
+                }
+                _ => return false,
             }
-            Some(Entry::Stop { who, .. }) => {
-                self.replay.pop_front();
-                self.settings.control.stop(&who);
-                self.stop();
-                true
-            }
-            Some(Entry::Gate { to, .. }) => {
-                self.replay.pop_front();
-                self.set_gate(to)
-            }
-            _ => false,
+        }
+    }
+
+    /// Notes that a person stopped it where it was ending already, or that they did.
+    pub(super) fn stop_late(&mut self) {
+        if self.settings.mode == Mode::Replay {
+            self.heeded_before();
+        } else if self.settings.control.is_stopped() && !self.cancelled {
+            self.heed();
         }
     }
 
