@@ -184,6 +184,10 @@ impl Hardware<'_, '_> {
             self.beat(false, out)?;
             failed = match replayed {
                 Some(Begun::Told(outcome)) => outcome,
+                Some(Begun::Not) => {
+                    let fault = self.replayed_fault();
+                    return Err(fault.unwrap_or_else(|| self.fault(codes::RUN_FAILED, Span::default(), String::new())));
+                }
                 Some(Begun::Fault(fault, lost)) => {
                     self.lose(lost, &fault);
                     return Err(fault);

@@ -14,6 +14,8 @@ use super::journal::Entry;
 pub(super) enum Begun {
     /// Its device was told, or refused: the failure and what it says.
     Told(Option<(String, String)>),
+    /// Something went wrong before it was told.
+    Not,
     /// It could not be told; the device whose line was lost by that.
     Fault(Fault, Option<String>),
 }
@@ -100,8 +102,8 @@ impl Hardware<'_, '_> {
         texts: &[String],
     ) -> Result<Option<Begun>, Fault> {
         let Some(entry) = self.next_entry() else { return Ok(None) };
-        if let Some(fault) = self.replayed_fault() {
-            return Err(fault);
+        if matches!(&entry, Entry::Fault { t, .. } if *t <= self.twin.now()) {
+            return Ok(Some(Begun::Not));
         }
         let begins = format!("`{label}` begins at {} s", show_number(self.twin.now()));
         let Entry::Starting { t, ticket: before, step: at, sends, device, .. } = &entry else {
