@@ -112,6 +112,9 @@ impl Answers {
                         service_fn(move |request: tonic::Request<$of>| {
                             let this = std::sync::Arc::clone(&this);
                             async move {
+                                if beside {
+                                    return Err(refused(Refusal::NoMetadata, "nothing goes beside calls here"));
+                                }
                                 let $message = request.into_inner();
                                 let all: Result<Streamed<$to>, Status> = $answer(this).await;
                                 all.map(Response::new)
