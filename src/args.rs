@@ -370,8 +370,11 @@ pub struct DeployArgs {
     /// Where to keep the journal; needed unless nothing is sent.
     #[arg(long, value_name = "FILE")]
     pub journal: Option<PathBuf>,
+    /// Where to keep the journal with program, bindings and report: a folder that `matterixc verify` checks.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "journal")]
+    pub record: Option<PathBuf>,
     /// Go on with a deployment that was cut off, from its journal.
-    #[arg(long, requires = "journal")]
+    #[arg(long)]
     pub resume: bool,
     /// Show all bytes that go out and come in.
     #[arg(long)]
@@ -404,8 +407,10 @@ pub enum DeployMode {
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("line").required(true).args(["pty", "tcp"]))]
 pub struct EmulateArgs {
-    /// An asset of the library with a driver, or with `--file` an instance of its lab.
-    pub device: String,
+    /// An asset of the library with a driver, or with `--file` an instance of its lab; several instances, each with its address as
+    /// in `pump@2`, answer at one line.
+    #[arg(required = true)]
+    pub device: Vec<String>,
     /// The lab the device stands in, with what is around it.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
@@ -492,7 +497,7 @@ pub struct EmitArgs {
 /// `matterixc verify`.
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// The recording that a run has written, or the folder it is in.
+    /// The recording that a run has written, the folder it is in, or the record of a deployment.
     #[arg(value_name = "RUN")]
     pub recording: PathBuf,
     /// Form of the verdict.

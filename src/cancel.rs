@@ -3,10 +3,13 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use matterix_runtime::record::give_up;
+
 use crate::terminal::{Stream, print};
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Set when a command is to end early.
+pub static ASKED: AtomicBool = AtomicBool::new(false);
 
 static LAST_WORDS: OnceLock<fn() -> String> = OnceLock::new();
 
@@ -41,6 +44,8 @@ fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
             if let Some(say) = LAST_WORDS.get() {
                 print(Stream::Err, &say());
             }
+            // Files that belong together are all there or none.
+            let _given_up = give_up();
             std::process::exit(INTERRUPTED);
         }
         print(Stream::Err, said);

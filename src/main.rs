@@ -15,6 +15,7 @@ mod mcp;
 mod pipeline;
 mod progress;
 mod reads;
+mod record;
 mod report;
 mod terminal;
 mod uri;
@@ -24,6 +25,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use args::{Cli, Command};
+use terminal::{Stream, print};
 
 /// How a command ended; a worse end is greater.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,9 +52,9 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(message) => {
-            // A reader that has gone away is no reason to fail.
-            let _ = message.print();
-            return if message.use_stderr() { Exit::Usage } else { Exit::Fine }.into();
+            let is_wrong = message.use_stderr();
+            print(if is_wrong { Stream::Err } else { Stream::Out }, &message.render().to_string());
+            return if is_wrong { Exit::Usage } else { Exit::Fine }.into();
         }
     };
     // Every pass over a text goes as deep as its brackets; the deepest that are read need more than a thread's usual stack.

@@ -2,9 +2,10 @@
 
 use std::time::{Duration, Instant};
 
+use matterix_ir::hidden::visible;
 use matterix_ir::plan::{Plan, Step, StepId};
 
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, paint, print};
 
 /// How often the live line is drawn anew.
 const FRAME: Duration = Duration::from_millis(50);
@@ -64,13 +65,13 @@ impl<'a> Progress<'a> {
         }
         self.drawn = Some(Instant::now());
         let labels: Vec<&str> = self.running.iter().map(|s| self.plan.get(*s).label.as_str()).collect();
-        print(Stream::Err, &format!("\r\x1b[2K{}", live(time, &labels, self.width)));
+        paint(Stream::Err, &format!("\r\x1b[2K{}", visible(&live(time, &labels, self.width))));
     }
 
     /// Takes the live line away.
     pub fn finish(&mut self) {
         if self.drawn.take().is_some() {
-            print(Stream::Err, "\r\x1b[2K");
+            paint(Stream::Err, "\r\x1b[2K");
         }
     }
 }
@@ -95,13 +96,13 @@ impl Count {
         }
         self.drawn = Some(Instant::now());
         let of = all.map_or_else(String::new, |all| format!(" of {all}"));
-        print(Stream::Err, &format!("\r\x1b[2K{ended}{of} runs"));
+        paint(Stream::Err, &format!("\r\x1b[2K{ended}{of} runs"));
     }
 
     /// Takes the live line away.
     pub fn finish(&mut self) {
         if self.drawn.take().is_some() {
-            print(Stream::Err, "\r\x1b[2K");
+            paint(Stream::Err, "\r\x1b[2K");
         }
     }
 }

@@ -32,6 +32,19 @@ impl Account {
         (result, account().take().unwrap_or_default())
     }
 
+    /// The files that were found, as they are now; an error where one holds something else by now.
+    pub fn again(&self) -> Result<Vec<(PathBuf, Vec<u8>)>, String> {
+        let found = self.files.iter().filter(|(_, entry)| entry.found.is_some());
+        let read = |(path, entry): (&PathBuf, &Entry)| {
+            let bytes = files::contents(path, entry.largest).map_err(|why| format!("`{}`: {why}", path.display()))?;
+            match entry.found == Some(mark(&bytes)) {
+                true => Ok((path.clone(), bytes)),
+                false => Err(format!("`{}` has changed meanwhile", path.display())),
+            }
+        };
+        found.map(read).collect()
+    }
+
     /// Whether any of the files holds something else by now.
     pub fn is_outdated(&self) -> bool {
         let entry = |path: &Path, largest| Entry { found: files::contents(path, largest).ok().map(mark), largest };

@@ -3,6 +3,8 @@
 use std::io::{self, IsTerminal, Write};
 use std::sync::OnceLock;
 
+use matterix_ir::hidden::visible;
+
 use crate::args::Color;
 use crate::report::Look;
 
@@ -29,8 +31,14 @@ pub fn lost() -> Option<&'static str> {
     LOST.get().map(String::as_str)
 }
 
-/// Writes text; a reader that has gone away ends the writing, not the command.
+/// Writes text; a reader that has gone away ends the writing, not the command. What a terminal would obey is written in letters: texts of
+/// files, devices and servers are in it, and none of them may clear a screen or hide a line.
 pub fn print(stream: Stream, text: &str) {
+    paint(stream, &visible(text));
+}
+
+/// Writes text as it is, with the escape sequences that this command puts into it.
+pub fn paint(stream: Stream, text: &str) {
     match stream {
         Stream::Out => pour(text.as_bytes()),
         // There is nowhere left to say that this failed.

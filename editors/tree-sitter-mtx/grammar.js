@@ -277,7 +277,7 @@ module.exports = grammar({
     // ---- declarations
     declaration: ($) => choice(
       $.use, $.dimension, $.unit_declaration, $.species_declaration, $.solution, $.reaction, $.capability, $.asset, $.process, $.event,
-      $.relation, $.function, $.constant, $.reactive_group, $.material, $.incompatible, $.allow, $.hazard, $.driver, $.lab, $.skill,
+      $.relation, $.function, $.constant, $.reactive_group, $.material, $.incompatible, $.allow, $.hazard, $.framing, $.driver, $.lab, $.skill,
       $.workflow, $.study, $.fit, $.test,
     ),
     use: ($) => seq('use', field('path', $._name), optional(seq(
@@ -427,12 +427,13 @@ module.exports = grammar({
     constant: ($) => seq(
       'const', field('name', $.identifier), optional(seq(':', nl($), field('type', $.type))), '=', nl($), field('value', $.expression),
     ),
+    framing: ($) => seq('framing', field('name', $.identifier), $.fields),
     driver: ($) => seq(
       'driver', field('name', $.identifier), optional($._nl_more), 'for', field('type', $._name), optional($._nl_more), 'over',
       field('line', $.identifier), optional(alias($._loose_arguments, $.arguments)), field('body', $.wires),
     ),
     wires: ($) => block_of($, $._wire),
-    _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_command),
+    _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_ignores, $.wire_command),
     wire_fixed: ($) => prec(1, seq(
       choice('open', 'close', 'halt', 'safe', 'play'), optional(seq('while', field('condition', $.expression))), $._exchange,
     )),
@@ -444,11 +445,12 @@ module.exports = grammar({
     wire_answers: ($) => seq('answers', $.string, 'with', $.string),
     wire_reading: ($) => seq(
       'reading', field('name', $._name), optional(seq('while', field('condition', $.expression))),
-      'asks', $.string, 'expects', $.string,
+      choice(seq('asks', $.string, 'expects', $.string), seq('hears', $.string, 'every', $._operand)),
     ),
+    wire_ignores: ($) => seq('ignores', $.string),
     wire_command: ($) => seq(signature_of($, alias($._wire_verb, $.verb)), $._exchange),
     _wire_verb: ($) => seq(
-      choice('return', word_of($, 'open', 'close', 'halt', 'safe', 'play', 'alive', 'reply', 'answers', 'reading')), repeat($.identifier),
+      choice('return', word_of($, 'open', 'close', 'halt', 'safe', 'play', 'alive', 'reply', 'answers', 'reading', 'ignores')), repeat($.identifier),
     ),
     _exchange: ($) => seq('sends', commas($, $.string), optional($._answer), optional($._wire_until)),
     _answer: ($) => seq('expects', $.string),

@@ -1,13 +1,14 @@
 //! `matterixc bill`.
 
 use std::path::Path;
+use std::sync::atomic::Ordering;
 
 use matterix_ir::{Diagnostic, Sources};
 
 use crate::args::{BillArgs, BillFormat, Color};
 use crate::pipeline::{self, Input, Prices};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, complain, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes once and prints what that uses up; findings go to standard error.
@@ -37,6 +38,9 @@ fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
         BillFormat::Csv => billed.csv()?,
     };
     print(Stream::Out, &text);
+    if cancel.load(Ordering::SeqCst) && !billed.complete {
+        complain("stopped before the run had ended; the bill above is of what had been done until then");
+    }
     Ok(if billed.complete { Exit::Fine } else { Exit::Findings })
 }
 
@@ -53,6 +57,6 @@ pub(super) fn show(sources: &Sources, found: Vec<Diagnostic>, color: Color) {
     }
     let mut reporter = Reporter::new(Format::Human, terminal::look(Stream::Err, color));
     let text = reporter.render(sources, found);
-    print(Stream::Err, &text);
+    paint(Stream::Err, &text);
     print(Stream::Err, &reporter.summary());
 }

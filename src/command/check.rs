@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use matterix_ir::hidden::visible;
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, Severity, Sources};
 use matterix_runtime::motion::Store;
@@ -14,7 +15,7 @@ use crate::files;
 use crate::pipeline::{self, Advice, Input, Mended, Mending};
 use crate::report::points::{self, Found as At};
 use crate::report::{Format, Reporter, stricter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, complain, paint, print};
 
 /// Findings, and the texts they are in.
 type Found = (Sources, Vec<Diagnostic>);
@@ -29,7 +30,7 @@ pub fn check(args: &CheckArgs, color: Color) -> Exit {
         return super::or_complain(watch::watch(&args.files, |files| look(args, files, color)));
     }
     let (found, exit) = look(args, &args.files, color);
-    print(Stream::Out, &found);
+    paint(Stream::Out, &found);
     exit
 }
 
@@ -99,7 +100,11 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
     let mut out = String::new();
     let Some(place) = args.at else {
         for points in known {
-            out += &if json { points::json(points, None, sources) } else { points::table(points, sources) + "\n" };
+            out += &if json {
+                visible(&points::json(points, None, sources)).into_owned()
+            } else {
+                points::table(points, sources) + "\n"
+            };
         }
         return Ok(out);
     };
@@ -109,7 +114,7 @@ fn contents(args: &CheckArgs, path: &Path, known: &[Points], sources: &Sources) 
         match points::find(points, place, sources) {
             At::Statement(index) => {
                 out += &match json {
-                    true => points::json(points, Some(index), sources),
+                    true => visible(&points::json(points, Some(index), sources)).into_owned(),
                     false => points::all(points, index, sources) + "\n",
                 };
                 shown = true;

@@ -1,23 +1,36 @@
 //! `matterixc deploy`.
 
-use std::cell::RefCell;
 use std::path::Path;
+use std::rc::Rc;
+use std::time::Duration;
 
+use matterix_hardware::binding;
 use matterix_hardware::calibration::{self, Calibrated};
-use matterix_hardware::deploy::{Exposed, Journal, Mode};
-use matterix_ir::Diagnostic;
+use matterix_hardware::deploy::{Answer, Binding, Carrier, Chain, Control, Exposed, Journal, JournalError, Kept, Mode};
+use matterix_hardware::world::Machine;
 use matterix_ir::quantity::show_number;
+use matterix_ir::{Diagnostic, FileId, Program};
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
-use crate::keys::Keys;
 use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
+use crate::reads::Account;
+use crate::record::{About, Bound, Folder, Gauge, Taken};
 use crate::terminal::{Stream, print};
-use crate::{Exit, cancel, files};
+use crate::{Exit, cancel, files, keys};
 
 /// Devices that are left as they are when a person cannot wait.
 pub(super) static EXPOSED: Exposed = Exposed::new();
+
+/// What people say meanwhile.
+pub(super) static CONTROL: Control = Control::new(&cancel::ASKED, keys::show);
+
+/// The number of the question that is put before the plan begins.
+const BEFORE: u64 = u64::MAX;
+
+/// How often it is looked whether that has been answered.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// Compiles, looks whether devices can do it, and lets them do it.
 pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
@@ -25,11 +38,13 @@ pub fn deploy(args: &DeployArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
-    let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
+    let (text, read) = Account::of(|| files::read(&args.subject.file));
+    let input = Input::file(&args.subject.file, text?);
     let bindings = String::from_utf8(files::read(&args.bind)?)
         .map_err(|_| format!("`{}` is not text in UTF-8", args.bind.display()))?;
-    if args.mode != DeployMode::Dry && args.journal.is_none() {
-        return Err("what is sent to devices is kept in a journal: say where with `--journal FILE`".to_string());
+    if args.mode != DeployMode::Dry && args.journal.is_none() && args.record.is_none() {
+        let how = "say where with `--journal FILE`, or with `--record FOLDER`";
+        return Err(format!("what is sent to devices is kept in a journal: {how}"));
     }
     if args.resume && args.mode == DeployMode::Dry {
         return Err("a dry run has nothing to go on with".to_string());
@@ -37,7 +52,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     let mut findings = Findings::new(RunFormat::Human, color);
     let measured = measured(args, &bindings);
     let options = Options { wires: Wires::Called, measured: measured.clone(), ..args.subject.options() };
-    let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
+    let ((mut sources, program, diagnostics), imported) = Account::of(|| pipeline::compile(&input, &options));
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);
     let Some(program) = program.filter(|_| !is_wrong) else {
@@ -65,18 +80,22 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         DeployMode::Shadow => Mode::Shadow,
         DeployMode::Real | DeployMode::SimFirst => Mode::Real,
     };
-    let yes = args.yes || mode == Mode::Dry;
-    let keys = RefCell::new((mode != Mode::Dry).then(Keys::listen).flatten());
-    let person = |text: &str| confirmed(text, yes, keys.borrow_mut().as_mut());
-    if mode != Mode::Dry && !args.resume && !stands(&measured, &person) {
+    let who = keys::person();
+    if args.yes || mode == Mode::Dry {
+        CONTROL.answer_all(Answer { yes: true, who: format!("{who}, by `--yes`") });
+    }
+    if mode != Mode::Dry && !keys::listen(&CONTROL) && !args.yes {
+        CONTROL.answer_all(Answer::of_nobody());
+    }
+    if mode != Mode::Dry && !args.resume && !stands(&measured) {
         findings.end();
         print(Stream::Err, "what was measured is not confirmed: nothing was sent\n");
         return Ok(Exit::Findings);
     }
-    let journal = match (&args.journal, args.resume) {
-        (Some(path), true) => Some(Journal::reopen(path)?),
-        (Some(path), false) if args.mode != DeployMode::Dry => Some((Journal::create(path)?, Vec::new())),
-        _ => None,
+    let record = recorded(args, &[read, imported], &bindings)?;
+    let journal = match &record {
+        Some((folder, _)) => journal(Some(&folder.journal()), args)?,
+        None => journal(args.journal.as_deref(), args)?,
     };
     let plan = DeployPlan {
         bindings: (file, &bindings),
@@ -85,8 +104,9 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         seed: args.seed,
         trace: args.trace,
         journal,
-        cancel,
-        person: &person,
+        control: &CONTROL,
+        who: &who,
+        world: Rc::new(Machine::new()),
         exposed: &EXPOSED,
     };
     cancel::last_words(left_exposed);
@@ -94,13 +114,31 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         let speed = show_number(args.speed);
         print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
     }
+    let bound = record.is_some().then(|| about(args, &program, (file, &bindings), &measured));
     let deployed = pipeline::deploy(&program, &sources, plan);
     if let (Some(path), false) = (&args.journal, args.resume) {
         forget_empty(path);
     }
-    let deployed = deployed?;
+    if let (Some((folder, _)), false) = (&record, args.resume) {
+        folder.forget_unused();
+    }
+    let deployed = match deployed? {
+        Ok(deployed) => deployed,
+        Err(found) => {
+            findings.show(&sources, found);
+            findings.end();
+            return Ok(Exit::Findings);
+        }
+    };
+    let sealed = record
+        .zip(bound)
+        .filter(|_| deployed.execution.is_some())
+        .map(|((folder, main), about)| folder.seal(About { main, ..about }, &deployed));
     findings.show(&sources, deployed.diagnostics);
     findings.end();
+    if let Some(digest) = sealed.transpose()? {
+        print(Stream::Err, &format!("the record is sealed: {digest}\n"));
+    }
     if let Some(end) = deployed.end {
         let [judged, met, unseen] = deployed.counts;
         let how = match (deployed.stopped, deployed.passed) {
@@ -123,12 +161,75 @@ fn measured(args: &DeployArgs, bindings: &str) -> Measured {
     Measured { name: args.bind.display().to_string(), text: bindings.to_owned(), given }
 }
 
+/// The folder of the record that is asked for, and the first file of the program in it.
+fn recorded(args: &DeployArgs, read: &[Account], bindings: &str) -> Result<Option<(Folder, String)>, String> {
+    let Some(dir) = args.record.as_ref().filter(|_| args.mode != DeployMode::Dry) else { return Ok(None) };
+    let folder = if args.resume { Folder::open(dir)? } else { Folder::create(dir)? };
+    let mut taken = Vec::new();
+    for account in read {
+        taken.extend(account.again()?.into_iter().map(|(path, bytes)| Taken { path, bytes }));
+    }
+    let main = folder.keep(&args.subject.file, &taken, bindings)?;
+    Ok(Some((folder, main)))
+}
+
+/// What a record says of what a deployment is given.
+fn about(args: &DeployArgs, program: &Program, (file, bindings): (FileId, &str), measured: &Measured) -> About {
+    let (bound, _) = binding::read(program, file, bindings);
+    let driver = |index: usize| program.drivers.get(index).map(|d| d.name.clone());
+    let device = |b: &Binding| {
+        let (driver, place) = match &b.carrier {
+            Carrier::Line { driver: index, place, .. } => (driver(*index), Some(place.to_string())),
+            Carrier::Shared { driver: index, .. } => (driver(*index), None),
+            Carrier::Hand => (None, None),
+        };
+        Bound { name: program.scene.get(b.instance).name.clone(), driver, place }
+    };
+    let value = |g: &Gauged| measured.text.get(g.value.clone()).unwrap_or_default().to_owned();
+    let gauge = |g: &Gauged| Gauge { of: format!("{}.{}", g.thing.0, g.field.0), value: value(g) };
+    About {
+        tool: env!("CARGO_PKG_VERSION").to_owned(),
+        main: String::new(),
+        workflow: args.subject.workflow.clone(),
+        lab: args.subject.lab.clone(),
+        set: args.subject.set.clone(),
+        mode: if args.mode == DeployMode::Shadow { "shadow" } else { "real" }.to_owned(),
+        speed: args.speed,
+        seed: args.seed,
+        devices: bound.iter().map(device).collect(),
+        calibration: measured.given.iter().map(gauge).collect(),
+    }
+}
+
+/// The journal that is asked for.
+fn journal(path: Option<&Path>, args: &DeployArgs) -> Result<Kept, String> {
+    let Some(path) = path.filter(|_| args.mode != DeployMode::Dry) else { return Ok(Kept::Not) };
+    if !args.resume {
+        return Journal::create(path).map(Kept::New).map_err(|e| e.text().to_owned());
+    }
+    match Journal::reopen(path) {
+        Ok((journal, before)) => Ok(Kept::Left(journal, before)),
+        Err(JournalError::Damaged(why)) => Ok(Kept::Damaged(why)),
+        Err(other) => Err(other.text().to_owned()),
+    }
+}
+
 /// Whether a person says that it is still so.
-fn stands(measured: &Measured, person: &dyn Fn(&str) -> bool) -> bool {
+fn stands(measured: &Measured) -> bool {
     let value = |g: &Gauged| measured.text.get(g.value.clone()).unwrap_or_default().to_owned();
     let all: Vec<String> =
         measured.given.iter().map(|g| format!("  {}.{}: {}\n", g.thing.0, g.field.0, value(g))).collect();
-    all.is_empty() || person(&format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()))
+    if all.is_empty() {
+        return true;
+    }
+    CONTROL.ask(BEFORE, &format!("measured, by `{}`:\n{}is that still so?", measured.name, all.concat()));
+    while !CONTROL.is_stopped() {
+        if let Some(answer) = CONTROL.answered(BEFORE) {
+            return answer.yes;
+        }
+        std::thread::sleep(LOOK);
+    }
+    false
 }
 
 /// What is said where nothing more is done.
@@ -140,24 +241,12 @@ pub(super) fn left_exposed() -> String {
     }
 }
 
-/// Removes a new journal into which nothing was written: what was refused beforehand may be tried again with it.
+/// Removes a new journal into which nothing was written but its head: what was refused beforehand may be tried again with it.
 pub(super) fn forget_empty(journal: &Path) {
-    if std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() == 0) {
+    let head = Chain::default().head().len() as u64;
+    let is_empty = std::fs::metadata(journal).is_ok_and(|there| there.is_file() && there.len() <= head);
+    if is_empty {
         // It stays where it cannot be removed, which the next attempt says.
         let _ = std::fs::remove_file(journal);
     }
-}
-
-/// Whether a person agrees; nobody does where nobody can be asked.
-fn confirmed(text: &str, yes: bool, keys: Option<&mut Keys>) -> bool {
-    print(Stream::Err, &format!("{text}\n"));
-    if yes {
-        return true;
-    }
-    let Some(keys) = keys else {
-        print(Stream::Err, "nobody is there to confirm: run it on a terminal, or with `--yes`\n");
-        return false;
-    };
-    print(Stream::Err, "type y and Enter to confirm: ");
-    keys.ask().is_some_and(|line| line.trim().eq_ignore_ascii_case("y"))
 }

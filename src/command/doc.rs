@@ -1,7 +1,5 @@
 //! `matterixc doc`.
 
-use std::fs;
-
 use crate::args::{Color, DocArgs};
 use crate::pipeline::{self, Input};
 use crate::terminal::{Stream, print};
@@ -21,9 +19,7 @@ fn attempt(args: &DocArgs, color: Color) -> Result<Exit, String> {
     show(&sources, found, color);
     let Some(text) = text else { return Ok(Exit::Findings) };
     match &args.out {
-        Some(path) => {
-            fs::write(path, text).map_err(|e| format!("cannot write `{}`: {}", path.display(), files::reason(&e)))?;
-        }
+        Some(path) => files::write(path, text)?,
         None => print(Stream::Out, &text),
     }
     Ok(Exit::Fine)

@@ -1,10 +1,12 @@
 //! `matterixc emit`.
 
+use std::sync::atomic::Ordering;
+
 use matterix_ir::Diagnostic;
 
 use crate::args::{Color, EmitArgs};
 use crate::pipeline::{self, Input};
-use crate::terminal;
+use crate::terminal::{self, complain};
 
 use super::bill::show;
 use crate::{Exit, cache, cancel, files};
@@ -30,7 +32,12 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
         }
     }
     show(&sources, found, color);
-    let Some(bytes) = written else { return Ok(Exit::Findings) };
+    let Some(bytes) = written else {
+        if cancel.load(Ordering::SeqCst) {
+            complain("stopped before the workflow had been performed; nothing is written");
+        }
+        return Ok(Exit::Findings);
+    };
     if let Some(bindings) = &args.play {
         let name = match args.target {
             pipeline::Target::OpentronsPython => "protocol.py",

@@ -19,9 +19,15 @@ pub fn emulate(args: &EmulateArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
-    let (input, device) = match &args.file {
-        Some(file) => (Input::file(file, files::read(file)?), args.device.as_str()),
-        None => (Input::stdin(alone(&args.device)?.into_bytes()), ALONE),
+    let named: Vec<(&str, Option<&str>)> = args
+        .device
+        .iter()
+        .map(|d| d.split_once('@').map_or((d.as_str(), None), |(name, address)| (name, Some(address))))
+        .collect();
+    let (input, devices) = match (&args.file, named.as_slice()) {
+        (Some(file), _) => (Input::file(file, files::read(file)?), named),
+        (None, [(asset, address)]) => (Input::stdin(alone(asset)?.into_bytes()), vec![(ALONE, *address)]),
+        (None, _) => return Err("several devices are of a lab: give its file with `--file`".to_owned()),
     };
     let options = Options { workflow: args.workflow.clone(), wires: Wires::Served, ..Options::default() };
     let (sources, program, diagnostics) = pipeline::compile(&input, &options);
@@ -39,7 +45,7 @@ fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
     };
     let mut ready = |place: &str| print(Stream::Out, &format!("{place}\n"));
     let driver = args.driver.as_deref();
-    pipeline::emulate(&program, device, driver, &line, (args.speed, args.seed), cancel, &mut ready)?;
+    pipeline::emulate(&program, &devices, driver, &line, (args.speed, args.seed), cancel, &mut ready)?;
     Ok(Exit::Fine)
 }
 

@@ -7,7 +7,7 @@ use crate::args::{Color, FmtArgs};
 use crate::files;
 use crate::pipeline::{self, Input};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, complain, paint, pour, print};
 
 /// Rewrites every file that can be read and parsed; the others stay as they are.
 pub fn fmt(args: &FmtArgs, color: Color) -> Exit {
@@ -30,7 +30,7 @@ fn one(path: &Path, args: &FmtArgs, reporter: &mut Reporter) -> Exit {
     let formatted = match pipeline::format(&input) {
         Ok(text) => text,
         Err((sources, diagnostics)) => {
-            print(Stream::Err, &reporter.render(&sources, diagnostics));
+            paint(Stream::Err, &reporter.render(&sources, diagnostics));
             return Exit::Findings;
         }
     };
@@ -42,7 +42,7 @@ fn one(path: &Path, args: &FmtArgs, reporter: &mut Reporter) -> Exit {
         return if differs { Exit::Findings } else { Exit::Fine };
     }
     if args.stdout || from_stdin {
-        print(Stream::Out, &formatted);
+        pour(formatted.as_bytes());
     } else if differs && let Err(message) = files::replace(path, &formatted) {
         return usage(&message);
     }

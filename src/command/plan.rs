@@ -1,10 +1,12 @@
 //! `matterixc plan`.
 
+use std::sync::atomic::Ordering;
+
 use matterix_ir::Diagnostic;
 
 use crate::args::{Color, PlanArgs, RunFormat};
 use crate::pipeline::{self, Input, Search};
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, complain, print};
 use crate::{Exit, cancel, files};
 
 use super::run::Findings;
@@ -26,7 +28,8 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
         return Ok(Exit::Findings);
     };
     let search = Search::Clock { time: args.time_limit, seed: args.seed };
-    let schedule = match pipeline::schedule(&program, search, cancel::on_interrupt()?) {
+    let cancel = cancel::on_interrupt_quietly()?;
+    let schedule = match pipeline::schedule(&program, search, cancel) {
         Ok(schedule) => schedule,
         Err(found) => {
             findings.show(&sources, vec![*found]);
@@ -34,6 +37,7 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
             return Ok(Exit::Findings);
         }
     };
+    let is_cut = cancel.load(Ordering::SeqCst);
     findings.end();
     match args.format {
         RunFormat::Human => print(Stream::Out, &pipeline::chart(&schedule, terminal::width(Stream::Out))),
@@ -41,6 +45,10 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
     }
     if let Some(path) = &args.svg {
         files::write(path, &pipeline::picture(&schedule)?)?;
+    }
+    if is_cut {
+        complain("stopped before the search had ended; the schedule above is the shortest found until then");
+        return Ok(Exit::Findings);
     }
     Ok(Exit::Fine)
 }

@@ -65,6 +65,7 @@ pub fn play(
     let (headline, code) = match &code {
         Trouble::Lost(why) => (why.clone(), codes::DEVICE_LOST),
         Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
+        Trouble::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
         Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };
     let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");

@@ -1,19 +1,19 @@
 //! `matterixc run`.
 
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use matterix_ir::{Diagnostic, Program};
 use matterix_runtime::exec::Turn;
 use matterix_runtime::motion::perturb;
+use matterix_runtime::record::Folder;
 
 use crate::args::{Color, Fidelity, RunArgs, RunFormat};
 use crate::cache;
 use crate::pipeline::{self, Choices, Input, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes and reports; findings and progress go to standard error, the report to standard output.
@@ -25,7 +25,7 @@ pub fn run(args: &RunArgs, color: Color) -> Exit {
 fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
     let input = Input::file(&args.subject.file, files::read(&args.subject.file)?);
     if let Some(dir) = &args.out {
-        create(dir)?;
+        is_writable(dir)?;
     }
     let mut findings = Findings::new(args.format, color);
     let (sources, program, diagnostics) = pipeline::compile(&input, &args.subject.options());
@@ -107,7 +107,7 @@ impl Findings {
     }
 
     pub(super) fn show(&mut self, sources: &matterix_ir::Sources, diagnostics: Vec<matterix_ir::Diagnostic>) {
-        print(Stream::Err, &self.reporter.render(sources, diagnostics));
+        paint(Stream::Err, &self.reporter.render(sources, diagnostics));
     }
 
     pub(super) fn end(&self) {
@@ -125,9 +125,10 @@ fn kind(format: RunFormat) -> Kind {
     }
 }
 
-pub(super) fn create(dir: &Path) -> Result<(), String> {
+/// Whether the files of a run can be written there, before it is run.
+pub(super) fn is_writable(dir: &Path) -> Result<(), String> {
     if dir.exists() && !dir.is_dir() {
         return Err(format!("`{}` is a file, not a directory", dir.display()));
     }
-    fs::create_dir_all(dir).map_err(|e| format!("cannot create `{}`: {}", dir.display(), files::reason(&e)))
+    Folder::check(dir).map_err(|e| e.to_string())
 }

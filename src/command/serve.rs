@@ -49,8 +49,9 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
             print(Stream::Err, &format!("{}: {commands} commands, {properties} properties\n", feature.id()));
         }
     };
-    let journal = args.journal.as_deref().map(Journal::create).transpose()?;
+    let journal = args.journal.as_deref().map(Journal::create).transpose().map_err(|e| e.text().to_owned())?;
     cancel::last_words(super::deploy::left_exposed);
+    cancel::on_interrupt_quietly()?;
     let service = Service {
         address,
         bindings: file,
@@ -59,7 +60,8 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         trace: args.trace,
         journal: journal.unwrap_or_default(),
         exposed: &super::deploy::EXPOSED,
-        cancel: cancel::on_interrupt_quietly()?,
+        control: &super::deploy::CONTROL,
+        who: crate::keys::person(),
         ready: &mut ready,
     };
     let found = pipeline::serve(&program, &sources, service);

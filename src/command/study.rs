@@ -18,7 +18,7 @@ fn attempt(args: &StudyArgs, color: Color) -> Result<Exit, String> {
     let many = &args.many;
     let input = Input::file(&many.file, files::read(&many.file)?);
     if let Some(dir) = &many.out {
-        super::run::create(dir)?;
+        super::run::is_writable(dir)?;
     }
     let (sources, compiled, found) = pipeline::many(&input, &many.options(), false);
     let is_wrong = found.iter().any(Diagnostic::is_error);

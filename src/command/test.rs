@@ -10,7 +10,7 @@ use crate::args::{Color, Fidelity, TestArgs, TestFormat};
 use crate::pipeline::{self, Choices, Input, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, complain, paint, print};
 use crate::{Exit, cancel, files};
 
 /// Runs every test of the files, a line each, and counts them; what failed is shown below its line.
@@ -38,12 +38,19 @@ pub fn test(args: &TestArgs, color: Color) -> Exit {
         exit = Exit::Usage;
     }
     for path in &found.files {
+        if cancel.load(Ordering::Relaxed) {
+            break;
+        }
         if let Err(message) = trial.file(path, args.only.as_deref().unwrap_or_default()) {
             complain(&message);
             exit = Exit::Usage;
         }
     }
     trial.close(found.files.len());
+    if cancel.load(Ordering::Relaxed) {
+        complain("stopped before all tests had run");
+        return exit.max(Exit::Findings);
+    }
     if trial.failed > 0 { exit.max(Exit::Findings) } else { exit }
 }
 
@@ -77,7 +84,7 @@ impl Trial {
         }
         for test in tests {
             if self.cancel.load(Ordering::Relaxed) {
-                return Err("stopped: the other tests were not run".to_string());
+                return Ok(());
             }
             self.run(&input.name, &sources, &test, broken);
         }
@@ -129,7 +136,7 @@ impl Trial {
     fn show(&self, sources: &Sources, found: Vec<Diagnostic>) {
         if self.format == TestFormat::Human {
             let text = Reporter::new(Format::Human, self.look).render(sources, found);
-            print(Stream::Out, &format!("\n{text}"));
+            paint(Stream::Out, &format!("\n{text}"));
         } else {
             for finding in self.findings(sources, found) {
                 print(Stream::Out, &format!("{finding}\n"));

@@ -4,7 +4,7 @@ use matterix_judge::{Looked, Verdict};
 
 use crate::args::{RunFormat, VerifyArgs};
 use crate::terminal::{Stream, print};
-use crate::{Exit, files};
+use crate::{Exit, files, record};
 
 /// Judges what a recording says robots did.
 pub fn verify(args: &VerifyArgs) -> Exit {
@@ -13,6 +13,9 @@ pub fn verify(args: &VerifyArgs) -> Exit {
 
 /// The verdict; `Err` says in words what is wrong with usage or files.
 fn attempt(args: &VerifyArgs) -> Result<Exit, String> {
+    if args.recording.join(record::MANIFEST).is_file() {
+        return deployed(args);
+    }
     let file = if args.recording.is_dir() { &args.recording.join("recording.mcap") } else { &args.recording };
     let verdict = matterix_judge::judge(&files::read_recording(file)?)
         .map_err(|why| format!("cannot judge `{}`: {why}", file.display()))?;
@@ -25,6 +28,24 @@ fn attempt(args: &VerifyArgs) -> Result<Exit, String> {
     };
     print(Stream::Out, &text);
     Ok(if verdict.wrong.is_empty() { Exit::Fine } else { Exit::Findings })
+}
+
+/// Checks the record of a deployment.
+fn deployed(args: &VerifyArgs) -> Result<Exit, String> {
+    let checked = record::verify(&args.recording)?;
+    let text = match args.format {
+        RunFormat::Human => {
+            let holds = checked.holds.iter().map(|line| format!("{line}\n"));
+            let wrong = checked.wrong.iter().map(|line| format!("wrong: {line}\n"));
+            holds.chain(wrong).collect::<String>() + &format!("digest {}\n", checked.digest)
+        }
+        RunFormat::Json => {
+            let json = serde_json::to_string_pretty(&checked).map_err(|e| format!("cannot write the verdict: {e}"))?;
+            json + "\n"
+        }
+    };
+    print(Stream::Out, &text);
+    Ok(if checked.wrong.is_empty() { Exit::Fine } else { Exit::Findings })
 }
 
 fn page(verdict: &Verdict) -> String {

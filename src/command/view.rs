@@ -24,7 +24,7 @@ fn attempt(args: &ViewArgs, color: Color) -> Result<Exit, String> {
         return Ok(Exit::Fine);
     }
     let failed = |e: std::io::Error| format!("cannot serve the page at port {}: {}", args.port, files::reason(&e));
-    let served = serve::Served::new(page, args.port).map_err(failed)?;
+    let mut served = serve::Served::new(page, args.port).map_err(failed)?;
     let stop = cancel::on_interrupt_quietly()?;
     print(Stream::Out, &format!("{}\n", served.url()));
     print(Stream::Err, "open this address in a browser; Ctrl-C ends\n");

@@ -9,7 +9,7 @@ use std::time::Duration;
 use notify::{Event, RecursiveMode, Watcher};
 
 use crate::reads::Account;
-use crate::terminal::{self, Stream, print};
+use crate::terminal::{self, Stream, paint, print};
 use crate::{Exit, cancel};
 
 /// How often Ctrl-C is looked for.
@@ -36,11 +36,11 @@ pub(super) fn watch(files: &[PathBuf], look: impl Fn(&[PathBuf]) -> (String, Exi
     loop {
         let ((found, exit), read) = Account::of(|| look(files));
         match (terminal::is_terminal(Stream::Out), first) {
-            (true, _) => print(Stream::Out, CLEAR),
+            (true, _) => paint(Stream::Out, CLEAR),
             (false, false) => print(Stream::Out, BETWEEN),
             (false, true) => {}
         }
-        print(Stream::Out, &found);
+        paint(Stream::Out, &found);
         first = false;
         loop {
             if stop.load(Ordering::SeqCst) {

@@ -9,13 +9,13 @@ mod prompts;
 mod resources;
 mod server;
 mod tools;
+mod transport;
 mod work;
 
 use std::path::Path;
 
 use rmcp::ServiceExt;
 use rmcp::service::ServerInitializeError;
-use rmcp::transport::stdio;
 
 use crate::STACK;
 use desk::Desk;
@@ -32,7 +32,7 @@ pub fn serve(root: &Path) -> Result<(), String> {
         .build()
         .map_err(|e| failed("cannot start the server", &e))?;
     let ended = runtime.block_on(async {
-        let running = match server.serve(stdio()).await {
+        let running = match server.serve(transport::bounded()).await {
             Ok(running) => running,
             // Nothing was asked, so nothing is wrong.
             Err(ServerInitializeError::ConnectionClosed(_)) => return Ok(()),

@@ -13,6 +13,8 @@ use super::desk::Desk;
 
 /// So many calls are worked on at once; others wait for their turn.
 const AT_ONCE: usize = 4;
+/// So many calls are there at once, those that wait with them; one more is refused.
+const MOST: usize = 64;
 /// How long work that is told to stop may take to do so: what `finally` says is done first, and a long run has a long report.
 const GRACE: Duration = Duration::from_secs(20);
 
@@ -24,12 +26,13 @@ pub type Work = Box<dyn FnOnce(&Desk, &Arc<AtomicBool>) -> Result<Answer, String
 pub struct Shop {
     desk: Arc<Desk>,
     turns: Arc<Semaphore>,
+    places: Arc<Semaphore>,
 }
 
 impl Shop {
     /// At a desk.
     pub fn new(desk: Desk) -> Self {
-        Shop { desk: Arc::new(desk), turns: Arc::new(Semaphore::new(AT_ONCE)) }
+        Shop { desk: Arc::new(desk), turns: Arc::new(Semaphore::new(AT_ONCE)), places: Arc::new(Semaphore::new(MOST)) }
     }
 
     /// Does a piece of work within a time, as long as `wanted` does not end; `Err` says in words why there is no answer.
@@ -39,6 +42,9 @@ impl Shop {
         limit: Duration,
         wanted: impl Future<Output = ()>,
     ) -> Result<Answer, String> {
+        let Ok(_place) = self.places.try_acquire() else {
+            return Err(format!("{MOST} calls are worked on or wait already: ask again when one of them has ended"));
+        };
         let stop = Arc::new(AtomicBool::new(false));
         let (shop, flag) = (self.clone(), stop.clone());
         let done = async move {

@@ -1,22 +1,14 @@
-//! A program on devices: bindings, checks before anything moves, execution, what is left safe.
+//! A program on devices: bindings, what is shown meanwhile, and what was found.
 
-// A fault ends the run: how many bytes it is returned in is of no account.
-#![allow(clippy::result_large_err)]
-
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::rc::Rc;
 
 use matterix_hardware::binding;
 use matterix_hardware::codec::shown;
-use matterix_hardware::deploy::{
-    Binding, Carrier, Device, Entry, Exposed, Hardware, Journal, Mode, Settings, Unreached, digest, preflight,
-};
-use matterix_hardware::link::Trouble;
-use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
-use matterix_runtime::backend::{Prepared, Sim};
-use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
-use matterix_runtime::fault::Fault;
-use matterix_runtime::process::{Engine, Observer, Options};
-use matterix_runtime::run::Screen;
+use matterix_hardware::deploy::{Control, Course, Ending, Exposed, Kept, Mode, carry_out};
+use matterix_hardware::world::World;
+use matterix_ir::{Diagnostic, FileId, Program, Sources};
+use matterix_runtime::exec::Listener;
+use matterix_runtime::process::{Engine, Observer};
 
 use crate::terminal::{Stream, print};
 
@@ -32,157 +24,31 @@ pub struct Plan<'p> {
     pub seed: u64,
     /// Shows all bytes.
     pub trace: bool,
-    /// The journal, with what an earlier process wrote into it.
-    pub journal: Option<(Journal, Vec<Entry>)>,
-    /// Ends it early.
-    pub cancel: &'p AtomicBool,
-    /// Asks a person.
-    pub person: &'p dyn Fn(&str) -> bool,
+    /// The journal.
+    pub journal: Kept,
+    /// What people say meanwhile.
+    pub control: &'p Control,
+    /// Who carries it out.
+    pub who: &'p str,
+    /// Clocks and ports.
+    pub world: Rc<dyn World>,
     /// Kept up to date with what is told to devices.
     pub exposed: &'p Exposed,
 }
 
-/// What came of it.
-pub struct Deployed {
-    /// What was found before or went wrong after.
-    pub diagnostics: Vec<Diagnostic>,
-    /// Whether it came to its end with all expectations met or not observed.
-    pub passed: bool,
-    /// Whether a person ended it early.
-    pub stopped: bool,
-    /// s of lab time; nothing where it did not begin.
-    pub end: Option<f64>,
-    /// Expectations that were judged, met and not observed.
-    pub counts: [usize; 3],
-}
-
-impl Deployed {
-    fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
-        Deployed { diagnostics, passed: false, stopped: false, end: None, counts: [0; 3] }
-    }
-}
-
-/// Carries a program out.
-pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Deployed, String> {
+/// Carries a program out; what was wrong with the bindings, or how it ended.
+pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Result<Ending, Vec<Diagnostic>>, String> {
+    let Plan { mode, speed, seed, trace, journal, control, who, world, exposed, .. } = plan;
     let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
     if found.iter().any(Diagnostic::is_error) {
-        return Ok(Deployed::not_begun(found));
+        return Ok(Err(found));
     }
-    if plan.mode == Mode::Shadow
-        && let Some(d) = unmeasured(program, &bindings)
-    {
-        return Ok(Deployed::not_begun(vec![d]));
-    }
-    let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
-    let digest = digest(program, plan.bindings.1)?;
-    let (journal, before) = plan.journal.unwrap_or((Journal::none(), Vec::new()));
-    if let Some(d) = unfit(&before, &digest, plan.speed) {
-        return Ok(Deployed::not_begun(vec![d]));
-    }
-    let prepared = Prepared::new(program);
-    let params = program.model.params.iter().map(|p| p.value).collect();
-    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
-    let mut screen = Screen::new(program);
-    let engine = match engine.and_then(|mut engine| engine.start(&mut screen).map(|()| engine)) {
-        Ok(engine) => engine,
-        Err(fault) => return Ok(Deployed::not_begun(vec![of_fault(fault)])),
-    };
-    let twin = Sim::new(engine, &prepared, plan.seed);
-    let shows = plan.trace || plan.mode == Mode::Dry;
-    let trace = traced(shows);
-    let Plan { mode, speed, cancel, person, exposed, .. } = plan;
-    let settings = Settings { mode, speed, cancel, person, exposed };
-    let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, Box::new(trace));
-    let found = {
-        let (observed, devices) = hardware.view();
-        preflight(program, devices, observed)
-    };
-    if !found.is_empty() {
-        return Ok(Deployed::not_begun(found));
-    }
-    let is_open = before.iter().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
-    let (begins, goes_on) = (before.is_empty(), !before.is_empty());
-    if is_open {
-        hardware.follow_journal(before);
-    }
-    let unreached = hardware.connect();
-    if !unreached.is_empty() {
-        return Ok(Deployed::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
-    }
-    if begins && let Err(fault) = hardware.begin_journal(&digest) {
-        return Ok(Deployed::not_begun(vec![of_fault(fault)]));
-    }
-    // One that was cut off before anything of the plan was begun opens its lines as a new one does.
-    if !is_open && let Err(failed) = hardware.open() {
-        let mut found = vec![not_opened(failed, sources)];
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
-        let stopped = plan.cancel.load(Ordering::Relaxed);
-        return Ok(Deployed { stopped, ..Deployed::not_begun(found) });
-    }
-    let limits = Limits { cancel: Some(plan.cancel), ..Limits::default() };
-    let mut told = Told { person: plan.person, cancel: plan.cancel };
-    let mut told = Tee(&mut screen, &mut told);
-    let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut told);
-    if let Some(unreached) = hardware.unreached() {
-        return Ok(Deployed::not_begun(vec![not_reached(unreached, goes_on)]));
-    }
-    let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
-    let stopped = !well && plan.cancel.load(Ordering::Relaxed);
-    let mut found = findings(&execution, sources);
-    found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
-    if !well {
-        found.extend(hardware.secure().into_iter().map(unsafe_left));
-    }
-    found.extend(hardware.close().err().map(of_fault));
-    let status = match (well, stopped) {
-        (_, true) => "stopped by a person",
-        (true, false) => "ended",
-        (false, false) => "failed",
-    };
-    found.extend(hardware.end_journal(status).err().map(of_fault));
-    let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
-    let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
-    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
-    Ok(Deployed { diagnostics: found, passed, stopped, end: Some(execution.end_time), counts })
-}
-
-/// That a shadow has nothing to go by: no device that tells something has a tolerance.
-fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
-    let is_measured = bindings.iter().any(|b| !b.tolerances.is_empty());
-    let telling = bindings.iter().find_map(|b| match &b.carrier {
-        Carrier::Line { driver, .. } => program.drivers[*driver].told.first().map(|told| (b, told)),
-        _ => None,
-    });
-    let at = telling.map(|(b, _)| b).or(bindings.first()).filter(|_| !is_measured)?.at;
-    let d = Diagnostic::error(codes::BINDING, at, "nothing is compared with the twin", "no device has a `tolerance`");
-    Some(match telling {
-        Some((_, told)) => {
-            let member = told.name.rsplit('.').next().unwrap_or(&told.name);
-            d.help(format!(
-                "say how far from the twin it may be: `tolerance = {{ {member} = \"2 {}\" }}`",
-                told.difference.symbol
-            ))
-        }
-        None => d.help("no device of these tells anything: take another mode"),
-    })
-}
-
-/// Why a journal is of another deployment, or of one that has ended.
-fn unfit(before: &[Entry], digest: &str, speed: f64) -> Option<Diagnostic> {
-    let wrong = |headline: &str| {
-        let d = Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on");
-        Some(d.help("begin anew, with a journal of its own"))
-    };
-    match (before.first(), before.last()) {
-        (None, _) => None,
-        (_, Some(Entry::End { .. })) => wrong("the deployment of this journal has come to its end"),
-        (Some(Entry::Begin { digest: of, speed: at, .. }), _) => match () {
-            () if of != digest => wrong("the journal is of another program, or of other bindings"),
-            () if *at != speed => wrong("the journal is of a deployment at another speed"),
-            () => None,
-        },
-        _ => wrong("the journal does not begin as one"),
-    }
+    let trace = Box::new(traced(trace || mode == Mode::Dry));
+    let course = Course { bindings, mode, speed, seed, trace, journal, control, who, world, exposed };
+    let ending = carry_out(program, sources, course, &mut Told)?;
+    let led = |d: Diagnostic| super::run::led_by_the_user(d, sources);
+    let diagnostics = ending.diagnostics.into_iter().map(led).collect();
+    Ok(Ok(Ending { diagnostics, ..ending }))
 }
 
 /// Shows what goes over lines, where that is wanted.
@@ -195,70 +61,17 @@ pub(super) fn traced(shows: bool) -> impl Fn(f64, &str, bool, &[u8]) {
     }
 }
 
-pub(super) fn of_fault(fault: Fault) -> Diagnostic {
-    exec::diagnostic(&FailureTrace::of_fault(fault))
-}
+/// Says what is noted.
+struct Told;
 
-/// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
-pub(super) fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
-    let Unreached { device, at, trouble } = unreached;
-    let code = match trouble {
-        Trouble::Lost(_) => codes::DEVICE_LOST,
-        Trouble::Garbled(_) => codes::DEVICE_GARBLED,
-        Trouble::Refused { .. } => codes::DEVICE_REFUSED,
-    };
-    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
-    let headline = format!("`{device}` {what}: {}", trouble.text());
-    let d = Diagnostic::error(code, *at, headline, "bound here");
-    d.help(if goes_on {
-        "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
-    } else {
-        "nothing was said to any device"
-    })
-}
-
-/// What went wrong when drivers said what they say first, with the place where the device is bound.
-pub(super) fn not_opened((fault, at): (Fault, Span), sources: &Sources) -> Diagnostic {
-    super::run::led_by_the_user(of_fault(fault).because(at, "bound here"), sources)
-}
-
-pub(super) fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
-    let headline = format!("a device could not be made safe: {why}");
-    Diagnostic::error(codes::DEVICE_LOST, at, headline, "see to it").help("go and look at it now")
-}
-
-fn findings(execution: &Execution, sources: &Sources) -> Vec<Diagnostic> {
-    let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
-    let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
-    found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
-    // That nothing more was said after it was refused to go on follows from that.
-    let others = execution.suppressed.iter().filter(|trace| trace.code != codes::JOURNAL_MISMATCH);
-    let others = others.map(exec::diagnostic);
-    found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
-    found.into_iter().map(|d| super::run::led_by_the_user(d, sources)).collect()
-}
-
-/// Says what is noted, and asks what is asked.
-struct Told<'p> {
-    person: &'p dyn Fn(&str) -> bool,
-    cancel: &'p AtomicBool,
-}
-
-impl Observer for Told<'_> {
+impl Observer for Told {
     fn sample(&mut self, _: f64, _: &Engine<'_>) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }
 
-impl Listener for Told<'_> {
+impl Listener for Told {
     fn note(&mut self, time: f64, _: matterix_ir::plan::StepId, text: &str) {
         print(Stream::Err, &format!("{time:10.3} s  {text}\n"));
-    }
-
-    fn ask(&mut self, _: f64, _: matterix_ir::plan::StepId, text: &str) {
-        // Who does not agree wants it to end.
-        if !(self.person)(text) {
-            self.cancel.store(true, Ordering::Relaxed);
-        }
     }
 }

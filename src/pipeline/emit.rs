@@ -7,7 +7,7 @@ use matterix_emit::robots::{ros, urscript};
 use matterix_emit::{Performance, Subject, opentrons, steps};
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, Program, Sources};
-use matterix_runtime::exec::Limits;
+use matterix_runtime::exec::{Limits, RunStatus};
 use matterix_runtime::run::{Fidelity, RunOptions};
 
 /// A kind of file.
@@ -62,7 +62,8 @@ pub fn emit(
     let mut performance = Performance::new(subject);
     let outcome = matterix_runtime::run::run(program, &options, &mut performance);
     let mut found = super::run::findings(&outcome, sources);
-    if found.iter().any(Diagnostic::is_error) {
+    // What was performed until then is no protocol.
+    if outcome.status == RunStatus::Cancelled || found.iter().any(Diagnostic::is_error) {
         return (None, found);
     }
     let written = match target {

@@ -7,7 +7,7 @@ use matterix_ir::study::{Fit, Study};
 use matterix_ir::{Diagnostic, Program, Sources, codes};
 use matterix_lang::{Compiled, Many, Options};
 use matterix_runtime::fit::{self, Unsolved};
-use matterix_runtime::record::write_whole;
+use matterix_runtime::record::Folder;
 use matterix_runtime::study::{self, Design, Summary};
 
 use super::Input;
@@ -49,10 +49,11 @@ pub struct Done {
 impl Done {
     /// Writes tables and figures into a folder.
     pub fn write(&self, dir: &Path) -> Result<(), String> {
-        for (name, text) in &self.files {
-            write_whole(&dir.join(name), text.as_bytes()).map_err(|e| e.to_string())?;
-        }
-        Ok(())
+        let put = |mut folder: Folder| {
+            self.files.iter().try_for_each(|(name, text)| folder.put(name, text.as_bytes()))?;
+            folder.finish()
+        };
+        Folder::begin(dir, &[]).and_then(put).map(drop).map_err(|e| e.to_string())
     }
 }
 

@@ -4,10 +4,14 @@
 #![allow(clippy::result_large_err)]
 
 use std::net::SocketAddr;
+use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::deploy::{Device, Exposed, Hardware, Journal, Mode, Settings, digest};
+use matterix_hardware::deploy::{
+    Control, Device, Exposed, Hardware, Journal, Mode, Settings, digest, not_opened, not_reached, of_fault, unsafe_left,
+};
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
+use matterix_hardware::world::Machine;
 use matterix_hardware::{binding, calibration};
 use matterix_ir::offer::{Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
@@ -17,7 +21,7 @@ use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
 use matterix_sila_wire::serve as answer;
 
-use super::deploy::{not_opened, not_reached, of_fault, traced, unsafe_left};
+use super::deploy::traced;
 use crate::terminal::{Stream, print};
 
 /// What a server is given beside a program.
@@ -36,8 +40,10 @@ pub struct Service<'p> {
     pub journal: Journal,
     /// Kept up to date with what is told to devices.
     pub exposed: &'p Exposed,
-    /// Ends it.
-    pub cancel: &'p AtomicBool,
+    /// What people say meanwhile; it ends when they stop it.
+    pub control: &'p Control,
+    /// Who serves.
+    pub who: String,
     /// Told where it answers, and what it offers.
     pub ready: &'p mut dyn FnMut(SocketAddr, &Catalogue<'_>),
 }
@@ -60,11 +66,13 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
     if found.iter().any(Diagnostic::is_error) {
         return Ok(found);
     }
+    let digest = digest(program, &binding::canonical(program, &bindings))?;
     let devices: Vec<Device<'_>> = bindings.into_iter().map(|b| Device::new(program, b)).collect::<Result<_, _>>()?;
     let over = traced(service.trace);
-    let nobody = |_: &str| false;
-    let Service { speed, cancel, exposed, .. } = service;
-    let settings = Settings { mode: Mode::Real, speed, cancel, person: &nobody, exposed };
+    let Service { speed, control, exposed, .. } = service;
+    let ended = AtomicBool::new(false);
+    let world = Rc::new(Machine::new());
+    let settings = Settings { mode: Mode::Real, speed, control, ended: &ended, world, exposed };
     let journal = std::mem::take(&mut service.journal);
     let mut hardware = Hardware::new(program, sources, twin, devices, settings, journal, Box::new(over));
     // What no device does or tells is not offered.
@@ -94,11 +102,11 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
     if !unreached.is_empty() {
         return Ok(unreached.iter().map(|u| not_reached(u, false)).collect());
     }
-    if let Err(fault) = hardware.begin_journal(&digest(program, text)?) {
+    if let Err(fault) = hardware.begin_journal(&digest, service.seed, &service.who) {
         return Ok(vec![of_fault(fault)]);
     }
     if let Err(failed) = hardware.open() {
-        let mut found = vec![not_opened(failed, sources)];
+        let mut found = vec![super::run::led_by_the_user(not_opened(failed), sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
         return Ok(found);
     }
@@ -130,8 +138,8 @@ fn attend(
     let desk = Desk::new(catalogue, &program.scene, &program.plan, requests);
     let mut say = |text: &str| print(Stream::Err, text);
     let mut listener = Attendant::new(&desk, sources, &mut say);
-    let mut paced = Paced::new(backend, &desk, service.cancel, service.speed);
-    let limits = Limits { cancel: Some(service.cancel), horizon: f64::INFINITY, ..Limits::default() };
+    let mut paced = Paced::new(backend, &desk, service.control.cancel(), service.speed);
+    let limits = Limits { cancel: Some(service.control.cancel()), horizon: f64::INFINITY, ..Limits::default() };
     let execution = exec::execute(&program.plan, &program.scene, &mut paced, limits, &mut listener);
     let well = execution.status == RunStatus::Cancelled;
     desk.end(if well { "the server is shut down" } else { "the lab has come to a fault" });

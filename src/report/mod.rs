@@ -10,6 +10,7 @@ mod text;
 use std::collections::BTreeSet;
 use std::fmt;
 
+use matterix_ir::hidden::visible;
 use matterix_ir::{Diagnostic, Severity, Sources};
 
 use text::Texts;
@@ -87,7 +88,10 @@ impl Reporter {
         let mut out = String::new();
         match self.format {
             Format::Concise => fresh.iter().for_each(|d| concise::render(d, &mut texts, &mut out)),
-            Format::Json => fresh.iter().for_each(|d| json::render(d, &mut texts, &mut out)),
+            Format::Json => {
+                fresh.iter().for_each(|d| json::render(d, &mut texts, &mut out));
+                out = visible(&out).into_owned();
+            }
             Format::Sarif => fresh.iter().for_each(|d| self.log.push(d, &mut texts)),
             Format::Human => {
                 for diagnostic in fresh.iter().take(MOST_SHOWN) {
@@ -107,7 +111,7 @@ impl Reporter {
     /// all that was found.
     pub fn summary(&self) -> String {
         match self.format {
-            Format::Sarif => self.log.document(),
+            Format::Sarif => visible(&self.log.document()).into_owned(),
             Format::Json => String::new(),
             Format::Concise if self.tally == Tally::default() => String::new(),
             _ => format!("{}\n", self.tally),

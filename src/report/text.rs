@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use matterix_ir::hidden::is_obeyed;
 use matterix_ir::{FileId, Sources, Span};
 use miette::{MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 
@@ -181,7 +182,8 @@ impl SourceCode for Text {
 fn harmless(c: char) -> char {
     match c {
         '\n' | '\t' => c,
-        '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => char::REPLACEMENT_CHARACTER,
+        '\u{61c}' => '·',
+        c if is_obeyed(c) && c.len_utf8() == 3 => char::REPLACEMENT_CHARACTER,
         c if c.is_control() && c.len_utf8() == 1 => '?',
         c if c.is_control() => '·',
         c => c,

@@ -65,3 +65,128 @@ fn a_request_to_terminate_ends_a_run_in_order() {
     let viewed = matterixc(&["view", &recording, "--export", &dir.join("page.html").display().to_string()]);
     assert_eq!(viewed.code, 0, "{}", viewed.err);
 }
+
+/// Asks the process to terminate once it listens for that.
+fn cut(process: &Child) {
+    const TERM: u64 = 1 << 14;
+    let listens = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", process.id())).unwrap_or_default();
+        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
+        caught.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & TERM != 0))
+    };
+    while !listens() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    terminate(process);
+}
+
+/// Ten jobs on ten machines and more: no search for the shortest schedule ends soon.
+fn shop() -> String {
+    let (jobs, machines) = (22, 12);
+    let mut text = "mtx 1\nasset Machine: Body { mass: 1 kg }\nlab shop {\n    ambient: 20 degC\n".to_owned();
+    (0..machines).for_each(|m| text += &format!("    m{m} = Machine at ({m}, 0, 0) m\n"));
+    text += "}\nworkflow jobs in shop {\n    parallel {\n";
+    for job in 0..jobs {
+        text += "        sequence {\n";
+        for step in 0..machines {
+            // Five is prime to twelve: every machine once, in another order for every job.
+            let (machine, time) = ((job + step * [1, 5, 7, 11][job % 4]) % machines, 10 + (job * 31 + step * 17) % 89);
+            text += &format!("            claim m{machine} {{ wait {time} s }}\n");
+        }
+        text += "        }\n";
+    }
+    text + "    }\n}\n"
+}
+
+#[test]
+fn what_is_cut_short_says_so_and_never_passes_for_whole() {
+    let dir = folder("stopped_others");
+    let study = "study many of stir_on {\n    vary cup.initial[water] in 90 g .. 110 g by sobol\n    runs 4\n    report hottest = max_over_time(cup.contents.temperature)\n}\n";
+    let test = "test at_length in bench {\n    repeat while elapsed < 10000 h max 1000000 { wait 1 s }\n}\ntest next in bench { wait 1 s }\n";
+    write(&dir, "long.mtx", LONG);
+    write(&dir, "study.mtx", format!("{LONG}{study}"));
+    write(&dir, "test.mtx", format!("{LONG}{test}"));
+    write(&dir, "shop.mtx", shop());
+    let cases: [(&[&str], &str); 5] = [
+        (&["plan", "shop.mtx", "--time-limit", "10 min"], "stopped before the search had ended"),
+        (&["emit", "long.mtx", "--target", "commands", "--out", "steps.txt"], "nothing is written"),
+        (&["bill", "long.mtx"], "stopped before the run had ended"),
+        (&["test", "test.mtx"], "stopped before all tests had run"),
+        (&["study", "study.mtx"], "stopped before all runs had ended"),
+    ];
+    for (args, said) in cases {
+        let mut child = command();
+        child.current_dir(&dir).args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = child.spawn().expect("the command starts");
+        cut(&child);
+        let ended = child.wait_with_output().expect("it ends");
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(1), "{args:?}: {err}");
+        assert!(err.contains(said), "{args:?}: {err}");
+    }
+    assert!(!dir.join("steps.txt").exists(), "a part of the steps is written as if it were all");
+}
+
+/// Ends soon, and leaves much behind.
+const SHORT: &str = "mtx 1
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    cup = Beaker250mL on plate holding 100 g of water
+}
+workflow warm in bench {
+    record cup.contents.temperature every 10 s
+    repeat 8 times { heat plate to 50 degC; wait 100 s; heat plate to 40 degC; wait 100 s }
+} finally { stop heating plate }
+";
+
+const FILES: [&str; 5] = ["plot.svg", "recording.mcap", "records.csv", "report.json", "states.csv"];
+
+#[test]
+fn a_folder_has_all_files_of_a_run_or_none_where_it_is_killed() {
+    let dir = folder("stopped_killed");
+    write(&dir, "short.mtx", SHORT);
+    for files in [1, 3, 4] {
+        let mut child = command();
+        child.current_dir(&dir).args(["run", "short.mtx", "--out", "out"]).stdout(Stdio::null()).stderr(Stdio::null());
+        let mut child = child.spawn().expect("the command starts");
+        let staging = dir.join(format!(".out.{}-0.part", child.id()));
+        // Until so many files are on their way, or all are in place.
+        while child.try_wait().expect("a status").is_none() {
+            if std::fs::read_dir(&staging).is_ok_and(|entries| entries.count() >= files) {
+                break;
+            }
+        }
+        let _ = child.kill();
+        let _ = child.wait();
+        let out = dir.join("out");
+        assert!(!out.exists() || names(&out) == FILES, "{:?}", names(&out));
+        let _ = std::fs::remove_dir_all(out);
+    }
+}
+
+#[test]
+fn a_full_disk_leaves_nothing_behind_and_what_was_there_as_it_was() {
+    let dir = folder("stopped_full");
+    write(&dir, "short.mtx", SHORT);
+    let run = |blocks: &str| {
+        let limited = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" run short.mtx --out out");
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &limited, env!("CARGO_BIN_EXE_matterixc")]).current_dir(&dir);
+        shell.stdout(Stdio::null()).output().expect("a shell")
+    };
+    let refused = run("100");
+    assert_eq!(refused.status.code(), Some(2));
+    let err = String::from_utf8_lossy(&refused.stderr);
+    assert!(err.contains("error: cannot write `out/recording.mcap`"), "{err}");
+    assert_eq!(names(&dir), ["short.mtx"]);
+
+    assert_eq!(run("unlimited").status.code(), Some(0));
+    let before = std::fs::read(dir.join("out/report.json")).expect("written");
+    assert_eq!(run("100").status.code(), Some(2));
+    assert_eq!(names(&dir.join("out")), FILES);
+    assert_eq!(std::fs::read(dir.join("out/report.json")).expect("still there"), before);
+    assert_eq!(names(&dir), ["out", "short.mtx"]);
+}

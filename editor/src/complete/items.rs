@@ -28,6 +28,7 @@ const ITEMS: &[(&str, &str)] = &[
     ("fn", "fn ${1:name}(${2:x}: ${3:Ratio}) = $0"),
     ("const", "const ${1:name} = $0"),
     ("lab", "lab ${1:bench} {\n    ambient: ${2:22 degC}\n    $0\n}"),
+    ("framing", "framing ${1:name} { carries: ${2:text}, frame: \"$0{data}\\r\" }"),
     ("driver", "driver ${1:Name} for ${2:Asset} over ${3:serial}(${4:baud: 9600}) {\n    $0\n}"),
     ("skill", "skill ${1:verb}(${2:item}: ${3:Body}) ${4:to}(${5:target}: ${6:Surface}) {\n    $0\n}"),
     ("workflow", "workflow ${1:name} in ${2:bench} {\n    $0\n}"),
@@ -94,6 +95,7 @@ const FIELDS: &[(&str, &[&str])] = &[
     ("reaction", &["rate", "order", "valid", "enthalpy", "template", "requires", "reverse", "reverse_order"]),
     ("reactive_group", &["title", "smarts", "unless", "members", "above", "source"]),
     ("material", &["title", "friction", "source"]),
+    ("framing", &["carries", "frame", "request", "reply", "length", "check", "silence"]),
     ("incompatible", &["consequence", "above", "phase", "source"]),
 ];
 

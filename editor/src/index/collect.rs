@@ -261,6 +261,7 @@ fn kind_of(kind: &ItemKind) -> Option<Kind> {
         ItemKind::Relation { .. } => Kind::Relation,
         ItemKind::Fn { .. } => Kind::Function,
         ItemKind::Const { .. } => Kind::Constant,
+        ItemKind::Framing { .. } => Kind::Framing,
         ItemKind::Driver { .. } => Kind::Driver,
         ItemKind::Lab { .. } => Kind::Lab,
         ItemKind::Skill { .. } => Kind::Skill,

@@ -20,7 +20,7 @@
 (header "mtx" @keyword)
 [
   "use" "dimension" "unit" "species" "solution" "reaction" "reactive_group" "material" "incompatible" "allow" "hazard" "caution"
-  "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "driver" "lab" "skill" "workflow" "study" "fit" "test"
+  "capability" "asset" "process" "event" "relation" "extern" "fn" "const" "framing" "driver" "lab" "skill" "workflow" "study" "fit" "test"
   "point" "prefixes" "labelled" "symmetric" "also" "any" "where" "when" "per"
 ] @keyword
 

@@ -47,6 +47,7 @@ macro_rules! codes {
 
 codes! {
     SYNTAX "syntax" "P0" "the text is not what the grammar expects here";
+    TEXT_DIRECTION "text-direction" "P0" "a hidden character changes the order in which a text is shown";
     BUDGET_SPENT "budget-spent" "P0" "a text asks for more work than a check does";
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
@@ -130,6 +131,7 @@ codes! {
     UNUSED "unused" "F4" "a thing or a reagent is declared and never used";
     NOT_REACHED "not-reached" "D2" "a device cannot bring about what is waited for";
     WRONG_REAGENT "wrong-reagent" "C2" "a call says of what it takes something, and the source holds none of it";
+    FRAMING "framing" "N0" "frames of a line that cannot be told apart, judged or put together";
     DRIVER_LINE "driver-line" "N0" "a line of a driver fits neither its device nor its transport";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a pipette is asked for less than its smallest volume";
@@ -188,6 +190,7 @@ codes! {
     DEVICE_LOST "device-lost" "W2" "a device no longer answers";
     DEVICE_GARBLED "device-garbled" "W2" "a device answers what makes no sense";
     DEVICE_REFUSED "device-refused" "W2" "a device refuses what it is told or asked";
+    UNSENDABLE "unsendable" "W2" "what a device is to be sent does not fit the form or frame that its driver declares";
     DIVERGED "diverged" "W2" "a device tells something else than it was told, or than its twin";
     JOURNAL_MISMATCH "journal-mismatch" "W2" "a deployment cannot go on from its journal";
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";

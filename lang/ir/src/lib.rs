@@ -11,6 +11,7 @@
 //! - [`scene`], [`model`], [`plan`]: what there is, how it evolves, what is done with it.
 //! - [`study`]: many runs of one workflow, and what is estimated from data.
 //! - [`wire`]: how devices are spoken to.
+//! - [`framing`], [`form`]: what stands around messages on a line, and how numbers are written there.
 //! - [`script`]: what stands for a workflow in files that other programs run.
 //! - [`bodies`]: what a recording says of shapes and joints.
 //! - [`points`]: what is known of all that at every statement, before the run.
@@ -20,12 +21,16 @@ pub mod codes;
 pub mod diagnostic;
 pub mod extent;
 pub mod footing;
+pub mod form;
+pub mod framing;
 pub mod graph;
+pub mod hidden;
 pub mod inertia;
 pub mod interval;
 pub mod math;
 pub mod mesh;
 pub mod message;
+pub mod modbus;
 pub mod model;
 pub mod offer;
 pub mod pages;

@@ -35,6 +35,17 @@ pub enum TextPart {
 }
 
 impl Text {
+    /// The nodes whose values it shows.
+    pub fn nodes(&self) -> impl Iterator<Item = NodeId> {
+        self.parts.iter().filter_map(|part| match part {
+            TextPart::Plain(_) => None,
+            TextPart::Quantity { value: node, .. }
+            | TextPart::Bool(node)
+            | TextPart::Instance(node)
+            | TextPart::Word(node, _) => Some(*node),
+        })
+    }
+
     /// The text with its values: `value` gives that of a node, or nothing where it cannot be known (shown as `?`),
     /// `instance` the name of one by its number in the graph.
     pub fn show<E>(

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::form::Form;
+use crate::framing::Frames;
 use crate::plan::{Operation, StepId};
 use crate::scene::InstanceId;
 use crate::{NodeId, Span, Unit};
@@ -34,8 +36,23 @@ pub enum Transport {
     },
 }
 
-/// The framing of what goes over HTTP.
-pub const JSON: &str = "json";
+/// What stands around messages on a line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Framing {
+    /// As a text declares it.
+    Frames(Frames),
+    /// Tecan Cavro pumps, the protocol for terminals.
+    CavroDt,
+    /// Tecan Cavro pumps, with checksums and numbered frames.
+    CavroOem,
+    /// Bodies in JSON.
+    Json,
+    /// Commands are calls of a server: each is one text.
+    Calls,
+}
+
+/// Names of the framings that no text declares: a status with the answer, several commands in a frame, a frame sent once more.
+pub const BUILT_IN: &[(&str, Framing)] = &[("cavro_dt", Framing::CavroDt), ("cavro_oem", Framing::CavroOem)];
 
 /// The driver over whose line another one speaks.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,12 +62,6 @@ pub struct Host {
     /// Its name.
     pub driver: String,
 }
-
-/// Names of the codecs that put a text on a line and take it off again.
-pub const FRAMINGS: &[&str] = &["line", "cr", "lf", "namur", "sics", "cavro_dt", "cavro_oem"];
-
-/// The name that stands for a framing where commands are calls of a server: each is one text.
-pub const CALLS: &str = "calls";
 
 /// A piece of what is sent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,8 +74,8 @@ pub enum Piece {
         value: NodeId,
         /// As sent.
         unit: Unit,
-        /// Digits after the point; as many as needed where absent.
-        digits: Option<u8>,
+        /// How it is written.
+        form: Form,
     },
     /// One of these words, by its index.
     Word(NodeId, Vec<String>),
@@ -96,9 +107,26 @@ pub enum Slot {
     /// As written.
     Plain(String),
     /// A number in this unit.
-    Number(Unit),
+    Number(Unit, Form),
+    /// One of these words.
+    Word(Vec<Choice>),
+    /// So many characters, whatever they are.
+    Skip(u8),
+    /// Anything, which is kept in the journal under this name.
+    Kept(String),
     /// Anything.
     Any,
+}
+
+/// A word of an enumeration, and what stands for it on the line.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Choice {
+    /// On the line; anything else where absent.
+    pub sent: Option<String>,
+    /// What it means.
+    pub word: String,
+    /// Its index among the words of what is told.
+    pub index: u32,
 }
 
 /// What a reply looks like.
@@ -115,7 +143,7 @@ impl Pattern {
     pub fn with(&self, value: &str) -> String {
         let slot = |slot: &Slot| match slot {
             Slot::Plain(text) => text.clone(),
-            Slot::Number(_) | Slot::Any => value.to_owned(),
+            Slot::Number(..) | Slot::Word(_) | Slot::Skip(_) | Slot::Kept(_) | Slot::Any => value.to_owned(),
         };
         self.slots.iter().map(slot).collect()
     }
@@ -162,12 +190,26 @@ pub struct Told {
     pub difference: Unit,
     /// It is what the device tells only while this is not 0.
     pub condition: Option<NodeId>,
+    /// Its words, where it is one of some.
+    pub words: Vec<String>,
+    /// The device says it by itself, so often, s; it is not asked.
+    pub heard: Option<f64>,
     /// What goes out.
     pub asks: Template,
     /// What comes back.
     pub expects: Pattern,
     /// Its line.
     pub span: Span,
+}
+
+impl Told {
+    /// A value for people.
+    pub fn show(&self, value: f64) -> String {
+        match self.words.get(value as usize) {
+            Some(word) => word.clone(),
+            None => self.unit.show(value),
+        }
+    }
 }
 
 /// A reply that means a failure.
@@ -214,8 +256,8 @@ pub struct Driver {
     pub transport: Transport,
     /// Whose line that is, where it is not its own.
     pub host: Option<Host>,
-    /// One of [`FRAMINGS`], or [`JSON`].
-    pub framing: String,
+    /// What stands around its messages.
+    pub framing: Framing,
     /// The device's own on a line that several share.
     pub address: Option<String>,
     /// Longest time until a reply has come, s.
@@ -234,6 +276,8 @@ pub struct Driver {
     pub alive: Vec<Alive>,
     /// What it tells.
     pub told: Vec<Told>,
+    /// What the device says by itself and nobody needs.
+    pub ignores: Vec<Pattern>,
     /// What else an emulator answers.
     pub answers: Vec<(Pattern, Template)>,
     /// Replies that mean failures.

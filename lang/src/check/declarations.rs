@@ -115,6 +115,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
             let mut planner = Planner::new(lab, sources);
             planner.check_skill(id);
         }
+        ItemKind::Framing { .. } => drop(Planner::new(lab, sources).frames(id)),
         ItemKind::Driver { transport, .. } if script::is_known(transport) => {
             Planner::new(lab, sources).check_script(id);
         }

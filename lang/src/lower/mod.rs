@@ -75,6 +75,8 @@ pub struct Planner<'a, 'e> {
     pub of_no_use: &'e dyn Fn() -> bool,
     /// What is asked of drivers.
     pub wires: wires::Wires,
+    /// What the framing of the driver at hand lets its messages say.
+    pub(crate) speech: wires::Speech,
     /// What is to be sent may be missing: then a driver has nothing to do with the device.
     lenient: bool,
     /// Drivers of the lab, with their declarations.
@@ -132,6 +134,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             draft: false,
             of_no_use: &|| false,
             wires: wires::Wires::Off,
+            speech: wires::Speech::default(),
             lenient: false,
             drivers: Vec::new(),
             offers: matterix_ir::offer::Offers::default(),

@@ -235,8 +235,10 @@ impl<'a> Planner<'a, '_> {
                     self.not_said(driver.transport, wire.span, &what);
                 }
                 WireKind::Alive { .. } => self.not_said(driver.transport, wire.span, "lines that are repeated"),
-                WireKind::Reading { .. } => self.not_said(driver.transport, wire.span, "readings"),
-                WireKind::Reply { .. } | WireKind::Answers { .. } => {
+                WireKind::Reading { .. } | WireKind::Hears { .. } => {
+                    self.not_said(driver.transport, wire.span, "readings")
+                }
+                WireKind::Reply { .. } | WireKind::Answers { .. } | WireKind::Ignores { .. } => {
                     self.not_said(driver.transport, wire.span, "replies");
                 }
                 WireKind::Error => {}

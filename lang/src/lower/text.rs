@@ -303,7 +303,13 @@ impl<'a> Planner<'a, '_> {
         for part in &text.parts {
             match part {
                 ast::TextPart::Plain(text) => parts.push(TextPart::Plain(text.clone())),
-                ast::TextPart::Value { value, digits } => {
+                ast::TextPart::Value { form: Some(form), .. } => {
+                    let headline = "a text for people shows digits after the point and nothing else";
+                    let d = Diagnostic::error(codes::SYNTAX, form.span, headline, "of a line to a device");
+                    self.lab.report(d.help("as in `{t as degC :.1}`"));
+                    good = false;
+                }
+                ast::TextPart::Value { value, digits, .. } => {
                     let v = self.lab.expr(value, scope);
                     good &= self.shown(v, *digits, value.span, &mut parts);
                 }

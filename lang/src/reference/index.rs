@@ -68,6 +68,7 @@ fn declared(item: &Item) -> Vec<(String, &'static str)> {
         ItemKind::Hazard { name, .. } => vec![(name.text.clone(), "hazard")],
         ItemKind::ReactiveGroup { name, .. } => vec![(name.text.clone(), "reactive group")],
         ItemKind::Material { name, .. } => vec![(name.text.clone(), "material")],
+        ItemKind::Framing { name, .. } => vec![(name.text.clone(), "framing")],
         ItemKind::Driver { name, .. } => vec![(name.text.clone(), "driver")],
         _ => Vec::new(),
     }

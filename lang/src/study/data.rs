@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use matterix_ir::study::{DataRow, Fit};
-use matterix_ir::{Diagnostic, FileId, Sources, Span, Unit, codes};
+use matterix_ir::{Diagnostic, FileId, Sources, Span, Unit, codes, hidden};
 
 use crate::elaborate::Tables;
 use crate::loader::Loader;
@@ -23,6 +23,9 @@ pub fn read(
         Box::new(d.help("files are looked for from the folder of the file that is checked"))
     })?;
     let file = sources.add(&fit.data, text.clone());
+    if let Some(hidden) = hidden::directions(file, &text).into_iter().find(Diagnostic::is_error) {
+        return Err(Box::new(hidden));
+    }
     let table = Table { text: &text, file, named: fit.data_span };
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)

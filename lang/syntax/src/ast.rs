@@ -236,6 +236,13 @@ pub enum ItemKind {
         /// Its value.
         value: Expr,
     },
+    /// `framing stx { carries: text, frame: "\x02{data}\x03" }`.
+    Framing {
+        /// Its name.
+        name: Name,
+        /// What stands around messages, and what proves them whole.
+        fields: Vec<Field>,
+    },
     /// `driver IkaNamur for IkaRet over serial(baud: 9600) { ... }`.
     Driver {
         /// Its name.
@@ -661,6 +668,8 @@ pub enum TextPart {
         value: Expr,
         /// Digits after the point.
         digits: Option<u8>,
+        /// `{t as degC :i16 big}`: another form, which only lines to devices know.
+        form: Option<Name>,
     },
 }
 
@@ -914,6 +923,22 @@ pub enum WireKind {
         asks: Text,
         /// What comes back.
         expects: Pattern,
+    },
+    /// `reading temperature hears "T={degC}" every 1 s`: what the device says by itself.
+    Hears {
+        /// The reading.
+        path: Path,
+        /// It is what the device tells only while this holds.
+        condition: Option<Expr>,
+        /// What comes in.
+        text: Pattern,
+        /// So often.
+        every: Expr,
+    },
+    /// `ignores "BOOT {_}"`: what it says by itself and nobody needs.
+    Ignores {
+        /// What comes in.
+        text: Pattern,
     },
     /// `reply "#" fails blocked`.
     Reply {

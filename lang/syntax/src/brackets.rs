@@ -396,6 +396,7 @@ const BLOCK_WORDS: &[&str] = &[
     "incompatible",
     "capability",
     "asset",
+    "framing",
     "driver",
     "lab",
     "skill",

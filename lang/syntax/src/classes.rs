@@ -178,9 +178,10 @@ fn class(rule: Rule, parent: Rule, text: &str, called: bool) -> Option<Class> {
         (value_member, word) | (frame_member | frame | part_line | grid | joint, ident) => {
             Class::Declared(Declared::Member)
         }
-        (const_ | dimension | solution | reaction | reactive_group | material | driver | lab | study | fit, ident) => {
-            Class::Declared(Declared::Other)
-        }
+        (
+            const_ | dimension | solution | reaction | reactive_group | material | framing | driver | lab | study | fit,
+            ident,
+        ) => Class::Declared(Declared::Other),
         (_, bare_word | returning) => Class::Call,
         (species_item, species) => Class::Declared(Declared::Other),
         (key, species) | (_, key | arg_name | member) | (named | setting, word) => Class::Member,

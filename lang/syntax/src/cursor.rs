@@ -120,6 +120,7 @@ fn is_noise(rule: Rule) -> bool {
             | kw_relation
             | kw_fn
             | kw_const
+            | kw_framing
             | kw_driver
             | kw_lab
             | kw_skill
@@ -185,6 +186,8 @@ fn is_noise(rule: Rule) -> bool {
             | kw_pitch
             | kw_alive
             | kw_answers
+            | kw_hears
+            | kw_ignores
             | kw_reply
             | kw_reading
             | kw_include

@@ -22,7 +22,7 @@ mod spot;
 mod tokens;
 mod words;
 
-use matterix_ir::{Diagnostic, FileId, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Span, codes, hidden};
 use pest::Parser;
 
 pub use decode::{NotText, decode};
@@ -53,7 +53,11 @@ pub fn parse_again(file: FileId, text: &str, memo: &mut Memo) -> (File, Vec<Diag
     if text.len() > MAX_SIZE {
         return (nothing(), vec![too_large(Span::new(file, 0, 0), text.len())]);
     }
+    let turns = hidden::directions(file, text);
+    // What is an error anyway is read as blanks, so that it is one finding wherever it stands.
+    let text = &hidden::blanked(text);
     let (changes, mut found) = brackets::balance(file, text, &scan::scan(text));
+    found.extend(turns);
     found.extend(reserved_character(file, text));
     if changes.len() > brackets::MAX_CHANGES {
         return (nothing(), shown(file, text, found, 0));
@@ -178,9 +182,9 @@ fn too_deep(span: Span) -> Diagnostic {
 }
 
 /// The findings in the order of the text, the first ones of very many.
-fn shown(file: FileId, text: &str, mut found: Vec<Diagnostic>, hidden: usize) -> Vec<Diagnostic> {
+fn shown(file: FileId, text: &str, mut found: Vec<Diagnostic>, unseen: usize) -> Vec<Diagnostic> {
     found.sort_by_key(|diagnostic| diagnostic.span().start);
-    let more = hidden + found.len().saturating_sub(MAX_SHOWN);
+    let more = unseen + found.len().saturating_sub(MAX_SHOWN);
     if more > 0 {
         found.truncate(MAX_SHOWN);
         let end = Span::new(file, text.len(), text.len());

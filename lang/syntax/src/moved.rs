@@ -157,6 +157,7 @@ impl Moved for ItemKind {
                 each!(put: external name params result body options)
             }
             ItemKind::Const { name, ty, value } => each!(put: name ty value),
+            ItemKind::Framing { name, fields } => each!(put: name fields),
             ItemKind::Driver { name, device, transport, args, wires } => each!(put: name device transport args wires),
             ItemKind::Lab { name, params, lines } => each!(put: name params lines),
             ItemKind::Skill { external, sig, clauses, body, handlers } => {
@@ -229,7 +230,7 @@ impl Moved for TextPart {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             TextPart::Plain(a) => each!(put: a),
-            TextPart::Value { value, digits } => each!(put: value digits),
+            TextPart::Value { value, digits, form } => each!(put: value digits form),
         }
     }
 }
@@ -291,6 +292,8 @@ impl Moved for WireKind {
             WireKind::Error => {}
             WireKind::Command { sig, exchange } => each!(put: sig exchange),
             WireKind::Reading { path, condition, asks, expects } => each!(put: path condition asks expects),
+            WireKind::Hears { path, condition, text, every } => each!(put: path condition text every),
+            WireKind::Ignores { text } => each!(put: text),
             WireKind::Reply { text, fails } => each!(put: text fails),
             WireKind::Answers { asked, with } => each!(put: asked with),
             WireKind::Fixed { when, condition, exchange } => each!(put: when condition exchange),

@@ -22,6 +22,7 @@ pub(super) const ITEM_WORDS: &[&str] = &[
     "extern",
     "fn",
     "const",
+    "framing",
     "driver",
     "lab",
     "skill",

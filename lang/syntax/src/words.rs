@@ -57,6 +57,7 @@ fn describe(rule: Rule) -> Option<&'static str> {
         kw_every => "`every`",
         kw_sends | sends => "`sends`",
         kw_asks => "`asks`",
+        kw_hears => "`hears`",
         kw_expects => "`expects`",
         kw_fails => "`fails`",
         kw_prefixes => "`prefixes`",

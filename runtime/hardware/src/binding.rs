@@ -7,7 +7,7 @@
 //! ```
 
 use matterix_ir::wire::Transport;
-use matterix_ir::{Diagnostic, FileId, Program, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Program, Span, codes, hidden};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -20,7 +20,7 @@ const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
 pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<Diagnostic>) {
-    let mut reader = Reader { program, file, found: Vec::new() };
+    let mut reader = Reader { program, file, found: hidden::directions(file, text) };
     let table = match DeTable::parse(text) {
         Ok(table) => table,
         Err(e) => {
@@ -33,8 +33,30 @@ pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<D
     for (name, value) in table.get_ref() {
         bindings.extend(reader.device(name, value).map(|binding| (binding, name.span())));
     }
+    reader.beside_each_other(&bindings);
     let bindings = reader.with_shared(bindings);
     (bindings, reader.found)
+}
+
+/// What a plan rests on of its bindings, as a text: who speaks to what, by which driver, under which address of its line and with
+/// which tolerances; not where lines are, as a device may be moved to another port.
+pub fn canonical(program: &Program, bindings: &[Binding]) -> String {
+    let mut lines: Vec<String> = bindings.iter().map(|b| line(program, b)).collect();
+    lines.sort();
+    lines.concat()
+}
+
+fn line(program: &Program, binding: &Binding) -> String {
+    let name = &program.scene.get(binding.instance).name;
+    let driver = |index: usize| program.drivers.get(index).map_or("", |d| d.name.as_str());
+    let by = match &binding.carrier {
+        Carrier::Line { driver: index, address, .. } => {
+            format!("{} {}", driver(*index), address.as_deref().unwrap_or_default())
+        }
+        Carrier::Shared { driver: index, .. } => driver(*index).to_owned(),
+        Carrier::Hand => HAND.to_owned(),
+    };
+    format!("{name}: {by} {:?}\n", binding.tolerances)
 }
 
 struct Reader<'p> {
@@ -134,6 +156,38 @@ impl Reader<'_> {
         let carrier = Carrier::Line { driver, place, address: unit.map(|(unit, _)| unit) };
         let at = Span::new(self.file, at.start, at.end);
         (self.found.len() == before).then_some(Binding { instance, at, carrier, tolerances })
+    }
+
+    /// Reports devices that are bound to one line and cannot be told apart there.
+    fn beside_each_other(&mut self, bound: &[(Binding, Range)]) {
+        for (later, (binding, at)) in bound.iter().enumerate() {
+            let Carrier::Line { driver, place: place @ (Place::Serial(_) | Place::Tcp(_)), address } = &binding.carrier
+            else {
+                continue;
+            };
+            let own = &self.program.drivers[*driver];
+            let address = address.as_ref().or(own.address.as_ref());
+            let beside = bound[..later].iter().find_map(|(other, _)| match &other.carrier {
+                Carrier::Line { driver, place: there, address } if there == place => Some((other, *driver, address)),
+                _ => None,
+            });
+            let Some((other, driver, known)) = beside else { continue };
+            let theirs = &self.program.drivers[driver];
+            let known = known.as_ref().or(theirs.address.as_ref());
+            let (name, first) =
+                (&self.program.scene.get(binding.instance).name, &self.program.scene.get(other.instance).name);
+            let (why, help) = if address.is_none() || known.is_none() {
+                ("their framing has no address", "bind each to a line of its own, or use a framing with an `{address}`")
+            } else if address == known {
+                ("both have the same address", "give each its own: `unit = \"2\"`")
+            } else if own.transport != theirs.transport || own.framing != theirs.framing {
+                ("their drivers speak in other ways", "use drivers with the same transport and framing")
+            } else {
+                continue;
+            };
+            let headline = format!("`{first}` and `{name}` cannot share a line: {why}");
+            self.wrong(at.clone(), &headline, "the same line", Some(help.to_owned()));
+        }
     }
 
     /// The texts of a binding; what is none is reported.

@@ -10,12 +10,15 @@ pub mod deploy;
 pub mod emulate;
 pub mod http;
 pub mod link;
+mod lock;
 pub mod pattern;
 pub mod place;
 pub mod play;
 pub mod port;
 #[cfg(feature = "sila")]
 pub mod serve;
+pub mod shared;
 #[cfg(feature = "sila")]
 mod sila;
 pub mod template;
+pub mod world;

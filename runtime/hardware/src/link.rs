@@ -1,14 +1,16 @@
 //! A device at the other end of a line: exchanges as its driver declares them.
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::rc::Rc;
+use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Transport, Until};
 
 use crate::codec::{Codec, Reply, shown};
 use crate::pattern::written;
 use crate::place::{self, Place};
-use crate::port::{self, Port};
+use crate::port::Port;
+use crate::world::World;
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,6 +19,8 @@ pub enum Trouble {
     Lost(String),
     /// What came is no answer to what was said.
     Garbled(String),
+    /// A frame has no room for what was to be said, and nothing was.
+    Unsaid(String),
     /// The device says no: the failure its driver names, and in words.
     Refused {
         /// As in `reply "..." fails NAME`.
@@ -30,7 +34,9 @@ impl Trouble {
     /// In words.
     pub fn text(&self) -> &str {
         match self {
-            Trouble::Lost(text) | Trouble::Garbled(text) | Trouble::Refused { text, .. } => text,
+            Trouble::Lost(text) | Trouble::Garbled(text) | Trouble::Unsaid(text) | Trouble::Refused { text, .. } => {
+                text
+            }
         }
     }
 }
@@ -82,6 +88,12 @@ pub trait Line {
     fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
     -> Result<bool, Trouble>;
 
+    /// The newest of what the device says by itself, SI, by its line of the driver; one that is older than the driver waits for
+    /// an answer is none, and the next is waited for as long.
+    fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+        Err(Trouble::Lost("nothing is heard over this line".to_owned()))
+    }
+
     /// What answers said that is put in later, by its word.
     fn kept(&self) -> BTreeMap<String, String> {
         BTreeMap::new()
@@ -97,12 +109,17 @@ pub trait Line {
 }
 
 /// Opens the line to a device.
-pub fn open(place: &Place, driver: &Driver, address: Option<&str>) -> Result<Box<dyn Line>, Trouble> {
+pub fn open(
+    world: &Rc<dyn World>,
+    place: &Place,
+    driver: &Driver,
+    address: Option<&str>,
+) -> Result<Box<dyn Line>, Trouble> {
     if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
         return sila(server, feature, driver.timeout);
     }
-    let opened = port::open(place, driver).map_err(|e| place::trouble(place, &e));
-    let link = opened.and_then(|port| Link::new(port, driver, address)).map_err(Trouble::Lost)?;
+    let opened = world.open(place, driver).map_err(|e| place::trouble(place, &e));
+    let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(Trouble::Lost)?;
     Ok(Box::new(link))
 }
 
@@ -119,50 +136,75 @@ fn sila(server: &str, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
 
 /// An open line to a device.
 pub struct Link {
+    world: Rc<dyn World>,
     port: Box<dyn Port>,
     codec: Codec,
     timeout: Duration,
     buffer: Vec<u8>,
+    /// What the device said by itself, by the line of its driver: when, and the value.
+    heard: BTreeMap<usize, (Duration, f64)>,
+    /// What answers said last that is kept, by its name.
+    texts: BTreeMap<String, String>,
 }
 
 impl Link {
     /// A line in use by a driver.
-    pub fn new(port: Box<dyn Port>, driver: &Driver, address: Option<&str>) -> Result<Self, String> {
+    pub fn new(
+        world: Rc<dyn World>,
+        port: Box<dyn Port>,
+        driver: &Driver,
+        address: Option<&str>,
+    ) -> Result<Self, String> {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { port, codec, timeout, buffer: Vec::new() })
+        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new(), texts: BTreeMap::new() })
     }
 
-    fn send(&mut self, frame: &[u8], ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
         // What is still there answers nothing that will be asked.
         loop {
-            match self.port.receive(Duration::ZERO) {
+            match self.port.receive(self.codec.silence()) {
                 Ok(late) if late.is_empty() => break,
-                Ok(late) => ear.back(&late),
+                Ok(late) => {
+                    ear.back(&late);
+                    self.buffer.extend(late);
+                }
                 Err(e) => return Err(Trouble::Lost(format!("the line is gone: {e}"))),
             }
         }
-        self.buffer.clear();
+        if speaks_up(driver) {
+            // A line that the device has begun by itself goes on.
+            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if let Ok(reply) = reply {
+                    self.overheard(&reply, driver);
+                }
+            }
+        } else {
+            self.buffer.clear();
+        }
         ear.out(frame);
+        self.codec.sent(frame);
         self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices answer by the wall clock")]
-    fn reply(&mut self, to: &[u8], ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
-        let begun = Instant::now();
+    fn reply(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+        let begun = self.world.elapsed();
         let mut most = self.timeout;
         let mut hurried = false;
         loop {
             if let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if reply.as_ref().is_ok_and(|reply| self.overheard(reply, driver)) {
+                    continue;
+                }
                 return reply
                     .map_err(|g| Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why)));
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;
-                most = most.min(begun.elapsed() + patience);
+                most = most.min(self.passed(begun) + patience);
             }
-            let left = most.saturating_sub(begun.elapsed());
+            let left = most.saturating_sub(self.passed(begun));
             if left.is_zero() {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
@@ -183,6 +225,21 @@ impl Link {
         }
     }
 
+    /// Takes what the device says by itself; false of an answer.
+    fn overheard(&mut self, reply: &Reply, driver: &Driver) -> bool {
+        for (line, told) in driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some()) {
+            if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
+                self.heard.insert(line, (self.world.elapsed(), value));
+                return true;
+            }
+        }
+        driver.ignores.iter().any(|pattern| self.codec.matched(pattern, &reply.text).is_some())
+    }
+
+    fn passed(&self, since: Duration) -> Duration {
+        self.world.elapsed().saturating_sub(since)
+    }
+
     /// The numbers of an answer, unless it is a refusal or says something else.
     fn judged(
         &mut self,
@@ -190,16 +247,24 @@ impl Link {
         reply: &Reply,
         expects: Option<&Pattern>,
         driver: &Driver,
+        ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         if let Some(refused) = self.refusal(driver, reply) {
             return Err(refused);
         }
         let Some(pattern) = expects else { return Ok(Vec::new()) };
-        self.codec.matched(pattern, &reply.text).ok_or_else(|| {
+        let said = self.codec.said(pattern, &reply.text).ok_or_else(|| {
             let (to, expected) = (shown(frame), written(pattern));
             let is = self.codec.shown_reply(None, &reply.text);
             Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
-        })
+        })?;
+        for (word, text) in said.kept {
+            if self.texts.get(&word) != Some(&text) {
+                ear.kept(&word, &text);
+                self.texts.insert(word, text);
+            }
+        }
+        Ok(said.numbers)
     }
 
     /// The failure that an answer means.
@@ -223,14 +288,14 @@ impl Line for Link {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
-        for frame in self.codec.say(texts) {
-            self.send(&frame, ear)?;
+        for frame in self.codec.say(texts).map_err(Trouble::Unsaid)? {
+            self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
             }
-            let reply = self.reply(&frame, ear)?;
+            let reply = self.reply(&frame, driver, ear)?;
             let before = self.kept();
-            numbers = self.judged(&frame, &reply, expects, driver)?;
+            numbers = self.judged(&frame, &reply, expects, driver, ear)?;
             for (word, text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
                 ear.kept(word, text);
             }
@@ -245,10 +310,10 @@ impl Line for Link {
         driver: &Driver,
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.reply(&frame, ear)?;
-        self.judged(&frame, &reply, Some(expects), driver)
+        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        self.send(&frame, driver, ear)?;
+        let reply = self.reply(&frame, driver, ear)?;
+        self.judged(&frame, &reply, Some(expects), driver, ear)
     }
 
     fn is_ready(
@@ -258,9 +323,9 @@ impl Line for Link {
         driver: &Driver,
         ear: &mut dyn Overhear,
     ) -> Result<bool, Trouble> {
-        let frame = self.codec.ask(text);
-        self.send(&frame, ear)?;
-        let reply = self.reply(&frame, ear)?;
+        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        self.send(&frame, driver, ear)?;
+        let reply = self.reply(&frame, driver, ear)?;
         if let Some(refused) = self.refusal(driver, &reply) {
             return Err(refused);
         }
@@ -268,6 +333,33 @@ impl Line for Link {
             Some(pattern) => self.codec.matched(pattern, &reply.text).is_some(),
             None => !reply.busy,
         })
+    }
+
+    fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+        let begun = self.world.elapsed();
+        loop {
+            while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
+                if let Ok(reply) = reply {
+                    self.overheard(&reply, driver);
+                }
+            }
+            if let Some((_, value)) = self.heard.get(&line).filter(|(when, _)| self.passed(*when) <= self.timeout) {
+                return Ok(*value);
+            }
+            let most = ear.patience().map_or(self.timeout, |patience| self.timeout.min(patience));
+            let left = most.saturating_sub(self.passed(begun));
+            if left.is_zero() {
+                let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
+                let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());
+                return Err(Trouble::Lost(why));
+            }
+            let bytes =
+                self.port.receive(left.min(LOOK)).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
+            if !bytes.is_empty() {
+                ear.back(&bytes);
+            }
+            self.buffer.extend(bytes);
+        }
     }
 
     fn kept(&self) -> BTreeMap<String, String> {
@@ -286,4 +378,9 @@ impl Line for Link {
             json.keep(word, text);
         }
     }
+}
+
+/// Whether a device says something by itself.
+fn speaks_up(driver: &Driver) -> bool {
+    !driver.ignores.is_empty() || driver.told.iter().any(|told| told.heard.is_some())
 }

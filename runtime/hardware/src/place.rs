@@ -126,7 +126,10 @@ pub fn trouble(place: &Place, error: &io::Error) -> String {
         (ErrorKind::PermissionDenied, Place::Serial(_)) => {
             format!("the port `{place}` may not be opened by this user")
         }
-        (ErrorKind::ResourceBusy, Place::Serial(_)) => format!("another program has the port `{place}`"),
+        (ErrorKind::ResourceBusy, Place::Serial(_)) if error.raw_os_error().is_some() => {
+            format!("another program has the port `{place}`")
+        }
+        (ErrorKind::ResourceBusy, _) => format!("`{place}` is taken: {}", plain(error)),
         // An error that says what it is needs no second saying.
         _ => format!("`{place}` cannot be opened: {}", plain(error)),
     }

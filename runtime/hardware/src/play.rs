@@ -1,5 +1,6 @@
 //! A file given to a device that runs it by itself: what its driver says for that, from uploading it to its end.
 
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -10,6 +11,7 @@ use crate::link::{Line, Link, Overhear, SECURING, STOPPING, Trouble};
 use crate::place::{self, Place};
 use crate::port;
 use crate::template;
+use crate::world::Machine;
 
 /// How often a device is asked whether it has come to the end.
 const POLL: Duration = Duration::from_millis(200);
@@ -47,7 +49,7 @@ pub fn play(
     });
     let lost = |why: String| Unplayed::Trouble(Trouble::Lost(why));
     let port = opened.map_err(|e| lost(place::trouble(place, &e)))?;
-    let link = Link::new(port, driver, None).map_err(lost)?;
+    let link = Link::new(Rc::new(Machine::new()), port, driver, None).map_err(lost)?;
     let mut player = Player { program, driver, link, cancel };
     let ear = &mut Hasty { ear, cancel, securing: false };
     let played = driver.play.iter().try_for_each(|exchange| player.exchange(exchange, ear));
@@ -132,5 +134,5 @@ impl Player<'_> {
 
 /// Texts that have no values in them.
 fn texts(sends: &[Template]) -> Vec<String> {
-    sends.iter().map(|t| template::filled(t, |_| None).unwrap_or_else(|| template::written(t))).collect()
+    sends.iter().map(|t| template::filled(t, |_| None).unwrap_or_else(|_| template::written(t))).collect()
 }

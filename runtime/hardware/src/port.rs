@@ -8,6 +8,7 @@ use matterix_ir::wire::{Driver, Transport};
 use serial2::{CharSize, Parity, SerialPort, Settings, StopBits};
 
 use crate::http;
+use crate::lock::{self, Hold};
 use crate::place::Place;
 
 /// Bytes out and in.
@@ -30,11 +31,33 @@ const CONNECT: Duration = Duration::from_secs(5);
 
 /// Opens a line; a driver for a serial port may also speak over a network, to a converter or an emulator.
 pub fn open(place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
-    match place {
-        Place::Serial(path) => Ok(Box::new(Serial(serial(path, &driver.transport)?))),
-        Place::Tcp(address) => Ok(Box::new(Tcp(connect(address)?))),
-        Place::Sila(_) => Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
-        Place::Http(address) => Ok(Box::new(http::open(address, driver)?)),
+    let hold = lock::take(place)?;
+    let port: Box<dyn Port> = match place {
+        Place::Serial(path) => Box::new(Serial(serial(path, &driver.transport)?)),
+        Place::Tcp(address) => Box::new(Tcp(connect(address)?)),
+        Place::Sila(_) => return Err(io::Error::new(ErrorKind::InvalidInput, "a server is no line")),
+        Place::Http(address) => Box::new(http::open(address, driver)?),
+    };
+    Ok(Box::new(Held { port, _hold: hold }))
+}
+
+/// A port that this process has to itself.
+struct Held {
+    port: Box<dyn Port>,
+    _hold: Hold,
+}
+
+impl Port for Held {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.port.send(bytes)
+    }
+
+    fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
+        self.port.receive(within)
+    }
+
+    fn attach(&mut self, name: &str, bytes: Vec<u8>) -> io::Result<()> {
+        self.port.attach(name, bytes)
     }
 }
 
@@ -56,14 +79,19 @@ fn serial(path: &str, transport: &Transport) -> io::Result<SerialPort> {
     // A pseudo-terminal has no characters of 7 bits and no parity; it carries bytes as they are.
     let is_pseudo = std::fs::canonicalize(path).is_ok_and(|p| p.starts_with("/dev/pts"));
     let (size, check) = if is_pseudo { (CharSize::Bits8, Parity::None) } else { (size, check) };
-    SerialPort::open(path, |mut settings: Settings| {
+    let port = SerialPort::open(path, |mut settings: Settings| {
         settings.set_raw();
         settings.set_baud_rate(baud)?;
         settings.set_char_size(size);
         settings.set_parity(check);
         settings.set_stop_bits(if stop_bits == 2 { StopBits::Two } else { StopBits::One });
         Ok(settings)
-    })
+    })?;
+    if !is_pseudo {
+        // Programs that do not know of locks are kept away too; a pseudo-terminal would remember it after this process.
+        rustix::termios::ioctl_tiocexcl(&port)?;
+    }
+    Ok(port)
 }
 
 pub(crate) fn connect(address: &str) -> io::Result<TcpStream> {

@@ -1,35 +1,30 @@
 //! What is sent: texts with the values of a moment in them, and values taken back out of such texts.
 
 use matterix_ir::NodeId;
-use matterix_ir::quantity::show_number;
+pub use matterix_ir::form::fixed;
 use matterix_ir::wire::{Piece, Template};
 
-/// The text with its values; `None` where one is not known.
-pub fn filled(template: &Template, mut value: impl FnMut(NodeId) -> Option<f64>) -> Option<String> {
+/// The text with its values; in words why there is none, where one is not known or does not fit its form.
+pub fn filled(template: &Template, mut value: impl FnMut(NodeId) -> Option<f64>) -> Result<String, String> {
     let mut out = String::new();
     for piece in &template.pieces {
         match piece {
             Piece::Plain(text) => out.push_str(text),
-            Piece::Number { value: node, unit, digits } => {
-                let number = unit.of_si(value(*node).filter(|v| v.is_finite())?);
-                out.push_str(&match digits {
-                    Some(digits) => fixed(number, *digits),
-                    None => show_number(number),
-                });
+            Piece::Number { value: node, unit, form } => {
+                let known = value(*node).filter(|v| v.is_finite());
+                let known = known.ok_or_else(|| format!("a number of `{}` is not known", written(template)))?;
+                let sent = form.write(unit.of_si(known));
+                let sent = sent
+                    .map_err(|why| format!("{} cannot be sent in `{}`: {why}", unit.show(known), written(template)))?;
+                out.push_str(&sent);
             }
-            Piece::Word(node, words) => out.push_str(words.get(value(*node)? as usize)?),
+            Piece::Word(node, words) => {
+                let word = value(*node).and_then(|index| words.get(index as usize));
+                out.push_str(word.ok_or_else(|| format!("a word of `{}` is not known", written(template)))?);
+            }
         }
     }
-    Some(out)
-}
-
-/// A number with so many digits after the point; rounded to nothing it has no sign.
-pub fn fixed(number: f64, digits: u8) -> String {
-    let text = format!("{number:.*}", usize::from(digits));
-    match text.strip_prefix('-') {
-        Some(rest) if !rest.bytes().any(|b| b.is_ascii_digit() && b != b'0') => rest.to_owned(),
-        _ => text,
-    }
+    Ok(out)
 }
 
 /// The template as it was written, for messages.
@@ -65,19 +60,21 @@ impl Found {
 
 /// The values of a message of this form; nothing where it has another.
 pub fn found(template: &Template, message: &str) -> Option<Vec<Found>> {
+    found_in(template, message, false)
+}
+
+/// The same; where it is `exact`, blanks around a message belong to it.
+pub fn found_in(template: &Template, message: &str, exact: bool) -> Option<Vec<Found>> {
     let mut out = Vec::new();
-    let mut rest = message.trim();
+    let mut rest = if exact { message } else { message.trim() };
     for piece in &template.pieces {
         match piece {
             Piece::Plain(text) => rest = rest.strip_prefix(text.as_str())?,
-            Piece::Number { value, unit, .. } => {
-                let end =
-                    rest.find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | '-' | '+')).unwrap_or(rest.len());
-                let number: f64 = rest[..end].parse().ok().filter(|n: &f64| n.is_finite())?;
-                let digits = rest[..end].split_once('.').map_or(0, |(_, d)| d.len());
-                let precision = 0.5 * 10f64.powi(-(digits.min(15) as i32)) * unit.factor.abs();
-                out.push(Found { node: *value, value: unit.to_si(number), precision, alike: Vec::new() });
-                rest = &rest[end..];
+            Piece::Number { value, unit, form } => {
+                let read = form.read(rest)?;
+                let precision = read.half * unit.factor.abs();
+                out.push(Found { node: *value, value: unit.to_si(read.number), precision, alike: Vec::new() });
+                rest = &rest[read.length..];
             }
             Piece::Word(node, words) => {
                 let longest = words.iter().enumerate().filter(|(_, w)| rest.starts_with(w.as_str()));
@@ -89,5 +86,5 @@ pub fn found(template: &Template, message: &str) -> Option<Vec<Found>> {
             }
         }
     }
-    rest.trim().is_empty().then_some(out)
+    (if exact { rest.is_empty() } else { rest.trim().is_empty() }).then_some(out)
 }

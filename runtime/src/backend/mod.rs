@@ -109,6 +109,21 @@ pub trait Backend {
     /// Sets a value that the plan keeps; `None` if it is not known.
     fn set_local(&mut self, local: u32, value: Option<f64>);
 
+    /// Whether a step that acts may begin now. Where one may not, time passes until it may.
+    fn admits(&mut self) -> bool {
+        true
+    }
+
+    /// Puts a question to a person; none where nobody is asked and the answer is taken to be yes, at once.
+    fn ask(&mut self, _step: StepId, _text: &str, _out: &mut dyn Listener) -> Result<Option<Ticket>, Fault> {
+        Ok(None)
+    }
+
+    /// Whether a question has been answered with yes; one that has is forgotten.
+    fn answered(&mut self, _question: Ticket, _out: &mut dyn Listener) -> Result<bool, Fault> {
+        Ok(true)
+    }
+
     /// What an operation that is about to begin would bring about and must not, by what is known of the world here.
     fn foresee(&mut self, _step: StepId, _operation: &Operation, _out: &mut dyn Listener) -> Option<Alarm> {
         None
@@ -120,7 +135,7 @@ pub trait Backend {
     /// Asks where an operation stands; one that has ended is forgotten.
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault>;
 
-    /// Abandons an operation.
+    /// Abandons an operation, or withdraws a question.
     fn halt(&mut self, ticket: Ticket);
 
     /// Lets time pass until `until` (finite), until a watch has its value or until a limit of the plan breaks, whichever comes

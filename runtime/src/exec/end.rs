@@ -41,6 +41,7 @@ impl<'p> Executor<'p, '_> {
                 self.backend.halt(*ticket);
                 self.out.operation(self.now, step, operation, OperationState::Halted);
             }
+            (Kind::Asked { ticket }, _) => self.backend.halt(*ticket),
             (
                 Kind::WaitUntil { .. } | Kind::Hold { .. },
                 Step::WaitUntil { condition, .. } | Step::Hold { condition, .. },

@@ -47,7 +47,7 @@ impl<'p> Executor<'p, '_> {
                 self.next_in_sequence(id);
             }
             Step::Parallel(list) => self.begin_parallel(id, list),
-            Step::Operation(operation) => self.begin_operation(id, operation)?,
+            Step::Operation(_) | Step::Ask(_) => self.begin_act(id, step)?,
             Step::Guarded { body, .. } => {
                 self.set_kind(id, Kind::Guarded { phase: Phase::Body, retries: 0 });
                 self.spawn(id, *body);
@@ -123,10 +123,6 @@ impl<'p> Executor<'p, '_> {
             Step::Note(text) => {
                 let text = self.words(text)?;
                 self.out.note(self.now, id, &text);
-            }
-            Step::Ask(text) => {
-                let text = self.words(text)?;
-                self.out.ask(self.now, id, &text);
             }
             _ => {}
         }

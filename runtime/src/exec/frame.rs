@@ -101,6 +101,12 @@ pub(super) enum Kind {
         /// What the first branch that did not end well ended with.
         end: Option<End>,
     },
+    /// Waits until it may begin: a person lets nothing new begin.
+    Held,
+    /// A question is open.
+    Asked {
+        ticket: Ticket,
+    },
     /// Waits for the instances it uses (inside a `finally`).
     Acquire,
     Operation {
@@ -191,7 +197,9 @@ impl Frame {
     pub fn waits(&self) -> bool {
         matches!(
             self.kind,
-            Kind::Wait { .. }
+            Kind::Held
+                | Kind::Asked { .. }
+                | Kind::Wait { .. }
                 | Kind::WaitUntil { .. }
                 | Kind::Hold { .. }
                 | Kind::Claim { granted: false }

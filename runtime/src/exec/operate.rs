@@ -1,8 +1,8 @@
 //! Operations: their claims, their needs, their course on the backend.
 
-use matterix_ir::codes;
-use matterix_ir::plan::{Operation, Step};
+use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::scene::InstanceId;
+use matterix_ir::{Text, codes};
 
 use super::Executor;
 use super::claims::{Request, Use};
@@ -13,6 +13,48 @@ use crate::backend::{Follow, Status};
 use crate::fault::Fault;
 
 impl<'p> Executor<'p, '_> {
+    /// Begins a step that acts, or holds it back while nothing new may begin. What a `finally` does is never held back.
+    pub(super) fn begin_act(&mut self, id: FrameId, step: StepId) -> Result<(), Fault> {
+        let plan = self.plan;
+        let finally = self.frames.get(&id).is_some_and(|f| f.finally);
+        if !finally && !self.backend.admits() {
+            self.set_kind(id, Kind::Held);
+            return Ok(());
+        }
+        self.set_kind(id, Kind::Pass);
+        match &plan.get(step).step {
+            Step::Operation(operation) => self.begin_operation(id, operation),
+            Step::Ask(text) => self.ask(id, step, text),
+            _ => Ok(()),
+        }
+    }
+
+    /// Puts a question; what follows begins when it has been answered.
+    fn ask(&mut self, id: FrameId, step: StepId, text: &'p Text) -> Result<(), Fault> {
+        let text = self.words(text)?;
+        self.out.ask(self.now, step, &text);
+        match self.backend.ask(step, &text, self.out)? {
+            Some(ticket) => {
+                self.set_kind(id, Kind::Asked { ticket });
+                self.look_at_question(id)
+            }
+            None => {
+                self.push_end(id, End::Done);
+                Ok(())
+            }
+        }
+    }
+
+    /// Goes on where a question has been answered.
+    pub(super) fn look_at_question(&mut self, id: FrameId) -> Result<(), Fault> {
+        let Some(Kind::Asked { ticket }) = self.frames.get(&id).map(|f| &f.kind) else { return Ok(()) };
+        if self.backend.answered(*ticket, self.out)? {
+            self.set_kind(id, Kind::Pass);
+            self.push_end(id, End::Done);
+        }
+        Ok(())
+    }
+
     /// Starts an operation unless something else uses what it writes; inside a `finally` it waits for that instead.
     pub(super) fn begin_operation(&mut self, id: FrameId, operation: &'p Operation) -> Result<(), Fault> {
         let finally = self.frames.get(&id).is_some_and(|f| f.finally);

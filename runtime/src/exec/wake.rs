@@ -85,6 +85,7 @@ impl Executor<'_, '_> {
                         agenda.watch(id, *node, true);
                     }
                 }
+                Kind::Held | Kind::Asked { .. } => {}
                 Kind::Monitored { monitors, breach: None } if frame.stop.is_none() => {
                     monitors.iter().for_each(|m| agenda.follow(id, &m.follower, false));
                     waits = false;
@@ -185,6 +186,12 @@ impl Executor<'_, '_> {
         let Some(frame) = self.frames.get(&id) else { return Ok(()) };
         let stopped = frame.stop.is_some();
         match &frame.kind {
+            Kind::Held if !stopped => {
+                if let Some(step) = frame.step {
+                    self.begin_act(id, step)?;
+                }
+            }
+            Kind::Asked { .. } => self.look_at_question(id)?,
             Kind::Wait { at } if self.now >= *at => self.push_end(id, End::Done),
             Kind::WaitUntil { .. } => self.look_at_wait(id, fired)?,
             Kind::Hold { .. } => self.look_at_hold(id, fired)?,

@@ -1,8 +1,6 @@
-//! Files that are there whole or not at all.
+//! What kept the files of a run from being written.
 
 use std::fmt;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 /// A file of a run could not be written.
@@ -15,9 +13,11 @@ pub struct RecordError {
 }
 
 impl RecordError {
-    /// With the reason as the library below words it.
+    /// With the reason as the library below words it, without the number of the system's error.
     pub(super) fn new(path: &Path, reason: impl fmt::Display) -> Self {
-        RecordError { path: path.to_owned(), reason: reason.to_string() }
+        let reason = reason.to_string();
+        let words = reason.split(" (os error").next().unwrap_or_default();
+        RecordError { path: path.to_owned(), reason: words.to_lowercase() }
     }
 }
 
@@ -28,15 +28,3 @@ impl fmt::Display for RecordError {
 }
 
 impl std::error::Error for RecordError {}
-
-/// Writes beside the target, then renames, so that a reader never sees half a file.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), RecordError> {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let partial = path.with_file_name(format!(".{name}.{}.part", std::process::id()));
-    let written: io::Result<()> = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
-    written.map_err(|e| {
-        // The partial file may not exist; the first error is the one to report.
-        let _ = fs::remove_file(&partial);
-        RecordError::new(path, e)
-    })
-}

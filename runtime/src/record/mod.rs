@@ -5,6 +5,7 @@
 
 pub(crate) mod column;
 mod files;
+mod folder;
 mod history;
 mod recording;
 pub(crate) mod run;
@@ -14,12 +15,12 @@ pub mod plot;
 pub mod report;
 pub mod table;
 
-use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-pub use files::{RecordError, write_whole};
+pub use files::RecordError;
+pub use folder::{Folder, give_up};
 pub use recording::{
     EventMark, Expectation, Level, LogLine, Measured, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
     StepState,
@@ -43,16 +44,15 @@ impl Outputs {
     pub const ALL: Outputs = Outputs { recording: true, tables: true, plot: true };
 }
 
-/// Writes the files of a run into `dir`, which is made if need be, each whole or not at all; gives their paths.
+/// Names of all files that a run may leave behind.
+const NAMES: &[&str] = &["recording.mcap", "states.csv", "records.csv", "plot.svg", "report.json"];
+
+/// Writes the files of a run into `dir`, which is made if need be, all or none; gives their paths.
 pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -> Result<Vec<PathBuf>, RecordError> {
-    fs::create_dir_all(dir).map_err(|e| RecordError::new(dir, e))?;
-    let mut written = Vec::new();
-    let mut put = |name: &str, bytes: Result<Vec<u8>, String>| {
-        let path = dir.join(name);
-        let bytes = bytes.map_err(|reason| RecordError::new(&path, reason))?;
-        files::write_whole(&path, &bytes)?;
-        written.push(path);
-        Ok(())
+    let mut folder = Folder::begin(dir, NAMES)?;
+    let mut put = |name: &'static str, bytes: Result<Vec<u8>, String>| {
+        let bytes = bytes.map_err(|reason| RecordError::new(&dir.join(name), reason))?;
+        folder.put(name, &bytes)
     };
     // The recording and the tables are the large ones: they are made side by side.
     let recording = || outputs.recording.then(|| mcap_bytes(run));
@@ -77,7 +77,7 @@ pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -
         put("plot.svg", plot::page(run).map(String::into_bytes).map_err(|e| e.to_string()))?;
     }
     put("report.json", report.json().map(String::into_bytes).map_err(|e| e.to_string()))?;
-    Ok(written)
+    folder.finish()
 }
 
 fn mcap_bytes(run: &Run<'_>) -> Result<Vec<u8>, String> {

@@ -129,7 +129,7 @@ pub fn symbol_kind(kind: Kind) -> SymbolKind {
         Kind::Thing | Kind::Variable | Kind::Parameter => SymbolKind::VARIABLE,
         Kind::Member | Kind::Option | Kind::Setting | Kind::Report => SymbolKind::PROPERTY,
         Kind::Frame | Kind::Part | Kind::Grid | Kind::Joint => SymbolKind::FIELD,
-        Kind::Driver => SymbolKind::MODULE,
+        Kind::Driver | Kind::Framing => SymbolKind::MODULE,
         Kind::Word => SymbolKind::ENUM_MEMBER,
     }
 }

@@ -149,7 +149,7 @@ fn hands_do_what_has_no_line_if_someone_confirms() {
     write(&dir, "lab.mtx", text);
     let given = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--speed", "40", "--journal"];
     let nobody = matterixc_in(&dir, &[&given[..], &["one"]].concat());
-    assert!(nobody.code == 1 && nobody.err.contains("nobody did"), "{}", nobody.err);
+    assert!(nobody.code == 1 && nobody.err.contains("nobody is there to confirm it"), "{}", nobody.err);
     let yes = matterixc_in(&dir, &[&given[..], &["two", "--yes"]].concat());
     assert_eq!(yes.code, 0, "{}", yes.err);
     assert!(yes.err.contains("please do this, then confirm: heat plate to 50 degC"), "{}", yes.err);

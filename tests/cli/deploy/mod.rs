@@ -1,8 +1,11 @@
 //! Workflows on devices: emulators and devices that misbehave, what is sent, what is refused, what is left safe.
 
+mod ask;
 mod bindings;
 mod faulty;
+mod journal;
 mod kills;
+mod record;
 mod server;
 mod stop;
 mod unreached;
@@ -129,6 +132,11 @@ fn serve(stream: TcpStream, end: u8, heard: &Mutex<Vec<String>>, answer: &dyn Fn
             Answer::HangsUp => return,
         }
     }
+}
+
+/// The lines of a journal after its head.
+pub fn lines(journal: &str) -> &str {
+    journal.split_once('\n').map_or("", |(_, rest)| rest)
 }
 
 /// A folder with a program and bindings of its one device.

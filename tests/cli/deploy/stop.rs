@@ -45,13 +45,17 @@ fn stopped(name: &str, stdin: Stdio, stop: impl FnOnce(&Child)) {
     }
 }
 
-#[test]
-fn a_key_at_the_terminal_stops_it_and_finally_is_done() {
+/// A keyboard, and the terminal that what is typed comes in at.
+pub fn terminal() -> (File, File) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
     grantpt(&master).and_then(|()| unlockpt(&master)).expect("its other end");
     let path = ptsname(&master, Vec::new()).expect("a name").into_string().expect("text");
-    let terminal = File::options().read(true).write(true).open(path).expect("a terminal");
-    let mut keyboard = File::from(master);
+    (File::from(master), File::options().read(true).write(true).open(path).expect("a terminal"))
+}
+
+#[test]
+fn a_key_at_the_terminal_stops_it_and_finally_is_done() {
+    let (mut keyboard, terminal) = terminal();
     stopped("stop_key", terminal.into(), move |_| {
         keyboard.write_all(b"what?\n").and_then(|()| keyboard.write_all(b"q\n")).expect("typed");
         // The terminal is there until the end.
@@ -64,7 +68,7 @@ fn a_request_to_terminate_stops_it_and_finally_is_done() {
     stopped("stop_term", Stdio::null(), |process| signal("-TERM", process));
 }
 
-fn signal(which: &str, process: &Child) {
+pub fn signal(which: &str, process: &Child) {
     let kill = std::process::Command::new("kill").args([which, &process.id().to_string()]).status();
     assert!(kill.expect("kill").success());
 }

@@ -270,6 +270,34 @@ fn a_call_can_be_cancelled_and_ends_when_its_time_is_over() {
 }
 
 #[test]
+fn lines_without_end_and_nesting_without_bottom_are_passed_over() {
+    let mut client = Client::new(&folder("mcp_endless"));
+    let nested = format!("{}1{}", "{\"a\":".repeat(100_000), "}".repeat(100_000));
+    client.line(&"x".repeat(20 << 20));
+    client.line(&format!("{{\"jsonrpc\":\"2.0\",\"id\":7,\"method\":\"tools/call\",\"params\":{nested}}}"));
+    client.line(&"[".repeat(1 << 20));
+    assert_eq!(client.data("check", json!({ "text": WARM }))["errors"], 0);
+    assert_eq!(client.close(), Some(0));
+}
+
+#[test]
+fn more_calls_than_can_wait_are_refused_and_others_answered() {
+    let endless = "mtx 1\nlab bench {\n    ambient: 22 degC\n}\n\nworkflow w in bench {\n    repeat 2000000 times {\n        \
+        wait 1 s\n    }\n}\n";
+    let mut client = Client::new(&folder("mcp_flood"));
+    let call = |text: &str| json!({ "name": "run", "arguments": { "text": text, "seconds": 600 } });
+    let ids: Vec<u64> = (0..64).map(|_| client.begin("tools/call", call(endless))).collect();
+    assert!(client.refused("check", json!({ "text": WARM })).contains("64 calls"));
+    assert!(client.ask("ping", json!({}))["error"].is_null());
+    for id in ids {
+        client.send(&json!({ "jsonrpc": "2.0", "method": "notifications/cancelled", "params": { "requestId": id } }));
+    }
+    assert!(client.ask("ping", json!({}))["error"].is_null());
+    assert_eq!(client.data("check", json!({ "text": WARM }))["errors"], 0);
+    assert_eq!(client.close(), Some(0));
+}
+
+#[test]
 fn a_client_that_goes_away_ends_the_server() {
     assert_eq!(Client::new(root()).close(), Some(0));
     assert_eq!(Client::silent(root()).close(), Some(0));

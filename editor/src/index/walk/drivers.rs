@@ -1,6 +1,6 @@
 //! Drivers: what is said to devices.
 
-use matterix_lang::ast::{Exchange, Wire, WireKind};
+use matterix_lang::ast::{Exchange, Expr, ExprKind, Path, Wire, WireKind};
 use matterix_lang::meanings::Sort;
 
 use super::{Found, Walk};
@@ -33,17 +33,14 @@ impl Walk<'_> {
                 }
                 self.exchange(exchange);
             }
+            WireKind::Ignores { .. } => {}
+            WireKind::Hears { path, condition, every, .. } => {
+                self.told(path, &device);
+                self.exprs(condition);
+                self.expr(every);
+            }
             WireKind::Reading { path, condition, asks, .. } => {
-                let kinds = match &device {
-                    Sort::Thing(kinds, _) => kinds.clone(),
-                    _ => Vec::new(),
-                };
-                let mut sort = Sort::Thing(kinds, None);
-                for segment in &path.segments {
-                    let member = self.index.member_of(&sort, &segment.text);
-                    self.note(segment.span, member.as_ref().map_or(Meaning::Unknown, |m| m.meaning));
-                    sort = member.map_or(Sort::Any, |m| m.sort);
-                }
+                self.told(path, &device);
                 self.exprs(condition);
                 self.text(asks);
             }
@@ -61,6 +58,41 @@ impl Walk<'_> {
             }
         }
         self.scope.truncate(depth);
+    }
+
+    /// A member of the device that it tells.
+    fn told(&mut self, path: &Path, device: &Sort) {
+        let kinds = match device {
+            Sort::Thing(kinds, _) => kinds.clone(),
+            _ => Vec::new(),
+        };
+        let mut sort = Sort::Thing(kinds, None);
+        for segment in &path.segments {
+            let member = self.index.member_of(&sort, &segment.text);
+            self.note(segment.span, member.as_ref().map_or(Meaning::Unknown, |m| m.meaning));
+            sort = member.map_or(Sort::Any, |m| m.sort);
+        }
+    }
+
+    /// Parts of frames in a field of a framing, and how a checksum is reckoned.
+    pub(super) fn frame_words(&mut self, e: &Expr) {
+        match &*e.kind {
+            ExprKind::Name(n) => self.language(n.span, "a part of a frame"),
+            ExprKind::Call(of, args) => {
+                self.frame_words(of);
+                for arg in args {
+                    if let Some(name) = &arg.name {
+                        self.language(name.span, "a parameter of a checksum");
+                    }
+                    self.frame_words(&arg.value);
+                }
+            }
+            ExprKind::Range(a, b) | ExprKind::Binary(_, a, b) => {
+                self.frame_words(a);
+                self.frame_words(b);
+            }
+            _ => {}
+        }
     }
 
     pub(super) fn exchange(&mut self, exchange: &Exchange) {

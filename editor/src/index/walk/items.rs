@@ -130,6 +130,15 @@ impl Walk<'_> {
                 let words = self.item.map(|d| self.index.def(d).words.clone()).unwrap_or_default();
                 self.expr_among(value, &words);
             }
+            ItemKind::Framing { fields, .. } => {
+                // Parts of frames and checksums are words of the language.
+                for f in fields {
+                    self.language(f.key.span, "a field of a framing");
+                    if let FieldValue::Expr(e) = &f.value {
+                        self.frame_words(e);
+                    }
+                }
+            }
             ItemKind::Driver { device, transport, args, wires, .. } => {
                 self.path(device);
                 let driver = self.index.lookup(self.at, &transport.text);
@@ -141,7 +150,15 @@ impl Walk<'_> {
                     if let Some(name) = &arg.name {
                         self.language(name.span, "a setting of the line");
                     }
+                    let is_framing = arg.name.as_ref().is_some_and(|n| n.text == "framing");
                     match &*arg.value.kind {
+                        ExprKind::Name(n) if is_framing => {
+                            let framing = self.index.lookup(self.at, &n.text);
+                            match framing.filter(|d| self.index.def(*d).kind == Kind::Framing) {
+                                Some(def) => self.known(n.span, def),
+                                None => self.language(n.span, "a framing"),
+                            }
+                        }
                         ExprKind::Name(n) => self.language(n.span, "a setting of the line"),
                         _ => drop(self.expr(&arg.value)),
                     }

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use matterix_ir::wire::{Exchange, Piece, Slot, Template, Told, Until};
+use matterix_ir::wire::{Exchange, Pattern, Piece, Slot, Template, Told, Until};
 use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
 
+use super::forms::Speech;
 use crate::ast::{self, ExprKind, Path, TextPart};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
+use crate::units::Dimension;
 
 impl<'a> Planner<'a, '_> {
     pub(super) fn exchange(&mut self, of: &'a ast::Exchange, span: Span, scope: &mut Scope) -> Option<Exchange> {
@@ -36,20 +38,41 @@ impl<'a> Planner<'a, '_> {
 
     /// A text to send.
     pub(super) fn template(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Template> {
+        let template = self.filled_template(text, scope)?;
+        if self.speech != Speech::Modbus {
+            return Some(template);
+        }
+        Some(Template { pieces: self.modbus_request(template.pieces, text.span)?, ..template })
+    }
+
+    /// A text that an emulator answers with.
+    pub(super) fn answer_text(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Template> {
+        let template = self.filled_template(text, scope)?;
+        if self.speech != Speech::Modbus {
+            return Some(template);
+        }
+        Some(Template { pieces: self.modbus_told(template.pieces, text.span)?, ..template })
+    }
+
+    fn filled_template(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Template> {
         let mut pieces = Vec::new();
         for part in &text.parts {
-            let (value, digits) = match part {
-                TextPart::Plain(text) => {
-                    pieces.push(Piece::Plain(text.clone()));
+            let (value, digits, form) = match part {
+                TextPart::Plain(words) => {
+                    self.speakable(words, text.span)?;
+                    pieces.push(Piece::Plain(words.clone()));
                     continue;
                 }
-                TextPart::Value { value, digits } => (value, *digits),
+                TextPart::Value { value, digits, form } => (value, *digits, form.as_ref()),
             };
             pieces.push(match self.lab.expr(value, scope) {
                 Value::Error => return None,
                 Value::Num(n) if matches!(&*value.kind, ExprKind::As(..)) || n.dimension.is_one() => {
                     let unit = n.unit.filter(|_| matches!(&*value.kind, ExprKind::As(..)));
-                    Piece::Number { value: n.node, unit: unit.map_or_else(Unit::one, Arc::unwrap_or_clone), digits }
+                    let unit = unit.map_or_else(Unit::one, Arc::unwrap_or_clone);
+                    let form = self.form_of(digits, form)?;
+                    self.fits_form(n.node, &unit, &form, value.span)?;
+                    Piece::Number { value: n.node, unit, form }
                 }
                 Value::Num(n) => {
                     let unit = self.lab.shown(&n).symbol;
@@ -58,8 +81,13 @@ impl<'a> Planner<'a, '_> {
                     self.lab.report(d.help(format!("write `{{... as {unit}}}`")));
                     return None;
                 }
-                Value::Enum(node, words) => Piece::Word(node, words.to_vec()),
-                Value::Bool(node) => Piece::Word(node, vec!["false".to_string(), "true".to_string()]),
+                Value::Enum(node, words) => Piece::Word(node, self.sent_words(&words, form)?),
+                Value::Bool(node) => Piece::Word(node, self.sent_words(&truth(), form)?),
+                _ if form.is_some() => {
+                    let at = form.map_or(value.span, |f| f.span);
+                    self.wrong(at, "only numbers and words have a form", "of neither", "leave it out");
+                    return None;
+                }
                 Value::Text(text) => Piece::Plain(text),
                 Value::Instance(i) | Value::Qualified(i, _) => {
                     Piece::Plain(self.lab.instances[i.0 as usize].name.clone())
@@ -77,6 +105,7 @@ impl<'a> Planner<'a, '_> {
                 }
             });
         }
+        self.parts_of_message(&pieces, text.span)?;
         Some(Template { pieces, span: text.span })
     }
 
@@ -89,6 +118,43 @@ impl<'a> Planner<'a, '_> {
         span: Span,
         scope: &mut Scope,
     ) -> Option<Told> {
+        let asks = self.template(asks, scope)?;
+        self.tells(path, asks, expects, span, scope)
+    }
+
+    /// A quantity that a device tells by itself.
+    pub(super) fn heard(
+        &mut self,
+        path: &'a Path,
+        text: &'a ast::Pattern,
+        every: &'a ast::Expr,
+        span: Span,
+        scope: &mut Scope,
+    ) -> Option<Told> {
+        let told = self.tells(path, Template { pieces: Vec::new(), span: text.span }, text, span, scope)?;
+        let period = self.duration_node(every, scope, "every")?;
+        match self.lab.known(period).filter(|s| *s > 0.0) {
+            Some(period) => Some(Told { heard: Some(period), ..told }),
+            None => {
+                self.wrong(
+                    every.span,
+                    "how often a device speaks is known before anything runs",
+                    "not a time",
+                    "as in `every 1 s`",
+                );
+                None
+            }
+        }
+    }
+
+    fn tells(
+        &mut self,
+        path: &'a Path,
+        asks: Template,
+        expects: &'a ast::Pattern,
+        span: Span,
+        scope: &mut Scope,
+    ) -> Option<Told> {
         let id = scope.this?;
         let name = path.segments.last()?;
         let live = std::mem::replace(&mut self.lab.readings_live, true);
@@ -97,17 +163,27 @@ impl<'a> Planner<'a, '_> {
             value = self.lab.member(value, segment);
         }
         self.lab.readings_live = live;
-        let asks = self.template(asks, scope)?;
-        let (expects, dimensions) = self.pattern(expects)?;
+        let (mut expects, dimensions) = self.pattern(expects)?;
+        let mut words = Vec::new();
         let n = match value {
             Value::Error => return None,
             Value::Num(n) => n,
+            Value::Enum(node, of) => {
+                words = self.told_words(&of, &mut expects, &name.text)?;
+                crate::eval::Num { node, dimension: Dimension::one(), point: false, unit: None, literal: false }
+            }
+            Value::Bool(node) => {
+                words = self.told_words(&truth(), &mut expects, &name.text)?;
+                crate::eval::Num { node, dimension: Dimension::one(), point: false, unit: None, literal: false }
+            }
             other => {
                 self.lab.expected("a quantity that a device can tell", &other, name.span);
                 return None;
             }
         };
-        let [dimension] = dimensions.as_slice() else {
+        let one = [Dimension::one()];
+        let dimensions = if words.is_empty() { dimensions.as_slice() } else { &one };
+        let [dimension] = dimensions else {
             let headline = format!("the reply must say once what `{}` is", name.text);
             let d =
                 Diagnostic::error(codes::DRIVER_LINE, expects.span, headline, format!("{} values", dimensions.len()));
@@ -132,7 +208,55 @@ impl<'a> Planner<'a, '_> {
             _ => (None, None),
         };
         let name = format!("{}.{}", self.lab.instances[id.0 as usize].name, super::words(path));
-        Some(Told { name, value: n.node, reading, state, unit, difference, condition: None, asks, expects, span })
+        Some(Told {
+            name,
+            value: n.node,
+            reading,
+            state,
+            unit,
+            difference,
+            condition: None,
+            words,
+            heard: None,
+            asks,
+            expects,
+            span,
+        })
+    }
+
+    /// The words of what is told, which a reply gives once by what stands for each.
+    fn told_words(&mut self, words: &[String], expects: &mut Pattern, name: &str) -> Option<Vec<String>> {
+        let list = words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", ");
+        let wrong = |this: &mut Self, headline: String| {
+            let example = words.first().map_or("", |w| w.as_str());
+            this.wrong(
+                expects.span,
+                &headline,
+                "not told",
+                &format!("it is one of {list}: as in `{{A = {example} | B = ...}}`"),
+            );
+        };
+        let numbers = expects.slots.iter().filter(|s| matches!(s, Slot::Number(..))).count();
+        let all = expects.slots.iter().filter(|s| matches!(s, Slot::Word(_))).count();
+        if all != 1 || numbers != 0 {
+            wrong(self, format!("the reply must say once which word `{name}` is"));
+            return None;
+        }
+        let choices = expects.slots.iter().find_map(|s| match s {
+            Slot::Word(choices) => Some(choices),
+            _ => None,
+        })?;
+        if let Some(strange) = choices.iter().find(|c| !words.contains(&c.word)) {
+            wrong(self, format!("`{name}` is never `{}`", strange.word));
+            return None;
+        }
+        for slot in &mut expects.slots {
+            let Slot::Word(choices) = slot else { continue };
+            for choice in choices {
+                choice.index = words.iter().position(|w| *w == choice.word).unwrap_or_default() as u32;
+            }
+        }
+        Some(words.to_vec())
     }
 
     /// The unit a told quantity is shown in: its own, else that of the reply.
@@ -150,9 +274,14 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         });
         let replied = expects.slots.iter().find_map(|s| match s {
-            Slot::Number(unit) => Some(unit.clone()),
+            Slot::Number(unit, _) => Some(unit.clone()),
             _ => None,
         });
         declared.or(replied).unwrap_or_else(Unit::one)
     }
+}
+
+/// The words of a truth value.
+fn truth() -> [String; 2] {
+    ["false".to_owned(), "true".to_owned()]
 }

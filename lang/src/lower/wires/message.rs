@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::message::{self, Field};
-use matterix_ir::wire::{Driver, Exchange, JSON, Pattern, Piece, Template};
+use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Piece, Template};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use super::hosted::Under;
@@ -16,7 +16,7 @@ const VALUE: &str = "0";
 impl<'a> Planner<'a, '_> {
     /// Reports what no server understands.
     pub(super) fn check_messages(&mut self, driver: &Driver, wires: &'a [Wire], under: Option<Under<'a>>) {
-        if driver.framing != JSON || !self.lab.prototype {
+        if driver.framing != Framing::Json || !self.lab.prototype {
             return;
         }
         let known: BTreeSet<String> =

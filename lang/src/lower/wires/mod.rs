@@ -4,9 +4,12 @@
 //! checked is what runs. A line maps a command of the device, or a primitive skill of whose parameters one, `self`, is the
 //! device. What is sent is an expression of the command's arguments and the device's members.
 
+mod forms;
+mod framing;
 mod hosted;
 mod lines;
 mod message;
+mod modbus;
 mod offers;
 mod pattern;
 mod served;
@@ -17,6 +20,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{self, Driver};
 use matterix_ir::{Diagnostic, Span, codes};
 
+pub(crate) use self::forms::Speech;
 use self::served::Arrangement;
 use super::call::Bound;
 use super::{Planner, script};
@@ -88,6 +92,7 @@ impl<'a> Planner<'a, '_> {
             let module = self.lab.tables.names.decl(id).module;
             let mut scope = Scope::of(instance, module);
             bind(sig, &bound.values, &mut scope);
+            self.speech = Speech::of(&self.drivers[at].1.framing);
             if let Some(exchange) = self.exchange(line.0, line.1, &mut scope) {
                 self.drivers[at].1.calls.push((step, exchange));
             }
@@ -146,6 +151,7 @@ impl<'a> Planner<'a, '_> {
             play: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),
+            ignores: Vec::new(),
             answers: Vec::new(),
             refusals: Vec::new(),
             calls: Vec::new(),
@@ -153,6 +159,7 @@ impl<'a> Planner<'a, '_> {
             span: name.span,
         };
         self.repeated(wires);
+        self.speech = Speech::of(&driver.framing);
         // What stands where a message has no word for it is not on this line.
         let lenient = std::mem::replace(&mut self.lenient, driver.host.is_some());
         let mut opens = 0;
@@ -212,7 +219,7 @@ impl<'a> Planner<'a, '_> {
                 }
             }
             WireKind::Answers { asked, with } => {
-                let (asked, with) = (self.pattern(asked), self.template(with, &mut scope));
+                let (asked, with) = (self.pattern(asked), self.answer_text(with, &mut scope));
                 driver.answers.extend(asked.zip(with).map(|((asked, _), with)| (asked, with)));
             }
             WireKind::Reading { path, condition, asks, expects } => {
@@ -222,6 +229,19 @@ impl<'a> Planner<'a, '_> {
                     driver.told.push(wire::Told { condition: condition.flatten(), ..told });
                 }
             }
+            WireKind::Hears { path, condition, text, every } => {
+                if matches!(driver.framing, wire::Framing::Json | wire::Framing::Calls) || driver.host.is_some() {
+                    let help = "ask for it: `reading ... asks ... expects ...`";
+                    self.wrong(w.span, "only a device on a line of its own speaks by itself", "never heard", help);
+                    return;
+                }
+                let told = self.heard(path, text, every, w.span, &mut scope);
+                let condition = condition.as_ref().map(|c| self.lab.truth(c, &mut scope));
+                if let (Some(told), true) = (told, condition != Some(None)) {
+                    driver.told.push(wire::Told { condition: condition.flatten(), ..told });
+                }
+            }
+            WireKind::Ignores { text } => driver.ignores.extend(self.pattern(text).map(|(pattern, _)| pattern)),
             WireKind::Alive { condition, every, by, otherwise } => {
                 let Some(node) = self.lab.truth(condition, &mut scope) else { return };
                 let Some(every) = self.duration_node(every, &mut scope, "every") else { return };
@@ -278,7 +298,8 @@ impl<'a> Planner<'a, '_> {
     fn repeated(&mut self, wires: &'a [Wire]) {
         let key = |w: &Wire| match &w.kind {
             WireKind::Command { sig, .. } => Some(self.form(sig)),
-            WireKind::Reading { path, .. } => Some(format!("reading {}", words(path))),
+            WireKind::Reading { path, .. } | WireKind::Hears { path, .. } => Some(format!("reading {}", words(path))),
+            WireKind::Ignores { text } => Some(format!("ignores {}", text.text)),
             WireKind::Reply { text, .. } => Some(format!("reply {text}")),
             _ => None,
         };

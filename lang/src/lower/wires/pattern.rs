@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
+use matterix_ir::form::Form;
 use matterix_ir::wire::{Pattern, Slot};
-use matterix_ir::{Diagnostic, Unit, codes};
+use matterix_ir::{Diagnostic, Span, Unit, codes};
 
+use super::forms::Speech;
 use crate::ast::{self, UnitText};
 use crate::elaborate::units::unit_error;
 use crate::lower::Planner;
@@ -38,16 +40,33 @@ impl Planner<'_, '_> {
             }
             let inner = rest[1..close].trim();
             rest = &rest[close + 1..];
+            if let Some(name) = inner.strip_prefix('<').and_then(|name| name.strip_suffix('>')) {
+                slots.push(Slot::Kept(self.kept_name(name, of.span)?));
+                continue;
+            }
+            if inner.contains('=') {
+                slots.push(Slot::Word(self.choices(inner, of.span)?));
+                continue;
+            }
+            let (inner, form) =
+                inner.rsplit_once(':').map_or((inner, None), |(inner, form)| (inner.trim(), Some(form)));
+            let form = match form {
+                Some(form) => self.parsed_form(form.trim(), of.span)?,
+                None => Form::default(),
+            };
             slots.push(match inner {
-                ANY => Slot::Any,
+                ANY => match form.width().map(u8::try_from) {
+                    Some(Ok(width)) => Slot::Skip(width),
+                    _ => Slot::Any,
+                },
                 "" => {
                     dimensions.push(Dimension::one());
-                    Slot::Number(Unit::one())
+                    Slot::Number(Unit::one(), form)
                 }
                 unit => match self.lab.tables.unit(unit) {
                     Ok(resolved) => {
                         dimensions.push(resolved.dimension);
-                        Slot::Number(Arc::unwrap_or_clone(resolved.unit))
+                        Slot::Number(Arc::unwrap_or_clone(resolved.unit), form)
                     }
                     Err(error) => {
                         let d = unit_error(&UnitText { text: unit.to_owned(), span: of.span }, error);
@@ -61,12 +80,28 @@ impl Planner<'_, '_> {
         if !plain.is_empty() {
             slots.push(Slot::Plain(plain));
         }
-        let beside = slots.windows(2).any(|w| !w.iter().any(|s| matches!(s, Slot::Plain(_))));
-        if beside {
-            let headline = "what a reply says between two values must be known";
-            self.lab.report(Diagnostic::error(codes::DRIVER_LINE, of.span, headline, "two values touch"));
-            return None;
+        for slot in &slots {
+            if let Slot::Plain(text) = slot {
+                self.speakable(text, of.span)?;
+            }
+        }
+        self.parts_of_reply(&slots, of.span)?;
+        if self.speech == Speech::Modbus {
+            slots = self.modbus_answer(slots, of.span)?;
         }
         Some((Pattern { slots, span: of.span }, dimensions))
+    }
+
+    /// The name under which a journal keeps what a reply says.
+    fn kept_name(&mut self, name: &str, at: Span) -> Option<String> {
+        if self.speech == Speech::Free {
+            self.wrong(at, "what a server answers is kept without braces", "in braces", &format!("write `<{name}>`"));
+            return None;
+        }
+        if !crate::syntax::is_name(name) {
+            self.wrong(at, "what a reply says is kept under a name", "not a name", "as in `{<serial>}`");
+            return None;
+        }
+        Some(name.to_owned())
     }
 }

@@ -1,9 +1,10 @@
 //! The line of a driver: `serial(baud: 9600, frame: "7E1", framing: line, timeout: 1 s)`.
 
-use matterix_ir::wire::{CALLS, FRAMINGS, JSON, Transport};
+use matterix_ir::framing::Part;
+use matterix_ir::wire::{BUILT_IN, Framing, Transport};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use crate::ast::{Arg, Expr, ExprKind, Name};
+use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name};
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 use crate::names::near;
@@ -11,7 +12,7 @@ use crate::names::near;
 /// A line, understood.
 pub(super) struct Line {
     pub transport: Transport,
-    pub framing: String,
+    pub framing: Framing,
     pub address: Option<String>,
     pub timeout: f64,
 }
@@ -80,7 +81,7 @@ impl<'a> Planner<'a, '_> {
         if name.text == "sila" {
             let transport = self.sila(given("feature")?)?;
             let timeout = self.timeout(given("timeout")?, module)?;
-            return Some(Line { transport, framing: CALLS.to_owned(), address: None, timeout });
+            return Some(Line { transport, framing: Framing::Calls, address: None, timeout });
         }
         let transport = match name.text.as_str() {
             "serial" => self.serial(given("baud")?, given("frame")?, module)?,
@@ -88,17 +89,14 @@ impl<'a> Planner<'a, '_> {
             _ => Transport::Tcp,
         };
         let framing = match transport {
-            Transport::Http { .. } => JSON.to_owned(),
-            _ => self.framing(given("framing")?)?,
+            Transport::Http { .. } => Framing::Json,
+            _ => self.framing(given("framing")?, module)?,
         };
         let address = match given("address") {
             Some(e) => Some(self.address(e, module)?),
             None => None,
         };
-        if framing.starts_with("cavro") && address.is_none() {
-            self.wrong(at, "this framing needs the `address` of the device", "no address", "as in `address: 1`");
-            return None;
-        }
+        self.addressed(&framing, address.as_deref(), given("address").map_or(at, |e| e.span))?;
         let timeout = self.timeout(given("timeout")?, module)?;
         Some(Line { transport, framing, address, timeout })
     }
@@ -170,18 +168,65 @@ impl<'a> Planner<'a, '_> {
         good.map(Some)
     }
 
-    fn framing(&mut self, e: &'a Expr) -> Option<String> {
+    /// A framing that a text declares or that is built in.
+    fn framing(&mut self, e: &'a Expr, module: usize) -> Option<Framing> {
         let word = match &*e.kind {
             ExprKind::Name(n) => n.text.as_str(),
             _ => "",
         };
-        if FRAMINGS.contains(&word) {
-            return Some(word.to_owned());
+        let names = self.lab.tables.names;
+        let is_framing = |id| matches!(names.decl(id).item.kind, ItemKind::Framing { .. });
+        if let Some(id) = names.lookup(module, word).filter(|id| is_framing(*id)) {
+            return self.frames(id).map(Framing::Frames);
         }
+        if let Some((_, framing)) = BUILT_IN.iter().find(|(name, _)| *name == word) {
+            return Some(framing.clone());
+        }
+        let declared = names.visible(module).filter(|(_, id)| is_framing(*id)).map(|(name, _)| name);
+        let all: Vec<&str> = declared.chain(BUILT_IN.iter().map(|(name, _)| *name)).collect();
         let mut d = Diagnostic::error(codes::DRIVER_LINE, e.span, "there is no such framing", "not a known one");
-        d.help.extend(near::question(&near::nearest(word, FRAMINGS)));
-        self.lab.report(d.help(format!("it is one of {}", list(FRAMINGS))));
+        d.help.extend(near::question(&near::nearest(word, &all)));
+        let d = d.help(format!("it is one of {}", list(&all)));
+        self.lab.report(d.help("declare one: `framing NAME { carries: text, frame: \"{data}\\r\" }`"));
         None
+    }
+
+    /// Whether a framing has an address where, and only where, it has room for one.
+    fn addressed(&mut self, framing: &Framing, address: Option<&str>, at: Span) -> Option<()> {
+        let form = match framing {
+            Framing::CavroDt | Framing::CavroOem => Some(None),
+            Framing::Frames(frames) => {
+                let forms = frames.request.iter().chain(&frames.reply).filter_map(|part| match part {
+                    Part::Address(form) => Some(form.as_ref()),
+                    _ => None,
+                });
+                let forms: Vec<_> = forms.collect();
+                forms.iter().find(|form| form.is_some()).or(forms.first()).copied()
+            }
+            Framing::Json | Framing::Calls => return Some(()),
+        };
+        match (form, address) {
+            (None, None) | (Some(None), Some(_)) => Some(()),
+            (Some(Some(form)), Some(address)) => {
+                let written =
+                    address.parse::<f64>().map_err(|_| "it is no number".to_owned()).and_then(|n| form.write(n));
+                if let Err(why) = written {
+                    let headline = format!("`{address}` is no address in this framing: {why}");
+                    self.wrong(at, &headline, "does not fit", "the framing says how it is written");
+                    return None;
+                }
+                Some(())
+            }
+            (Some(_), None) => {
+                self.wrong(at, "this framing needs the `address` of the device", "no address", "as in `address: 1`");
+                None
+            }
+            (None, Some(_)) => {
+                let help = "leave it out, or give the framing an `{address}`";
+                self.wrong(at, "this framing has no room for an address", "never sent", help);
+                None
+            }
+        }
     }
 
     fn address(&mut self, e: &'a Expr, module: usize) -> Option<String> {

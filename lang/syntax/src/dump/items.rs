@@ -95,6 +95,7 @@ fn item_kind(kind: &ItemKind) -> Sexp {
         ItemKind::Const { name: word, ty: of, value } => {
             node("const").with([name(word)]).with(of.as_ref().map(ty)).with([expr(value)])
         }
+        ItemKind::Framing { name: word, fields: list } => node("framing").with([name(word)]).with(fields(list)),
         ItemKind::Driver { name: word, device, transport, args: list, wires } => node("driver")
             .with([name(word), path(device), node("over").with([name(transport)]).with(args(list))])
             .with(wires.iter().map(wire)),
@@ -321,6 +322,11 @@ fn wire(wire: &Wire) -> Sexp {
             .with([path(of)])
             .with(maybe("while", condition.as_ref()))
             .with([filled(asks), quoted(&expects.text)]),
+        WireKind::Hears { path: of, condition, text, every } => node("hears")
+            .with([path(of)])
+            .with(maybe("while", condition.as_ref()))
+            .with([quoted(&text.text), expr(every)]),
+        WireKind::Ignores { text } => node("ignores").with([quoted(&text.text)]),
         WireKind::Reply { text, fails } => node("reply").with([quoted(text), name(fails)]),
         WireKind::Answers { asked, with } => node("answers").with([quoted(&asked.text), filled(with)]),
         WireKind::Fixed { when, condition, exchange: said } => {

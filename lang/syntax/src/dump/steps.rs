@@ -32,9 +32,10 @@ pub(super) fn labelled(labelled: &[(Name, Expr)]) -> Vec<Sexp> {
 pub(super) fn filled(text: &Text) -> Sexp {
     let part = |part: &TextPart| match part {
         TextPart::Plain(text) => quoted(text),
-        TextPart::Value { value, digits } => {
-            node("value").with([expr(value)]).with(digits.map(|d| leaf(format!(".{d}"))))
-        }
+        TextPart::Value { value, digits, form } => node("value")
+            .with([expr(value)])
+            .with(digits.map(|d| leaf(format!(".{d}"))))
+            .with(form.as_ref().map(|form| quoted(&form.text))),
     };
     match text.parts.as_slice() {
         [] => quoted(""),

@@ -106,11 +106,30 @@ impl Lower<'_> {
                 Some((_, 'r')) => text.push('\r'),
                 Some((_, 't')) => text.push('\t'),
                 Some((_, c @ ('"' | '\\'))) => text.push(c),
+                Some((at, 'x')) if self.on_line => {
+                    let code = inner.get(at + 1..at + 3).filter(|c| c.bytes().all(|b| b.is_ascii_hexdigit()));
+                    match code.and_then(|code| u8::from_str_radix(code, 16).ok()) {
+                        Some(code) if !matches!(code, b'{' | b'}') => {
+                            text.push(char::from(code));
+                            chars.nth(1);
+                        }
+                        code => {
+                            let span = self.place(start + at - 1, start + at + 1);
+                            let (headline, help) = match code {
+                                Some(_) => ("a brace stands for a value here", "write `{{` or `}}`"),
+                                None => ("a byte has two hexadecimal digits", "as in `\\x02`"),
+                            };
+                            self.report(Diagnostic::error(codes::SYNTAX, span, headline, "here").help(help));
+                        }
+                    }
+                }
                 Some((at, c)) => {
                     let span = self.place(start + at - 1, start + at + c.len_utf8());
                     self.report(
                         Diagnostic::error(codes::SYNTAX, span, format!("`\\{c}` has no meaning in a text"), "here")
-                            .help("a text knows `\\n`, `\\r`, `\\t`, `\\\"` and `\\\\`")
+                            .help(
+                                "a text knows `\\n`, `\\r`, `\\t`, `\\\"` and `\\\\`; what goes over a line also `\\x02`, a byte",
+                            )
                             .fix("write the backslash itself", span, format!("\\\\{c}")),
                     );
                     text.push('\\');

@@ -41,6 +41,12 @@ impl Lower<'_> {
             },
             Rule::reactive_group => ItemKind::ReactiveGroup { name: self.name_in(kids), fields: self.fields_in(kids) },
             Rule::material => ItemKind::Material { name: self.name_in(kids), fields: self.fields_in(kids) },
+            Rule::framing => {
+                let outside = std::mem::replace(&mut self.on_line, true);
+                let item = ItemKind::Framing { name: self.name_in(kids), fields: self.fields_in(kids) };
+                self.on_line = outside;
+                item
+            }
             Rule::incompatible => {
                 ItemKind::Incompatible { a: self.name_in(kids), b: self.name_in(kids), fields: self.fields_in(kids) }
             }

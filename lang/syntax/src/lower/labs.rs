@@ -213,12 +213,14 @@ impl Lower<'_> {
         let device = self.path_in(kids);
         let transport = self.name_in(kids);
         let args = self.args_in(kids);
+        let outside = std::mem::replace(&mut self.on_line, true);
         let wires = self.lines(
             kids.eat(Rule::wires),
             Rule::only_wire,
             |this, node, span| Wire { kind: this.wire(node), span },
             |_, _, span| Some(Wire { kind: WireKind::Error, span }),
         );
+        self.on_line = outside;
         ItemKind::Driver { name, device, transport, args, wires }
     }
 
@@ -241,6 +243,15 @@ impl Lower<'_> {
             Rule::wire_answers => WireKind::Answers {
                 asked: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
                 with: self.said(kids, span),
+            },
+            Rule::wire_hears => WireKind::Hears {
+                path: self.path_in(kids),
+                condition: self.while_in(kids),
+                text: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
+                every: self.expr_in(kids),
+            },
+            Rule::wire_ignores => WireKind::Ignores {
+                text: kids.eat(Rule::string).map(|s| self.pattern(&s)).unwrap_or_else(|| silence(span)),
             },
             Rule::wire_reading => WireKind::Reading {
                 path: self.path_in(kids),

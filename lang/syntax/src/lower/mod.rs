@@ -41,11 +41,22 @@ pub(super) struct Lower<'a> {
     base: usize,
     /// Inside a `test`, where `run` is a statement.
     in_test: bool,
+    /// Inside a driver or framing, where texts go over lines and `\x02` is a byte.
+    on_line: bool,
 }
 
 impl<'a> Lower<'a> {
     pub(super) fn new(file: FileId, text: &'a str, offsets: &'a Offsets) -> Self {
-        Lower { file, text, offsets, mistakes: Mistakes::new(file, text, offsets), depth: 0, base: 0, in_test: false }
+        Lower {
+            file,
+            text,
+            offsets,
+            mistakes: Mistakes::new(file, text, offsets),
+            depth: 0,
+            base: 0,
+            in_test: false,
+            on_line: false,
+        }
     }
 
     /// The tree, and what is wrong with the text in the order of the text.

@@ -10,7 +10,7 @@ use super::{
     },
     Lower,
 };
-use crate::ast::{Text, TextPart};
+use crate::ast::{Name, Text, TextPart};
 
 /// The deepest brackets inside a value of a text.
 const MAX_BRACKETS: usize = 32;
@@ -72,10 +72,15 @@ impl Lower<'_> {
 
     /// What stands between braces, at `start` of the file.
     fn value_part(&mut self, text: &str, start: usize) -> Option<TextPart> {
-        let (value, digits) = match text.rsplit_once(':').map(|(value, form)| (value, digits_of(form))) {
-            Some((value, Some(digits))) => (value, Some(digits)),
-            _ => (text, None),
+        let (value, form) = match form_at(text) {
+            Some(at) => (&text[..at], Some(&text[at + 1..])),
+            None => (text, None),
         };
+        let digits = form.and_then(digits_of);
+        let form = form.filter(|_| digits.is_none()).map(|form| {
+            let at = start + value.len() + 1 + form.len() - form.trim_start().len();
+            Name { text: form.trim().to_owned(), span: self.place(at, at + form.trim().len()) }
+        });
         if scan::depth(&scan::scan(value)).0 > MAX_BRACKETS {
             let span = self.place(start, start + value.len());
             self.report(
@@ -85,8 +90,26 @@ impl Lower<'_> {
             return None;
         }
         let value = self.piece(start, start + value.len())?;
-        Some(TextPart::Value { value, digits })
+        Some(TextPart::Value { value, digits, form })
     }
+}
+
+/// Where the form of a value begins: at the last colon outside brackets, but for those of paths.
+fn form_at(text: &str) -> Option<usize> {
+    let bytes = text.as_bytes();
+    let mut depth = 0_i32;
+    for (at, byte) in bytes.iter().enumerate().rev() {
+        match byte {
+            b')' | b']' => depth += 1,
+            b'(' | b'[' => depth -= 1,
+            b':' if depth == 0 => {
+                let doubled = bytes.get(at + 1) == Some(&b':') || at > 0 && bytes[at - 1] == b':';
+                return (!doubled && !text[at..].contains('"')).then_some(at);
+            }
+            _ => {}
+        }
+    }
+    None
 }
 
 /// `.1`: digits after the point.

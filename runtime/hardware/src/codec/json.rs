@@ -142,7 +142,7 @@ impl Json {
     pub(super) fn asked(&self, known: &Pattern, request: &str) -> bool {
         let piece = |slot: &Slot| match slot {
             Slot::Plain(text) => Some(Piece::Plain(text.clone())),
-            Slot::Number(_) | Slot::Any => None,
+            Slot::Number(..) | Slot::Word(_) | Slot::Skip(_) | Slot::Kept(_) | Slot::Any => None,
         };
         let pieces: Option<Vec<Piece>> = known.slots.iter().map(piece).collect();
         let template = pieces.map(|pieces| Template { pieces, span: known.span });
@@ -163,9 +163,8 @@ impl Json {
         template::found(&Template { pieces, ..Template::default() }, is)
     }
 
-    /// The server's end: an answer that looks like this, under new names where drivers keep some.
-    pub(super) fn rendered(&mut self, pattern: &Pattern, number: impl FnMut(&matterix_ir::Unit) -> String) -> String {
-        let text = pattern::rendered(pattern, number);
+    /// The server's end: an answer, under new names where drivers keep some.
+    pub(super) fn named(&mut self, text: &str) -> String {
         let mut out = String::with_capacity(text.len());
         for (i, word) in text.split(' ').enumerate() {
             out.push_str(if i > 0 { " " } else { "" });

@@ -38,6 +38,11 @@ impl Hardware<'_, '_> {
         Ok(())
     }
 
+    /// Devices were alone: what is to be repeated is said at once.
+    pub(super) fn forget_beats(&mut self) {
+        self.devices.iter_mut().for_each(|device| device.beats.fill(None));
+    }
+
     /// When something is due next, s.
     pub(super) fn next_beat(&mut self) -> f64 {
         let mut next = f64::INFINITY;
@@ -56,9 +61,12 @@ impl Hardware<'_, '_> {
 
     /// A command apart from the plan.
     fn serve(&mut self, device: usize, served: &Served, out: &mut dyn Listener) -> Result<(), Fault> {
-        let texts = self.texts(&served.exchange.sends);
+        let texts = self.texts(&served.exchange.sends)?;
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
+        if !self.is_live() && !self.is_dry() {
+            return self.replayed_fault().map_or(Ok(()), Err);
+        }
         self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
     }
 }

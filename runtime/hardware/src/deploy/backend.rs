@@ -1,9 +1,6 @@
 //! The backend that talks to devices. A twin goes along: it keeps what was commanded, checks what steps need, and supposes what
 //! no device tells. Time is the clock's; in a dry run it is the twin's, and nothing is sent.
 
-use std::sync::atomic::Ordering;
-use std::time::Duration;
-
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::{Leaves, NodeId, Op, Span, codes};
@@ -12,16 +9,15 @@ use matterix_runtime::exec::{Alarm, Listener};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Advance, Watch};
 
-use super::hardware::{Hardware, Running, address, wall};
-use super::journal::Entry;
+use super::control::Answer;
+use super::hardware::{Hardware, Running, address};
+use super::journal::{Entry, Gate};
 use super::preflight::carrier;
+use super::replay::Begun;
 use crate::link::Trouble;
 
 /// How often devices are asked whether they are ready, and quantities without a period of their own are asked for, s.
 const POLL: f64 = 0.25;
-
-/// Longest time in which nobody looks at the clock.
-const NAP: Duration = Duration::from_millis(10);
 
 impl Backend for Hardware<'_, '_> {
     fn now(&self) -> f64 {
@@ -78,9 +74,84 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        self.noted = None;
+        let begun = self.start_operation(operation, out);
+        begun.map_err(|fault| self.from_outside(fault))
+    }
+
+    fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+        self.noted = None;
+        let status = self.poll_operation(ticket, out);
+        status.map_err(|fault| self.from_outside(fault))
+    }
+
+    fn halt(&mut self, ticket: Ticket) {
+        if self.questions.remove(&ticket).is_some() {
+            self.settings.control.withdraw(ticket.0);
+        }
+        let Some(running) = self.running.remove(&ticket) else { return };
+        self.twin.halt(running.twin);
+        let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
+        if running.ready || !self.is_live() || self.unreached.is_some() {
+            return;
+        }
+        for exchange in &driver.halt {
+            let Ok(texts) = self.texts(&exchange.sends) else { continue };
+            // What goes wrong here ends what is ending already.
+            if let Err(trouble) = self.try_say(running.device, &texts, exchange.expects.as_ref()) {
+                self.trouble(running.device, &trouble, exchange.span);
+            }
+        }
+    }
+
+    fn admits(&mut self) -> bool {
+        match self.gate {
+            Gate::Go => true,
+            Gate::Pause => false,
+            Gate::Step => {
+                self.gate = Gate::Pause;
+                true
+            }
+        }
+    }
+
+    fn ask(&mut self, step: StepId, text: &str, out: &mut dyn Listener) -> Result<Option<Ticket>, Fault> {
+        if self.is_dry() {
+            return Ok(None);
+        }
+        let ticket = Ticket(self.tickets);
+        self.tickets += 1;
+        self.put(ticket, step, text.to_owned(), out)?;
+        Ok(Some(ticket))
+    }
+
+    fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
+        match self.answer(ticket)? {
+            Some(Answer { yes: false, who }) => {
+                // Who does not agree wants it to end.
+                self.settings.control.stop(&who);
+                Ok(false)
+            }
+            answer => Ok(answer.is_some()),
+        }
+    }
+
+    fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        self.noted = None;
+        let advance = self.pass(until, watches, out);
+        advance.map_err(|fault| self.from_outside(fault))
+    }
+}
+
+impl Hardware<'_, '_> {
+    fn start_operation(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         if self.refused.get() {
             let message = format!("`{}` is not said: it was refused to go on", operation.verb);
             return Err(self.fault(codes::JOURNAL_MISMATCH, Span::default(), message));
+        }
+        // What begins now begins where the clock is by now, on the twin too.
+        if self.next_entry().is_none() {
+            self.go_live(out)?;
         }
         let step = self.steps.get(&address(operation)).copied();
         let step =
@@ -97,17 +168,9 @@ impl Backend for Hardware<'_, '_> {
         };
         let driver = self.devices.get(device).and_then(|d| d.driver);
         let exchange = driver.and_then(|d| d.call(step));
-        let replayed = match exchange {
-            Some(_) => self.replayed_start(number, step, label)?,
-            None => None,
-        };
         let by_hand = exchange.is_none() && device != usize::MAX && !self.is_dry();
-        if by_hand && self.next_entry().is_none() {
-            let agreed = (self.settings.person)(&format!("please do this, then confirm: {label}"));
-            if !agreed {
-                let message = format!("nobody did `{label}`");
-                return Err(self.fault(codes::RUN_FAILED, program.plan.get(step).span, message));
-            }
+        if by_hand {
+            self.put(ticket, step, format!("please do this, then confirm: {label}"), out)?;
         }
         let graph = &self.program.model.graph;
         let heard = |n: &NodeId| graph.leaves(*n).meets(Leaves::READING);
@@ -116,19 +179,21 @@ impl Backend for Hardware<'_, '_> {
             self.eval(node, out)?;
         }
         // What is said goes by what was before: which tip is next, how much is in a syringe.
-        let texts = exchange.map(|e| self.texts(&e.sends)).unwrap_or_default();
+        let texts = exchange.map(|e| self.texts(&e.sends)).transpose()?.unwrap_or_default();
+        let replayed = match exchange {
+            Some(_) => self.replayed_start(number, step, label, &texts)?,
+            None => None,
+        };
         let twin = self.twin.start(operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
-            match replayed {
-                Some(outcome) => failed = outcome,
-                None => {
-                    self.go_live(out)?;
-                    self.beat(false, out)?;
-                    failed = self.begin(device, exchange, texts, operation, step, number)?;
-                    self.beat(true, out)?;
-                }
-            }
+            self.beat(false, out)?;
+            failed = match replayed {
+                Some(Begun::Told(outcome)) => outcome,
+                Some(Begun::Fault(fault)) => return Err(fault),
+                None => self.begin(device, exchange, texts, operation, step, number)?,
+            };
+            self.beat(true, out)?;
         }
         let until = exchange.and_then(|e| e.until.as_ref());
         let deadline = self.twin.now() + until.map_or(0.0, |u| self.twin.engine().eval(u.timeout));
@@ -145,15 +210,18 @@ impl Backend for Hardware<'_, '_> {
         if changed && failed.is_none() && ready && self.is_live() {
             self.read_back(device, &set, false)?;
         }
+        if let Some(fault) = self.replayed_fault() {
+            return Err(fault);
+        }
         if changed {
             self.commanded.extend(set);
         }
-        let running = Running { device, twin, exchange, deadline, ready, failed, changed };
+        let running = Running { device, twin, exchange, deadline, ready, failed, changed, by_hand };
         self.running.insert(ticket, running);
         Ok(ticket)
     }
 
-    fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
+    fn poll_operation(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         let now = self.twin.now();
         let Some(running) = self.running.get_mut(&ticket) else { return Ok(Status::Done) };
         let (device, twin, exchange) = (running.device, running.twin, running.exchange);
@@ -162,11 +230,30 @@ impl Backend for Hardware<'_, '_> {
             self.twin.halt(twin);
             return Ok(Status::Failed { name, text });
         }
+        if running.by_hand {
+            match self.answer(ticket)? {
+                None => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
+                Some(Answer { yes: true, .. }) => {}
+                Some(Answer { yes: false, who }) => {
+                    self.running.remove(&ticket);
+                    self.twin.halt(twin);
+                    return Ok(Status::Failed { name: "refused".to_owned(), text: Answer::refusal(&who) });
+                }
+            }
+            if let Some(running) = self.running.get_mut(&ticket) {
+                running.by_hand = false;
+            }
+            return self.poll_operation(ticket, out);
+        }
         if let (false, Some(exchange), Some(until)) = (running.ready, exchange, exchange.and_then(|e| e.until.as_ref()))
         {
             let deadline = running.deadline;
-            match self.next_entry() {
-                Some(Entry::Ended { ticket: before, failed, .. }) if before == ticket.0 => {
+            let next = self.next_entry();
+            if let Some(fault) = self.replayed_fault() {
+                return Err(fault);
+            }
+            match next {
+                Some(Entry::Ended { t, ticket: before, failed }) if before == ticket.0 && t <= now => {
                     self.replay.pop_front();
                     if let Some((name, text)) = failed {
                         self.running.remove(&ticket);
@@ -177,8 +264,8 @@ impl Backend for Hardware<'_, '_> {
                 Some(_) => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
                 None => {
                     self.go_live(out)?;
-                    let text = self.texts(std::slice::from_ref(&until.asks)).concat();
-                    let asked = self.over(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
+                    let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
+                    let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {
                         Ok(true) => self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?,
                         Ok(false) if now >= deadline => {
@@ -210,74 +297,11 @@ impl Backend for Hardware<'_, '_> {
                 {
                     self.read_back(device, &[], true)?;
                 }
+                if let Some(fault) = self.replayed_fault() {
+                    return Err(fault);
+                }
                 Ok(ended)
             }
         }
-    }
-
-    fn halt(&mut self, ticket: Ticket) {
-        let Some(running) = self.running.remove(&ticket) else { return };
-        self.twin.halt(running.twin);
-        let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
-        if running.ready || !self.is_live() || self.unreached.is_some() {
-            return;
-        }
-        for exchange in &driver.halt {
-            let texts = self.texts(&exchange.sends);
-            // What goes wrong here ends what is ending already.
-            if let Err(trouble) = self.try_say(running.device, &texts, exchange.expects.as_ref()) {
-                self.trouble(running.device, &trouble, exchange.span);
-            }
-        }
-    }
-
-    fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
-        match self.next_entry() {
-            Some(Entry::Time { t, fired, .. }) => {
-                self.replay.pop_front();
-                let mut broken = Vec::new();
-                loop {
-                    if let Advance::Broken(limits) = self.twin.advance(t, &[], out)? {
-                        broken.extend(limits);
-                    } else if self.twin.now() >= t {
-                        break;
-                    }
-                }
-                if !broken.is_empty() {
-                    return Ok(Advance::Broken(broken));
-                }
-                return Ok(if fired.is_empty() && t >= until { Advance::Reached } else { Advance::Watch(fired) });
-            }
-            Some(other) => return Err(self.mismatch("time passes", &other)),
-            None => {}
-        }
-        self.go_live(out)?;
-        let outcome = loop {
-            let now = self.twin.now();
-            let clock = if self.is_dry() { f64::INFINITY } else { self.clock() };
-            let target = until.min(clock).min(self.next_beat()).max(now);
-            match self.twin.advance(target, watches, out)? {
-                Advance::Reached => {}
-                stopped => break stopped,
-            }
-            self.beat(true, out)?;
-            if self.twin.now() >= until {
-                break Advance::Reached;
-            }
-            if self.settings.cancel.load(Ordering::Relaxed) && !self.cancelled {
-                self.cancelled = true;
-                break Advance::Watch(Vec::new());
-            }
-            if !self.is_dry() && self.twin.now() >= self.clock() {
-                let left = Duration::try_from_secs_f64((until - self.twin.now()) / self.settings.speed);
-                std::thread::sleep(left.unwrap_or(NAP).min(NAP));
-            }
-        };
-        let fired = match &outcome {
-            Advance::Watch(fired) => fired.clone(),
-            Advance::Reached | Advance::Broken(_) => Vec::new(),
-        };
-        self.journal.note(&Entry::Time { t: self.twin.now(), fired, wall: wall() });
-        Ok(outcome)
     }
 }

@@ -104,17 +104,28 @@ pub(super) struct Ear<'e, 't> {
     pub trace: &'e mut Trace<'t>,
     pub cancel: &'e AtomicBool,
     pub securing: bool,
+    /// What went over the line and is written down only if it made no sense: an answer that does is noted as what it tells.
+    pub unsaid: Option<Vec<Entry>>,
+}
+
+impl Ear<'_, '_> {
+    fn note(&mut self, entry: Entry) {
+        match &mut self.unsaid {
+            Some(unsaid) => unsaid.push(entry),
+            None => self.journal.note(&entry),
+        }
+    }
 }
 
 impl Overhear for Ear<'_, '_> {
     fn out(&mut self, bytes: &[u8]) {
         (self.trace)(self.time, self.device, true, bytes);
-        self.journal.note(&Entry::Out { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
+        self.note(Entry::Out { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
     }
 
     fn back(&mut self, bytes: &[u8]) {
         (self.trace)(self.time, self.device, false, bytes);
-        self.journal.note(&Entry::Back { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
+        self.note(Entry::Back { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });
     }
 
     fn kept(&mut self, word: &str, text: &str) {

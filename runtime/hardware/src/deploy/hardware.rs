@@ -1,8 +1,9 @@
 //! Devices, their twin and the clock, as they are while a plan is carried out.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::wire::Exchange;
@@ -11,11 +12,14 @@ use matterix_runtime::backend::{Backend, Sim, Ticket};
 use matterix_runtime::fault::Fault;
 
 use super::Trace;
+use super::control::Control;
 use super::device::Device;
 use super::exposed::Exposed;
-use super::journal::{Entry, Journal};
+use super::journal::{Entry, Gate, Journal, sha256};
 use super::observe::Observed;
 use crate::link::Trouble;
+use crate::shared::Shared;
+use crate::world::World;
 
 /// What a deployment does with devices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,6 +30,8 @@ pub enum Mode {
     Real,
     /// Devices do it, and what they tell is held against the twin.
     Shadow,
+    /// Nothing is sent: what a journal says is gone through again.
+    Replay,
 }
 
 /// What a deployment is given.
@@ -34,10 +40,12 @@ pub struct Settings<'t> {
     pub mode: Mode,
     /// Seconds of lab time per second: 1, unless all devices are emulators as fast.
     pub speed: f64,
-    /// Set to end it early.
-    pub cancel: &'t AtomicBool,
-    /// Asks a person; false where they say no.
-    pub person: &'t dyn Fn(&str) -> bool,
+    /// What people say meanwhile.
+    pub control: &'t Control,
+    /// Set when the plan is to end early.
+    pub ended: &'t AtomicBool,
+    /// Clocks and ports.
+    pub world: Rc<dyn World>,
     /// Kept up to date with what is told to devices.
     pub exposed: &'t Exposed,
 }
@@ -64,6 +72,8 @@ pub(super) struct Running<'m> {
     pub(super) failed: Option<(String, String)>,
     /// What it sets, for reading it back.
     pub(super) changed: bool,
+    /// A person does it, and has not confirmed yet.
+    pub(super) by_hand: bool,
 }
 
 /// Devices, their twin and the clock.
@@ -76,10 +86,20 @@ pub struct Hardware<'m, 't> {
     pub(super) settings: Settings<'t>,
     pub(super) journal: Journal,
     pub(super) trace: Box<Trace<'t>>,
+    /// When the journal that is gone through again ends, s.
+    pub(super) ends_at: f64,
     /// What an earlier process wrote, as far as it has not been gone through again.
     pub(super) replay: VecDeque<Entry>,
     /// Lab time and the clock at one moment.
-    pub(super) origin: (f64, Instant),
+    pub(super) origin: (f64, Duration),
+    /// When the journal last said what the clock shows, s since 1970.
+    pub(super) dated: f64,
+    /// What may begin.
+    pub(super) gate: Gate,
+    /// Answers that were waiting when it was last looked; while a journal is gone through, lines that were left then.
+    pub(super) answers: usize,
+    /// Questions that are open, as they were put.
+    pub(super) questions: BTreeMap<Ticket, String>,
     /// An earlier process is followed, and devices have not been asked yet.
     pub(super) resuming: bool,
     /// It was refused to go on: what is there is not known well enough for anything but making it safe.
@@ -88,8 +108,10 @@ pub struct Hardware<'m, 't> {
     pub(super) unreached: Option<Unreached>,
     /// Devices are being made safe.
     pub(super) securing: bool,
-    /// When it was cut off, s since 1970.
-    pub(super) left_at: f64,
+    /// Devices that have been.
+    pub(super) made_safe: Vec<usize>,
+    /// Lab time and s since 1970 when it is last known that somebody looked after devices.
+    pub(super) left_at: (f64, f64),
     /// What answers to an earlier process said: the device whose line it was, the word, the text.
     pub(super) kept: Vec<(usize, String, String)>,
     /// States that devices were told.
@@ -99,13 +121,20 @@ pub struct Hardware<'m, 't> {
     /// What was told at this instant.
     pub(super) fresh: BTreeMap<NodeId, (f64, f64)>,
     pub(super) cancelled: bool,
+    /// Who goes on after a journal.
+    pub(super) who: String,
+    /// The device whose line was lost last, until that is noted.
+    pub(super) losing: Option<String>,
+    /// The last fault that was noted.
+    pub(super) noted: Option<String>,
+    /// The lab time that the clock had come to when a journal was gone on with, s.
+    pub(super) caught_up: Option<f64>,
     /// The step of each operation, by where it stands in memory.
     pub(super) steps: BTreeMap<usize, StepId>,
 }
 
 impl<'m, 't> Hardware<'m, 't> {
     /// Devices whose lines are not open yet, with a twin that has been started.
-    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
     pub fn new(
         program: &'m Program,
         sources: &'m Sources,
@@ -125,6 +154,8 @@ impl<'m, 't> Hardware<'m, 't> {
             Step::Operation(operation) => Some((address(operation), StepId(i as u32))),
             _ => None,
         });
+        let settings = Settings { world: Rc::new(Shared::new(settings.world)), ..settings };
+        let origin = (0.0, settings.world.elapsed());
         Hardware {
             observed: Observed::new(&program.model, told),
             steps: steps.collect(),
@@ -135,19 +166,29 @@ impl<'m, 't> Hardware<'m, 't> {
             settings,
             journal,
             trace,
+            ends_at: f64::INFINITY,
             replay: VecDeque::new(),
             resuming: false,
             refused: std::cell::Cell::new(false),
             unreached: None,
             securing: false,
-            left_at: 0.0,
+            made_safe: Vec::new(),
+            left_at: (0.0, 0.0),
             kept: Vec::new(),
             commanded: BTreeSet::new(),
-            origin: (0.0, Instant::now()),
+            origin,
+            dated: f64::NEG_INFINITY,
+            gate: Gate::Go,
+            answers: 0,
+            questions: BTreeMap::new(),
             running: BTreeMap::new(),
             tickets: 0,
             fresh: BTreeMap::new(),
             cancelled: false,
+            who: String::new(),
+            losing: None,
+            noted: None,
+            caught_up: None,
         }
     }
 
@@ -159,6 +200,11 @@ impl<'m, 't> Hardware<'m, 't> {
     /// The device that did not answer when a journal was to be gone on with: nothing was said to any, and nothing may be.
     pub fn unreached(&self) -> Option<&Unreached> {
         self.unreached.as_ref()
+    }
+
+    /// Whether a person has ended it.
+    pub fn is_stopped(&self) -> bool {
+        self.settings.control.is_stopped()
     }
 
     /// The twin.
@@ -183,11 +229,16 @@ impl<'m, 't> Hardware<'m, 't> {
 
     /// Whether what an earlier process wrote has been gone through, and devices have been asked since.
     pub(super) fn is_live(&self) -> bool {
-        self.replay.is_empty() && !self.resuming
+        self.replay.is_empty() && !self.resuming && self.settings.mode != Mode::Replay
     }
 
     pub(super) fn is_dry(&self) -> bool {
         self.settings.mode == Mode::Dry
+    }
+
+    /// Whether anything goes over lines.
+    pub(super) fn speaks(&self) -> bool {
+        !matches!(self.settings.mode, Mode::Dry | Mode::Replay)
     }
 
     pub(super) fn fault(&self, code: Code, span: Span, message: String) -> Fault {
@@ -199,11 +250,13 @@ impl<'m, 't> Hardware<'m, 't> {
         let code = match trouble {
             Trouble::Lost(_) => codes::DEVICE_LOST,
             Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+            Trouble::Unsaid(_) => codes::UNSENDABLE,
             Trouble::Refused { .. } => codes::DEVICE_REFUSED,
         };
         if matches!(trouble, Trouble::Lost(_)) {
             let line = self.line_of(device);
             self.devices[line].lost = Some(trouble.text().to_owned());
+            self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
                 self.kept.extend(link.kept().into_iter().map(|(word, text)| (line, word, text)));
             }
@@ -216,19 +269,40 @@ impl<'m, 't> Hardware<'m, 't> {
         self.journal.keep(entry).map_err(|why| self.fault(codes::JOURNAL_MISMATCH, Span::default(), why))
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+    /// Lab time by the clock, s.
     pub(super) fn clock(&self) -> f64 {
-        self.origin.0 + self.origin.1.elapsed().as_secs_f64() * self.settings.speed
+        let passed = self.settings.world.elapsed().saturating_sub(self.origin.1);
+        self.origin.0 + passed.as_secs_f64() * self.settings.speed
+    }
+
+    /// s since 1970.
+    pub(super) fn wall(&self) -> f64 {
+        self.settings.world.wall()
+    }
+
+    /// A fault that came from outside: whoever replays the journal meets it again.
+    pub(super) fn from_outside(&mut self, fault: Fault) -> Fault {
+        let is_theirs = matches!(
+            fault.code,
+            codes::DEVICE_LOST | codes::DEVICE_GARBLED | codes::DEVICE_REFUSED | codes::DIVERGED | codes::RUN_FAILED
+        );
+        if is_theirs && self.is_live() && !self.is_dry() && self.noted.as_ref() != Some(&fault.message) {
+            let (t, code, text) = (self.twin.now(), fault.code.name.to_owned(), fault.message.clone());
+            self.noted = Some(fault.message.clone());
+            let lost = self.losing.take();
+            self.journal.note(&Entry::Fault { t, lost, code, text });
+        }
+        fault
+    }
+
+    /// Digest of the states of the twin, to the last bit.
+    pub(super) fn states(&mut self) -> String {
+        let states = self.twin.engine().states();
+        sha256(&states.iter().flat_map(|state| state.to_bits().to_le_bytes()).collect::<Vec<u8>>())
     }
 }
 
 /// Where an operation stands in memory.
 pub(super) fn address(operation: &Operation) -> usize {
     std::ptr::from_ref(operation) as usize
-}
-
-/// s since 1970.
-#[allow(clippy::disallowed_methods, reason = "a journal says when things were done")]
-pub(super) fn wall() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
 }

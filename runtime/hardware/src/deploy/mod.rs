@@ -2,22 +2,29 @@
 
 mod alive;
 mod backend;
+mod control;
+mod course;
 mod device;
 mod exposed;
 mod hardware;
 mod journal;
 mod observe;
+mod pace;
+mod people;
 mod preflight;
 mod replay;
+mod resume;
 mod sense;
 mod speak;
 mod unbound;
 mod values;
 
+pub use control::{Answer, Control};
+pub use course::{Course, Ending, Kept, carry_out, not_opened, not_reached, of_fault, unsafe_left};
 pub use device::{Binding, Carrier, Device};
 pub use exposed::Exposed;
 pub use hardware::{Hardware, Mode, Settings, Unreached};
-pub use journal::{Entry, Journal, JournalError, digest};
+pub use journal::{Chain, Entry, Gate, Journal, JournalError, Paper, Past, VERSION, digest, read, sha256};
 pub use preflight::preflight;
 
 /// Told of every frame: lab time in s, the device, whether it goes out, the bytes.

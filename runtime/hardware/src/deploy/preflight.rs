@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::codes::Code;
+use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Program, Span, codes};
@@ -56,6 +57,28 @@ fn judged(node: &PlanStep) -> Vec<(NodeId, Span, &str)> {
         Step::Let { value, .. } => vec![(*value, node.span, &node.label)],
         _ => Vec::new(),
     }
+}
+
+/// What devices are asked for in the course of a plan: nodes that a driver has a reading of.
+pub(super) fn asked_for(program: &Program, observed: &Observed) -> BTreeSet<NodeId> {
+    let nodes = reachable(&program.plan).into_iter().flat_map(|(id, _)| looked_at(program.plan.get(id)));
+    nodes.flat_map(|node| observed.asks(&program.model, node).0).collect()
+}
+
+/// The nodes whose values a step asks for.
+fn looked_at(node: &PlanStep) -> Vec<NodeId> {
+    let judged = judged(node).into_iter().map(|(node, ..)| node);
+    let more: Vec<NodeId> = match &node.step {
+        Step::Expect(conditions) => conditions.iter().map(|c| c.node).collect(),
+        Step::Record { value, .. } => value.clone(),
+        Step::Note(text) | Step::Ask(text) | Step::Fail { text, .. } => text.nodes().collect(),
+        Step::Operation(operation) => {
+            let needs = operation.needs.iter().map(|c| c.node);
+            needs.chain(operation.at_start.iter().chain(&operation.at_end).map(Action::source)).collect()
+        }
+        _ => Vec::new(),
+    };
+    judged.chain(more).collect()
 }
 
 /// The device that carries out an operation.

@@ -2,6 +2,7 @@
 
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::quantity::show_number;
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
@@ -9,21 +10,37 @@ use matterix_runtime::fault::Fault;
 use super::hardware::Hardware;
 use super::journal::Entry;
 
+/// What became of an operation that an earlier process began.
+pub(super) enum Begun {
+    /// Its device was told, or refused: the failure and what it says.
+    Told(Option<(String, String)>),
+    /// It could not be told.
+    Fault(Fault),
+}
+
 impl Hardware<'_, '_> {
-    /// The next line of the earlier process that says what came from outside.
+    /// The next line of the earlier process that says what came from outside. Where it was gone on with in between, the lab has
+    /// come to the time of that.
     pub(super) fn next_entry(&mut self) -> Option<Entry> {
+        while let Some(Entry::Resumed { t, .. }) = self.front() {
+            self.replay.pop_front();
+            while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
+            self.forget_beats();
+        }
+        self.front()
+    }
+
+    /// The next line that matters to the plan, wherever the lab is by then.
+    pub(super) fn front(&mut self) -> Option<Entry> {
         while let Some(entry) = self.replay.front() {
             match entry {
-                Entry::Resumed { t, .. } => {
-                    let t = *t;
-                    while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
-                    self.replay.pop_front();
-                }
                 Entry::Opened { .. }
+                | Entry::Clock { .. }
                 | Entry::Kept { .. }
                 | Entry::Out { .. }
                 | Entry::Back { .. }
                 | Entry::Begin { .. }
+                | Entry::Safe { .. }
                 | Entry::End { .. } => {
                     self.replay.pop_front();
                 }
@@ -31,6 +48,20 @@ impl Hardware<'_, '_> {
             }
         }
         None
+    }
+
+    /// The fault that the earlier process met at this moment.
+    pub(super) fn replayed_fault(&mut self) -> Option<Fault> {
+        let Some(Entry::Fault { t, lost, code, text }) = self.front() else { return None };
+        if t > self.twin.now() {
+            return None;
+        }
+        self.replay.pop_front();
+        if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
+            device.lost = Some(text.clone());
+        }
+        let code = codes::find(&code).unwrap_or(codes::RUN_FAILED);
+        Some(self.fault(code, Span::default(), text))
     }
 
     pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
@@ -54,24 +85,37 @@ impl Hardware<'_, '_> {
         ticket: u64,
         step: StepId,
         label: &str,
-    ) -> Result<Option<Option<(String, String)>>, Fault> {
+        texts: &[String],
+    ) -> Result<Option<Begun>, Fault> {
         let Some(entry) = self.next_entry() else { return Ok(None) };
-        let Entry::Starting { ticket: before, step: at, sends, device, .. } = &entry else {
-            return Err(self.mismatch(&format!("`{label}` begins"), &entry));
+        if let Some(fault) = self.replayed_fault() {
+            return Err(fault);
+        }
+        let begins = format!("`{label}` begins at {} s", show_number(self.twin.now()));
+        let Entry::Starting { t, ticket: before, step: at, sends, device, .. } = &entry else {
+            return Err(self.mismatch(&begins, &entry));
         };
-        if *before != ticket || *at != step.0 {
-            return Err(self.mismatch(&format!("`{label}` begins"), &entry));
+        if *before != ticket || *at != step.0 || *t != self.twin.now() {
+            return Err(self.mismatch(&begins, &entry));
+        }
+        if sends != texts {
+            let sends = texts.join("`, `");
+            return Err(self.mismatch(&format!("`{label}` sends `{sends}`"), &entry));
         }
         let (sends, device) = (sends.clone(), device.clone());
         self.replay.pop_front();
-        match self.next_entry() {
+        let next = self.next_entry();
+        if let Some(fault) = self.replayed_fault() {
+            return Ok(Some(Begun::Fault(fault)));
+        }
+        match next {
             Some(Entry::Started { ticket: t, .. }) if t == ticket => {
                 self.replay.pop_front();
-                Ok(Some(None))
+                Ok(Some(Begun::Told(None)))
             }
             Some(Entry::Ended { ticket: t, failed, .. }) if t == ticket => {
                 self.replay.pop_front();
-                Ok(Some(failed))
+                Ok(Some(Begun::Told(failed)))
             }
             None => {
                 // It was cut off while this was being said: said once more only where that changes nothing.

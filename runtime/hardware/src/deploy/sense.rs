@@ -1,15 +1,12 @@
 //! Opening lines, holding what devices tell against the twin, going on after a journal, and leaving devices safe.
 
-use std::sync::atomic::Ordering;
-
-use matterix_ir::wire::{Driver, Exchange};
+use matterix_ir::wire::{Driver, Exchange, Piece, Slot};
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::Backend;
-use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
 use super::device::Carrier;
-use super::hardware::{Hardware, Mode, Unreached, wall};
+use super::hardware::{Hardware, Mode, Unreached};
 use super::journal::Entry;
 use crate::link::{self, Line, Trouble};
 use crate::place::Place;
@@ -22,7 +19,7 @@ impl Hardware<'_, '_> {
     pub fn connect(&mut self) -> Vec<Unreached> {
         let mut unreached = Vec::new();
         for index in 0..self.devices.len() {
-            let Some(driver) = self.devices[index].driver.filter(|_| !self.is_dry()) else { continue };
+            let Some(driver) = self.devices[index].driver.filter(|_| self.speaks()) else { continue };
             let Carrier::Line { place, address, .. } = self.devices[index].binding.carrier.clone() else { continue };
             match self.linked(index, driver, &place, address.as_deref()) {
                 Ok(link) => self.devices[index].link = Some(link),
@@ -32,7 +29,7 @@ impl Hardware<'_, '_> {
         unreached
     }
 
-    fn not_reached(&self, index: usize, trouble: Trouble) -> Unreached {
+    pub(super) fn not_reached(&self, index: usize, trouble: Trouble) -> Unreached {
         let device = &self.devices[index];
         Unreached { device: device.name.to_owned(), at: device.binding.at, trouble }
     }
@@ -46,26 +43,27 @@ impl Hardware<'_, '_> {
             }
         }
         self.set_clock();
-        let t = self.twin.now();
-        self.keep(&Entry::Opened { t }).map_err(|fault| (fault, Span::default()))
+        let (t, wall) = (self.twin.now(), self.wall());
+        self.dated = wall;
+        self.keep(&Entry::Opened { t, wall }).map_err(|fault| (fault, Span::default()))
     }
 
     fn first(&mut self, index: usize, exchange: &Exchange) -> Result<(), Fault> {
-        let texts = self.texts(&exchange.sends);
+        let texts = self.texts(&exchange.sends)?;
         self.say(index, &texts, exchange.expects.as_ref(), exchange.span)?;
         let Some(until) = exchange.until.as_ref().filter(|_| !self.is_dry()) else { return Ok(()) };
-        let text = self.texts(std::slice::from_ref(&until.asks)).concat();
+        let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
         let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
         for _ in 0..tries {
             let asked = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
             if asked.map_err(|trouble| self.trouble(index, &trouble, exchange.span))? {
                 return Ok(());
             }
-            if self.settings.cancel.load(Ordering::Relaxed) {
+            if self.settings.control.is_stopped() {
                 let message = format!("`{}` was not waited for: it was stopped by a person", self.devices[index].name);
                 return Err(self.fault(codes::RUN_FAILED, exchange.span, message));
             }
-            std::thread::sleep(std::time::Duration::from_millis(100));
+            self.settings.world.sleep(std::time::Duration::from_millis(100));
         }
         let message = format!("`{}` was not ready in time", self.devices[index].name);
         Err(self.fault(codes::DEVICE_LOST, exchange.span, message))
@@ -79,140 +77,53 @@ impl Hardware<'_, '_> {
         place: &Place,
         address: Option<&str>,
     ) -> Result<Box<dyn Line>, Trouble> {
-        let mut link = link::open(place, driver, address)?;
+        let mut link = link::open(&self.settings.world, place, driver, address)?;
         for (_, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
             link.keep(word.clone(), text.clone());
         }
         Ok(link)
     }
 
-    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
     pub(super) fn set_clock(&mut self) {
-        self.origin = (self.twin.now(), std::time::Instant::now());
-    }
-
-    /// Goes through what an earlier process wrote before anything is said.
-    pub fn follow_journal(&mut self, entries: Vec<Entry>) {
-        let last = entries.iter().rev().find_map(|e| match e {
-            Entry::Time { wall, .. } | Entry::Resumed { wall, .. } | Entry::Begin { wall, .. } => Some(*wall),
-            _ => None,
-        });
-        for entry in &entries {
-            let Entry::Kept { device, word, text, .. } = entry else { continue };
-            if let Some(index) = self.devices.iter().position(|d| d.name == device) {
-                self.kept.push((self.line_of(index), word.clone(), text.clone()));
-            }
-        }
-        self.left_at = last.unwrap_or_else(wall);
-        for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
-            device.said = true;
-            self.settings.exposed.told(device.name);
-        }
-        self.replay = entries.into();
-        self.resuming = true;
-    }
-
-    /// From what was written to what is: the twin catches up with the clock, devices are asked, and must agree.
-    pub(super) fn go_live(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
-        if !std::mem::take(&mut self.resuming) {
-            return Ok(());
-        }
-        self.catch_up(out).map_err(|fault| {
-            self.refused.set(true);
-            if self.unreached.is_some() {
-                self.journal.seal();
-            }
-            let code = if fault.code == codes::DIVERGED { codes::JOURNAL_MISMATCH } else { fault.code };
-            Fault { code, ..fault }
-        })
-    }
-
-    fn catch_up(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
-        let away = (wall() - self.left_at).max(0.0) * self.settings.speed;
-        for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver else { continue };
-            for alive in &driver.alive {
-                let every = self.twin.engine().eval(alive.every);
-                if self.twin.engine().eval(alive.condition) != 0.0 && away > every {
-                    let name = self.devices[device].name;
-                    let message = format!(
-                        "nothing was said to `{name}` for {} s, while its driver says something every {} s so that it goes on",
-                        matterix_ir::quantity::show_number(away),
-                        matterix_ir::quantity::show_number(every)
-                    );
-                    let mut fault = self.fault(codes::JOURNAL_MISMATCH, driver.span, message);
-                    fault.help.push("its watchdog may have stopped it: begin anew".to_owned());
-                    return Err(fault);
-                }
-            }
-        }
-        let then = self.twin.now() + away;
-        while self.twin.now() < then {
-            self.twin.advance(then, &[], out)?;
-        }
-        self.set_clock();
-        for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver else { continue };
-            for (line, told) in driver.told.iter().enumerate() {
-                let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
-                if !holds {
-                    continue;
-                }
-                let value = match self.tell(device, line) {
-                    Err(fault) if fault.code == codes::DEVICE_LOST => {
-                        let why = self.devices[self.line_of(device)].lost.clone();
-                        let trouble = Trouble::Lost(why.unwrap_or_else(|| fault.message.clone()));
-                        self.unreached = Some(self.not_reached(device, trouble));
-                        return Err(fault);
-                    }
-                    told => told?,
-                };
-                if told.state.is_some_and(|s| !self.commanded.contains(&s)) {
-                    continue;
-                }
-                if told.reading.is_none()
-                    && self.observed.is_settled(&self.program.model, told.value)
-                    && !self.is_busy(device)
-                {
-                    self.settled(device, line, value)?;
-                } else {
-                    self.held_against(device, line, value)?;
-                }
-            }
-        }
-        // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
-        let (t, wall) = (self.twin.now(), wall());
-        self.keep(&Entry::Resumed { t, wall })
+        self.origin = (self.twin.now(), self.settings.world.elapsed());
     }
 
     /// What is told of what was commanded must be that.
     pub(super) fn settled(&mut self, device: usize, line: usize, value: f64) -> Result<(), Fault> {
         let Some(told) = self.devices[device].driver.and_then(|d| d.told.get(line)) else { return Ok(()) };
         let wanted = self.twin.engine().eval(told.value);
-        let unit = told.expects.slots.iter().find_map(|s| match s {
-            matterix_ir::wire::Slot::Number(unit) => Some(unit),
-            _ => None,
-        });
-        let Some(unit) = unit else { return Ok(()) };
-        let step = 10f64.powi(-i32::from(self.digits_sent(device, unit)));
+        let one = matterix_ir::Unit::one();
+        let (unit, step) = told
+            .expects
+            .slots
+            .iter()
+            .find_map(|s| match s {
+                Slot::Number(unit, form) => {
+                    Some((unit, form.step(unit.of_si(wanted)).max(self.step_sent(device, unit, wanted))))
+                }
+                Slot::Word(_) => Some((&one, 1.0)),
+                _ => None,
+            })
+            .unwrap_or((&one, 0.0));
         if (unit.of_si(value) - unit.of_si(wanted)).abs() <= ROUNDING * step {
             return Ok(());
         }
-        let (name, is, was) = (&told.name, unit.show(value), unit.show(wanted));
+        let (name, is, was) = (&told.name, told.show(value), told.show(wanted));
         let message = format!("`{name}` is {is} on the device, not {was} as it was told");
         let span = told.span;
         Err(self.fault(codes::DIVERGED, span, message))
     }
 
-    /// Digits after the point with which a device is sent numbers in this unit.
-    fn digits_sent(&self, device: usize, unit: &matterix_ir::Unit) -> u8 {
+    /// How far apart two numbers near this one are, SI, that a device is sent in this unit: the finest of all forms; 1 where it is
+    /// sent none.
+    fn step_sent(&self, device: usize, unit: &matterix_ir::Unit, near: f64) -> f64 {
         let calls = self.devices[device].driver.into_iter().flat_map(|d| &d.calls);
         let pieces = calls.flat_map(|(_, e)| &e.sends).flat_map(|t| &t.pieces);
-        let digits = pieces.filter_map(|p| match p {
-            matterix_ir::wire::Piece::Number { unit: sent, digits, .. } if sent.symbol == unit.symbol => *digits,
+        let steps = pieces.filter_map(|p| match p {
+            Piece::Number { unit: sent, form, .. } if sent.symbol == unit.symbol => Some(form.step(unit.of_si(near))),
             _ => None,
         });
-        digits.max().unwrap_or(0)
+        steps.fold(f64::INFINITY, f64::min).min(1.0)
     }
 
     /// Where devices are shadowed, what is told may not be far from what the twin supposes.
@@ -220,7 +131,7 @@ impl Hardware<'_, '_> {
         if self.settings.mode == Mode::Shadow { self.held_against(device, line, value) } else { Ok(()) }
     }
 
-    fn held_against(&mut self, device: usize, line: usize, value: f64) -> Result<(), Fault> {
+    pub(super) fn held_against(&mut self, device: usize, line: usize, value: f64) -> Result<(), Fault> {
         let Some(told) = self.devices[device].driver.and_then(|d| d.told.get(line)) else { return Ok(()) };
         let member = told.name.strip_prefix(self.devices[device].name).unwrap_or(&told.name).trim_start_matches('.');
         let tolerance = self.devices[device].binding.tolerances.iter().find(|(m, _)| m == member).map(|(_, t)| *t);
@@ -241,6 +152,23 @@ impl Hardware<'_, '_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Nothing is gone on with: devices may be as an earlier process has left them. Whether there are any behind lines.
+    pub fn abandon(&mut self) -> bool {
+        if matches!(self.settings.mode, Mode::Dry | Mode::Replay) {
+            return false;
+        }
+        for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
+            device.said = true;
+            self.settings.exposed.told(device.name);
+        }
+        true
+    }
+
+    /// The names of the devices that have been made safe.
+    pub fn secured(&self) -> Vec<String> {
+        self.made_safe.iter().map(|index| format!("`{}`", self.devices[*index].name)).collect()
     }
 
     /// After a run that did not end well: every device to which something was said is told what makes it safe, whatever became
@@ -265,7 +193,13 @@ impl Hardware<'_, '_> {
             let before = troubles.len();
             let at = self.devices[index].binding.at;
             for exchange in &driver.safe {
-                let texts = self.texts(&exchange.sends);
+                let texts = match self.texts(&exchange.sends) {
+                    Ok(texts) => texts,
+                    Err(fault) => {
+                        troubles.push((at, fault.message));
+                        break;
+                    }
+                };
                 if self.devices[line].link.as_ref().is_some_and(|link| link.lacks(&texts)) {
                     continue;
                 }
@@ -275,6 +209,7 @@ impl Hardware<'_, '_> {
                 }
             }
             if troubles.len() == before {
+                self.made_safe.push(index);
                 self.settings.exposed.safe(self.devices[line].name);
             }
         }
@@ -291,23 +226,11 @@ impl Hardware<'_, '_> {
             };
             for exchange in &driver.close {
                 let texts = self.texts(&exchange.sends);
-                let said = self.say(index, &texts, exchange.expects.as_ref(), exchange.span);
+                let said = texts.and_then(|t| self.say(index, &t, exchange.expects.as_ref(), exchange.span));
                 first = first.and(said.map(|_| ()));
             }
             self.devices[index].link = None;
         }
         first
-    }
-
-    /// The first line of a journal.
-    pub fn begin_journal(&mut self, digest: &str) -> Result<(), Fault> {
-        let (digest, workflow, speed) = (digest.to_owned(), self.program.plan.workflow.clone(), self.settings.speed);
-        self.keep(&Entry::Begin { version: super::journal::VERSION, digest, workflow, wall: wall(), speed })
-    }
-
-    /// The last line of a journal.
-    pub fn end_journal(&mut self, status: &str) -> Result<(), Fault> {
-        let t = self.twin.now();
-        self.keep(&Entry::End { t, status: status.to_owned() })
     }
 }

@@ -7,15 +7,18 @@ use matterix_runtime::backend::Backend;
 use matterix_runtime::fault::Fault;
 
 use super::device::Ear;
-use super::hardware::Hardware;
+use super::hardware::{Hardware, Mode};
 use super::journal::Entry;
 use crate::link::{Line, Overhear, Trouble};
 use crate::template;
 
 impl<'m> Hardware<'m, '_> {
-    pub(super) fn texts(&mut self, sends: &[Template]) -> Vec<String> {
+    /// Messages with the values that they have now; a fault where one does not fit its form.
+    pub(super) fn texts(&mut self, sends: &[Template]) -> Result<Vec<String>, Fault> {
         let engine = self.twin.engine();
-        sends.iter().map(|t| template::filled(t, |n| Some(engine.eval(n))).unwrap_or_default()).collect()
+        let filled = |t: &Template| template::filled(t, |n| Some(engine.eval(n))).map_err(|why| (t.span, why));
+        let texts: Result<_, _> = sends.iter().map(filled).collect();
+        texts.map_err(|(span, why)| self.fault(codes::UNSENDABLE, span, why))
     }
 
     /// Says commands to a device.
@@ -37,7 +40,7 @@ impl<'m> Hardware<'m, '_> {
     ) -> Result<Vec<f64>, Trouble> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
-        if self.devices[index].driver.is_none() {
+        if self.devices[index].driver.is_none() || self.settings.mode == Mode::Replay {
             return Ok(Vec::new());
         }
         if let Some(why) = &self.devices[self.line_of(index)].lost {
@@ -45,7 +48,8 @@ impl<'m> Hardware<'m, '_> {
         }
         let device = &mut self.devices[index];
         if is_dry {
-            for frame in device.codec.iter_mut().flat_map(|codec| codec.say(texts)) {
+            let frames = device.codec.as_mut().map(|codec| codec.say(texts)).transpose().map_err(Trouble::Unsaid)?;
+            for frame in frames.into_iter().flatten() {
                 (self.trace)(time, device.name, true, &frame);
             }
             return Ok(Vec::new());
@@ -56,10 +60,28 @@ impl<'m> Hardware<'m, '_> {
         self.over(index, |link, driver, ear| link.say(texts, expects, driver, ear))
     }
 
-    /// Does something over the line of a device.
+    /// Does something over the line of a device, with all that goes over it in the journal.
     pub(super) fn over<T>(
         &mut self,
         index: usize,
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.over_line(index, None, act)
+    }
+
+    /// Asks something over the line of a device; what went over it is in the journal where that came to nothing.
+    pub(super) fn inquire<T>(
+        &mut self,
+        index: usize,
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        self.over_line(index, Some(Vec::new()), act)
+    }
+
+    fn over_line<T>(
+        &mut self,
+        index: usize,
+        unsaid: Option<Vec<Entry>>,
         act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
     ) -> Result<T, Trouble> {
         let (time, line) = (self.twin.now(), self.line_of(index));
@@ -67,9 +89,13 @@ impl<'m> Hardware<'m, '_> {
         let (Some(link), Some(driver)) = (self.devices[line].link.as_deref_mut(), driver) else {
             return Err(Trouble::Lost("its line is not open".to_owned()));
         };
-        let (cancel, securing) = (self.settings.cancel, self.securing);
+        let (cancel, securing) = (self.settings.control.cancel(), self.securing);
         let (journal, trace) = (&mut self.journal, &mut *self.trace);
-        act(link, driver, &mut Ear { time, device, journal, trace, cancel, securing })
+        let mut ear = Ear { time, device, journal, trace, cancel, securing, unsaid };
+        let done = act(link, driver, &mut ear);
+        let unsaid = ear.unsaid.take().filter(|_| done.is_err());
+        unsaid.iter().flatten().for_each(|entry| self.journal.note(entry));
+        done
     }
 
     /// Asks a device for a quantity, SI.
@@ -81,17 +107,22 @@ impl<'m> Hardware<'m, '_> {
             let message = format!("`{}` cannot be told now: its driver says so", told.name);
             return Err(self.fault(codes::DEVICE_REFUSED, told.span, message));
         }
-        let text = self.texts(std::slice::from_ref(&told.asks)).concat();
+        let text = self.texts(std::slice::from_ref(&told.asks))?.concat();
         let (time, is_dry) = (self.twin.now(), self.is_dry());
         let device = &mut self.devices[index];
         if is_dry {
-            if let Some(codec) = &mut device.codec {
-                let frame = codec.ask(&text);
-                (self.trace)(time, device.name, true, &frame);
+            if let Some(codec) = device.codec.as_mut().filter(|_| told.heard.is_none()) {
+                match codec.ask(&text) {
+                    Ok(frame) => (self.trace)(time, device.name, true, &frame),
+                    Err(why) => return Err(self.fault(codes::UNSENDABLE, told.span, why)),
+                }
             }
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
-        let asked = self.over(index, |link, driver, ear| link.ask(&text, &told.expects, driver, ear));
+        let asked = self.inquire(index, |link, driver, ear| match told.heard {
+            Some(_) => link.hear(line, driver, ear).map(|value| vec![value]),
+            None => link.ask(&text, &told.expects, driver, ear),
+        });
         let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
         numbers
             .first()

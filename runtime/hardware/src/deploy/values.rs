@@ -20,17 +20,24 @@ impl Hardware<'_, '_> {
         let (device, line) = self.observed.told[&node];
         let told = self.devices[device].driver.map(|d| &d.told[line]);
         let name = told.map(|t| t.name.clone()).unwrap_or_default();
-        let value = match self.next_entry() {
-            Some(Entry::Told { name: before, value, .. }) if before == name => {
+        let next = self.next_entry();
+        let now = self.twin.now();
+        if let Some(fault) = self.replayed_fault() {
+            return Err(fault);
+        }
+        let value = match next {
+            Some(Entry::Told { t, name: before, value }) if before == name && t == now => {
                 self.replay.pop_front();
                 value
             }
             Some(other) => return Err(self.mismatch(&format!("`{name}` is asked for"), &other)),
             None => {
                 self.go_live(out)?;
-                let (now, value) = (self.twin.now(), self.tell(device, line)?);
+                let now = self.twin.now();
+                let told = self.tell(device, line);
+                let value = told.map_err(|fault| self.from_outside(fault))?;
                 self.journal.note(&Entry::Told { t: now, name: name.clone(), value });
-                self.compared(device, line, value)?;
+                self.compared(device, line, value).map_err(|fault| self.from_outside(fault))?;
                 value
             }
         };
@@ -38,6 +45,7 @@ impl Hardware<'_, '_> {
             out.reading(now, slot as usize, value);
             self.twin.give(r, value);
         }
+        let now = self.twin.now();
         self.fresh.insert(node, (now, value));
         Ok(value)
     }

@@ -1,15 +1,16 @@
-//! One emulated device: requests in, answers out, the twin in between.
+//! One emulated device at a line: requests in, answers out, the twin in between.
 
 use std::collections::BTreeMap;
 
-use matterix_ir::Unit;
 use matterix_ir::plan::Operation;
-use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Template, Told};
+use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Slot, Template, Told};
+use matterix_ir::{Span, codes};
 use matterix_runtime::backend::{Backend, Sim, Status, Ticket};
 use matterix_runtime::fault::Fault;
 
 use super::solve::solve;
 use crate::codec::{Codec, Reply, Request};
+use crate::pattern::Shown;
 use crate::template::{self, Found};
 
 /// The failure that a driver gives to what its device does not understand.
@@ -20,9 +21,8 @@ const BUSY: &str = "busy";
 /// Most characters of a message that is not understood.
 const SHOWN: usize = 200;
 
-/// A device in its lab.
-pub struct Emulator<'m> {
-    sim: Sim<'m>,
+/// A device at a line.
+pub(super) struct Unit<'m> {
     /// The device's, then those over its line.
     drivers: Vec<&'m Driver>,
     codec: Codec,
@@ -32,72 +32,94 @@ pub struct Emulator<'m> {
     /// What was answered last.
     last: Vec<u8>,
     input: Vec<u8>,
+    /// When it says next what it says by itself, in the order of its lines, s.
+    due: Vec<(&'m Told, f64)>,
 }
 
-impl<'m> Emulator<'m> {
-    /// The device of the first of these drivers in a lab that has been started; the others speak over its line.
-    pub fn new(sim: Sim<'m>, drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
+impl<'m> Unit<'m> {
+    /// The device of the first of these drivers; the others speak over its line.
+    pub(super) fn new(drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
         let first = drivers.first().ok_or("no driver says how it is spoken to")?;
         let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
-        Ok(Emulator {
-            sim,
-            drivers,
-            codec,
-            running: Vec::new(),
-            heard: BTreeMap::new(),
-            last: Vec::new(),
-            input: Vec::new(),
-        })
+        let told = drivers.iter().flat_map(|d| &d.told).filter_map(|t| t.heard.map(|every| (t, every)));
+        let (due, running, heard) = (told.collect(), Vec::new(), BTreeMap::new());
+        Ok(Unit { drivers, codec, running, heard, last: Vec::new(), input: Vec::new(), due })
     }
 
-    /// The model behind it.
-    pub fn sim(&mut self) -> &mut Sim<'m> {
-        &mut self.sim
+    /// The device with what stands behind it.
+    pub(super) fn with<'e>(&'e mut self, sim: &'e mut Sim<'m>) -> Device<'e, 'm> {
+        let Unit { drivers, codec, running, heard, last, input, due } = self;
+        Device { sim, drivers, codec, running, heard, last, input, due }
     }
 
-    /// Lets lab time pass until then, s.
-    pub fn pass(&mut self, until: f64) -> Result<(), Fault> {
-        loop {
-            self.sweep()?;
-            let now = self.sim.now();
-            if now >= until {
-                return Ok(());
-            }
-            let ends =
-                self.running.clone().into_iter().filter_map(|(ticket, _)| match self.sim.poll(ticket, &mut ()) {
-                    Ok(Status::Running { until, watch }) => Some((until, watch)),
-                    _ => None,
-                });
-            let (mut next, mut watches) = (until, Vec::new());
-            for (end, watch) in ends.collect::<Vec<_>>() {
-                next = end.unwrap_or(f64::INFINITY).clamp(now, next);
-                watches.extend(watch.map(|node| matterix_runtime::process::Watch { node, value: true }));
-            }
-            self.sim.advance(next, &watches, &mut ())?;
-        }
+    /// Changes to the line of another master, and takes what has come in over that of a request that is not whole.
+    pub(super) fn change_line(&mut self, input: &mut Vec<u8>) {
+        std::mem::swap(&mut self.input, input);
     }
 
+    /// What it does.
+    pub(super) fn running(&self) -> impl Iterator<Item = Ticket> {
+        self.running.iter().map(|(ticket, _)| *ticket)
+    }
+
+    /// When it says something by itself at the earliest, s.
+    pub(super) fn next_due(&self) -> f64 {
+        self.due.iter().fold(f64::INFINITY, |next, (_, due)| next.min(*due))
+    }
+}
+
+/// A device at a line, with the model behind it.
+pub(super) struct Device<'e, 'm> {
+    sim: &'e mut Sim<'m>,
+    drivers: &'e [&'m Driver],
+    codec: &'e mut Codec,
+    running: &'e mut Vec<(Ticket, &'m Operation)>,
+    heard: &'e mut BTreeMap<(usize, usize, usize), Vec<Found>>,
+    last: &'e mut Vec<u8>,
+    input: &'e mut Vec<u8>,
+    due: &'e mut Vec<(&'m Told, f64)>,
+}
+
+impl<'m> Device<'_, 'm> {
     /// What is over is forgotten.
-    fn sweep(&mut self) -> Result<(), Fault> {
+    pub(super) fn sweep(&mut self) -> Result<(), Fault> {
         let mut left = Vec::new();
-        for (ticket, operation) in std::mem::take(&mut self.running) {
+        for (ticket, operation) in std::mem::take(self.running) {
             if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
                 left.push((ticket, operation));
             }
         }
-        self.running = left;
+        *self.running = left;
         Ok(())
     }
 
+    /// What it says by itself now.
+    pub(super) fn speak(&mut self) -> Result<Vec<u8>, Fault> {
+        let mut out = Vec::new();
+        for at in 0..self.due.len() {
+            let (told, due) = self.due[at];
+            if due > self.sim.now() {
+                continue;
+            }
+            self.due[at].1 = self.sim.now() + told.heard.unwrap_or(f64::INFINITY);
+            if told.condition.is_some_and(|c| self.sim.engine().eval(c) == 0.0) {
+                continue;
+            }
+            let reply = Reply::of(self.tells(told)?);
+            out.extend(self.codec.answer(&reply).map_err(|why| untold(told.span, self.sim.now(), why))?);
+        }
+        Ok(out)
+    }
+
     /// Bytes that have come in; the bytes that are answered.
-    pub fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
+    pub(super) fn receive(&mut self, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
         self.input.extend_from_slice(bytes);
         let mut out = Vec::new();
-        while let Some(request) = self.codec.take_request(&mut self.input) {
+        while let Some(request) = self.codec.take_request(self.input) {
             let reply = match request {
                 Ok(Request::Says(words)) => self.obey(&words)?,
                 Ok(Request::Again) => {
-                    out.extend_from_slice(&self.last);
+                    out.extend_from_slice(self.last);
                     continue;
                 }
                 Ok(Request::Other) => continue,
@@ -105,17 +127,17 @@ impl<'m> Emulator<'m> {
             };
             if let Some(reply) = reply {
                 let reply = Reply { busy: !self.running.is_empty(), ..reply };
-                self.last = self.codec.answer(&reply);
-                out.extend_from_slice(&self.last);
+                *self.last = self.codec.answer(&reply).map_err(|why| untold(Span::default(), self.sim.now(), why))?;
+                out.extend_from_slice(self.last);
             }
         }
         Ok(out)
     }
 
     /// An answer to what is no message at all; none where the driver knows none.
-    pub fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
+    pub(super) fn complaint(&mut self, why: &str) -> Option<Vec<u8>> {
         let reply = self.refuse(NOT_UNDERSTOOD, why)?;
-        Some(self.codec.answer(&reply))
+        self.codec.answer(&reply).ok()
     }
 
     /// Does what a string of commands says; what is answered, if something is.
@@ -142,13 +164,13 @@ impl<'m> Emulator<'m> {
             if self.codec.found(&until.asks, word).is_some() {
                 let text = match &until.expects {
                     Some(pattern) if self.running.is_empty() => self.plain(pattern),
-                    Some(_) => answer.unwrap_or_else(|| "BUSY".to_owned()),
+                    Some(_) => answer.transpose()?.unwrap_or_else(|| "BUSY".to_owned()),
                     None => String::new(),
                 };
                 return Ok(Some(Reply::of(text)));
             }
         }
-        if let Some(text) = answer {
+        if let Some(text) = answer.transpose()? {
             return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
         }
         if let Some(reply) = self.command(word)? {
@@ -168,7 +190,7 @@ impl<'m> Emulator<'m> {
 
     /// An answer without numbers of its own.
     fn plain(&mut self, pattern: &Pattern) -> String {
-        self.codec.rendered(pattern, |_| "0".to_owned())
+        self.codec.rendered(pattern, |_| Shown::default()).unwrap_or_default()
     }
 
     /// Whether a message is this one with the values that it has now.
@@ -179,33 +201,35 @@ impl<'m> Emulator<'m> {
     }
 
     /// What is answered apart from commands and readings.
-    fn answer(&mut self, word: &str) -> Option<String> {
+    fn answer(&mut self, word: &str) -> Option<Result<String, Fault>> {
         let answers = self.drivers.iter().flat_map(|d| &d.answers);
         let (_, with) = answers.into_iter().find(|(asked, _)| self.codec.asked(asked, word))?;
         let engine = self.sim.engine();
-        template::filled(with, |n| Some(engine.eval(n)))
+        let text = template::filled(with, |n| Some(engine.eval(n)));
+        Some(text.map_err(|why| untold(with.span, self.sim.now(), why)))
     }
 
     /// The quantity a message asks for.
     fn asked(&mut self, word: &str) -> Option<&'m Told> {
         let told = self.drivers.iter().flat_map(|d| &d.told);
-        let asked = told.filter(|t| self.codec.found(&t.asks, word).is_some());
+        let asked = told.filter(|t| t.heard.is_none() && self.codec.found(&t.asks, word).is_some());
         let all: Vec<&Told> = asked.collect();
         let holds = |sim: &mut Sim<'m>, t: &Told| t.condition.is_none_or(|c| sim.engine().eval(c) != 0.0);
-        all.iter().find(|t| t.condition.is_some() && holds(&mut self.sim, t)).or_else(|| all.first()).copied()
+        all.iter().find(|t| t.condition.is_some() && holds(self.sim, t)).or_else(|| all.first()).copied()
     }
 
     fn tells(&mut self, told: &'m Told) -> Result<String, Fault> {
         let value = self.sim.value(told.value, &mut ())?.unwrap_or(0.0);
         let digits = self.digits(told);
-        Ok(self.codec.rendered(&told.expects, |unit| number(unit, value, digits)))
+        let text = self.codec.rendered(&told.expects, |_| Shown { value, digits });
+        text.map_err(|why| untold(told.span, self.sim.now(), why))
     }
 
     /// Digits after the point of what a reading shows, in the unit it is told in.
     fn digits(&mut self, told: &Told) -> Option<u8> {
         let reading = self.sim.engine().model().readings.get(told.reading? as usize)?;
         let unit = told.expects.slots.iter().find_map(|s| match s {
-            matterix_ir::wire::Slot::Number(unit) => Some(unit),
+            Slot::Number(unit, _) => Some(unit),
             _ => None,
         })?;
         let step = reading.resolution? / unit.factor.abs();
@@ -273,35 +297,30 @@ impl<'m> Emulator<'m> {
 
     /// An answer that says numbers as they were sent, or else as they are told.
     fn echo(&mut self, pattern: &Pattern, found: &[Found]) -> Result<String, Fault> {
-        let numbers: Vec<&Unit> = pattern
-            .slots
-            .iter()
-            .filter_map(|s| match s {
-                matterix_ir::wire::Slot::Number(unit) => Some(unit),
-                _ => None,
-            })
-            .collect();
-        let mut texts = BTreeMap::new();
-        for unit in numbers {
-            let slot = matterix_ir::wire::Slot::Number(unit.clone());
-            let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(&slot));
-            let text = match (found.first(), told) {
-                (Some(sent), _) => number(unit, sent.value, None),
+        let is_value = |s: &&Slot| matches!(s, Slot::Number(..) | Slot::Word(_));
+        let mut values = Vec::new();
+        for slot in pattern.slots.iter().filter(is_value) {
+            let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(slot));
+            let shown = match (found.first(), told) {
+                (Some(sent), _) => Shown { value: sent.value, digits: None },
                 (None, Some(told)) => {
-                    let (value, digits) = (self.sim.value(told.value, &mut ())?.unwrap_or(0.0), self.digits(told));
-                    number(unit, value, digits)
+                    Shown { value: self.sim.value(told.value, &mut ())?.unwrap_or(0.0), digits: self.digits(told) }
                 }
-                (None, None) => "0".to_owned(),
+                (None, None) => Shown::default(),
             };
-            texts.insert(unit.symbol.clone(), text);
+            values.push((slot, shown));
         }
-        Ok(self.codec.rendered(pattern, |unit| texts.get(&unit.symbol).cloned().unwrap_or_default()))
+        let shown =
+            |slot: &Slot| values.iter().find(|(of, _)| *of == slot).map(|(_, shown)| *shown).unwrap_or_default();
+        self.codec.rendered(pattern, shown).map_err(|why| untold(pattern.span, self.sim.now(), why))
     }
 
     /// The answer that means a failure; none where the driver knows none, as devices do that ignore what they do not understand.
     fn refuse(&mut self, failure: &str, why: &str) -> Option<Reply> {
         let named = |name: &str| self.drivers.iter().flat_map(|d| &d.refusals).find(|r| r.failure == name);
-        let refusal = named(failure).or_else(|| named(NOT_UNDERSTOOD))?;
+        let Some(refusal) = named(failure).or_else(|| named(NOT_UNDERSTOOD)) else {
+            return self.codec.unknown().map(|text| Reply { is_error: true, ..Reply::of(text) });
+        };
         let text = self.codec.refused(&refusal.reply, &refusal.failure, why);
         Some(Reply { is_error: self.codec.acknowledges(), ..Reply::of(text) })
     }
@@ -318,9 +337,7 @@ fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
     driver.halt.iter().map(|e| (e, true)).chain(quiet)
 }
 
-fn number(unit: &Unit, si: f64, digits: Option<u8>) -> String {
-    match digits {
-        Some(digits) => template::fixed(unit.of_si(si), digits),
-        None => matterix_ir::quantity::show_number(unit.of_si(si)),
-    }
+/// What the device would say has no room in the form that its driver declares.
+fn untold(span: Span, time: f64, message: String) -> Fault {
+    Fault { code: codes::UNSENDABLE, span: Some(span), time, message, help: Vec::new() }
 }

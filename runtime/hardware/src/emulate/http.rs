@@ -1,9 +1,8 @@
 //! An emulator as a server at a port of this machine.
 
-use std::io::Read;
 use std::sync::atomic::Ordering;
 
-use tiny_http::{Header, Request, Response, Server};
+use matterix_net::http::{Answer, Limits, Request, Server};
 
 use super::serve::{Clock, Stop, TICK, turn};
 use super::{Emulator, form};
@@ -17,45 +16,40 @@ pub fn serve_http(
     stop: Stop<'_>,
     ready: &mut dyn FnMut(&str),
 ) -> Result<(), String> {
-    let server = Server::http(("127.0.0.1", port)).map_err(|e| format!("cannot listen at port {port}: {e}"))?;
-    ready(&server.server_addr().to_string());
+    let limits = Limits { body: LONGEST_JSON, ..Limits::default() };
+    let mut server = Server::bind(port, limits).map_err(|e| format!("cannot listen at port {port}: {e}"))?;
+    ready(&server.address().to_string());
     let clock = Clock::new(stop.speed);
     while !stop.cancel.load(Ordering::Relaxed) {
-        let request = server.recv_timeout(TICK).map_err(|e| format!("the port is gone: {e}"))?;
-        let Some(mut request) = request else {
+        let Some(asked) = server.next(TICK).map_err(|e| format!("the port is gone: {e}"))? else {
             turn(emulator, &clock, &[])?;
             continue;
         };
-        let (status, body) = match asked(&mut request, header) {
+        let (status, body) = match as_line(&asked.request, header) {
             Ok(line) => parts(&turn(emulator, &clock, line.as_bytes())?),
             Err((status, why)) => {
                 let line = emulator.complaint(&why).unwrap_or_default();
                 (status, parts(&line).1)
             }
         };
-        // Who asked may be gone.
-        let _ = request.respond(answer(status, body));
+        server.answer(asked.client, Answer::new(status, "application/json", body.into_bytes()));
     }
     Ok(())
 }
 
 /// A request as a line, or the status it is refused with, and why.
-fn asked(request: &mut Request, header: Option<&(String, String)>) -> Result<String, (u16, String)> {
+fn as_line(request: &Request, header: Option<&(String, String)>) -> Result<String, (u16, String)> {
     let has = |name: &str, value: &str| {
-        let is_it = |h: &Header| h.field.as_str().as_str().eq_ignore_ascii_case(name) && h.value.as_str() == value;
-        request.headers().iter().any(is_it)
+        request.head.headers.iter().any(|(n, v)| n.eq_ignore_ascii_case(name) && v.as_str() == value)
     };
     if let Some((name, value)) = header.filter(|(name, value)| !has(name, value)) {
         return Err((422, format!("the header `{name}: {value}` is missing")));
     }
-    let mut kinds = request.headers().iter().filter(|h| h.field.equiv("Content-Type"));
-    let kind = kinds.next().map(|h| h.value.as_str().to_owned()).unwrap_or_default();
-    let mut bytes = Vec::new();
-    request.as_reader().take(LONGEST_JSON as u64).read_to_end(&mut bytes).map_err(|e| (400, e.to_string()))?;
-    let body = match bytes.as_slice() {
+    let kind = request.header("Content-Type").unwrap_or_default();
+    let body = match request.body.as_slice() {
         [] => String::new(),
         bytes if kind.starts_with(form::KIND) => {
-            let field = form::field(&kind, bytes).map_err(|why| (422, why))?;
+            let field = form::field(kind, bytes).map_err(|why| (422, why))?;
             format!(" @{field}")
         }
         bytes => {
@@ -63,7 +57,7 @@ fn asked(request: &mut Request, header: Option<&(String, String)>) -> Result<Str
             format!(" {}", value.map_err(|e| (400, format!("the body is not JSON: {e}")))?)
         }
     };
-    Ok(format!("{} {}{body}\n", request.method(), request.url()))
+    Ok(format!("{} {}{body}\n", request.method(), request.target()))
 }
 
 /// Status and body of an answer; what is not understood is answered with nothing.
@@ -71,12 +65,4 @@ fn parts(line: &[u8]) -> (u16, String) {
     let text = String::from_utf8_lossy(line);
     let parts = text.trim_end().split_once(' ').and_then(|(s, body)| Some((s.parse().ok()?, body.to_owned())));
     parts.unwrap_or((404, "{}".to_owned()))
-}
-
-fn answer(status: u16, body: String) -> Response<std::io::Cursor<Vec<u8>>> {
-    let answer = Response::from_string(body).with_status_code(status);
-    match Header::from_bytes("Content-Type", "application/json") {
-        Ok(header) => answer.with_header(header),
-        Err(()) => answer,
-    }
 }

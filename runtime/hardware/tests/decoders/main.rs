@@ -16,6 +16,11 @@ const HTTP: &[&str] = &[
     "POST /protocols files=@\nPOST /runs {\"data\":{\"id\":[1,2,{\"a\":null}]}}\n",
     "GET /a?b=c&d=<e> /0/1=2 ~01~10=3\nGET /a?b=c&d=x-1 {\"0\":[1,2]}\n",
 ];
+const REQUEST: &[&str] = &[
+    "POST /runs?a=b HTTP/1.1\r\nHost: localhost:80\r\nContent-Length: 5\r\nConnection: close\r\n\r\n{\"a\"}GET / HTTP/1.1\r\n",
+    "PUT / HTTP/1.1\r\nHost: [::1]\r\nTransfer-Encoding: chunked\r\nOrigin: null\r\n\r\n4;x=y\r\nWiki\r\n05\r\npedia\r\n0\r\nA: b\r\n\r\n",
+    "GET / HTTP/1.0\r\n\r\n",
+];
 const JOURNAL: &[&str] = &[
     "{\"event\":\"begin\",\"version\":1,\"digest\":\"0\",\"workflow\":\"warm\",\"wall\":0.5,\"speed\":40.0}\n",
     "{\"event\":\"starting\",\"t\":1.5,\"ticket\":0,\"step\":3,\"label\":\"a\",\"span\":\"a:1:1\",\"device\":\"p\",\"sends\":[\"A\"]}\n",
@@ -50,6 +55,10 @@ const WORDS: &[&str] = &[
     "\u{0}",
     "R",
     ",",
+    "\r\n\r\n",
+    "Content-Length: ",
+    "ffffffffffffffff",
+    "0\r\n",
 ];
 
 /// Numbers from a seed.
@@ -125,6 +134,11 @@ fn no_line_upsets_a_framing() {
 #[test]
 fn no_answer_upsets_the_messages_of_a_server() {
     spoil("http", HTTP, any::http);
+}
+
+#[test]
+fn no_request_upsets_a_server() {
+    spoil("request", REQUEST, any::request);
 }
 
 #[test]

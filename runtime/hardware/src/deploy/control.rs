@@ -1,0 +1,152 @@
+//! People beside a deployment: questions and their answers, what may begin, and who stopped it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::journal::Gate;
+
+/// What a person said to a question.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Whether they confirmed.
+    pub yes: bool,
+    /// Who.
+    pub who: String,
+}
+
+/// Who answers where nobody can be asked.
+const NOBODY: &str = "nobody";
+
+impl Answer {
+    /// The answer of a room without people.
+    pub fn of_nobody() -> Self {
+        Answer { yes: false, who: NOBODY.to_owned() }
+    }
+
+    /// A no in words.
+    pub(super) fn refusal(who: &str) -> String {
+        match who {
+            NOBODY => "nobody is there to confirm it: run it on a terminal, or with `--yes`".to_owned(),
+            who => format!("{who} did not confirm it"),
+        }
+    }
+}
+
+/// What people say while a deployment goes on: from a keyboard, by signals, over a page. It is shared between threads.
+#[derive(Debug)]
+pub struct Control {
+    /// Set to end it early.
+    cancel: &'static AtomicBool,
+    /// Shows a question, and whether somebody has to answer it.
+    show: fn(&str, bool),
+    said: Mutex<Said>,
+}
+
+#[derive(Debug, Default)]
+struct Said {
+    /// Questions that are open, by number.
+    open: BTreeMap<u64, String>,
+    answers: BTreeMap<u64, Answer>,
+    /// Answers every question at once.
+    standing: Option<Answer>,
+    gates: VecDeque<(Gate, String)>,
+    stopped_by: Option<String>,
+}
+
+impl Control {
+    /// Nothing has been said yet; `cancel` is set to end the deployment early, `show` is given each question, and whether somebody
+    /// has to answer it.
+    pub const fn new(cancel: &'static AtomicBool, show: fn(&str, bool)) -> Self {
+        let said = Said {
+            open: BTreeMap::new(),
+            answers: BTreeMap::new(),
+            standing: None,
+            gates: VecDeque::new(),
+            stopped_by: None,
+        };
+        Control { cancel, show, said: Mutex::new(said) }
+    }
+
+    /// From now on every question has this answer at once.
+    pub fn answer_all(&self, answer: Answer) {
+        self.said().standing = Some(answer);
+    }
+
+    /// A question is put.
+    pub fn ask(&self, question: u64, text: &str) {
+        let mut said = self.said();
+        (self.show)(text, said.standing.is_none());
+        match said.standing.clone() {
+            Some(answer) => drop(said.answers.insert(question, answer)),
+            None => drop(said.open.insert(question, text.to_owned())),
+        }
+    }
+
+    /// The questions that are open, by number.
+    pub fn open(&self) -> Vec<(u64, String)> {
+        self.said().open.iter().map(|(number, text)| (*number, text.clone())).collect()
+    }
+
+    /// A person answers; false where that question is not open.
+    pub fn answer(&self, question: u64, answer: Answer) -> bool {
+        let mut said = self.said();
+        let is_open = said.open.remove(&question).is_some();
+        if is_open {
+            said.answers.insert(question, answer);
+        }
+        is_open
+    }
+
+    /// What was answered, once.
+    pub fn answered(&self, question: u64) -> Option<Answer> {
+        self.said().answers.remove(&question)
+    }
+
+    /// Answers that nobody has taken note of.
+    pub fn answers(&self) -> usize {
+        self.said().answers.len()
+    }
+
+    /// A question is open no longer.
+    pub fn withdraw(&self, question: u64) {
+        let mut said = self.said();
+        said.open.remove(&question);
+        said.answers.remove(&question);
+    }
+
+    /// A person says what may begin.
+    pub fn set_gate(&self, gate: Gate, who: &str) {
+        self.said().gates.push_back((gate, who.to_owned()));
+    }
+
+    /// What was last said of that and has not been heeded yet.
+    pub fn next_gate(&self) -> Option<(Gate, String)> {
+        self.said().gates.pop_front()
+    }
+
+    /// A person ends the deployment early.
+    pub fn stop(&self, who: &str) {
+        self.said().stopped_by.get_or_insert_with(|| who.to_owned());
+        self.cancel.store(true, Ordering::SeqCst);
+    }
+
+    /// Whether it is to end.
+    pub fn is_stopped(&self) -> bool {
+        self.cancel.load(Ordering::SeqCst)
+    }
+
+    /// The flag that ends it.
+    pub fn cancel(&self) -> &AtomicBool {
+        self.cancel
+    }
+
+    /// Who ended it, where that is known.
+    pub fn stopped_by(&self) -> Option<String> {
+        self.said().stopped_by.clone()
+    }
+
+    fn said(&self) -> MutexGuard<'_, Said> {
+        self.said.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,321 @@
+//! A program on devices from its bindings to what is left safe.
+
+use std::rc::Rc;
+use std::sync::atomic::AtomicBool;
+
+use matterix_ir::{Diagnostic, Program, Severity, Sources, Span, codes};
+use matterix_runtime::backend::{Prepared, Sim};
+use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
+use matterix_runtime::fault::Fault;
+use matterix_runtime::process::{Engine, Options};
+use matterix_runtime::run::Screen;
+
+use super::Trace;
+use super::control::Control;
+use super::device::{Binding, Carrier, Device};
+use super::exposed::Exposed;
+use super::hardware::{Hardware, Mode, Settings, Unreached};
+use super::journal::{Entry, Journal, VERSION, digest};
+use super::preflight::preflight;
+use crate::binding;
+use crate::link::Trouble;
+use crate::world::World;
+
+/// What a deployment is given beside a program.
+pub struct Course<'p> {
+    /// Where devices are.
+    pub bindings: Vec<Binding>,
+    /// What is done with devices.
+    pub mode: Mode,
+    /// Seconds of lab time per second.
+    pub speed: f64,
+    /// Where the noise of the twin starts.
+    pub seed: u64,
+    /// Told of every frame.
+    pub trace: Box<Trace<'p>>,
+    /// The journal.
+    pub journal: Kept,
+    /// What people say meanwhile.
+    pub control: &'p Control,
+    /// Who carries it out.
+    pub who: &'p str,
+    /// Clocks and ports.
+    pub world: Rc<dyn World>,
+    /// Kept up to date with what is told to devices.
+    pub exposed: &'p Exposed,
+}
+
+/// The journal of a deployment.
+pub enum Kept {
+    /// None is kept.
+    Not,
+    /// A new one.
+    New(Journal),
+    /// One that an earlier process has left, and what it says.
+    Left(Journal, Vec<Entry>),
+    /// One that an earlier process has left, and that is not as it was written: why.
+    Damaged(String),
+}
+
+/// How a deployment ended.
+pub struct Ending {
+    /// What was found before or went wrong after.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Whether it came to its end with all expectations met or not observed.
+    pub passed: bool,
+    /// Whether a person ended it early.
+    pub stopped: bool,
+    /// The same in a word, as the journal has it.
+    pub status: &'static str,
+    /// s of lab time; nothing where it did not begin.
+    pub end: Option<f64>,
+    /// Expectations that were judged, met and not observed.
+    pub counts: [usize; 3],
+    /// What came of the plan, where it began.
+    pub execution: Option<Execution>,
+    /// Digest of the states of the twin at the end.
+    pub states: String,
+}
+
+impl Ending {
+    fn not_begun(diagnostics: Vec<Diagnostic>) -> Self {
+        let (passed, stopped, end, execution) = (false, false, None, None);
+        Ending {
+            diagnostics,
+            passed,
+            stopped,
+            status: "not begun",
+            end,
+            counts: [0; 3],
+            execution,
+            states: String::new(),
+        }
+    }
+}
+
+/// Why a journal is not gone on with.
+enum Unfit {
+    /// Nothing is left to be done.
+    Over(Diagnostic),
+    /// What it is about may still be on.
+    Unknown(Diagnostic),
+}
+
+/// Carries a program out; `out` hears of what the executor does.
+pub fn carry_out(
+    program: &Program,
+    sources: &Sources,
+    course: Course<'_>,
+    out: &mut dyn Listener,
+) -> Result<Ending, String> {
+    let Course { bindings, mode, speed, seed, trace, journal, control, who, world, exposed } = course;
+    if mode == Mode::Shadow
+        && let Some(d) = unmeasured(program, &bindings)
+    {
+        return Ok(Ending::not_begun(vec![d]));
+    }
+    let digest = digest(program, &binding::canonical(program, &bindings))?;
+    let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
+    let (journal, before, unfit) = match journal {
+        Kept::Not => (Journal::none(), None, None),
+        Kept::New(journal) => (journal, None, None),
+        Kept::Left(journal, before) => {
+            let unfit = unfit(&before, &digest, speed, seed).filter(|_| mode != Mode::Replay);
+            (journal, Some(before), unfit)
+        }
+        Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),
+    };
+    let prepared = Prepared::new(program);
+    let params = program.model.params.iter().map(|p| p.value).collect();
+    let engine = Engine::new(&prepared.model, params, program.plan.locals.len(), Options::default());
+    let mut screen = Screen::new(program);
+    let engine = match engine.and_then(|mut engine| engine.start(&mut screen).map(|()| engine)) {
+        Ok(engine) => engine,
+        Err(fault) => return Ok(Ending::not_begun(vec![of_fault(fault)])),
+    };
+    let twin = Sim::new(engine, &prepared, seed);
+    let ended = AtomicBool::new(false);
+    let settings = Settings { mode, speed, control, ended: &ended, world, exposed };
+    let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, trace);
+    if let Some(unfit) = unfit {
+        return Ok(Ending::not_begun(made_safe(hardware, unfit)));
+    }
+    if let Some(ending) = ready(&mut hardware, program, before, &digest, (seed, who)) {
+        return Ok(ending);
+    }
+    let limits = Limits { cancel: Some(&ended), ..Limits::default() };
+    let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut Tee(&mut screen, out));
+    Ok(concluded(hardware, execution, screen, control))
+}
+
+/// Comes to where the plan begins, or goes on; how it ended where it does not come so far.
+fn ready(
+    hardware: &mut Hardware<'_, '_>,
+    program: &Program,
+    before: Option<Vec<Entry>>,
+    digest: &str,
+    (seed, who): (u64, &str),
+) -> Option<Ending> {
+    let found = {
+        let (observed, devices) = hardware.view();
+        preflight(program, devices, observed)
+    };
+    if !found.is_empty() {
+        return Some(Ending::not_begun(found));
+    }
+    let goes_on = before.is_some();
+    let is_open = before.iter().flatten().any(|e| matches!(e, Entry::Opened { .. } | Entry::Starting { .. }));
+    if let Some(before) = before.filter(|_| is_open) {
+        hardware.follow_journal(before, who);
+    }
+    let unreached = hardware.connect();
+    if !unreached.is_empty() {
+        return Some(Ending::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
+    }
+    if !goes_on && let Err(fault) = hardware.begin_journal(digest, seed, who) {
+        return Some(Ending::not_begun(vec![of_fault(fault)]));
+    }
+    // One that was cut off before anything of the plan was begun opens its lines as a new one does.
+    if !is_open && let Err(failed) = hardware.open() {
+        let mut found = vec![not_opened(failed)];
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
+        return Some(Ending { stopped: hardware.is_stopped(), ..Ending::not_begun(found) });
+    }
+    None
+}
+
+/// What is found after a plan has ended, with devices left safe where it did not end well.
+fn concluded(mut hardware: Hardware<'_, '_>, execution: Execution, screen: Screen<'_>, control: &Control) -> Ending {
+    if let Some(unreached) = hardware.unreached() {
+        return Ending::not_begun(vec![not_reached(unreached, true)]);
+    }
+    let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    let stopped = !well && control.is_stopped();
+    let mut found = findings(&execution);
+    found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
+    if !well {
+        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
+    }
+    found.extend(hardware.close().err().map(of_fault));
+    let status = match (well, stopped) {
+        (_, true) => "stopped by a person",
+        (true, false) => "ended",
+        (false, false) => "failed",
+    };
+    found.extend(hardware.end_journal(status).err().map(of_fault));
+    let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
+    let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
+    let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
+    let (end, states) = (Some(execution.end_time), hardware.states());
+    Ending { diagnostics: found, passed, stopped, status, end, counts, execution: Some(execution), states }
+}
+
+/// That a shadow has nothing to go by: no device that tells something has a tolerance.
+fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
+    let is_measured = bindings.iter().any(|b| !b.tolerances.is_empty());
+    let telling = bindings.iter().find_map(|b| match &b.carrier {
+        Carrier::Line { driver, .. } => program.drivers[*driver].told.first().map(|told| (b, told)),
+        _ => None,
+    });
+    let at = telling.map(|(b, _)| b).or(bindings.first()).filter(|_| !is_measured)?.at;
+    let d = Diagnostic::error(codes::BINDING, at, "nothing is compared with the twin", "no device has a `tolerance`");
+    Some(match telling {
+        Some((_, told)) => {
+            let member = told.name.rsplit('.').next().unwrap_or(&told.name);
+            d.help(format!(
+                "say how far from the twin it may be: `tolerance = {{ {member} = \"2 {}\" }}`",
+                told.difference.symbol
+            ))
+        }
+        None => d.help("no device of these tells anything: take another mode"),
+    })
+}
+
+/// Why a journal is of another deployment, or of one that has ended.
+fn unfit(before: &[Entry], digest: &str, speed: f64, seed: u64) -> Option<Unfit> {
+    let this = env!("CARGO_PKG_VERSION");
+    match (before.first(), before.last()) {
+        (_, Some(Entry::End { .. })) => {
+            let d = mismatch("the deployment of this journal has come to its end");
+            Some(Unfit::Over(d.help("begin anew, with a journal of its own")))
+        }
+        (Some(Entry::Begin { version, tool, digest: of, speed: at, seed: from, .. }), _) => match () {
+            () if *version != VERSION || tool != this => {
+                Some(refused(&format!("the journal was written by version {tool} of this program, not by {this}")))
+            }
+            () if of != digest => Some(refused("the journal is of another program, or of other bindings")),
+            () if *at != speed => Some(refused("the journal is of a deployment at another speed")),
+            () if *from != seed => Some(refused("the journal is of a deployment with another seed")),
+            () => None,
+        },
+        _ => Some(refused("the journal says nothing of a deployment")),
+    }
+}
+
+fn mismatch(headline: &str) -> Diagnostic {
+    Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on")
+}
+
+/// That a journal is not gone on with, though what it is about may still be on.
+fn refused(why: &str) -> Unfit {
+    Unfit::Unknown(mismatch(why).help("see what the devices have done, and begin anew with a journal of its own"))
+}
+
+/// What an earlier process has left on is made safe, as it is not known what that was.
+fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
+    let unfit = match unfit {
+        Unfit::Over(d) => return vec![d],
+        Unfit::Unknown(d) if !hardware.abandon() => return vec![d],
+        Unfit::Unknown(d) => d,
+    };
+    let left = hardware.secure_all();
+    let names = hardware.secured().join(", ");
+    let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
+    std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
+}
+
+/// A fault as a finding.
+pub fn of_fault(fault: Fault) -> Diagnostic {
+    exec::diagnostic(&FailureTrace::of_fault(fault))
+}
+
+/// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
+pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
+    let Unreached { device, at, trouble } = unreached;
+    let code = match trouble {
+        Trouble::Lost(_) => codes::DEVICE_LOST,
+        Trouble::Garbled(_) => codes::DEVICE_GARBLED,
+        Trouble::Unsaid(_) => codes::UNSENDABLE,
+        Trouble::Refused { .. } => codes::DEVICE_REFUSED,
+    };
+    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
+    let headline = format!("`{device}` {what}: {}", trouble.text());
+    let d = Diagnostic::error(code, *at, headline, "bound here");
+    d.help(if goes_on {
+        "nothing was said to any device; the journal is not at its end: go on with `--resume` when it is there"
+    } else {
+        "nothing was said to any device"
+    })
+}
+
+/// What went wrong when drivers said what they say first, with the place where the device is bound.
+pub fn not_opened((fault, at): (Fault, Span)) -> Diagnostic {
+    of_fault(fault).because(at, "bound here")
+}
+
+/// That a device may be hot or moving: where it is bound, and why.
+pub fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
+    let headline = format!("a device could not be made safe: {why}");
+    Diagnostic::error(codes::DEVICE_LOST, at, headline, "see to it").help("go and look at it now")
+}
+
+fn findings(execution: &Execution) -> Vec<Diagnostic> {
+    let missed = execution.expectations.iter().filter(|e| e.verdict == Verdict::Failed);
+    let mut found: Vec<Diagnostic> = missed.map(exec::expectation_diagnostic).collect();
+    found.extend(execution.failure.iter().chain(&execution.unfinished).map(exec::diagnostic));
+    // That nothing more was said after it was refused to go on follows from that.
+    let others = execution.suppressed.iter().filter(|trace| trace.code != codes::JOURNAL_MISMATCH);
+    let others = others.map(exec::diagnostic);
+    found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
+    found
+}

@@ -1,0 +1,170 @@
+//! Lines that several devices share: a port is opened once, and each device speaks over it in its turn.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::io::{self, ErrorKind};
+use std::rc::{Rc, Weak};
+use std::time::Duration;
+
+use matterix_ir::wire::Driver;
+
+use crate::place::Place;
+use crate::port::Port;
+use crate::world::World;
+
+/// A port that is open; none once it has failed, for all of its devices.
+type Wire = RefCell<Option<Box<dyn Port>>>;
+
+/// A world whose ports are opened once each, as long as somebody uses them.
+pub struct Shared {
+    world: Rc<dyn World>,
+    open: RefCell<BTreeMap<String, Weak<Wire>>>,
+}
+
+impl Shared {
+    /// The same world with shared ports.
+    pub fn new(world: Rc<dyn World>) -> Self {
+        Shared { world, open: RefCell::default() }
+    }
+}
+
+impl World for Shared {
+    fn elapsed(&self) -> Duration {
+        self.world.elapsed()
+    }
+
+    fn wall(&self) -> f64 {
+        self.world.wall()
+    }
+
+    fn sleep(&self, time: Duration) {
+        self.world.sleep(time);
+    }
+
+    fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>> {
+        let (Place::Serial(at) | Place::Tcp(at)) = place else { return self.world.open(place, driver) };
+        let known = self.open.borrow().get(at).and_then(Weak::upgrade);
+        let wire = known.unwrap_or_default();
+        if wire.borrow().is_none() {
+            *wire.borrow_mut() = Some(self.world.open(place, driver)?);
+            self.open.borrow_mut().insert(at.clone(), Rc::downgrade(&wire));
+        }
+        Ok(Box::new(Tap(wire)))
+    }
+}
+
+/// One device's share of a port.
+struct Tap(Rc<Wire>);
+
+impl Tap {
+    fn over<T>(&self, act: impl FnOnce(&mut dyn Port) -> io::Result<T>) -> io::Result<T> {
+        let mut wire = self.0.borrow_mut();
+        let port = wire.as_deref_mut();
+        let port = port.ok_or_else(|| io::Error::new(ErrorKind::NotConnected, "it has failed before"))?;
+        let done = act(port);
+        if done.is_err() {
+            *wire = None;
+        }
+        done
+    }
+}
+
+impl Port for Tap {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.over(|port| port.send(bytes))
+    }
+
+    fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>> {
+        self.over(|port| port.receive(within))
+    }
+
+    fn attach(&mut self, name: &str, bytes: Vec<u8>) -> io::Result<()> {
+        self.over(|port| port.attach(name, bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[derive(Default)]
+    struct Counting {
+        opened: Cell<usize>,
+        fails: Rc<Cell<bool>>,
+    }
+
+    struct Silent(Rc<Cell<bool>>);
+
+    impl Port for Silent {
+        fn send(&mut self, _: &[u8]) -> io::Result<()> {
+            if self.0.get() { Err(io::Error::other("gone")) } else { Ok(()) }
+        }
+
+        fn receive(&mut self, _: Duration) -> io::Result<Vec<u8>> {
+            Ok(Vec::new())
+        }
+    }
+
+    impl World for Counting {
+        fn elapsed(&self) -> Duration {
+            Duration::ZERO
+        }
+
+        fn wall(&self) -> f64 {
+            0.0
+        }
+
+        fn sleep(&self, _: Duration) {}
+
+        fn open(&self, _: &Place, _: &Driver) -> io::Result<Box<dyn Port>> {
+            self.opened.set(self.opened.get() + 1);
+            Ok(Box::new(Silent(Rc::clone(&self.fails))))
+        }
+    }
+
+    fn driver() -> Driver {
+        Driver {
+            name: "D".into(),
+            instance: matterix_ir::scene::InstanceId(0),
+            transport: matterix_ir::wire::Transport::Tcp,
+            host: None,
+            framing: matterix_ir::wire::Framing::Calls,
+            address: None,
+            timeout: 1.0,
+            open: Vec::new(),
+            close: Vec::new(),
+            halt: Vec::new(),
+            safe: Vec::new(),
+            play: Vec::new(),
+            alive: Vec::new(),
+            told: Vec::new(),
+            ignores: Vec::new(),
+            answers: Vec::new(),
+            refusals: Vec::new(),
+            calls: Vec::new(),
+            served: Vec::new(),
+            span: matterix_ir::Span::default(),
+        }
+    }
+
+    #[test]
+    fn a_port_is_opened_once_and_again_for_all_when_it_has_failed() {
+        let counting = Rc::new(Counting::default());
+        let shared = Shared::new(Rc::clone(&counting) as Rc<dyn World>);
+        let open = |at: &str| shared.open(&Place::Serial(at.into()), &driver()).expect("it opens");
+        let (mut first, mut second, _other) = (open("a"), open("a"), open("b"));
+        assert_eq!(counting.opened.get(), 2);
+        counting.fails.set(true);
+        assert!(first.send(b"x").is_err());
+        counting.fails.set(false);
+        assert!(second.send(b"x").is_err(), "it is gone for both");
+        let _third = open("a");
+        assert!(first.send(b"x").is_ok() && second.send(b"x").is_ok());
+        assert_eq!(counting.opened.get(), 3);
+        drop((first, second, _third));
+        let _again = open("a");
+        assert_eq!(counting.opened.get(), 4, "closed when nobody uses it");
+    }
+}

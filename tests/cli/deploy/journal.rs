@@ -1,0 +1,169 @@
+//! Journals that others have laid hands on: what is gone on with, what is refused, and what is then left safe.
+
+use std::fs::OpenOptions;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+use super::{Emulated, HEAT, bench, lines};
+use crate::harness::{Ended, command, matterixc_in, write};
+
+/// A plate must hear something every 15 s of lab time: slow enough for a process to end and another to begin.
+const SLOW: &str = "4";
+
+const DEPLOY: [&str; 10] =
+    ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SLOW];
+
+/// Heats for long enough to be disturbed.
+fn text() -> String {
+    HEAT.replace(
+        "wait until plate.temperature >= 30 degC timeout 1 h",
+        "wait until plate.temperature >= 45 degC timeout 1 h",
+    )
+}
+
+fn deployed(dir: &Path) -> Child {
+    let mut child = command();
+    child.current_dir(dir).args(DEPLOY).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    child.spawn().expect("the command starts")
+}
+
+fn resumed(dir: &Path, bindings: &str) -> Ended {
+    let mut args = DEPLOY.map(str::to_owned).to_vec();
+    args[3] = bindings.to_owned();
+    args.push("--resume".to_owned());
+    matterixc_in(dir, &args.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+fn journal(dir: &Path) -> String {
+    std::fs::read_to_string(dir.join("journal")).unwrap_or_default()
+}
+
+/// Waits until the journal says something so often.
+fn until(dir: &Path, word: &str, times: usize) {
+    for _ in 0..2000 {
+        if journal(dir).matches(word).count() >= times {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("{}", journal(dir));
+}
+
+/// A deployment that was killed while it heated, on an emulator that goes on.
+fn killed(name: &str) -> (std::path::PathBuf, Emulated) {
+    let dir = bench(name, &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut process = deployed(&dir);
+    until(&dir, "\"told\"", 3);
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    (dir, emulated)
+}
+
+#[test]
+fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
+    let (dir, _emulated) = killed("edited");
+    let before = journal(&dir);
+    let all: Vec<&str> = before.split_inclusive('\n').collect();
+    let line = all.iter().position(|l| l.contains("START_1")).expect("it heats");
+    let gone = |at: usize| [&all[..at], &all[at + 1..]].concat().concat();
+    let cases = [
+        ("a line is gone", gone(line), "was edited"),
+        ("another set point", before.replace("OUT_SP_1 50.0", "OUT_SP_1 90.0"), "was edited"),
+        ("another label", before.replace("heat plate to", "stir plate to"), "was edited"),
+        ("another time", before.replacen("\"t\":0.0", "\"t\":7.5", 1), "was edited"),
+        ("the last line is gone", all[..all.len() - 1].concat(), "was cut short"),
+        ("half is gone", before[..before.len() / 2].to_owned(), "was cut short"),
+        ("all is gone", String::new(), "is empty"),
+        ("no head", lines(&before).to_owned(), "does not begin as one"),
+    ];
+    for (name, text, why) in cases {
+        assert_ne!(text, before, "{name}");
+        write(&dir, "journal", &text);
+        let ended = resumed(&dir, "lab.toml");
+        assert_eq!(ended.code, 1, "{name}: {}", ended.err);
+        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(one_line.contains("journal-mismatch") && one_line.contains(why), "{name}: {}", ended.err);
+        assert!(one_line.contains("made safe meanwhile: `plate`"), "{name}: {}", ended.err);
+        assert_eq!(journal(&dir), text, "{name}: it is left as it is");
+    }
+}
+
+#[test]
+fn another_program_another_seed_and_another_end_are_refused() {
+    let (dir, _emulated) = killed("unlike");
+    write(&dir, "lab.mtx", text().replace("300 rpm", "310 rpm"));
+    let ended = resumed(&dir, "lab.toml");
+    assert!(ended.code == 1 && ended.err.contains("another program"), "{}", ended.err);
+    write(&dir, "lab.mtx", text());
+    let seeded = matterixc_in(&dir, &[&DEPLOY[..], &["--resume", "--seed", "7"]].concat());
+    assert!(seeded.code == 1 && seeded.err.contains("another seed"), "{}", seeded.err);
+    let again = matterixc_in(&dir, &DEPLOY);
+    assert!(again.code == 2 && again.err.contains("--resume"), "{}", again.err);
+}
+
+#[test]
+fn a_device_that_was_moved_to_another_port_is_gone_on_with() {
+    let (dir, emulated) = killed("moved");
+    let door = super::unreached::Door::at(&emulated.address);
+    write(&dir, "moved.toml", format!("# it has another converter now\n[plate]\naddress = \"{}\"\n", door.address));
+    let ended = resumed(&dir, "moved.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+#[test]
+fn two_processes_do_not_write_one_journal() {
+    let dir = bench("twice", &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut first = deployed(&dir);
+    until(&dir, "\"told\"", 2);
+    let second = resumed(&dir, "lab.toml");
+    assert_eq!(second.code, 2, "{}", second.err);
+    let named = format!("process {} of ", first.id());
+    assert!(second.err.contains(&named) && second.err.contains("is writing the journal"), "{}", second.err);
+    assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
+    assert_eq!(journal(&dir).matches("\"event\":\"resumed\"").count(), 0);
+}
+
+#[test]
+fn two_processes_do_not_speak_over_one_line() {
+    let dir = bench("one_line", &text(), "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut first = deployed(&dir);
+    until(&dir, "\"told\"", 2);
+    let mut other = DEPLOY;
+    other[7] = "another";
+    let second = matterixc_in(&dir, &other);
+    assert_eq!(second.code, 1, "{}", second.err);
+    let said = second.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains(&format!("is taken: process {} (", first.id())) && said.contains("nothing was said"),
+        "{said}"
+    );
+    assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
+}
+
+#[test]
+fn a_journal_is_its_users_own_and_small() {
+    let dir = bench("own", &text(), "plate", "");
+    let emulated = Emulated::at("40", &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut args = DEPLOY;
+    args[9] = "40";
+    let ended = matterixc_in(&dir, &args);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let file = OpenOptions::new().read(true).open(dir.join("journal")).expect("a journal");
+    let about = file.metadata().expect("it is there");
+    assert_eq!(about.permissions().mode() & 0o777, 0o600);
+    let all = journal(&dir);
+    let last: serde_json::Value = serde_json::from_str(all.lines().last().expect("a line")).expect("JSON");
+    let hours = last["t"].as_f64().expect("a time") / 3600.0;
+    let told = all.matches("\"told\"").count() as f64;
+    let (bytes, per_hour) = (about.len() as f64, 0.5e6);
+    assert!(bytes <= 8e3 + per_hour * hours, "{bytes} bytes in {hours} h with {told} readings");
+}
