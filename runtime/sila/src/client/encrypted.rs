@@ -26,11 +26,18 @@ fn answer(address: &str, timeout: Duration) -> std::io::Result<[u8; 2]> {
     Ok(first)
 }
 
-/// A client's greeting: version 1.2, no session, one cipher suite (TLS_ECDHE_RSA_WITH_AES_128_GCM_SHA256), no compression.
+/// A client's greeting: version 1.2, no session, ECDHE with AES-GCM, no compression; the curves x25519 and secp256r1, common
+/// signatures, and HTTP/2 (RFC 5246, 7.4.1; RFC 7301).
 fn greeting() -> Vec<u8> {
+    const EXTENSIONS: [u8; 33] = [
+        0, 10, 0, 6, 0, 4, 0, 0x1d, 0, 0x17, // supported_groups
+        0, 13, 0, 10, 0, 8, 4, 3, 4, 1, 8, 4, 5, 1, // signature_algorithms
+        0, 16, 0, 5, 0, 3, 2, b'h', b'2', // application_layer_protocol_negotiation
+    ];
     let mut hello = vec![3, 3];
     hello.extend([7; 32]);
-    hello.extend([0, 0, 2, 0xc0, 0x2f, 1, 0]);
+    hello.extend([0, 0, 4, 0xc0, 0x2f, 0xc0, 0x2b, 1, 0, 0, EXTENSIONS.len() as u8]);
+    hello.extend(EXTENSIONS);
     let mut out = vec![22, 3, 1, 0, hello.len() as u8 + 4, 1, 0, 0, hello.len() as u8];
     out.extend(hello);
     out
