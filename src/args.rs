@@ -454,6 +454,9 @@ pub struct ServeArgs {
     /// everybody on the network may use the lab.
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     pub host: String,
+    /// The identifier of the server; without it, the same whenever this lab of this file is served on this machine.
+    #[arg(long, value_name = "UUID")]
+    pub uuid: Option<String>,
     /// Where the devices of the lab are; the digital twin answers without it.
     #[arg(long, value_name = "FILE")]
     pub bind: Option<PathBuf>,

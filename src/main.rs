@@ -9,6 +9,8 @@ mod cache;
 mod cancel;
 mod command;
 mod files;
+#[cfg(feature = "sila")]
+mod identity;
 mod keys;
 mod lsp;
 mod mcp;

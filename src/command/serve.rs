@@ -52,8 +52,13 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     let journal = args.journal.as_deref().map(Journal::create).transpose().map_err(|e| e.text().to_owned())?;
     cancel::last_words(super::deploy::left_exposed);
     cancel::on_interrupt_quietly()?;
+    let uuid = match &args.uuid {
+        Some(given) => matterix_sila_wire::uuid(given).ok_or_else(|| format!("`{given}` is no UUID"))?,
+        None => crate::identity::of(&args.file, &program.scene.lab)?,
+    };
     let service = Service {
         address,
+        uuid,
         bindings: file,
         speed: args.speed,
         seed: args.seed,

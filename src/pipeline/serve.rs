@@ -28,6 +28,8 @@ use crate::terminal::{Stream, print};
 pub struct Service<'p> {
     /// Where it answers.
     pub address: SocketAddr,
+    /// Its identifier.
+    pub uuid: String,
     /// The text of the bindings and the file they are in; the twin alone without them.
     pub bindings: Option<(FileId, &'p str)>,
     /// Seconds of lab time per second.
@@ -133,7 +135,7 @@ fn attend(
     let (name, features) = (program.scene.lab.clone(), catalogue.features.clone());
     let about = format!("The lab `{name}`.");
     let version = env!("CARGO_PKG_VERSION");
-    let (server, requests) = answer(service.address, &name, &about, version, features)?;
+    let (server, requests) = answer(service.address, &name, &about, version, &service.uuid, features)?;
     (service.ready)(server.address, &catalogue);
     let desk = Desk::new(catalogue, &program.scene, &program.plan, requests);
     let mut say = |text: &str| print(Stream::Err, text);

@@ -101,7 +101,7 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
     let given = calibration::read(&bindings).into_iter().map(gauged).collect();
     let measured = Measured { name: BINDINGS.to_owned(), text: bindings.clone(), given };
     let (workflow, set, lab) = (about.workflow.clone(), about.set.clone(), about.lab.clone());
-    let options = Options { workflow, set, lab, wires: Wires::Called, measured, ..Options::default() };
+    let options = Options { workflow, set, lab, wires: Wires::Called, measured };
     let (mut sources, program, found) = pipeline::compile(&Input::file(&main, files::read(&main)?), &options);
     let is_wrong = found.iter().any(Diagnostic::is_error);
     let Some(program) = program.filter(|_| !is_wrong) else {

@@ -187,19 +187,65 @@ def served():
         verdict("a skill of the file", held is not None and plate.Target.get() == 45.0 and plate.Active.get() is False, held)
         wrong = raised(lambda: client.BenchSkills.WarmUp(Plate="beaker", T=45.0), ValidationError)
         verdict("a thing that does not fit", wrong is not None, f"{wrong!r:.120}")
+        turning = turner.TurnForAWhile(Speed=1.0)
+        client.CancelController.CancelCommand(str(turning.execution_uuid))
+        until = time.monotonic() + 10
+        while not turning.done and time.monotonic() < until:
+            time.sleep(0.02)
+        error = raised(turning.get_responses, UndefinedExecutionError)
+        good = error is not None and "cancelled" in error.message
+        verdict("a command is cancelled", good, f"{error!r:.120}")
+        unknown = raised(lambda: client.CancelController.CancelCommand(str(turning.execution_uuid)), DefinedExecutionError)
+        verdict("one that has ended is not", unknown is not None and unknown.identifier == "InvalidCommandExecutionUUID")
+        warming = client.BenchSkills.WarmUp(Plate="plate", T=46.0)
+        client.CancelController.CancelAll()
+        verdict("and all are", raised(lambda: ended(warming), UndefinedExecutionError) is not None)
+        verdict("metadata on a subscription is refused", *beside(host, port, names))
+        turns = turner.Turns.get()
         seen = turner.Turns.subscribe()
         first = next(iter(seen))
         turner.TurnForAWhile(Speed=1.0)
         second = next(iter(seen))
         seen.cancel()
-        verdict("a property that is subscribed to", (first, second) == (1.0, 2.0), (first, second))
+        verdict("a property that is subscribed to", (first, second) == (turns, turns + 1), (first, second))
         rubbish(host, port, names)
         verdict("it still answers after rubbish", service.ServerName.get() == "renamed")
+        first = service.ServerUUID.get()
         client.close()
         process.send_signal(signal.SIGTERM)
         verdict("it ends when it is told to", process.wait(10) == 0)
     finally:
         process.kill()
+    process, host, port = start(os.path.join(FOLDER, "served"), text)
+    try:
+        client = SilaClient(host, port, insecure=True)
+        second = client.SiLAService.ServerUUID.get()
+        client.close()
+        verdict("its UUID stays", first == second, first)
+    finally:
+        process.kill()
+
+
+def ended(command):
+    """What an observable command answers, once it has ended."""
+    until = time.monotonic() + 10
+    while not command.done and time.monotonic() < until:
+        time.sleep(0.02)
+    return command.get_responses()
+
+
+def beside(host, port, names):
+    """Whether a subscription with metadata is refused, and how."""
+    parts = next(n for n in names if n.endswith("PlateHeater/v1")).split("/")
+    path = f"/sila2.{parts[0]}.{parts[1]}.{parts[2].lower()}.{parts[3]}.{parts[2]}/Subscribe_Target"
+    channel = grpc.insecure_channel(f"{host}:{port}")
+    try:
+        told = channel.unary_stream(path)(b"", timeout=5, metadata=[("sila-org.example-test-lock-v1-metadata-key-bin", b"x")])
+        return False, next(iter(told))
+    except grpc.RpcError as error:
+        return error.code().name == "ABORTED", error.code().name
+    finally:
+        channel.close()
 
 
 def rubbish(host, port, names):
@@ -246,6 +292,8 @@ class Plate(FeatureImplementationBase):
             raise failed(self)
         if self.trouble == "silent":
             time.sleep(30)
+        if self.trouble == "late":
+            time.sleep(4)
         self.temperature = Target
         self._CurrentTemperature_producer_queue.put(self.temperature)
 
@@ -389,6 +437,35 @@ def driven():
     verdict("a server that does not answer", ended.returncode == 1 and "error[device-lost]" in ended.stderr and "lab.mtx:" in ended.stderr, last(ended))
     verdict("is told to stop all the same", ("Stop",) in one.heard, one.heard)
     server.stop()
+
+    server, one, address = plate("late")
+    ended = deploy("late", address, OWN.replace('    safe sends "Stop"\n', ""))
+    verdict("a server that answers late", ended.returncode == 1 and "error[device-lost]" in ended.stderr, last(ended))
+    verdict("is told what stands in `finally`", one.heard[-1:] == [("Stop",)], one.heard)
+    server.stop()
+
+    server, one, address = plate("fails while it lasts")
+    text = (INPUTS / "hotplate.mtx").read_text().replace("\n} finally {\n    stop plate\n}", "\n}")
+    text = text.replace('"hotplate.sila.xml"\n', '"hotplate.sila.xml" {\n    param safe_call: Text\n}\n')
+    text = text.replace("asset Plate: HotPlate {\n", 'asset Plate: HotPlate {\n    safe_call: "Stop"\n')
+    ended = deploy("safe", address, text)
+    verdict("an imported asset says what is safe", ended.returncode == 1 and one.heard[-1:] == [("Stop",)], f"{last(ended)} {one.heard}")
+    server.stop()
+
+    server = SilaServer("plate", "Plate", "a plate", "1.0", "https://example.org")
+    server.set_feature_implementation(Feature(FEATURE), Plate(server))
+    port = free()
+    try:
+        made = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=SiLA2", "-keyout", "key", "-out", "chain"]
+        subprocess.run(made, cwd=FOLDER, check=True, capture_output=True)
+        key, chain = [(pathlib.Path(FOLDER) / name).read_bytes() for name in ("key", "chain")]
+        server.start("127.0.0.1", port, key, chain, enable_discovery=False)
+    except Exception as why:  # noqa: BLE001
+        print(f"skipped: an encrypted server: {why}")
+    else:
+        ended = deploy("encrypted", f"127.0.0.1:{port}", OWN)
+        verdict("an encrypted server is named as such", ended.returncode != 0 and "encrypted" in ended.stderr, " ".join(ended.stderr.split())[-160:])
+        server.stop()
 
     server, one, address = plate(feature=FEATURE)
     other = (INPUTS / "hotplate.mtx").read_text()

@@ -207,6 +207,40 @@ pub struct Constraints {
     pub least: Option<(f64, bool)>,
     /// The greatest, and whether it is itself left out.
     pub greatest: Option<(f64, bool)>,
+    /// Fewest and most characters of a text.
+    pub length: (Option<u64>, Option<u64>),
+    /// A regular expression that the whole of a text matches.
+    pub pattern: Option<String>,
+    /// Fewest and most elements of a list.
+    pub count: (Option<u64>, Option<u64>),
+}
+
+impl Constraints {
+    /// These, and where they say nothing those of the type inside; of two bounds the narrower one holds.
+    pub fn over(&self, inner: &Constraints) -> Constraints {
+        let pick = |a: Option<(f64, bool)>, b: Option<(f64, bool)>, lower: bool| match (a, b) {
+            (Some(a), Some(b)) if a.0 == b.0 => Some((a.0, a.1 || b.1)),
+            (Some(a), Some(b)) => Some(if (a.0 > b.0) == lower { a } else { b }),
+            (a, b) => a.or(b),
+        };
+        let size = |a: (Option<u64>, Option<u64>), b: (Option<u64>, Option<u64>)| {
+            (a.0.max(b.0), [a.1, b.1].into_iter().flatten().min())
+        };
+        let set = match (self.set.is_empty(), inner.set.is_empty()) {
+            (false, false) => self.set.iter().filter(|v| inner.set.contains(v)).cloned().collect(),
+            (true, _) => inner.set.clone(),
+            (_, true) => self.set.clone(),
+        };
+        Constraints {
+            unit: self.unit.clone().or_else(|| inner.unit.clone()),
+            set,
+            least: pick(self.least, inner.least, true),
+            greatest: pick(self.greatest, inner.greatest, false),
+            length: size(self.length, inner.length),
+            pattern: self.pattern.clone().or_else(|| inner.pattern.clone()),
+            count: size(self.count, inner.count),
+        }
+    }
 }
 
 /// The units of the international system that all others are given by.

@@ -15,15 +15,8 @@ const DEEPEST: usize = 32;
 
 /// Constraints of the standard that are left to the server that states them.
 const NOT_LOOKED_AT: &[&str] = &[
-    "Length",
-    "MinimalLength",
-    "MaximalLength",
-    "Pattern",
     "ContentType",
     "Schema",
-    "ElementCount",
-    "MinimalElementCount",
-    "MaximalElementCount",
     "FullyQualifiedIdentifier",
     "AllowedTypes",
     // Of dates and times.
@@ -315,21 +308,43 @@ fn number(node: Node<'_, '_>) -> Result<f64, Problem> {
     number.ok_or_else(|| wrong(node, format!("`{word}` is no number")))
 }
 
+/// How many characters or elements.
+fn size(node: Node<'_, '_>) -> Result<u64, Problem> {
+    text(node).parse().map_err(|_| wrong(node, format!("`{}` is no count", text(node))))
+}
+
 fn constraints(node: Node<'_, '_>, of: &DataType) -> Result<Constraints, Problem> {
-    let is_number = matches!(of, DataType::Basic(Basic::Real | Basic::Integer));
+    let is_number = matches!(of.plain(), DataType::Basic(Basic::Real | Basic::Integer));
+    // Behind a name may be a number or a date; only one of them is written as a number.
+    let is_bounded = |node| is_number || matches!(of.plain(), DataType::Identifier(_)) && number(node).is_ok();
+    let has_length = matches!(of.plain(), DataType::Basic(Basic::String | Basic::Binary) | DataType::Identifier(_));
+    let has_elements = matches!(of.plain(), DataType::List(_) | DataType::Identifier(_));
     let mut out = Constraints::default();
     for inner in node.children().filter(Node::is_element) {
         let name = inner.tag_name().name();
         match name {
-            "Unit" if is_number => out.unit = Some(unit(inner)?),
+            "Unit" if is_number || matches!(of.plain(), DataType::Identifier(_)) => out.unit = Some(unit(inner)?),
             "Set" => out.set = children(inner, "Value").map(|v| text(v).to_owned()).collect(),
-            "MinimalInclusive" | "MinimalExclusive" if is_number => {
+            "MinimalInclusive" | "MinimalExclusive" if is_bounded(inner) => {
                 out.least = Some((number(inner)?, name == "MinimalExclusive"));
             }
-            "MaximalInclusive" | "MaximalExclusive" if is_number => {
+            "MaximalInclusive" | "MaximalExclusive" if is_bounded(inner) => {
                 out.greatest = Some((number(inner)?, name == "MaximalExclusive"));
             }
+            "Length" if has_length => out.length = (Some(size(inner)?), Some(size(inner)?)),
+            "MinimalLength" if has_length => out.length.0 = Some(size(inner)?),
+            "MaximalLength" if has_length => out.length.1 = Some(size(inner)?),
+            "ElementCount" if has_elements => out.count = (Some(size(inner)?), Some(size(inner)?)),
+            "MinimalElementCount" if has_elements => out.count.0 = Some(size(inner)?),
+            "MaximalElementCount" if has_elements => out.count.1 = Some(size(inner)?),
+            "Pattern" if has_length => out.pattern = Some(inner.text().unwrap_or_default().to_owned()),
             "Unit" => return Err(wrong(inner, "only numbers have a `Unit`")),
+            "Length" | "MinimalLength" | "MaximalLength" | "Pattern" => {
+                return Err(wrong(inner, format!("only texts have a `{name}`")));
+            }
+            "ElementCount" | "MinimalElementCount" | "MaximalElementCount" => {
+                return Err(wrong(inner, format!("only lists have a `{name}`")));
+            }
             known if NOT_LOOKED_AT.contains(&known) => {}
             other => return Err(wrong(inner, format!("there is no constraint `{other}`"))),
         }
@@ -338,6 +353,13 @@ fn constraints(node: Node<'_, '_>, of: &DataType) -> Result<Constraints, Problem
         && least > greatest
     {
         return Err(wrong(node, format!("nothing is from {least} to {greatest}")));
+    }
+    for (least, most) in [out.length, out.count] {
+        if let (Some(least), Some(most)) = (least, most)
+            && least > most
+        {
+            return Err(wrong(node, format!("nothing has from {least} to {most} parts")));
+        }
     }
     Ok(out)
 }

@@ -118,8 +118,27 @@ impl Writer {
         self.close("DataType");
     }
 
+    /// Fewest and most, as one number where these are the same.
+    fn sizes(&mut self, sizes: (Option<u64>, Option<u64>), tag: &str) {
+        if let (Some(least), Some(most)) = sizes
+            && least == most
+        {
+            return self.leaf(tag, &least.to_string());
+        }
+        for (size, prefix) in [(sizes.0, "Minimal"), (sizes.1, "Maximal")] {
+            if let Some(size) = size {
+                self.leaf(&format!("{prefix}{tag}"), &size.to_string());
+            }
+        }
+    }
+
     fn constraints(&mut self, of: &Constraints) {
         self.open("Constraints");
+        self.sizes(of.length, "Length");
+        if let Some(pattern) = &of.pattern {
+            self.leaf("Pattern", pattern);
+        }
+        self.sizes(of.count, "ElementCount");
         if !of.set.is_empty() {
             self.open("Set");
             of.set.iter().for_each(|v| self.leaf("Value", v));

@@ -94,7 +94,17 @@ fn data_type() -> impl Strategy<Value = DataType> {
         let constraints = Constraints { set, ..Default::default() };
         DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))
     });
-    let leaf = prop_oneof![basic, number, words];
+    let sizes = || (proptest::option::of(0..4u64), proptest::option::of(4..9u64));
+    let long = (sizes(), proptest::option::of("[a-z]{1,5}")).prop_map(|(length, pattern)| {
+        let constraints = Constraints { length, pattern, ..Default::default() };
+        DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))
+    });
+    let list = sizes().prop_map(|count| {
+        let constraints = Constraints { count, ..Default::default() };
+        let list = DataType::List(Box::new(DataType::Basic(Basic::Real)));
+        DataType::Constrained(Box::new(list), Box::new(constraints))
+    });
+    let leaf = prop_oneof![basic, number, words, long, list];
     leaf.prop_recursive(2, 8, 3, |inner| {
         let part = (named(), inner.clone()).prop_map(|((identifier, display, description), ty)| Element {
             identifier,

@@ -69,6 +69,9 @@ pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTr
     for error in &feature.errors {
         writer.wire(&format!("reply \"{}\" fails {}", error.identifier, name(&error.identifier)));
     }
+    if writer.own.contains(SAFE) {
+        writer.wire(&format!("safe sends \"{{{SAFE}}}\""));
+    }
     let left_out = writer.left_out;
     let mut text = String::from("mtx 1\n");
     text.push_str(&writer.types.declarations());
@@ -82,6 +85,9 @@ pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTr
     );
     Declared { text, left_out }
 }
+
+/// The parameter that a capability declares where assets say by which call they are made safe.
+const SAFE: &str = "safe_call";
 
 /// How long a server may take to answer a call.
 const PATIENCE: &str = "10 s";

@@ -55,14 +55,14 @@ impl<'f> Types<'f> {
     }
 
     /// The basic type behind a type, with what constrains it.
-    fn basic<'t>(&'t self, ty: &'t DataType) -> Result<(Basic, Option<&'t Constraints>), String> {
+    fn basic(&self, ty: &DataType) -> Result<(Basic, Constraints), String> {
         let of = self.feature.resolved(ty).ok_or("is of a type that is not defined")?;
         match of {
-            DataType::Basic(basic) => Ok((*basic, None)),
-            DataType::Constrained(inner, constraints) => match &**inner {
-                DataType::Basic(basic) => Ok((*basic, Some(constraints))),
-                inner => self.basic(inner),
-            },
+            DataType::Basic(basic) => Ok((*basic, Constraints::default())),
+            DataType::Constrained(inner, outer) => {
+                let (basic, inner) = self.basic(inner)?;
+                Ok((basic, outer.over(&inner)))
+            }
             DataType::Identifier(_) => self.basic(of),
             DataType::List(_) => Err("is a list".to_owned()),
             DataType::Structure(_) => Err("is a structure".to_owned()),
@@ -72,7 +72,6 @@ impl<'f> Types<'f> {
     /// A parameter of a command.
     pub fn given(&mut self, option: &str, ty: &DataType) -> Result<Given, String> {
         let (basic, constraints) = self.basic(ty)?;
-        let constraints = constraints.cloned().unwrap_or_default();
         let plain = |ty: &str, piece: String| Given { ty: ty.to_owned(), piece, needs: Vec::new() };
         Ok(match basic {
             Basic::Boolean => plain("Bool", format!("{{{option}}}")),
@@ -110,7 +109,7 @@ impl<'f> Types<'f> {
     /// A property or an answer.
     pub fn told(&mut self, ty: &DataType) -> Result<Told, String> {
         let (basic, constraints) = self.basic(ty)?;
-        let unit = constraints.and_then(|c| c.unit.clone());
+        let unit = constraints.unit;
         Ok(match (basic, unit) {
             (Basic::Real | Basic::Integer, Some(unit)) => {
                 let Counted { ty, unit } = self.counted(&unit)?;

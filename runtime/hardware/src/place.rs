@@ -16,6 +16,13 @@ pub enum Place {
     Http(String),
 }
 
+impl Place {
+    /// Whether each answer there belongs to its question, however late it comes.
+    pub fn keeps_answers_apart(&self) -> bool {
+        matches!(self, Place::Sila(_))
+    }
+}
+
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text) | Place::Http(text)) = self;

@@ -1,5 +1,6 @@
 //! A client: commands and properties of one server, by the features that it says it has. It blocks.
 
+mod encrypted;
 mod given;
 mod wire;
 
@@ -58,8 +59,17 @@ pub struct Client {
 impl Client {
     /// A connection to a server, `HOST:PORT`, that must offer this feature; no call lasts longer than `timeout`. The
     /// connection is not encrypted.
-    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
     pub fn connect(address: &str, feature: &str, timeout: Duration) -> Result<Client, Failure> {
+        Client::connected(address, feature, timeout).map_err(|failure| match failure {
+            Failure::Lost(_) if encrypted::is_encrypted(address, timeout) => Failure::Garbled(format!(
+                "the server at `{address}` is encrypted (TLS), and calls are made without encryption only: start it without"
+            )),
+            other => other,
+        })
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
+    fn connected(address: &str, feature: &str, timeout: Duration) -> Result<Client, Failure> {
         let lost = |why: String| Failure::Lost(format!("cannot connect to `{address}`: {why}"));
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.map_err(|e| lost(e.to_string()))?;

@@ -14,7 +14,7 @@ mod value;
 pub use call::Failure;
 pub use client::{Client, is_of};
 pub use raw::Raw;
-pub use server::{Call, News, Read, Request, Server, serve};
+pub use server::{Call, News, Read, Request, Server, new_uuid, serve, uuid};
 pub use service::spaced;
 /// The channels by which news of a call goes out.
 pub use tokio::sync::mpsc as news;

@@ -1,10 +1,12 @@
 //! A server: features offered to others. What is called goes as a [`Request`] to whoever carries it out.
 
 mod answer;
+mod cancel;
 mod executions;
 mod streams;
 
 use std::net::SocketAddr;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -41,6 +43,15 @@ pub struct Call {
     pub arguments: Vec<Value>,
     /// Told how it stands; nobody listens any more where this is closed.
     pub news: news::UnboundedSender<News>,
+    /// Set when whoever called it wants it no more.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+impl Call {
+    /// Whether it is to be broken off.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
 }
 
 /// How a command that was called stands.
@@ -97,6 +108,16 @@ impl Drop for Server {
     }
 }
 
+/// An identifier that no other server has.
+pub fn new_uuid() -> String {
+    uuid::Uuid::new_v4().to_string()
+}
+
+/// An identifier as it is written; nothing where it is none.
+pub fn uuid(text: &str) -> Option<String> {
+    uuid::Uuid::parse_str(text).ok().map(|uuid| uuid.to_string())
+}
+
 /// Longest time in which connections that are open may end.
 const IDLE: Duration = Duration::from_secs(20);
 
@@ -106,6 +127,7 @@ pub fn serve(
     name: &str,
     description: &str,
     version: &str,
+    uuid: &str,
     features: Vec<Feature>,
 ) -> Result<(Server, mpsc::Receiver<Request>), String> {
     let failed = |e: std::io::Error| format!("cannot answer at `{address}`: {e}");
@@ -117,10 +139,11 @@ pub fn serve(
         name: name.to_owned(),
         description: description.to_owned(),
         version: version.to_owned(),
-        uuid: uuid::Uuid::new_v4().to_string(),
+        uuid: uuid.to_owned(),
     };
     let mut all = vec![service::feature()];
     all.extend(features);
+    all.push(cancel::feature());
     let answers = Arc::new(Answers::new(all, Mutex::new(about), sender));
     runtime.spawn(async move {
         loop {

@@ -39,9 +39,11 @@ pub fn call(text: &str) -> Result<Call, String> {
 
 /// What stands between commas that are in no brackets and no quotes.
 fn parts(text: &str) -> Result<Vec<&str>, String> {
-    let (mut out, mut depth, mut quoted, mut from) = (Vec::new(), 0usize, false, 0);
+    let (mut out, mut depth, mut quoted, mut from, mut escaped) = (Vec::new(), 0usize, false, 0, false);
     for (at, c) in text.char_indices() {
         match c {
+            _ if std::mem::take(&mut escaped) => {}
+            '\\' if quoted => escaped = true,
             '"' => quoted = !quoted,
             _ if quoted => {}
             '[' | '{' => depth += 1,
@@ -81,7 +83,7 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
             let of = feature.resolved(ty).ok_or_else(|| format!("there is no type `{name}`"))?;
             within(feature, of, text, depth + 1)?
         }
-        DataType::Basic(Basic::String) => Value::Text(unquoted(text).to_owned()),
+        DataType::Basic(Basic::String) => Value::Text(unquoted(text)?),
         DataType::Basic(Basic::Real) => {
             let number = text.parse::<f64>().ok().filter(|n| n.is_finite());
             Value::Real(number.ok_or_else(|| format!("`{text}` is no number"))?)
@@ -119,8 +121,23 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
     })
 }
 
-fn unquoted(text: &str) -> &str {
-    text.strip_prefix('"').and_then(|t| t.strip_suffix('"')).unwrap_or(text)
+/// A text without its quotes, in which `\"` is a quote and `\\` a backslash; one without quotes is as it stands.
+fn unquoted(text: &str) -> Result<String, String> {
+    let Some(rest) = text.strip_prefix('"') else { return Ok(text.to_owned()) };
+    let mut out = String::new();
+    let mut chars = rest.chars();
+    loop {
+        match chars.next() {
+            Some('"') if chars.as_str().is_empty() => return Ok(out),
+            Some('"') => return Err(format!("`{text}` goes on after its closing quote")),
+            Some('\\') => match chars.next() {
+                Some(c @ ('"' | '\\')) => out.push(c),
+                _ => return Err(format!("in `{text}` a `\\` stands before neither `\"` nor `\\`")),
+            },
+            Some(c) => out.push(c),
+            None => return Err(format!("`{text}` is not closed")),
+        }
+    }
 }
 
 /// A value as text: numbers as they are, truth as 1 and 0.

@@ -83,7 +83,13 @@ pub fn decode(feature: &Feature, elements: &[Element], raw: &Raw) -> Result<Vec<
 fn take(feature: &Feature, ty: &DataType, number: u32, raw: &Raw) -> Result<Value, String> {
     let mut all = raw.all(number);
     if let DataType::List(of) = ty.plain() {
-        return all.map(|bytes| understood(feature, of, bytes)).collect::<Result<_, _>>().map(Value::List);
+        let list = all.map(|bytes| understood(feature, of, bytes)).collect::<Result<_, _>>().map(Value::List)?;
+        let mut outer = ty;
+        while let DataType::Constrained(inner, constraints) = outer {
+            fits(&list, constraints)?;
+            outer = inner;
+        }
+        return Ok(list);
     }
     match (all.next(), all.next()) {
         (Some(bytes), None) => understood(feature, ty, bytes),
@@ -154,5 +160,29 @@ pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
     if number.is_some_and(|n| !n.is_finite()) {
         return Err(format!("{shown} is no finite number"));
     }
-    Ok(())
+    match value {
+        Value::Text(text) => {
+            within(text.chars().count(), constraints.length, "characters")?;
+            constraints.pattern.as_ref().map_or(Ok(()), |pattern| matches(text, pattern))
+        }
+        Value::List(values) => within(values.len(), constraints.count, "elements"),
+        _ => Ok(()),
+    }
+}
+
+/// Whether there are neither too few nor too many; why not.
+fn within(size: usize, (least, most): (Option<u64>, Option<u64>), of: &str) -> Result<(), String> {
+    match size as u64 {
+        n if least.is_some_and(|least| n < least) => Err(format!("it has {n} {of}, fewer than {}", least.unwrap_or(0))),
+        n if most.is_some_and(|most| n > most) => Err(format!("it has {n} {of}, more than {}", most.unwrap_or(0))),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a pattern matches the whole of a text; why not.
+fn matches(text: &str, pattern: &str) -> Result<(), String> {
+    let whole = regex_lite::Regex::new(&format!("^(?:{pattern})$"));
+    let whole =
+        whole.map_err(|_| format!("its pattern `{pattern}` is not understood here, so nothing can be checked"))?;
+    if whole.is_match(text) { Ok(()) } else { Err(format!("`{text}` does not match `{pattern}`")) }
 }

@@ -4,6 +4,7 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
+use matterix_sila::feature::{Basic, Constraints, DataType, Element};
 use matterix_sila::{Feature, read};
 use matterix_sila_wire::text::{call, shown, value};
 use matterix_sila_wire::{Client, Failure, News, Raw, Request, Value, decode, encode, serve};
@@ -11,6 +12,7 @@ use proptest::prelude::*;
 use prost::Message;
 
 const PLATE: &str = include_str!("../../../tests/deploy/hotplate.sila.xml");
+const UUID: &str = "7f3f5b0e-8c57-4d56-9a3e-2c1f0d9b6a11";
 const ID: &str = "org.example/heating/HotPlate/v1";
 
 fn plate() -> Feature {
@@ -63,13 +65,17 @@ fn refused(result: Result<String, Failure>) -> (String, String) {
 #[test]
 fn a_client_and_a_server_understand_each_other() {
     let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let (server, requests) = serve(any, "plate", "a plate", "1.0", vec![plate()]).expect("a port is free");
+    let (server, requests) = serve(any, "plate", "a plate", "1.0", UUID, vec![plate()]).expect("a port is free");
     let working = std::thread::spawn(move || lab(requests));
     let (address, time) = (server.address.to_string(), Duration::from_secs(5));
     let mut client = Client::connect(&address, ID, time).expect("it answers");
     assert_eq!(client.feature().id(), ID);
     assert_eq!(client.ask("CurrentTemperature"), Ok("25".into()));
     assert_eq!(client.ask("SiLAService.ServerName"), Ok("plate".into()));
+    assert_eq!(client.ask("SiLAService.ServerUUID"), Ok(UUID.into()));
+    let unknown = refused(client.say(&format!("CancelController.CancelCommand(CommandExecutionUUID: {UUID})"), true));
+    assert_eq!(unknown.0, "InvalidCommandExecutionUUID");
+    assert_eq!(client.say("CancelController.CancelAll", true), Ok(String::new()));
     let said = "SetTarget(Target: 60.5, Mode: fast, Quiet: true)";
     assert_eq!(client.say(said, false), Ok(String::new()));
     assert_eq!(client.ask("CurrentTemperature"), Ok("60.5".into()));
@@ -98,6 +104,68 @@ fn a_client_and_a_server_understand_each_other() {
     assert!(matches!(client.say(said, false), Err(Failure::Lost(_))));
     drop(client);
     working.join().expect("the lab ends");
+}
+
+#[test]
+fn a_text_keeps_its_quotes_commas_and_backslashes() {
+    let feature = plate();
+    let text = DataType::Basic(Basic::String);
+    let call = call(r#"Stop(A: "say \"hi\", then \\", B: 2)"#).expect("it is a call");
+    assert_eq!(call.arguments.len(), 2);
+    let read = value(&feature, &text, &call.arguments[0].1);
+    assert_eq!(read, Ok(Value::Text(r#"say "hi", then \"#.into())));
+    for wrong in [r#""a"b"#, r#""a\b""#, r#""a"#] {
+        assert!(value(&feature, &text, wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn lengths_patterns_and_counts_are_checked_through_nested_constraints() {
+    let feature = plate();
+    let constrained = |of, constraints| DataType::Constrained(Box::new(of), Box::new(constraints));
+    let short = constrained(
+        DataType::Basic(Basic::String),
+        Constraints { length: (Some(2), Some(4)), ..Constraints::default() },
+    );
+    let letters = constrained(short, Constraints { pattern: Some("[a-z]+|Ä{3}".into()), ..Constraints::default() });
+    for (text, good) in [("abc", true), ("ÄÄÄ", true), ("a", false), ("abcde", false), ("ab1", false), ("xÄÄÄ", false)]
+    {
+        assert_eq!(value(&feature, &letters, text).is_ok(), good, "{text}");
+    }
+    let pair =
+        constrained(DataType::List(Box::new(letters)), Constraints { count: (Some(2), Some(2)), ..Default::default() });
+    let element =
+        Element { identifier: "A".into(), display: String::new(), description: String::new(), ty: pair.clone() };
+    for (text, good) in [("[ab, cd]", true), ("[ab]", false), ("[ab, cd, ef]", false), ("[ab, c]", false)] {
+        assert_eq!(value(&feature, &pair, text).is_ok(), good, "{text}");
+    }
+    let one = encode(&feature, std::slice::from_ref(&element), &[Value::List(vec![Value::Text("ab".into())])]);
+    let told = decode(&feature, &[element], &one.expect("it is encoded"));
+    assert!(told.is_err_and(|why| why.contains("1 elements")));
+}
+
+/// A server that takes a connection and answers like this.
+fn answering(first: &'static [u8]) -> String {
+    use std::io::{Read, Write};
+    let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a port is free");
+    let address = listener.local_addr().expect("it has one").to_string();
+    std::thread::spawn(move || {
+        for mut stream in listener.incoming().flatten() {
+            let _ = stream.read(&mut [0; 64]);
+            let _ = stream.write_all(first);
+        }
+    });
+    address
+}
+
+#[test]
+fn an_encrypted_server_is_named_as_such() {
+    // An alert of TLS: a protocol version that the server does not speak.
+    let address = answering(&[21, 3, 3, 0, 2, 2, 70]);
+    let failed = Client::connect(&address, ID, Duration::from_secs(1)).err();
+    assert!(matches!(&failed, Some(Failure::Garbled(why)) if why.contains("is encrypted (TLS)")), "{failed:?}");
+    let failed = Client::connect(&answering(b"HTTP/1.1 400"), ID, Duration::from_secs(1)).err();
+    assert!(failed.is_some_and(|f| !format!("{f:?}").contains("TLS")));
 }
 
 #[test]

@@ -32,6 +32,13 @@ impl<'p> Executor<'p, '_> {
         if self.abort.is_some() {
             return;
         }
+        for step in self.out.given_up() {
+            let is_it = |(_, f): &(&FrameId, &super::Frame)| f.job && f.parent == Some(ROOT) && f.step == Some(step);
+            if let Some(job) = self.frames.iter().find(is_it).map(|(&id, _)| id) {
+                self.stop(job, Stop::Now, false);
+                self.drain();
+            }
+        }
         for asked in self.out.asked(self.now) {
             if self.plan.steps.len() <= asked.step.0 as usize {
                 continue;

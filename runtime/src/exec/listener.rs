@@ -136,6 +136,10 @@ pub trait Listener: Observer {
     fn asked(&mut self, time: f64) -> Vec<Asked> {
         Vec::new()
     }
+    /// Steps that were asked for and are to be broken off: what runs is halted, each `finally` still gets its turn.
+    fn given_up(&mut self) -> Vec<StepId> {
+        Vec::new()
+    }
     /// What an operation that is about to begin would bring about and must not.
     fn foreseen(&mut self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
         None

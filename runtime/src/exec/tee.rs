@@ -46,6 +46,12 @@ impl Listener for Tee<'_> {
         asked
     }
 
+    fn given_up(&mut self) -> Vec<StepId> {
+        let mut given_up = self.0.given_up();
+        given_up.extend(self.1.given_up());
+        given_up
+    }
+
     fn foreseen(&mut self, engine: &Engine<'_>, step: StepId, operation: &Operation) -> Option<Alarm> {
         self.0.foreseen(engine, step, operation).or_else(|| self.1.foreseen(engine, step, operation))
     }

@@ -24,7 +24,9 @@ fn third(name: &str, answer: fn() -> Answer) -> (crate::harness::Ended, Vec<Stri
 
 #[test]
 fn one_reading_that_is_lost_or_garbled_is_asked_for_again() {
-    let cases: [(&str, fn() -> Answer); 7] = [
+    /// What a device answers instead of a reading.
+    type Spoiled = fn() -> Answer;
+    let cases: [(&str, Spoiled); 7] = [
         ("lost", || Answer::Nothing),
         ("garbled", || Answer::Says("2\u{7f}x.3 2 \r\n")),
         ("half", || Answer::Says("25.")),

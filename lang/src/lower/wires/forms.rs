@@ -11,9 +11,11 @@ use crate::lower::Planner;
 /// What the framing of a driver lets its messages say.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) enum Speech {
-    /// Bodies in JSON, and calls.
+    /// Bodies in JSON.
     #[default]
     Free,
+    /// Calls, in which texts stand in quotes.
+    Calls,
     /// Printable characters, without these signs.
     Text(Vec<u8>),
     /// Any bytes.
@@ -25,7 +27,8 @@ pub(crate) enum Speech {
 impl Speech {
     pub(super) fn of(framing: &Framing) -> Speech {
         match framing {
-            Framing::Json | Framing::Calls => Speech::Free,
+            Framing::Json => Speech::Free,
+            Framing::Calls => Speech::Calls,
             Framing::CavroDt | Framing::CavroOem => Speech::Text(Vec::new()),
             Framing::Frames(frames) => match frames.carries {
                 Carries::Text => Speech::Text(ends(frames)),
@@ -74,7 +77,7 @@ impl Planner<'_, '_> {
                 "bytes of a number are no printable characters",
                 "write `hex` behind it, or a framing that `carries: bytes`",
             )),
-            Speech::Free if !form.is_plain() => Some((
+            Speech::Free | Speech::Calls if !form.is_plain() => Some((
                 "a server is told a number as people write it",
                 "as in `:.1`, or `:.0 * 10` where it counts tenths",
             )),
@@ -103,7 +106,7 @@ impl Planner<'_, '_> {
     /// Whether a framing can carry what a message says as it is.
     pub(super) fn speakable(&mut self, text: &str, at: Span) -> Option<()> {
         let (bad, help) = match &self.speech {
-            Speech::Free => return Some(()),
+            Speech::Free | Speech::Calls => return Some(()),
             Speech::Bytes => (text.chars().find(|c| u32::from(*c) > 0xff), "write bytes as `\\x1b`"),
             Speech::Modbus => (text.chars().find(|c| !matches!(c, ' '..='~')), "write registers as numbers"),
             Speech::Text(ends) => {
@@ -138,7 +141,7 @@ impl Planner<'_, '_> {
                     Piece::Word(_, words) => words.iter().any(|w| goes_on(w)),
                 }
         });
-        if touches && self.speech != Speech::Free {
+        if touches && !matches!(self.speech, Speech::Free | Speech::Calls) {
             let help = "put something between them, or give the number a width, as in `:05.1`";
             self.wrong(at, "a number cannot be told from what follows it", "they touch", help);
             return None;

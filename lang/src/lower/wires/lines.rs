@@ -63,6 +63,33 @@ impl<'a> Planner<'a, '_> {
         Some(Template { pieces: self.modbus_told(template.pieces, text.span)?, ..template })
     }
 
+    /// A text as it stands in a call: with its quotes escaped where it is in quotes.
+    fn quotable(&mut self, text: String, before: &[Piece], at: Span) -> Option<String> {
+        let (mut quoted, mut escaped) = (false, false);
+        for piece in before {
+            let Piece::Plain(plain) = piece else { continue };
+            for c in plain.chars() {
+                match c {
+                    _ if std::mem::take(&mut escaped) => {}
+                    '\\' if quoted => escaped = true,
+                    '"' => quoted = !quoted,
+                    _ => {}
+                }
+            }
+        }
+        if quoted {
+            return Some(text.replace('\\', "\\\\").replace('"', "\\\""));
+        }
+        match text.chars().find(|c| "\"\\,:()[]{}".contains(*c)) {
+            None => Some(text),
+            Some(c) => {
+                let headline = format!("`{c}` cannot stand in a text without quotes");
+                self.wrong(at, &headline, "would be taken for a part of the call", "write `\\\"` on both sides of it");
+                None
+            }
+        }
+    }
+
     fn filled_template(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Template> {
         let mut pieces = Vec::new();
         for part in &text.parts {
@@ -96,6 +123,9 @@ impl<'a> Planner<'a, '_> {
                     let at = form.map_or(value.span, |f| f.span);
                     self.wrong(at, "only numbers and words have a form", "of neither", "leave it out");
                     return None;
+                }
+                Value::Text(words) if self.speech == Speech::Calls && text.parts.len() > 1 => {
+                    Piece::Plain(self.quotable(words, &pieces, value.span)?)
                 }
                 Value::Text(text) => Piece::Plain(text),
                 Value::Instance(i) | Value::Qualified(i, _) => {

@@ -94,7 +94,7 @@ impl Planner<'_, '_> {
 
     /// The name under which a journal keeps what a reply says.
     fn kept_name(&mut self, name: &str, at: Span) -> Option<String> {
-        if self.speech == Speech::Free {
+        if matches!(self.speech, Speech::Free | Speech::Calls) {
             self.wrong(at, "what a server answers is kept without braces", "in braces", &format!("write `<{name}>`"));
             return None;
         }

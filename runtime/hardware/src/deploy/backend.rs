@@ -76,13 +76,13 @@ impl Backend for Hardware<'_, '_> {
     fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         self.noted = None;
         let begun = self.start_operation(operation, out);
-        begun.map_err(|fault| self.from_outside(fault))
+        begun.map_err(|fault| self.outward(fault))
     }
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         self.noted = None;
         let status = self.poll_operation(ticket, out);
-        status.map_err(|fault| self.from_outside(fault))
+        status.map_err(|fault| self.outward(fault))
     }
 
     fn halt(&mut self, ticket: Ticket) {
@@ -113,14 +113,14 @@ impl Backend for Hardware<'_, '_> {
         self.tickets += 1;
         self.noted = None;
         let put = self.put(ticket, step, text.to_owned(), out);
-        put.map_err(|fault| self.from_outside(fault))?;
+        put.map_err(|fault| self.outward(fault))?;
         Ok(Some(ticket))
     }
 
     fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
         self.noted = None;
         let answer = self.answer(ticket);
-        match answer.map_err(|fault| self.from_outside(fault))? {
+        match answer.map_err(|fault| self.outward(fault))? {
             Some(Answer { yes: false, who }) => {
                 // Who does not agree wants it to end.
                 self.settings.control.stop(&who);
@@ -133,7 +133,7 @@ impl Backend for Hardware<'_, '_> {
     fn advance(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         self.noted = None;
         let advance = self.pass(until, watches, out);
-        advance.map_err(|fault| self.from_outside(fault))
+        advance.map_err(|fault| self.outward(fault))
     }
 }
 

@@ -69,6 +69,8 @@ pub struct Device<'m> {
     pub told: bool,
     /// Why nothing more is said to it.
     pub lost: Option<String>,
+    /// Its line was opened anew after it was lost.
+    pub renewed: bool,
     /// When what keeps its watchdog quiet was last said, by line of the driver, s.
     pub beats: Vec<Option<f64>>,
 }
@@ -94,7 +96,8 @@ impl<'m> Device<'m> {
         };
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
-        Ok(Device { name, binding, driver, host, link: None, codec, said: false, told: false, lost: None, beats })
+        let (said, told, lost, renewed) = (false, false, None, false);
+        Ok(Device { name, binding, driver, host, link: None, codec, said, told, lost, renewed, beats })
     }
 }
 

@@ -299,7 +299,7 @@ impl<'m, 't> Hardware<'m, 't> {
     }
 
     /// A fault that came from outside: whoever replays the journal meets it again.
-    pub(super) fn from_outside(&mut self, fault: Fault) -> Fault {
+    pub(super) fn outward(&mut self, fault: Fault) -> Fault {
         let is_theirs = matches!(
             fault.code,
             codes::DEVICE_LOST | codes::DEVICE_GARBLED | codes::DEVICE_REFUSED | codes::DIVERGED | codes::RUN_FAILED

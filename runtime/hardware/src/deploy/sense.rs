@@ -84,6 +84,21 @@ impl Hardware<'_, '_> {
         Ok(link)
     }
 
+    /// Opens a lost line anew, once, where no late answer can be taken for another one's. The loss has ended the run: what is
+    /// said from then on is what `finally` says.
+    pub(super) fn renew(&mut self, line: usize) {
+        let device = &self.devices[line];
+        let Carrier::Line { place, address, .. } = device.binding.carrier.clone() else { return };
+        if device.lost.is_none() || device.renewed || !device.said || self.is_dry() || !self.is_live() {
+            return;
+        }
+        let Some(driver) = device.driver.filter(|_| place.keeps_answers_apart()) else { return };
+        self.devices[line].renewed = true;
+        if let Ok(link) = self.linked(line, driver, &place, address.as_deref()) {
+            (self.devices[line].link, self.devices[line].lost) = (Some(link), None);
+        }
+    }
+
     pub(super) fn set_clock(&mut self) {
         self.origin = (self.twin.now(), self.settings.world.elapsed());
     }

@@ -54,6 +54,7 @@ impl<'m> Hardware<'m, '_> {
         if self.devices[index].driver.is_none() || self.settings.mode == Mode::Replay {
             return Ok(Vec::new());
         }
+        self.renew(self.line_of(index));
         if let Some(why) = &self.devices[self.line_of(index)].lost {
             return Err(Trouble::Lost(format!("nothing more can be said to it: {why}")));
         }

@@ -35,9 +35,9 @@ impl Hardware<'_, '_> {
                 self.go_live(out)?;
                 let now = self.twin.now();
                 let told = self.tell(device, line);
-                let value = told.map_err(|fault| self.from_outside(fault))?;
+                let value = told.map_err(|fault| self.outward(fault))?;
                 self.journal.note(&Entry::Told { t: now, name: name.clone(), value });
-                self.compared(device, line, value).map_err(|fault| self.from_outside(fault))?;
+                self.compared(device, line, value).map_err(|fault| self.outward(fault))?;
                 value
             }
         };

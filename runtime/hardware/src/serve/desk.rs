@@ -24,6 +24,14 @@ struct Going {
     /// When news of it went out last, s.
     told: f64,
     failure: Option<(String, String)>,
+    /// The executor was told that it is cancelled.
+    given_up: bool,
+}
+
+impl Going {
+    fn is_to_be_given_up(&self) -> bool {
+        self.call.is_cancelled() && !self.given_up
+    }
 }
 
 /// What is asked and what goes on; the one who lets time pass and the one who listens both look at it.
@@ -46,7 +54,7 @@ impl<'p> Desk<'p> {
         Desk { catalogue, scene, plan, requests, calls, reads, going, busy: Cell::new(false) }
     }
 
-    /// Takes in what has come; whether a command is waiting.
+    /// Takes in what has come; whether a command is waiting, or is to be broken off.
     pub(super) fn look(&self) -> bool {
         loop {
             match self.requests.try_recv() {
@@ -55,7 +63,7 @@ impl<'p> Desk<'p> {
                 Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
             }
         }
-        !self.calls.borrow().is_empty()
+        !self.calls.borrow().is_empty() || self.going.borrow().values().any(Going::is_to_be_given_up)
     }
 
     /// The next property that is asked for, with its node.
@@ -169,8 +177,15 @@ impl<'p> Desk<'p> {
             not_now(&call, format!("`{name}` is in use: `{label}` goes on"));
             return None;
         }
-        let going =
-            Going { call, device: offer.device, begun: now, takes: None, told: f64::NEG_INFINITY, failure: None };
+        let going = Going {
+            call,
+            device: offer.device,
+            begun: now,
+            takes: None,
+            told: f64::NEG_INFINITY,
+            failure: None,
+            given_up: false,
+        };
         self.busy.set(true);
         let _ = going.call.news.send(News::Begun);
         self.going.borrow_mut().insert(arranged.step, going);
@@ -232,12 +247,24 @@ impl Listener for Attendant<'_, '_> {
             return Vec::new();
         }
         let next = self.desk.calls.borrow_mut().pop_front();
+        let next = next.filter(|call| !call.is_cancelled());
         let asked = next.and_then(|call| self.desk.begin(call, time));
         if let Some(asked) = &asked {
             self.last = time;
             (self.say)(&format!("{time:10.3} s  {} begins\n", self.desk.plan.get(asked.step).label));
         }
         asked.into_iter().collect()
+    }
+
+    fn given_up(&mut self) -> Vec<StepId> {
+        let mut going = self.desk.going.borrow_mut();
+        let cancelled = going.iter_mut().filter(|(_, g)| g.is_to_be_given_up());
+        cancelled
+            .map(|(step, g)| {
+                g.given_up = true;
+                *step
+            })
+            .collect()
     }
 
     fn step(&mut self, time: f64, step: StepId, state: StepState) {
@@ -249,6 +276,7 @@ impl Listener for Attendant<'_, '_> {
         let news = match (&going.failure, state) {
             (_, StepState::Done) => News::Done(Vec::new()),
             (Some(failure), _) => self.desk.failed(&going.call, failure),
+            (None, _) if going.call.is_cancelled() => News::Failed(Failure::Garbled("it was cancelled".to_owned())),
             (None, _) => News::Failed(Failure::Garbled("it was broken off".to_owned())),
         };
         let how = match &news {

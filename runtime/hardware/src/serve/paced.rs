@@ -224,8 +224,14 @@ mod tests {
         let (ask, requests) = channel();
         let desk = Desk::new(catalogue, &scene, &plan, requests);
         let (told, mut heard) = news::unbounded_channel();
-        ask.send(Request::Call(Call { feature: 0, command: 0, arguments: Vec::new(), news: told }))
-            .expect("it is open");
+        ask.send(Request::Call(Call {
+            feature: 0,
+            command: 0,
+            arguments: Vec::new(),
+            news: told,
+            cancelled: Default::default(),
+        }))
+        .expect("it is open");
         let mut say = |_: &str| {};
         let mut listener = Attendant::new(&desk, &sources, &mut say);
         let begun = listener.asked(0.0);

@@ -1,7 +1,8 @@
 //! Calls of gRPC, answered.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use hyper::body::Incoming;
@@ -12,6 +13,7 @@ use tonic::{Response, Status};
 use tonic_prost::ProstCodec;
 use tower::service_fn;
 
+use super::cancel;
 use super::executions::{Executions, Known, State};
 use super::streams::{LIFETIME, Streamed, follow, infos, subscribed};
 use super::{About, Call, News, Read, Request};
@@ -112,6 +114,9 @@ impl Answers {
                         service_fn(move |request: tonic::Request<$of>| {
                             let this = std::sync::Arc::clone(&this);
                             async move {
+                                if beside {
+                                    return Err(refused(Refusal::NoMetadata, "nothing goes beside calls here"));
+                                }
                                 let $message = request.into_inner();
                                 let all: Result<Streamed<$to>, Status> = $answer(this).await;
                                 all.map(Response::new)
@@ -130,6 +135,9 @@ impl Answers {
             }
             Some(Meant::Command(SERVICE, c)) => {
                 unary!(Raw => Raw, |raw| async |this: This| this.own_command(c, &raw))
+            }
+            Some(Meant::Command(f, c)) if this.features[f].identifier == cancel::IDENTIFIER => {
+                unary!(Raw => Raw, |raw| async |this: This| this.cancel(f, c, &raw))
             }
             Some(Meant::Command(f, c)) => unary!(Raw => Raw, |raw| async |this: This| this.whole(f, c, raw).await),
             Some(Meant::Get(SERVICE, p)) => unary!(Raw => Raw, |_raw| async |this: This| this.own_property(p)),
@@ -173,18 +181,46 @@ impl Answers {
         Ok(values)
     }
 
-    async fn call(&self, f: usize, c: usize, raw: &Raw) -> Result<news::UnboundedReceiver<News>, Status> {
+    async fn call(
+        &self,
+        f: usize,
+        c: usize,
+        raw: &Raw,
+    ) -> Result<(news::UnboundedReceiver<News>, Arc<AtomicBool>), Status> {
         let command = &self.features[f].commands[c];
         let path = format!("Command/{}", command.identifier);
         let arguments = self.arguments(f, &command.parameters, &path, raw)?;
         let (news, heard) = news::unbounded_channel();
-        self.send(Request::Call(Call { feature: f - 1, command: c, arguments, news }))?;
-        Ok(heard)
+        let cancelled = Arc::new(AtomicBool::new(false));
+        self.send(Request::Call(Call {
+            feature: f - 1,
+            command: c,
+            arguments,
+            news,
+            cancelled: Arc::clone(&cancelled),
+        }))?;
+        Ok((heard, cancelled))
+    }
+
+    /// Breaks off a command that goes on, or all.
+    fn cancel(&self, f: usize, c: usize, raw: &Raw) -> Result<Raw, Status> {
+        let feature = &self.features[f];
+        let command = &feature.commands[c];
+        let path = format!("Command/{}", command.identifier);
+        let arguments = self.arguments(f, &command.parameters, &path, raw)?;
+        let named = arguments.first().map(crate::text::shown);
+        if !self.executions.cancel(named.as_deref())
+            && let Some(name) = named
+        {
+            let message = format!("no command with the execution `{name}` goes on");
+            return Err(Failure::Refused { name: cancel::UNKNOWN.to_owned(), message }.status(&feature.id()));
+        }
+        Ok(Raw::default())
     }
 
     /// A command that does not last.
     async fn whole(&self, f: usize, c: usize, raw: Raw) -> Result<Raw, Status> {
-        let mut heard = self.call(f, c, &raw).await?;
+        let (mut heard, _) = self.call(f, c, &raw).await?;
         let feature = &self.features[f];
         loop {
             match tokio::time::timeout(PATIENCE, heard.recv()).await {
@@ -201,7 +237,7 @@ impl Answers {
 
     /// A command that lasts: its execution is named as soon as it has begun.
     async fn begin(&self, f: usize, c: usize, raw: Raw) -> Result<Confirmation, Status> {
-        let mut heard = self.call(f, c, &raw).await?;
+        let (mut heard, cancelled) = self.call(f, c, &raw).await?;
         let (state, watched) = watch::channel(State::default());
         let first = tokio::time::timeout(PATIENCE, heard.recv()).await;
         match first {
@@ -211,7 +247,7 @@ impl Answers {
             }
             Ok(None) | Err(_) => return Err(gone()),
         }
-        let value = self.executions.add((f, c), watched);
+        let value = self.executions.add((f, c), cancelled, watched);
         let value = value.ok_or_else(|| refused(Refusal::NotAccepted, "too many commands go on"))?;
         tokio::spawn(async move {
             while state.borrow().end.is_none() {

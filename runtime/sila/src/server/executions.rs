@@ -1,7 +1,8 @@
 //! Commands that were called and last: how each stands, for whoever asks.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::sync::watch;
 
@@ -29,6 +30,8 @@ pub struct State {
 pub struct Known {
     /// Index of its feature and of its command.
     pub of: (usize, usize),
+    /// Set to break it off.
+    pub cancelled: Arc<AtomicBool>,
     /// How it stands.
     pub state: watch::Receiver<State>,
 }
@@ -46,7 +49,7 @@ struct Kept {
 
 impl Executions {
     /// A new one; nothing where too many go on.
-    pub fn add(&self, of: (usize, usize), state: watch::Receiver<State>) -> Option<String> {
+    pub fn add(&self, of: (usize, usize), cancelled: Arc<AtomicBool>, state: watch::Receiver<State>) -> Option<String> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.all.len() >= MOST {
             let ended = kept.all.iter().filter(|(_, (_, known))| known.state.borrow().end.is_some());
@@ -56,8 +59,16 @@ impl Executions {
         let name = uuid::Uuid::new_v4().to_string();
         kept.count += 1;
         let turn = kept.count;
-        kept.all.insert(name.clone(), (turn, Known { of, state }));
+        kept.all.insert(name.clone(), (turn, Known { of, cancelled, state }));
         Some(name)
+    }
+
+    /// Breaks off one that goes on, or all without a name; whether there was one with it.
+    pub fn cancel(&self, name: Option<&str>) -> bool {
+        let kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let meant = kept.all.iter().filter(|(known, _)| name.is_none_or(|name| name == known.as_str()));
+        let going = meant.filter(|(_, (_, known))| known.state.borrow().end.is_none());
+        going.map(|(_, (_, known))| known.cancelled.store(true, Ordering::Relaxed)).count() > 0
     }
 
     /// One of a command.
