@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks the run to stop, so that every `finally` runs; the second ends the command at once.
+//! Ctrl-C and the other signals that end a command: the first asks the run to stop, so that every `finally` runs; the second ends the command at once.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +21,7 @@ pub fn last_words(say: fn() -> String) {
     LAST_WORDS.get_or_init(|| say);
 }
 
-/// From here on Ctrl-C and a request to terminate set the flag returned.
+/// From here on Ctrl-C, Ctrl-\, a request to terminate and a terminal that is closed set the flag returned.
 pub fn on_interrupt() -> Result<&'static AtomicBool, String> {
     listen("\nstopping: what `finally` says is done first; Ctrl-C again ends at once\n")
 }
@@ -53,5 +53,22 @@ fn listen(said: &'static str) -> Result<&'static AtomicBool, String> {
         ASKED.store(true, Ordering::SeqCst);
     };
     ctrlc::set_handler(handler).map_err(|e| format!("cannot listen for Ctrl-C: {e}"))?;
+    others(handler).map_err(|e| format!("cannot listen for signals: {e}"))?;
     Ok(&ASKED)
+}
+
+/// Ctrl-\ ends a command as Ctrl-C does. A file that may not become larger is an error of who writes it, and ends nothing by itself.
+#[cfg(unix)]
+fn others(handler: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGQUIT, SIGXFSZ};
+
+    signal_hook::flag::register(SIGXFSZ, std::sync::Arc::new(AtomicBool::new(false)))?;
+    let mut signals = signal_hook::iterator::Signals::new([SIGQUIT])?;
+    std::thread::spawn(move || signals.forever().for_each(|_| handler()));
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn others(_: impl Fn() + Send + 'static) -> std::io::Result<()> {
+    Ok(())
 }

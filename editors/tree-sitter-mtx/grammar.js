@@ -452,7 +452,8 @@ module.exports = grammar({
     _wire_verb: ($) => seq(
       choice('return', word_of($, 'open', 'close', 'halt', 'safe', 'play', 'alive', 'reply', 'answers', 'reading', 'ignores')), repeat($.identifier),
     ),
-    _exchange: ($) => seq('sends', commas($, $.string), optional($._answer), optional($._wire_until)),
+    _exchange: ($) => seq('sends', commas($, $.string), optional($._replies), optional($._wire_until)),
+    _replies: ($) => seq('expects', commas($, $.string)),
     _answer: ($) => seq('expects', $.string),
     _wire_until: ($) => seq(
       'until', 'asks', $.string, optional($._answer), 'timeout', $._operand,

@@ -14,10 +14,14 @@ const LIMITS: Limits = Limits {
     body: 1 << 16,
     bodies: 1 << 17,
     unread: 1 << 16,
-    request: Duration::from_millis(300),
-    idle: Duration::from_millis(300),
-    stalled: Duration::from_millis(300),
+    request: SOON,
+    idle: SOON,
+    stalled: SOON,
 };
+
+/// The same with little patience.
+const HASTY: Limits =
+    Limits { request: Duration::from_secs(1), idle: Duration::from_secs(1), stalled: Duration::from_secs(1), ..LIMITS };
 
 /// Long enough for a busy machine, short enough that nothing waits for an evil client.
 const SOON: Duration = Duration::from_secs(20);
@@ -89,7 +93,7 @@ fn is_served(address: SocketAddr) {
 
 #[test]
 fn unfinished_heads_and_bodies_hold_nobody_up_and_are_ended() {
-    with(LIMITS, |address| {
+    with(HASTY, |address| {
         let begun = [
             "",
             "G",
@@ -114,7 +118,7 @@ fn unfinished_heads_and_bodies_hold_nobody_up_and_are_ended() {
 
 #[test]
 fn a_head_that_drips_is_ended_by_its_first_byte() {
-    with(LIMITS, |address| {
+    with(HASTY, |address| {
         let mut stream = connect(address);
         let drips = (0..10_000).take_while(|_| {
             std::thread::sleep(Duration::from_millis(20));

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use matterix_hardware::deploy::Carrier;
+use matterix_hardware::deploy::{Carrier, unsafe_left};
 use matterix_hardware::link::{Overhear, Trouble};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
 use matterix_hardware::{binding, calibration};
@@ -51,25 +51,37 @@ pub fn play(
     };
     let device = &program.scene.get(driver.instance).name;
     print(Stream::Err, &format!("`{device}` is given `{name}`, {} bytes\n", bytes.len()));
-    let code = match played(&program, driver, place, Sheet { name: name.to_owned(), bytes }, cancel, &mut Silent) {
+    let sheet = Sheet { name: name.to_owned(), bytes };
+    let broken = match played(&program, driver, place, sheet, cancel, &mut Silent) {
         Ok(()) => {
             print(Stream::Err, &format!("`{device}` has run it to its end\n"));
             return Ok(Exit::Fine);
         }
-        Err(Unplayed::Stopped) => {
+        Err(broken) => broken,
+    };
+    // What is on its deck was switched on by the file, and nobody knows by which name.
+    let on_it = program.drivers.iter().filter(|d| {
+        !broken.is_untouched && d.stays_on && d.host.as_ref().is_some_and(|h| h.instance == driver.instance)
+    });
+    let on_it = on_it.map(|d| format!("`{}`: `{device}` ran the file by itself", program.scene.get(d.instance).name));
+    let left = broken.left.map(|why| format!("`{device}`: {why}")).into_iter().chain(on_it);
+    let left: Vec<Diagnostic> = left.map(|why| unsafe_left((*at, why))).collect();
+    let code = match broken.why {
+        Unplayed::Stopped => {
+            show(&sources, left, color);
             print(Stream::Err, "it was stopped\n");
             return Ok(Exit::Findings);
         }
-        Err(Unplayed::Trouble(trouble)) => trouble,
+        Unplayed::Trouble(trouble) => trouble,
     };
     let (headline, code) = match &code {
-        Trouble::Lost(why) => (why.clone(), codes::DEVICE_LOST),
+        Trouble::Lost(why) | Trouble::Silent(why) => (why.clone(), codes::DEVICE_LOST),
         Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
         Trouble::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
         Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };
     let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");
-    show(&sources, vec![d], color);
+    show(&sources, std::iter::once(d).chain(left).collect(), color);
     Ok(Exit::Findings)
 }
 

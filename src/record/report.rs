@@ -299,6 +299,7 @@ impl Report {
             | Entry::Leap { .. }
             | Entry::Out { .. }
             | Entry::Back { .. }
+            | Entry::Again { .. }
             | Entry::Kept { .. } => {}
         }
     }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use matterix_hardware::deploy::{
-    Control, Course, Ending, Entry, Exposed, Journal, Kept, Mode, Past, carry_out, digest, read, sha256,
+    Control, Course, Ending, Entry, Exposed, Journal, Kept, Mode, Past, REFUSED, carry_out, digest, read, sha256,
 };
 use matterix_hardware::place::Place;
 use matterix_hardware::port::Port;
@@ -147,6 +147,10 @@ fn compared(
             Some(d) => format!("it does not begin: {}", d.headline),
             None => "it does not begin".to_owned(),
         });
+        return Ok(());
+    }
+    if status == REFUSED {
+        checked.holds.push("it was refused to go on: what there is before that is not gone through again".to_owned());
         return Ok(());
     }
     if ending.status != status {

@@ -74,9 +74,8 @@ fn cut(process: &Child) {
         let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
         caught.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & TERM != 0))
     };
-    while !listens() {
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
+    // One that has ended by itself never will; what it said then tells why.
+    (0..5000).take_while(|_| !listens()).for_each(|_| std::thread::sleep(std::time::Duration::from_millis(2)));
     terminate(process);
 }
 

@@ -9,10 +9,12 @@ drivers from PyPI run unchanged on its emulators. Each line printed is a figure 
 import os
 import pathlib
 import re
+import signal
 import socket
 import subprocess
 import sys
 import threading
+import time
 
 COMMAND, FOLDER = sys.argv[1], sys.argv[2]
 SPEED = 10
@@ -120,6 +122,67 @@ def deployments():
     verdict("the plunger", told == wanted, f"{told}, round(volume * 3000 / 5 mL) is {wanted}")
 
 
+def stopped():
+    """A person stops a run: what is left on, by the simulators' own account."""
+    from labmcp_cavro.simulator import CavroSimulator
+    from labmcp_ika.simulator import IKASimulator
+
+    plate = IKASimulator(time_scale=SPEED)
+    address, heard = serve(plate, b"\r\n", b"\r\n")
+    forever = HEAT.replace(">= 30 degC", ">= 49.9 degC")
+    said = interrupted("stop_heat", forever, "plate", address, lambda: any(l == "START_1" for l, _ in heard))
+    good = said.returncode == 1 and not plate.heating and not plate.motor
+    verdict("a stopped labmcp-ika", good, "neither heats nor stirs" if good else said.stderr[-1500:])
+
+    pump = CavroSimulator(standard_steps=3000, valve_ports=9, speed=0.05)
+    address, heard = serve(pump, b"\r", b"\x03\r\n")
+    moves = lambda: any("A" in l and l.endswith("R") for l, _ in heard) and pump._busy()
+    said = interrupted("stop_dose", DOSE, "pump", address, moves, 'driver = "CavroDt"\n')
+    told = [l for l, _ in heard if l.startswith("/1T")]
+    good = said.returncode == 1 and told and set(told) == {"/1T"} and not any(a["kind"] == "plunger" for a in pump.plan)
+    verdict("a stopped labmcp-cavro", good, f"its plunger rests, {len(told)} times `T` without `R`" if good else f"{told} {said.stderr[-1500:]}")
+
+
+def interrupted(name, text, device, address, when, more=""):
+    """A deployment that is stopped as soon as something is so."""
+    folder = os.path.join(FOLDER, name)
+    os.makedirs(folder)
+    for file, content in (("lab.mtx", text), ("lab.toml", f'[{device}]\naddress = "{address}"\n{more}')):
+        pathlib.Path(folder, file).write_text(content)
+    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", "1"]
+    process = subprocess.Popen([COMMAND, "deploy", "lab.mtx", *arguments], cwd=folder, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not when():
+        time.sleep(0.02)
+    process.send_signal(signal.SIGQUIT)
+    said = process.communicate(timeout=60)[1]
+    return subprocess.CompletedProcess([], process.returncode, "", said)
+
+
+def lossy():
+    """One reading in seven gets lost or garbled on the way: it is asked for again, commands are not."""
+    from labmcp_ika.simulator import IKASimulator
+
+    plate, count = IKASimulator(time_scale=SPEED), 0
+    whole = plate.handle
+
+    def handle(line):
+        nonlocal count
+        count += line.startswith("IN_")
+        reply = whole(line)
+        if line.startswith("IN_PV") and count % 7 == 0:
+            return None if count % 2 else "2x?"
+        return reply
+
+    plate.handle = handle
+    address, heard = serve(plate, b"\r\n", b"\r\n")
+    ended = deploy("lossy", HEAT, "plate", address)
+    again = (pathlib.Path(FOLDER) / "lossy" / "journal").read_text().count('"event":"again"')
+    starts = [l for l, _ in heard if l.startswith("START")]
+    good = ended.returncode == 0 and again > 0 and len(starts) == 2
+    verdict("a line that loses readings", good, f"{again} of {count} were asked for again" if good else ended.stderr[-1500:])
+
+
 def drivers():
     from matterlab_hotplates import IKAHotplate
     from matterlab_pumps import TecanXCPump
@@ -149,8 +212,7 @@ def drivers():
         out.write(DOSE)
     process, path = emulator("pump", "--file", file, "--driver", "CavroDt", "--pty", "--speed", str(SPEED))
     try:
-        # Its other resolution is not one of the emulated pump.
-        pump = TecanXCPump(com_port=path, address=0, syringe_volume=5e-3, num_valve_port=9, fine_pos=False)
+        pump = TecanXCPump(com_port=path, address=0, syringe_volume=5e-3, num_valve_port=9, fine_pos=True)
         drawn = (pump.draw(2, valve_port=1), pump.volume, pump.port)[1:]
         pushed = (pump.dispense(1, valve_port=3), pump.volume, pump.port)[1:]
         good = drawn == (2.0, 1) and pushed == (1.0, 3)
@@ -160,5 +222,7 @@ def drivers():
 
 
 deployments()
+stopped()
+lossy()
 drivers()
 sys.exit(1 if BAD else 0)

@@ -110,7 +110,8 @@ def ran(folder, *arguments):
 
 def told(folder):
     """What the server says of the commands of the run that the journal names."""
-    entries = map(json.loads, (folder / "journal").read_text().splitlines())
+    # The first line is the head of the journal.
+    entries = map(json.loads, (folder / "journal").read_text().splitlines()[1:])
     run = next(e["text"] for e in entries if e["event"] == "kept" and e["word"] == "run")
     listed = ask(f"/runs/{run}/commands?cursor=0&pageLength=10000")
     # The list leaves out results.
@@ -212,6 +213,61 @@ def stopped(text):
     verdict("a run that a person stops", good, f"{status} after {took:.1f} s" if good else f"{status} {said[-1500:]}")
 
 
+COOK = """mtx 1
+use std::opentrons::{Corning96, HeaterShaker, OT2, P300Single, Reservoir12, TipRack300}
+lab deck {
+    ambient: 22 degC
+    ot2 = OT2 { left: P300Single } at (0, 0, 0) m
+    tips = TipRack300 on ot2.slot[10]
+    shaker = HeaterShaker on ot2.slot[1]
+    plate = Corning96 on shaker
+    stock = Reservoir12 on ot2.slot[3] holding { A1: 10 mL of water }
+}
+workflow cook in deck {
+    close latch shaker
+    heat shaker to 60 degC
+    shake shaker at 500 rpm
+    wait 200 s
+    stop shaking shaker
+    transfer 50 uL from stock[A1] to plate[A1 .. H1] by ot2.left using tips { tips: once }
+}
+"""
+
+
+def module():
+    """What the heater-shaker does, by the server."""
+    data = ask("/modules")[0]["data"]
+    return data["temperatureStatus"], data.get("targetTemperature"), data["speedStatus"], data["currentSpeed"]
+
+
+def hot(name, stop):
+    """A workflow that is stopped while the heater-shaker is hot and in motion; what it says, its status, and how long it took."""
+    folder = place(name, COOK)
+    process = subprocess.Popen([COMMAND, *DEPLOY[:-1], "1"], cwd=folder, stderr=subprocess.PIPE, text=True)
+    journal = folder / "journal"
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not (journal.exists() and "setAndWaitForShakeSpeed" in journal.read_text()):
+        time.sleep(0.2)
+    time.sleep(2)
+    before = module()
+    entries = map(json.loads, journal.read_text().splitlines()[1:])
+    run = next(e["text"] for e in entries if e["event"] == "kept" and e["word"] == "run")
+    begun = time.monotonic()
+    stop(process, run)
+    said = process.communicate(timeout=120)[1]
+    took = time.monotonic() - begun
+    is_on, is_off = before[1] == 60 and before[3] == 500, module()[0] == "idle" and module()[2] == "idle"
+    good = process.returncode == 1 and is_on and is_off and "could not be made safe" not in said
+    verdict(name, good, f"{before} before, {module()} {took:.1f} s after" if good else f"{before} {module()} {said[-1500:]}")
+
+
+def at_the_robot(_, run):
+    body = json.dumps({"data": {"actionType": "stop"}}).encode()
+    headers = {"Opentrons-Version": "4", "Content-Type": "application/json"}
+    request = urllib.request.Request(f"http://{ADDRESS}/runs/{run}/actions", method="POST", data=body, headers=headers)
+    urllib.request.urlopen(request, timeout=60).close()
+
+
 def another(text):
     folder = place("another", text)
     ended = ran(folder, *DEPLOY)
@@ -230,6 +286,8 @@ with robot(pipettes(FIRST)):
     own_labware(FIRST)
     measured(FIRST)
     stopped(FIRST)
+    hot("a stop leaves no module on", lambda process, _: process.send_signal(signal.SIGINT))
+    hot("a stop at the robot leaves no module on", at_the_robot)
 with robot({"left": {"model": "p1000_single_v2.1", "id": "left"}}):
     another(FIRST)
 sys.exit(1 if BAD else 0)

@@ -181,6 +181,12 @@ impl Room {
         self.disk.borrow().clone()
     }
 
+    /// Frames that are to come to no device as they were sent.
+    pub fn lost(&self) -> usize {
+        let fate = self.fate.borrow();
+        fate.faults.iter().filter(|(_, f)| matches!(f, Fault::Lost | Fault::Garbled)).count()
+    }
+
     /// Frames that went out.
     pub fn frames(&self) -> usize {
         self.frames.get()

@@ -47,7 +47,7 @@ macro_rules! codes {
 
 codes! {
     SYNTAX "syntax" "P0" "the text is not what the grammar expects here";
-    TEXT_DIRECTION "text-direction" "P0" "a hidden character changes the order in which a text is shown";
+    HIDDEN_CHARACTER "hidden-character" "P0" "a hidden character changes how a text is shown";
     BUDGET_SPENT "budget-spent" "P0" "a text asks for more work than a check does";
     UNSUPPORTED "unsupported" "P0" "the construct is part of the language but has no meaning yet";
     UNKNOWN_MODULE "unknown-module" "N0" "an imported module does not exist";
@@ -133,6 +133,7 @@ codes! {
     WRONG_REAGENT "wrong-reagent" "C2" "a call says of what it takes something, and the source holds none of it";
     FRAMING "framing" "N0" "frames of a line that cannot be told apart, judged or put together";
     DRIVER_LINE "driver-line" "N0" "a line of a driver fits neither its device nor its transport";
+    NO_SAFE "no-safe" "N0" "a driver does not say how its device is made safe, though it can be left on";
     CONTAMINATION "contamination" "C1" "a tool carries one reagent into another";
     BELOW_MINIMUM "below-minimum" "V3" "a pipette is asked for less than its smallest volume";
     TIP_OVERFLOW "tip-overflow" "V3" "a tip takes up more than it holds";

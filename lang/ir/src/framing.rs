@@ -245,6 +245,13 @@ mod tests {
         }
     }
 
+    /// The packet that takes a pump of New Era out of its safe mode, as its manual prints it: 0x02 0x08 SAF0 0x55 0x43 0x03.
+    #[test]
+    fn a_checksum_is_that_of_a_manual() {
+        let (_, sum) = CHECKSUMS.iter().find(|(name, _)| *name == "crc16_xmodem").expect("known");
+        assert_eq!(sum.of(b"SAF0"), 0x5543);
+    }
+
     #[test]
     fn a_stretch_has_both_its_ends() {
         let layout = [Part::Fixed(vec![2]), Part::Data, Part::Check(Form::default())];

@@ -2,44 +2,52 @@
 //! terminal obeys.
 //!
 //! With the first a text can be shown in another order than it is read, so that a comment seems to be code, or a limit another one
-//! ([CVE-2021-42574](https://trojansource.codes), Unicode's UAX #9). With the second whoever is printed writes on the terminal what they like.
+//! ([CVE-2021-42574](https://trojansource.codes), Unicode's UAX #9). With the second a line can be hidden or written over, and whoever is
+//! printed writes on the terminal what they like.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
 use crate::{Diagnostic, Edit, FileId, Span, codes};
 
-/// The name of a character that turns the direction of what follows, and whether it does so until it is ended.
-fn direction(c: char) -> Option<(&'static str, bool)> {
+/// The name of a character that turns the direction of what follows.
+fn direction(c: char) -> Option<&'static str> {
     Some(match c {
-        '\u{61c}' => ("Arabic letter mark", false),
-        '\u{200e}' => ("left-to-right mark", false),
-        '\u{200f}' => ("right-to-left mark", false),
-        '\u{202a}' => ("left-to-right embedding", true),
-        '\u{202b}' => ("right-to-left embedding", true),
-        '\u{202c}' => ("pop directional formatting", true),
-        '\u{202d}' => ("left-to-right override", true),
-        '\u{202e}' => ("right-to-left override", true),
-        '\u{2066}' => ("left-to-right isolate", true),
-        '\u{2067}' => ("right-to-left isolate", true),
-        '\u{2068}' => ("first strong isolate", true),
-        '\u{2069}' => ("pop directional isolate", true),
+        '\u{61c}' => "Arabic letter mark",
+        '\u{200e}' => "left-to-right mark",
+        '\u{200f}' => "right-to-left mark",
+        '\u{202a}' => "left-to-right embedding",
+        '\u{202b}' => "right-to-left embedding",
+        '\u{202c}' => "pop directional formatting",
+        '\u{202d}' => "left-to-right override",
+        '\u{202e}' => "right-to-left override",
+        '\u{2066}' => "left-to-right isolate",
+        '\u{2067}' => "right-to-left isolate",
+        '\u{2068}' => "first strong isolate",
+        '\u{2069}' => "pop directional isolate",
         _ => return None,
     })
 }
 
-fn holds(c: char) -> bool {
-    direction(c).is_some_and(|(_, holds)| holds)
+/// The same of other characters that are not seen.
+fn name(c: char) -> &'static str {
+    match c {
+        '\u{8}' => "backspace",
+        '\r' => "carriage return without a line feed",
+        '\u{1b}' => "escape",
+        '\u{9b}' => "control sequence introducer",
+        _ => direction(c).unwrap_or("a control character"),
+    }
 }
 
-/// Whether a character turns the direction of writing.
-pub fn is_direction(c: char) -> bool {
-    direction(c).is_some()
+/// Whether a character can hide or move what stands around it: marks cannot, and other control characters are only not seen.
+fn hides(c: char) -> bool {
+    matches!(c, '\u{8}' | '\r' | '\u{1b}' | '\u{9b}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Whether a terminal obeys or reorders by a character instead of showing it; line ends and tabs are not among them.
 pub fn is_obeyed(c: char) -> bool {
-    matches!(c, '\u{2028}' | '\u{2029}') || is_direction(c) || (c.is_control() && !matches!(c, '\n' | '\t'))
+    matches!(c, '\u{2028}' | '\u{2029}') || direction(c).is_some() || (c.is_control() && !matches!(c, '\n' | '\t'))
 }
 
 /// The text with each such character in letters, `\u001b`. In JSON that is the same text.
@@ -60,48 +68,52 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// The text with blanks, byte for byte, for every character that turns the direction until it is ended.
+/// The text with blanks, byte for byte, for every character that is an error in it; line ends stay.
 pub fn blanked(text: &str) -> Cow<'_, str> {
-    if !text.contains(holds) {
+    let is_error = |c: char| hides(c) && c != '\r';
+    if !text.contains(is_error) {
         return Cow::Borrowed(text);
     }
-    let blank = |c: char| if holds(c) { " ".repeat(c.len_utf8()) } else { c.to_string() };
+    let blank = |c: char| if is_error(c) { " ".repeat(c.len_utf8()) } else { c.to_string() };
     Cow::Owned(text.chars().map(blank).collect())
 }
 
-/// The lines of a file on which a character turns the direction of writing. One that holds until it is ended is an error; a mark,
-/// which texts in Arabic or Hebrew may need, a warning.
-pub fn directions(file: FileId, text: &str) -> Vec<Diagnostic> {
-    // In UTF-8 they begin with one of these bytes; most texts have neither.
-    if !text.as_bytes().contains(&0xe2) && !text.as_bytes().contains(&0xd8) {
-        return Vec::new();
-    }
+/// The lines of a file that are not shown as they are read. A character that hides or moves others is an error; a mark, which texts in
+/// Arabic or Hebrew may need, or one that is only not seen, a warning.
+pub fn characters(file: FileId, text: &str) -> Vec<Diagnostic> {
     let mut start = 0;
     let mut found = Vec::new();
     for line in text.split_inclusive('\n') {
-        let turns: Vec<(usize, char)> = line.char_indices().filter(|(_, c)| is_direction(*c)).collect();
-        found.extend(finding(file, start, &turns));
+        let shown = line.strip_suffix("\r\n").unwrap_or(line);
+        if !shown.bytes().all(|b| (0x20..0x7f).contains(&b)) {
+            let hidden: Vec<(usize, char)> = shown.char_indices().filter(|(_, c)| is_hidden(*c)).collect();
+            found.extend(finding(file, start, &hidden));
+        }
         start += line.len();
     }
     found
 }
 
-fn finding(file: FileId, start: usize, turns: &[(usize, char)]) -> Option<Diagnostic> {
-    let first = turns.iter().find(|(_, c)| holds(*c)).or(turns.first())?;
+/// A substitute (U+001A) has a finding of its own.
+fn is_hidden(c: char) -> bool {
+    direction(c).is_some() || (c.is_control() && !matches!(c, '\n' | '\t' | '\u{1a}'))
+}
+
+fn finding(file: FileId, start: usize, hidden: &[(usize, char)]) -> Option<Diagnostic> {
+    let first = hidden.iter().find(|(_, c)| hides(*c)).or(hidden.first())?;
     let span = |(at, c): &(usize, char)| Span::new(file, start + at, start + at + c.len_utf8());
-    let (name, is_worse) = direction(first.1)?;
     let headline =
-        format!("a hidden character (U+{:04X}, {name}) changes the order in which this is shown", u32::from(first.1));
-    let label = match turns.len() {
+        format!("a hidden character (U+{:04X}, {}) changes how this is shown", u32::from(first.1), name(first.1));
+    let label = match hidden.len() {
         1 => "here".to_owned(),
         n => format!("here; {n} of them on this line"),
     };
-    let report = if is_worse { Diagnostic::error } else { Diagnostic::warning };
-    let mut found = report(codes::TEXT_DIRECTION, span(first), headline, label)
+    let report = if hides(first.1) { Diagnostic::error } else { Diagnostic::warning };
+    let mut found = report(codes::HIDDEN_CHARACTER, span(first), headline, label)
         .help("what is shown may not be what is read: look at the line again and remove what is hidden")
         .guess("remove what is hidden", span(first), "");
     if let Some(fix) = found.fixes.last_mut() {
-        fix.edits = turns.iter().map(|turn| Edit { span: span(turn), text: String::new() }).collect();
+        fix.edits = hidden.iter().map(|one| Edit { span: span(one), text: String::new() }).collect();
     }
     Some(found)
 }
@@ -126,9 +138,19 @@ mod tests {
     }
 
     #[test]
+    fn what_writes_over_a_line_is_found_and_line_ends_are_not() {
+        let found = |text: &str| characters(FileId(0), text).iter().map(|d| d.severity).collect::<Vec<_>>();
+        assert_eq!(found("a\r\nb\tc\r\n"), []);
+        for c in ['\r', '\u{1b}', '\u{8}', '\u{9b}'] {
+            assert_eq!(found(&format!("heat // {c}stop\r\n")), [Severity::Error], "{c:?}");
+        }
+        assert_eq!(found("a\u{c}\n\u{2}\u{7f}"), [Severity::Warning; 2]);
+    }
+
+    #[test]
     fn every_turn_is_found_once_a_line_with_its_place() {
         let file = FileId(0);
-        let found = directions(file, "a\nb \u{202e}c\u{2069}\nd\u{200f}\n— é\n");
+        let found = characters(file, "a\nb \u{202e}c\u{2069}\nd\u{200f}\n— é\n");
         let seen: Vec<_> = found.iter().map(|d| (d.severity, d.span().start, d.fixes[0].edits.len())).collect();
         assert_eq!(seen, [(Severity::Error, 4, 2), (Severity::Warning, 13, 1)]);
         for c in ['\u{61c}', '\u{200e}', '\u{200f}']
@@ -136,8 +158,8 @@ mod tests {
             .chain('\u{202a}'..='\u{202e}')
             .chain('\u{2066}'..='\u{2069}')
         {
-            assert_eq!(directions(file, &format!("x{c}y")).len(), 1, "{c:?}");
+            assert_eq!(characters(file, &format!("x{c}y")).len(), 1, "{c:?}");
         }
-        assert!(directions(file, "Ωμέγα, Ø, ﷼, שלום").is_empty(), "other writing is not hidden");
+        assert!(characters(file, "Ωμέγα, Ø, ﷼, שלום").is_empty(), "other writing is not hidden");
     }
 }

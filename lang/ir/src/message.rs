@@ -7,6 +7,11 @@
 /// Methods that a message may begin with.
 pub const METHODS: &[&str] = &["GET", "POST", "PUT", "PATCH", "DELETE"];
 
+/// Whether a message changes nothing where it goes (RFC 9110, 9.2.1).
+pub fn only_asks(text: &str) -> bool {
+    text.starts_with("GET ")
+}
+
 /// A member of a body.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field<'t> {
@@ -120,9 +125,38 @@ pub fn kept(value: &str) -> Option<&str> {
     good.then_some(inner)
 }
 
+/// What of an array a part of a pointer chooses: `[serialNumber:<serial>]` is the first item of which that member is that text.
+pub fn choice(token: &str) -> Option<(&str, &str)> {
+    token
+        .strip_prefix('[')?
+        .strip_suffix(']')?
+        .split_once(':')
+        .filter(|(member, text)| !member.is_empty() && !text.is_empty())
+}
+
+/// A pointer with what answers said in place of the words by which it chooses.
+pub fn chosen(pointer: &str, known: impl Fn(&str) -> Option<String>) -> String {
+    let part = |token: &str| match choice(token).and_then(|(member, text)| Some((member, known(kept(text)?)?))) {
+        Some((member, text)) => format!("[{member}:{text}]"),
+        None => token.to_owned(),
+    };
+    pointer.split('/').map(part).collect::<Vec<_>>().join("/")
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{answer, kept, request};
+    use super::{answer, choice, chosen, kept, request};
+
+    #[test]
+    fn an_item_of_an_array_is_chosen_by_a_member() {
+        let said = answer("200 /data/[serialNumber:<serial>]/id=<module>").expect("an answer");
+        let [field] = &said.fields[..] else { panic!("one member") };
+        assert_eq!((field.pointer.as_str(), field.value), ("/data/[serialNumber:<serial>]/id", "<module>"));
+        assert_eq!(choice("[serialNumber:<serial>]"), Some(("serialNumber", "<serial>")));
+        assert_eq!((choice("data"), choice("[x]"), choice("[:x]")), (None, None, None));
+        let known = |word: &str| (word == "serial").then(|| "HS7".to_owned());
+        assert_eq!(chosen(&field.pointer, known), "/data/[serialNumber:HS7]/id");
+    }
 
     #[test]
     fn a_request_has_a_method_a_path_and_members() {

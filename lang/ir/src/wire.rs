@@ -134,11 +134,18 @@ pub struct Choice {
 pub struct Pattern {
     /// In order.
     pub slots: Vec<Slot>,
+    /// What the replies to the second frame and those after it look like, where each has its own.
+    pub then: Vec<Pattern>,
     /// Where it is declared.
     pub span: Span,
 }
 
 impl Pattern {
+    /// What the reply to a frame looks like, by its place among those that are sent.
+    pub fn of(&self, place: usize) -> &Pattern {
+        place.checked_sub(1).and_then(|later| self.then.get(later)).unwrap_or(self)
+    }
+
     /// The text with the same in place of all that may differ.
     pub fn with(&self, value: &str) -> String {
         let slot = |slot: &Slot| match slot {
@@ -154,7 +161,7 @@ impl Pattern {
 pub struct Exchange {
     /// What goes out, in order.
     pub sends: Vec<Template>,
-    /// What comes back to each.
+    /// What comes back to each; see [`Pattern::of`].
     pub expects: Option<Pattern>,
     /// How its end is known.
     pub until: Option<Until>,
@@ -198,11 +205,20 @@ pub struct Told {
     pub asks: Template,
     /// What comes back.
     pub expects: Pattern,
+    /// The least and the most that its instrument can show, SI, where its line says so.
+    pub shows: Option<[f64; 2]>,
+    /// What may come back instead, where more lines ask the same.
+    pub also: Vec<Alternative>,
     /// Its line.
     pub span: Span,
 }
 
 impl Told {
+    /// What may come back, in the order of the lines, each with what its instrument can show.
+    pub fn forms(&self) -> impl Iterator<Item = (&Pattern, Option<[f64; 2]>)> {
+        std::iter::once((&self.expects, self.shows)).chain(self.also.iter().map(|f| (&f.expects, f.shows)))
+    }
+
     /// A value for people.
     pub fn show(&self, value: f64) -> String {
         match self.words.get(value as usize) {
@@ -210,6 +226,15 @@ impl Told {
             None => self.unit.show(value),
         }
     }
+}
+
+/// One more form of an answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alternative {
+    /// What comes back.
+    pub expects: Pattern,
+    /// The least and the most that its instrument can show, SI, where its line says so.
+    pub shows: Option<[f64; 2]>,
 }
 
 /// A reply that means a failure.
@@ -270,6 +295,8 @@ pub struct Driver {
     pub halt: Vec<Exchange>,
     /// To leave it safe after a run that did not end well.
     pub safe: Vec<Exchange>,
+    /// One of its commands brings its device into a state that it stays in, heating, moving or pumping.
+    pub stays_on: bool,
     /// To let it run a file by itself, from giving it the file to its end.
     pub play: Vec<Exchange>,
     /// What keeps its watchdog quiet.

@@ -10,6 +10,7 @@ mod types;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
+use matterix_ir::hidden::visible;
 use matterix_sila::Feature;
 use matterix_sila::words::name;
 
@@ -91,10 +92,10 @@ const SAFE: &str = "safe_call";
 /// How long a server may take to answer a call.
 const PATIENCE: &str = "10 s";
 
-/// A description as a comment.
+/// A description as a comment. Hidden characters of another author's text stand in letters, which nobody has to remove.
 fn docs(text: &str, indent: &str) -> String {
     let line: String = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    if line.is_empty() { String::new() } else { format!("{indent}/// {line}\n") }
+    if line.is_empty() { String::new() } else { format!("{indent}/// {}\n", visible(&line)) }
 }
 
 impl Writer<'_> {

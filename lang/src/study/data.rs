@@ -23,7 +23,7 @@ pub fn read(
         Box::new(d.help("files are looked for from the folder of the file that is checked"))
     })?;
     let file = sources.add(&fit.data, text.clone());
-    if let Some(hidden) = hidden::directions(file, &text).into_iter().find(Diagnostic::is_error) {
+    if let Some(hidden) = hidden::characters(file, &text).into_iter().find(Diagnostic::is_error) {
         return Err(Box::new(hidden));
     }
     let table = Table { text: &text, file, named: fit.data_span };

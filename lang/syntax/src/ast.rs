@@ -981,8 +981,10 @@ pub enum WireKind {
 pub struct Exchange {
     /// What goes out, in order.
     pub sends: Vec<Text>,
-    /// What comes back to each.
+    /// What comes back: to each, or to the first where `then` has the others.
     pub expects: Option<Pattern>,
+    /// What comes back to the second and those after it.
+    pub then: Vec<Pattern>,
     /// How its end is known.
     pub until: Option<Box<Until>>,
 }

@@ -53,11 +53,11 @@ pub fn parse_again(file: FileId, text: &str, memo: &mut Memo) -> (File, Vec<Diag
     if text.len() > MAX_SIZE {
         return (nothing(), vec![too_large(Span::new(file, 0, 0), text.len())]);
     }
-    let turns = hidden::directions(file, text);
+    let unseen = hidden::characters(file, text);
     // What is an error anyway is read as blanks, so that it is one finding wherever it stands.
     let text = &hidden::blanked(text);
     let (changes, mut found) = brackets::balance(file, text, &scan::scan(text));
-    found.extend(turns);
+    found.extend(unseen);
     found.extend(reserved_character(file, text));
     if changes.len() > brackets::MAX_CHANGES {
         return (nothing(), shown(file, text, found, 0));

@@ -104,7 +104,7 @@ parts! {
     Clause { kind span }
     Refusal { failure help because }
     Wire { kind span }
-    Exchange { sends expects until }
+    Exchange { sends expects then until }
     Until { asks expects timeout }
     Pattern { text span }
     LabLine { kind span }

@@ -20,7 +20,7 @@ const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
 pub fn read(program: &Program, file: FileId, text: &str) -> (Vec<Binding>, Vec<Diagnostic>) {
-    let mut reader = Reader { program, file, found: hidden::directions(file, text) };
+    let mut reader = Reader { program, file, found: hidden::characters(file, text) };
     let table = match DeTable::parse(text) {
         Ok(table) => table,
         Err(e) => {

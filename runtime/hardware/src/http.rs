@@ -111,6 +111,10 @@ impl Http {
 }
 
 impl Port for Http {
+    fn renews(&self) -> bool {
+        true
+    }
+
     fn attach(&mut self, name: &str, bytes: Vec<u8>) -> io::Result<()> {
         self.file = Some((name.to_owned(), bytes));
         Ok(())

@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use matterix_ir::wire::{Driver, Pattern, Transport, Until};
+use matterix_ir::quantity::show_number;
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::{Driver, Pattern, Slot, Told, Transport, Until};
 
-use crate::codec::{Codec, Reply, shown};
+use crate::codec::{Codec, Kept, Reply, shown};
 use crate::pattern::written;
 use crate::place::{self, Place};
 use crate::port::Port;
@@ -15,8 +17,10 @@ use crate::world::World;
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Trouble {
-    /// The line is gone, or nothing came in time.
+    /// The line is gone.
     Lost(String),
+    /// Nothing came in time over a line that stands, as far as is known.
+    Silent(String),
     /// What came is no answer to what was said.
     Garbled(String),
     /// A frame has no room for what was to be said, and nothing was.
@@ -34,9 +38,11 @@ impl Trouble {
     /// In words.
     pub fn text(&self) -> &str {
         match self {
-            Trouble::Lost(text) | Trouble::Garbled(text) | Trouble::Unsaid(text) | Trouble::Refused { text, .. } => {
-                text
-            }
+            Trouble::Lost(text)
+            | Trouble::Silent(text)
+            | Trouble::Garbled(text)
+            | Trouble::Unsaid(text)
+            | Trouble::Refused { text, .. } => text,
         }
     }
 }
@@ -61,6 +67,12 @@ pub const STOPPING: Duration = Duration::from_secs(10);
 /// Longest wait for each answer while devices are made safe.
 pub const SECURING: Duration = Duration::from_secs(5);
 
+/// Longest silence after which nothing more is taken for an answer to a question that was given up.
+const QUIET: Duration = Duration::from_secs(1);
+
+/// Longest time in which a line that does not fall silent is listened to.
+const RESTLESS: Duration = Duration::from_secs(5);
+
 /// How often who waits for an answer looks whether it is to end.
 const LOOK: Duration = Duration::from_millis(50);
 
@@ -75,14 +87,8 @@ pub trait Line {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble>;
 
-    /// Asks; the numbers of the answer, SI.
-    fn ask(
-        &mut self,
-        text: &str,
-        expects: &Pattern,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble>;
+    /// Asks for a quantity; what the answer says of it, SI.
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble>;
 
     /// Whether the device is ready.
     fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
@@ -94,18 +100,23 @@ pub trait Line {
         Err(Trouble::Lost("nothing is heard over this line".to_owned()))
     }
 
-    /// What answers said that is put in later, by its word.
-    fn kept(&self) -> BTreeMap<String, String> {
-        BTreeMap::new()
+    /// Lets go by what may still come in answer to a question that is given up, before it is put again.
+    fn settle(&mut self, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        Ok(())
+    }
+
+    /// What answers said that is put in later.
+    fn kept(&self) -> Kept {
+        Kept::new()
     }
 
     /// Whether something is to be put in that no answer has said: what it is about has never begun.
-    fn lacks(&self, _texts: &[String]) -> bool {
+    fn lacks(&mut self, _driver: &Driver, _texts: &[String]) -> bool {
         false
     }
 
-    /// Puts back what an answer said to an earlier process.
-    fn keep(&mut self, _word: String, _text: String) {}
+    /// Puts back what an answer for a device said, to an earlier process or before others spoke.
+    fn keep(&mut self, _device: InstanceId, _word: String, _text: String) {}
 }
 
 /// Opens the line to a device.
@@ -141,6 +152,8 @@ pub struct Link {
     codec: Codec,
     timeout: Duration,
     buffer: Vec<u8>,
+    /// A question was not answered in time, and its answer may still come.
+    owed: bool,
     /// What the device said by itself, by the line of its driver: when, and the value.
     heard: BTreeMap<usize, (Duration, f64)>,
     /// What answers said last that is kept, by its name.
@@ -158,7 +171,8 @@ impl Link {
         let codec = Codec::new(&driver.framing, address.or(driver.address.as_deref()))?;
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
-        Ok(Link { world, port, codec, timeout, buffer: Vec::new(), heard: BTreeMap::new(), texts: BTreeMap::new() })
+        let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
+        Ok(Link { world, port, codec, timeout, buffer, owed: false, heard, texts })
     }
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -208,7 +222,10 @@ impl Link {
             if left.is_zero() {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
-                    [] => Trouble::Lost(format!("it did not answer `{}` within {seconds} s", shown(to))),
+                    [] => {
+                        self.owed = true;
+                        Trouble::Silent(format!("it did not answer `{}` within {seconds} s", shown(to)))
+                    }
                     half => Trouble::Garbled(format!(
                         "its answer to `{}` broke off after `{}`: nothing more came within {seconds} s",
                         shown(to),
@@ -216,20 +233,61 @@ impl Link {
                     )),
                 });
             }
-            let bytes =
-                self.port.receive(left.min(LOOK)).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
-            if !bytes.is_empty() {
-                ear.back(&bytes);
-            }
-            self.buffer.extend(bytes);
+            self.listen(left.min(LOOK), ear)?;
         }
+    }
+
+    /// What comes in meanwhile; whether something did.
+    fn listen(&mut self, within: Duration, ear: &mut dyn Overhear) -> Result<bool, Trouble> {
+        let bytes = self.port.receive(within).map_err(|e| {
+            let why = format!("the line is gone: {e}");
+            if self.port.renews() { Trouble::Silent(why) } else { Trouble::Lost(why) }
+        })?;
+        if !bytes.is_empty() {
+            ear.back(&bytes);
+        }
+        let came = !bytes.is_empty();
+        self.buffer.extend(bytes);
+        Ok(came)
+    }
+
+    /// Waits until nothing has come for a while.
+    fn hush(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        let begun = self.world.elapsed();
+        let mut heard = begun;
+        while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
+            if self.listen(LOOK.min(self.timeout), ear)? {
+                heard = self.world.elapsed();
+            }
+        }
+        Ok(())
+    }
+
+    /// The answer to a question. Where the one before was not answered in time, what comes last is: the first may be late.
+    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+        let mut reply = self.reply(to, driver, ear)?;
+        if std::mem::take(&mut self.owed) {
+            self.hush(ear)?;
+            while let Some(later) = self.codec.take_reply(&mut self.buffer) {
+                let later = later.map_err(|g| {
+                    Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
+                })?;
+                if !self.overheard(&later, driver) {
+                    reply = later;
+                }
+            }
+        }
+        Ok(reply)
     }
 
     /// Takes what the device says by itself; false of an answer.
     fn overheard(&mut self, reply: &Reply, driver: &Driver) -> bool {
         for (line, told) in driver.told.iter().enumerate().filter(|(_, told)| told.heard.is_some()) {
             if let Some(value) = self.codec.matched(&told.expects, &reply.text).and_then(|n| n.first().copied()) {
-                self.heard.insert(line, (self.world.elapsed(), value));
+                // What its instrument cannot show is nothing that was said.
+                if showable(told, &[value], &told.expects, told.shows).is_ok() {
+                    self.heard.insert(line, (self.world.elapsed(), value));
+                }
                 return true;
             }
         }
@@ -258,13 +316,32 @@ impl Link {
             let is = self.codec.shown_reply(None, &reply.text);
             Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
         })?;
-        for (word, text) in said.kept {
+        self.note_texts(said.kept, ear);
+        Ok(said.numbers)
+    }
+
+    /// Tells what an answer said that a journal keeps, where it is new.
+    fn note_texts(&mut self, kept: Vec<(String, String)>, ear: &mut dyn Overhear) {
+        for (word, text) in kept {
             if self.texts.get(&word) != Some(&text) {
                 ear.kept(&word, &text);
                 self.texts.insert(word, text);
             }
         }
-        Ok(said.numbers)
+    }
+
+    /// Who speaks from here on, where the framing puts in what answers said.
+    fn speak_for(&mut self, driver: &Driver) {
+        if let Codec::Json(json) = &mut self.codec {
+            json.speak_for(driver);
+        }
+    }
+
+    /// Tells what an answer said that is put in later.
+    fn note_kept(&self, before: &Kept, ear: &mut dyn Overhear) {
+        for ((_, word), text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
+            ear.kept(word, text);
+        }
     }
 
     /// The failure that an answer means.
@@ -288,32 +365,47 @@ impl Line for Link {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
-        for frame in self.codec.say(texts).map_err(Trouble::Unsaid)? {
+        self.speak_for(driver);
+        for (place, frame) in self.codec.say(texts).map_err(Trouble::Unsaid)?.into_iter().enumerate() {
             self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
             }
             let reply = self.reply(&frame, driver, ear)?;
             let before = self.kept();
-            numbers = self.judged(&frame, &reply, expects, driver, ear)?;
-            for (word, text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
-                ear.kept(word, text);
-            }
+            numbers = self.judged(&frame, &reply, expects.map(|e| e.of(place)), driver, ear)?;
+            self.note_kept(&before, ear);
         }
         Ok(numbers)
     }
 
-    fn ask(
-        &mut self,
-        text: &str,
-        expects: &Pattern,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+        self.speak_for(driver);
         let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
         self.send(&frame, driver, ear)?;
-        let reply = self.reply(&frame, driver, ear)?;
-        self.judged(&frame, &reply, Some(expects), driver, ear)
+        let reply = self.answer(&frame, driver, ear)?;
+        if let Some(refused) = self.refusal(driver, &reply) {
+            return Err(refused);
+        }
+        let codec = &mut self.codec;
+        let found = told.forms().find_map(|(form, shows)| Some((codec.said(form, &reply.text)?, form, shows)));
+        let Some((said, form, shows)) = found else {
+            let (to, is) = (shown(&frame), self.codec.shown_reply(None, &reply.text));
+            return Err(Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{}`", forms(told))));
+        };
+        self.note_texts(said.kept, ear);
+        showable(told, &said.numbers, form, shows)
+    }
+
+    fn settle(&mut self, driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        self.hush(ear)?;
+        while let Some(late) = self.codec.take_reply(&mut self.buffer) {
+            if let Ok(late) = late {
+                self.overheard(&late, driver);
+            }
+        }
+        self.buffer.clear();
+        Ok(())
     }
 
     fn is_ready(
@@ -323,16 +415,22 @@ impl Line for Link {
         driver: &Driver,
         ear: &mut dyn Overhear,
     ) -> Result<bool, Trouble> {
+        self.speak_for(driver);
         let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
         self.send(&frame, driver, ear)?;
-        let reply = self.reply(&frame, driver, ear)?;
-        if let Some(refused) = self.refusal(driver, &reply) {
-            return Err(refused);
+        let reply = self.answer(&frame, driver, ear)?;
+        // What is waited for may be what else means a failure: that a run is stopped, where it is to stop.
+        let before = self.kept();
+        if let Some(pattern) = &until.expects
+            && self.codec.matched(pattern, &reply.text).is_some()
+        {
+            self.note_kept(&before, ear);
+            return Ok(true);
         }
-        Ok(match &until.expects {
-            Some(pattern) => self.codec.matched(pattern, &reply.text).is_some(),
-            None => !reply.busy,
-        })
+        match self.refusal(driver, &reply) {
+            Some(refused) => Err(refused),
+            None => Ok(until.expects.is_none() && !reply.busy),
+        }
     }
 
     fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
@@ -351,33 +449,53 @@ impl Line for Link {
             if left.is_zero() {
                 let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
                 let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());
-                return Err(Trouble::Lost(why));
+                return Err(Trouble::Silent(why));
             }
-            let bytes =
-                self.port.receive(left.min(LOOK)).map_err(|e| Trouble::Lost(format!("the line is gone: {e}")))?;
-            if !bytes.is_empty() {
-                ear.back(&bytes);
-            }
-            self.buffer.extend(bytes);
+            self.listen(left.min(LOOK), ear)?;
         }
     }
 
-    fn kept(&self) -> BTreeMap<String, String> {
+    fn kept(&self) -> Kept {
         match &self.codec {
             Codec::Json(json) => json.kept().clone(),
-            _ => BTreeMap::new(),
+            _ => Kept::new(),
         }
     }
 
-    fn lacks(&self, texts: &[String]) -> bool {
+    fn lacks(&mut self, driver: &Driver, texts: &[String]) -> bool {
+        self.speak_for(driver);
         matches!(&self.codec, Codec::Json(json) if texts.iter().any(|t| json.lacks(t)))
     }
 
-    fn keep(&mut self, word: String, text: String) {
+    fn keep(&mut self, device: InstanceId, word: String, text: String) {
         if let Codec::Json(json) = &mut self.codec {
-            json.keep(word, text);
+            json.keep(device, word, text);
         }
     }
+}
+
+/// What may be answered, as it was written, for messages.
+pub(crate) fn forms(told: &Told) -> String {
+    told.forms().map(|(form, _)| written(form)).collect::<Vec<_>>().join("` or `")
+}
+
+/// What is told, where its instrument can show that.
+pub(crate) fn showable(told: &Told, numbers: &[f64], form: &Pattern, shows: Option<[f64; 2]>) -> Result<f64, Trouble> {
+    let value = *numbers.first().ok_or_else(|| Trouble::Garbled("no number was told".to_owned()))?;
+    let Some([least, most]) = shows.filter(|[least, most]| !(*least..=*most).contains(&value)) else {
+        return Ok(value);
+    };
+    let unit = form.slots.iter().find_map(|s| match s {
+        Slot::Number(unit, _) => Some(unit),
+        _ => None,
+    });
+    let unit = unit.unwrap_or(&told.unit);
+    let range = match (least.is_finite(), most.is_finite()) {
+        (true, true) => format!("{} to {}", unit.show(least), unit.show(most)),
+        (true, false) => format!("{} and more", unit.show(least)),
+        _ => format!("at most {}", show_number(unit.of_si(most))),
+    };
+    Err(Trouble::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, unit.show(value))))
 }
 
 /// Whether a device says something by itself.

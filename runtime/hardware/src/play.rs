@@ -13,6 +13,9 @@ use crate::port;
 use crate::template;
 use crate::world::Machine;
 
+/// Longest time until a device that took what makes it safe says that it is.
+const SECURED: Duration = Duration::from_secs(30);
+
 /// How often a device is asked whether it has come to the end.
 const POLL: Duration = Duration::from_millis(200);
 
@@ -33,6 +36,17 @@ pub struct Sheet {
     pub bytes: Vec<u8>,
 }
 
+/// A file that was not run to its end.
+#[derive(Debug)]
+pub struct Broken {
+    /// Why.
+    pub why: Unplayed,
+    /// Nothing was said to the device.
+    pub is_untouched: bool,
+    /// Why the device may not be safe.
+    pub left: Option<String>,
+}
+
 /// Gives a file to the device at a place and waits until it has run it. Ended early or in trouble, what its driver calls `safe`
 /// is said.
 pub fn play(
@@ -42,28 +56,22 @@ pub fn play(
     sheet: Sheet,
     cancel: &AtomicBool,
     ear: &mut dyn Overhear,
-) -> Result<(), Unplayed> {
+) -> Result<(), Broken> {
     let opened = port::open(place, driver).and_then(|mut port| {
         port.attach(&sheet.name, sheet.bytes)?;
         Ok(port)
     });
-    let lost = |why: String| Unplayed::Trouble(Trouble::Lost(why));
+    let lost = |why: String| Broken { why: Unplayed::Trouble(Trouble::Lost(why)), is_untouched: true, left: None };
     let port = opened.map_err(|e| lost(place::trouble(place, &e)))?;
     let link = Link::new(Rc::new(Machine::new()), port, driver, None).map_err(lost)?;
     let mut player = Player { program, driver, link, cancel };
     let ear = &mut Hasty { ear, cancel, securing: false };
     let played = driver.play.iter().try_for_each(|exchange| player.exchange(exchange, ear));
     ear.securing = true;
-    if played.is_err() {
-        for exchange in &driver.safe {
-            let texts = texts(&exchange.sends);
-            if !player.link.lacks(&texts) {
-                // What goes wrong here ends what is ending already.
-                let _ = player.link.say(&texts, exchange.expects.as_ref(), driver, ear);
-            }
-        }
-    }
-    played
+    played.map_err(|why| {
+        let left = player.secure(ear).err().map(|trouble| trouble.text().to_owned());
+        Broken { why, is_untouched: false, left }
+    })
 }
 
 /// Hears what another one hears, and waits no longer than seconds for each answer once it is to end.
@@ -125,6 +133,32 @@ impl Player<'_> {
             }
             std::thread::sleep(POLL);
         }
+    }
+
+    /// Says what makes the device safe; why it may not be. What it tells in the end counts, not whether it took the command.
+    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+    fn secure(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        for exchange in &self.driver.safe {
+            let texts = texts(&exchange.sends);
+            if self.link.lacks(self.driver, &texts) {
+                continue;
+            }
+            let said = self.link.say(&texts, exchange.expects.as_ref(), self.driver, ear).map(|_| ());
+            let Some(until) = exchange.until.as_ref().filter(|_| matches!(said, Ok(()) | Err(Trouble::Refused { .. })))
+            else {
+                said?;
+                continue;
+            };
+            let question = self::texts(std::slice::from_ref(&until.asks)).concat();
+            let begun = Instant::now();
+            while !self.link.is_ready(&question, until, self.driver, ear)? {
+                if begun.elapsed() > SECURED {
+                    return said.and(Err(Trouble::Silent("it did not tell in time that it was safe".to_owned())));
+                }
+                std::thread::sleep(POLL);
+            }
+        }
+        Ok(())
     }
 
     fn number(&self, node: NodeId) -> f64 {

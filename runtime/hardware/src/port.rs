@@ -17,6 +17,10 @@ pub trait Port {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
     /// What has come in, waiting at most so long for the first of it: none where nothing came in time.
     fn receive(&mut self, within: Duration) -> io::Result<Vec<u8>>;
+    /// Whether each message has a connection of its own, so that the next one may go where one was cut.
+    fn renews(&self) -> bool {
+        false
+    }
     /// Has a file ready that a message may say is to go with it.
     fn attach(&mut self, _name: &str, _bytes: Vec<u8>) -> io::Result<()> {
         Err(io::Error::new(ErrorKind::Unsupported, "files do not go over this line"))

@@ -137,6 +137,7 @@ mod tests {
             close: Vec::new(),
             halt: Vec::new(),
             safe: Vec::new(),
+            stays_on: false,
             play: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use matterix_ir::wire::{Driver, Pattern, Until};
+use matterix_ir::wire::{Driver, Pattern, Told, Until};
 use matterix_sila_wire::{Client, Failure, is_of};
 
-use crate::link::{Line, Overhear, Trouble};
+use crate::link::{Line, Overhear, Trouble, forms, showable};
 use crate::pattern::{matched, written};
 use crate::template;
 
@@ -66,29 +66,27 @@ impl Line for Server {
     ) -> Result<Vec<f64>, Trouble> {
         let mut numbers = Vec::new();
         self.0.wait_at_most(ear.patience());
-        for text in texts {
+        for (place, text) in texts.iter().enumerate() {
             ear.out(text.as_bytes());
             let reply = self.0.say(text, !goes_on(driver, text)).map_err(|f| trouble(f, driver, ear))?;
             ear.back(reply.as_bytes());
             if let Some(expects) = expects {
-                numbers = understood(text, &reply, expects)?;
+                numbers = understood(text, &reply, expects.of(place))?;
             }
         }
         Ok(numbers)
     }
 
-    fn ask(
-        &mut self,
-        text: &str,
-        expects: &Pattern,
-        driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
         self.0.wait_at_most(ear.patience());
         ear.out(text.as_bytes());
         let reply = self.0.ask(text).map_err(|f| trouble(f, driver, ear))?;
         ear.back(reply.as_bytes());
-        understood(text, &reply, expects)
+        let found = told.forms().find_map(|(form, shows)| Some((matched(form, &reply)?, form, shows)));
+        let Some((numbers, form, shows)) = found else {
+            return Err(Trouble::Garbled(format!("to `{text}` it answered `{reply}`, not `{}`", forms(told))));
+        };
+        showable(told, &numbers, form, shows)
     }
 
     fn is_ready(

@@ -3,9 +3,13 @@
 mod ask;
 mod bindings;
 mod faulty;
+mod framed;
 mod journal;
 mod kills;
+mod modules;
+mod reads;
 mod record;
+mod safe;
 mod server;
 mod stop;
 mod unreached;

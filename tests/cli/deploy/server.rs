@@ -40,9 +40,9 @@ fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
     let (wrong, left) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(recorded.len())));
     let (told, rest) = (Arc::clone(&wrong), Arc::clone(&left));
     std::thread::spawn(move || {
-        let mut next = 0;
+        let (mut next, mut stopped) = (0, false);
         for stream in listener.incoming().flatten() {
-            serve(stream, &recorded, &mut next, spoiled.as_ref(), &told);
+            serve(stream, &recorded, (&mut next, &mut stopped), spoiled.as_ref(), &told);
             *rest.lock().expect("not poisoned") = recorded.len() - next;
         }
     });
@@ -53,7 +53,7 @@ fn replay(spoiled: Option<(&'static str, Spoiled)>) -> Replay {
 fn serve(
     stream: TcpStream,
     recorded: &[Value],
-    next: &mut usize,
+    (next, stopped): (&mut usize, &mut bool),
     spoiled: Option<&(&str, Spoiled)>,
     wrong: &Mutex<Vec<String>>,
 ) {
@@ -63,7 +63,11 @@ fn serve(
         let name = body["data"]["commandType"].as_str().unwrap_or_default().to_owned();
         let expected = recorded.get(*next);
         let same = |e: &Value| e["method"] == method.as_str() && e["path"] == path.as_str() && e["body"] == body;
+        *stopped |= body["data"]["actionType"] == "stop";
+        // Whether a person has stopped it is asked for all the time.
+        let looks = method == "GET" && path.starts_with("/runs/") && path.matches('/').count() == 2;
         let (status, answer) = match (expected, spoiled) {
+            _ if looks => (200, json!({ "data": { "status": if *stopped { "stopped" } else { "running" } } })),
             _ if version != "4" => (422, json!({ "errors": [{ "id": "InvalidRequest", "detail": "no version" }] })),
             (Some(e), Some((at, how))) if same(e) && *at == name => match how {
                 Spoiled::Cut => return,
@@ -92,7 +96,7 @@ fn serve(
 }
 
 /// Method, path, version header and body of the next request.
-fn request(reader: &mut BufReader<TcpStream>) -> Option<(String, String, String, Value)> {
+pub fn request(reader: &mut BufReader<TcpStream>) -> Option<(String, String, String, Value)> {
     let mut line = String::new();
     reader.read_line(&mut line).ok().filter(|n| *n > 0)?;
     let mut words = line.split_whitespace().map(str::to_owned);

@@ -68,6 +68,16 @@ fn a_request_to_terminate_stops_it_and_finally_is_done() {
     stopped("stop_term", Stdio::null(), |process| signal("-TERM", process));
 }
 
+#[test]
+fn a_quit_from_the_keyboard_stops_it_and_finally_is_done() {
+    stopped("stop_quit", Stdio::null(), |process| signal("-QUIT", process));
+}
+
+#[test]
+fn a_terminal_that_is_closed_stops_it_and_finally_is_done() {
+    stopped("stop_hup", Stdio::null(), |process| signal("-HUP", process));
+}
+
 pub fn signal(which: &str, process: &Child) {
     let kill = std::process::Command::new("kill").args([which, &process.id().to_string()]).status();
     assert!(kill.expect("kill").success());

@@ -91,7 +91,7 @@ impl Walk<'_> {
                 self.frame_words(a);
                 self.frame_words(b);
             }
-            _ => {}
+            _ => drop(self.expr(e)),
         }
     }
 

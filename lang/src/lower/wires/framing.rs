@@ -13,7 +13,7 @@ use crate::names::{DeclId, near};
 
 const FIELDS: &[&str] = &["carries", "frame", "request", "reply", "length", "check", "silence"];
 const MARKS: &[(&str, Mark)] = &[
-    ("start", Mark::Start),
+    ("begin", Mark::Start),
     ("data", Mark::Data),
     ("address", Mark::Address),
     ("length", Mark::Length),
@@ -381,7 +381,7 @@ impl<'a> Planner<'a, '_> {
                         *span,
                         "this checksum is over nothing",
                         "no such stretch",
-                        "as in `sum8(start .. data)`",
+                        "as in `sum8(begin .. data)`",
                     );
                 }
                 let bits = check.sum.bits();

@@ -18,10 +18,19 @@ impl<'a> Planner<'a, '_> {
         for text in &of.sends {
             sends.push(self.template(text, scope)?);
         }
-        let expects = match &of.expects {
+        let mut expects = match &of.expects {
             Some(pattern) => Some(self.pattern(pattern)?.0),
             None => None,
         };
+        if !of.then.is_empty() && of.then.len() + 1 != of.sends.len() {
+            let headline = format!("{} replies are expected to {} messages", of.then.len() + 1, of.sends.len());
+            self.wrong(of.then[0].span, &headline, "not one for each", "expect one for all of them, or one for each");
+            return None;
+        }
+        for pattern in &of.then {
+            let (pattern, _) = self.pattern(pattern)?;
+            expects.iter_mut().for_each(|first| first.then.push(pattern.clone()));
+        }
         let until = match &of.until {
             Some(until) => {
                 let asks = self.template(&until.asks, scope)?;
@@ -193,7 +202,17 @@ impl<'a> Planner<'a, '_> {
             value = self.lab.member(value, segment);
         }
         self.lab.readings_live = live;
-        let (mut expects, dimensions) = self.pattern(expects)?;
+        let (text, bounds) = bounded(&expects.text);
+        let bounds = match bounds {
+            Some(Err(why)) => {
+                let d = Diagnostic::error(codes::DRIVER_LINE, expects.span, why, "what can it show?");
+                self.lab.report(d.help("write two numbers in the unit before them, as in `{degC in -50 .. 400}`"));
+                return None;
+            }
+            Some(Ok(bounds)) => Some(bounds),
+            None => None,
+        };
+        let (mut expects, dimensions) = self.pattern(&ast::Pattern { text, span: expects.span })?;
         let mut words = Vec::new();
         let n = match value {
             Value::Error => return None,
@@ -231,6 +250,15 @@ impl<'a> Planner<'a, '_> {
             _ => None,
         };
         let unit = self.unit_of(member, &expects, n.node);
+        let told_in = expects.slots.iter().find_map(number_unit);
+        let shows = bounds.zip(told_in).map(|(bounds, unit)| bounds.map(|bound| unit.to_si(bound)));
+        // Nothing is colder than 0 K, whatever an instrument can show.
+        let shows = if n.point {
+            let [least, most] = shows.unwrap_or([0.0, f64::INFINITY]);
+            Some([least.max(0.0), most])
+        } else {
+            shows
+        };
         let difference = if n.point { self.lab.tables.si(&n.dimension) } else { unit.clone() };
         let (reading, state) = match self.lab.graph.op(n.node) {
             Op::Reading(r) => (Some(r), None),
@@ -250,6 +278,8 @@ impl<'a> Planner<'a, '_> {
             heard: None,
             asks,
             expects,
+            shows,
+            also: Vec::new(),
             span,
         })
     }
@@ -303,12 +333,37 @@ impl<'a> Planner<'a, '_> {
             }
             _ => None,
         });
-        let replied = expects.slots.iter().find_map(|s| match s {
-            Slot::Number(unit, _) => Some(unit.clone()),
-            _ => None,
-        });
+        let replied = expects.slots.iter().find_map(number_unit).cloned();
         declared.or(replied).unwrap_or_else(Unit::one)
     }
+}
+
+fn number_unit(slot: &Slot) -> Option<&Unit> {
+    match slot {
+        Slot::Number(unit, _) => Some(unit),
+        _ => None,
+    }
+}
+
+/// Between a unit and what its instrument can show.
+const IN: &str = " in ";
+
+/// A reply without what the instrument can show, and that: `{degC in -50 .. 400}`; in words what is wrong with it.
+fn bounded(text: &str) -> (String, Option<Result<[f64; 2], String>>) {
+    let braces = text.match_indices('{').filter_map(|(at, _)| {
+        let (before, rest) = text.split_at(at);
+        let end = rest.find('}')?;
+        let (unit, range) = rest[1..end].split_once(IN).filter(|(unit, _)| !unit.contains('{'))?;
+        Some((before, unit, range, &rest[end..]))
+    });
+    let Some((before, unit, range, after)) = braces.into_iter().next() else { return (text.to_owned(), None) };
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| n.is_finite());
+    let (range, form) =
+        range.split_once(':').map_or((range, String::new()), |(range, form)| (range, format!(" :{form}")));
+    let bounds = range.split_once("..").and_then(|(least, most)| Some([number(least)?, number(most)?]));
+    let bounds = bounds.filter(|[least, most]| least < most);
+    let whole = format!("{before}{{{}{form}{after}", unit.trim());
+    (whole, Some(bounds.ok_or_else(|| format!("`{}` are not the least and the most of something", range.trim()))))
 }
 
 /// The words of a truth value.

@@ -36,7 +36,7 @@ impl<'a> Planner<'a, '_> {
         }
         for told in &driver.told {
             self.check_request(&told.asks, &known);
-            self.check_answer(&told.expects);
+            told.forms().for_each(|(form, _)| self.check_answer(form, &known));
         }
         for (asked, with) in &driver.answers {
             if let Err(why) = message::request(&asked.with(VALUE)) {
@@ -47,17 +47,20 @@ impl<'a> Planner<'a, '_> {
             }
         }
         for refusal in &driver.refusals {
-            self.check_answer(&refusal.reply);
+            self.check_answer(&refusal.reply, &known);
         }
     }
 
     fn check_exchange(&mut self, exchange: &Exchange, known: &BTreeSet<String>) {
         exchange.sends.iter().for_each(|sent| self.check_request(sent, known));
-        exchange.expects.iter().for_each(|expected| self.check_answer(expected));
+        if let Some(expected) = &exchange.expects {
+            self.check_answer(expected, known);
+            expected.then.iter().for_each(|expected| self.check_answer(expected, known));
+        }
         if let Some(until) = &exchange.until {
             self.check_request(&until.asks, known);
             match &until.expects {
-                Some(expected) => self.check_answer(expected),
+                Some(expected) => self.check_answer(expected, known),
                 None => self.no_message(until.asks.span, "over HTTP nothing but an answer says that a device is ready"),
             }
         }
@@ -72,16 +75,27 @@ impl<'a> Planner<'a, '_> {
         let path = request.target.split(['/', '?', '&', '=']).filter_map(message::kept);
         let missing = path.chain(put_in(&request.fields)).find(|word| !known.contains(*word));
         if let Some(word) = missing {
-            let headline = format!("nothing says what `<{word}>` is");
-            let d = Diagnostic::error(codes::DRIVER_LINE, template.span, headline, "put in here");
-            self.lab.report(d.help(format!("an answer does, as in `expects \"201 /data/id=<{word}>\"`")));
+            self.unknown_word(template.span, word);
         }
     }
 
-    fn check_answer(&mut self, pattern: &Pattern) {
-        if let Err(why) = message::answer(&pattern.with(VALUE)) {
-            self.no_message(pattern.span, &why);
+    fn check_answer(&mut self, pattern: &Pattern, known: &BTreeSet<String>) {
+        let text = pattern.with(VALUE);
+        let answer = match message::answer(&text) {
+            Ok(answer) => answer,
+            Err(why) => return self.no_message(pattern.span, &why),
+        };
+        let chosen = answer.fields.iter().flat_map(|f| f.pointer.split('/')).filter_map(message::choice);
+        let missing = chosen.filter_map(|(_, text)| message::kept(text)).find(|word| !known.contains(*word));
+        if let Some(word) = missing {
+            self.unknown_word(pattern.span, word);
         }
+    }
+
+    fn unknown_word(&mut self, span: Span, word: &str) {
+        let headline = format!("nothing says what `<{word}>` is");
+        let d = Diagnostic::error(codes::DRIVER_LINE, span, headline, "put in here");
+        self.lab.report(d.help(format!("an answer does, as in `expects \"201 /data/id=<{word}>\"`")));
     }
 
     fn no_message(&mut self, span: Span, why: &str) {
@@ -99,6 +113,8 @@ fn kept_by(wire: &Wire) -> Vec<String> {
         WireKind::Fixed { exchange, .. } | WireKind::Command { exchange, .. } => exchange,
         _ => return Vec::new(),
     };
-    let Some(expects) = &exchange.expects else { return Vec::new() };
-    message::answer(&expects.text).map(|answer| put_in(&answer.fields).map(str::to_owned).collect()).unwrap_or_default()
+    let until = exchange.until.iter().filter_map(|until| until.expects.as_ref());
+    let all = exchange.expects.iter().chain(&exchange.then).chain(until);
+    let said = all.filter_map(|expects| message::answer(&expects.text).ok());
+    said.flat_map(|answer| put_in(&answer.fields).map(str::to_owned).collect::<Vec<_>>()).collect()
 }

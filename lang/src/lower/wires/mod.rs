@@ -7,6 +7,7 @@
 mod forms;
 mod framing;
 mod hosted;
+mod left;
 mod lines;
 mod message;
 mod modbus;
@@ -148,6 +149,7 @@ impl<'a> Planner<'a, '_> {
             close: Vec::new(),
             halt: Vec::new(),
             safe: Vec::new(),
+            stays_on: false,
             play: Vec::new(),
             alive: Vec::new(),
             told: Vec::new(),
@@ -179,6 +181,8 @@ impl<'a> Planner<'a, '_> {
                 self.line(w, instance, module, &mut driver);
             }
         }
+        driver.stays_on = self.stays_on(wires, instance, under);
+        self.check_safe(&driver, wires);
         self.check_messages(&driver, wires, under);
         Some(driver)
     }
@@ -226,7 +230,7 @@ impl<'a> Planner<'a, '_> {
                 let told = self.told(path, asks, expects, w.span, &mut scope);
                 let condition = condition.as_ref().map(|c| self.lab.truth(c, &mut scope));
                 if let (Some(told), true) = (told, condition != Some(None)) {
-                    driver.told.push(wire::Told { condition: condition.flatten(), ..told });
+                    add_told(driver, wire::Told { condition: condition.flatten(), ..told });
                 }
             }
             WireKind::Hears { path, condition, text, every } => {
@@ -298,7 +302,20 @@ impl<'a> Planner<'a, '_> {
     fn repeated(&mut self, wires: &'a [Wire]) {
         let key = |w: &Wire| match &w.kind {
             WireKind::Command { sig, .. } => Some(self.form(sig)),
-            WireKind::Reading { path, .. } | WireKind::Hears { path, .. } => Some(format!("reading {}", words(path))),
+            WireKind::Reading { path, asks, expects, .. } => {
+                // What asks the same and is answered otherwise is another form of the answer.
+                let first = wires.iter().find_map(|w| match &w.kind {
+                    WireKind::Reading { path: of, asks, .. } if words(of) == words(path) => Some(asks),
+                    _ => None,
+                });
+                let form = if first.is_some_and(|first| first.parts == asks.parts) {
+                    format!(" {}", expects.text)
+                } else {
+                    String::new()
+                };
+                Some(format!("reading {}{form}", words(path)))
+            }
+            WireKind::Hears { path, .. } => Some(format!("reading {}", words(path))),
             WireKind::Ignores { text } => Some(format!("ignores {}", text.text)),
             WireKind::Reply { text, .. } => Some(format!("reply {text}")),
             _ => None,
@@ -311,6 +328,16 @@ impl<'a> Planner<'a, '_> {
                 self.lab.report(d.because(wires[first].span, "said first here"));
             }
         }
+    }
+}
+
+/// A line for a reading; one that asks what another one asks is one more form of the answer to that.
+fn add_told(driver: &mut Driver, told: wire::Told) {
+    let same =
+        driver.told.iter_mut().find(|t| t.heard.is_none() && t.name == told.name && t.asks.pieces == told.asks.pieces);
+    match same {
+        Some(first) => first.also.push(wire::Alternative { expects: told.expects, shows: told.shows }),
+        None => driver.told.push(told),
     }
 }
 

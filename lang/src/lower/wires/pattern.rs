@@ -89,7 +89,7 @@ impl Planner<'_, '_> {
         if self.speech == Speech::Modbus {
             slots = self.modbus_answer(slots, of.span)?;
         }
-        Some((Pattern { slots, span: of.span }, dimensions))
+        Some((Pattern { slots, then: Vec::new(), span: of.span }, dimensions))
     }
 
     /// The name under which a journal keeps what a reply says.

@@ -341,7 +341,7 @@ fn wire(wire: &Wire) -> Sexp {
 fn exchange(said: &Exchange) -> Vec<Sexp> {
     let expects = |p: &Pattern| node("expects").with([quoted(&p.text)]);
     let mut out = vec![node("sends").with(said.sends.iter().map(filled))];
-    out.extend(said.expects.as_ref().map(expects));
+    out.extend(said.expects.as_ref().into_iter().chain(&said.then).map(expects));
     out.extend(said.until.as_ref().map(|u| {
         let asks = node("until").with([filled(&u.asks)]);
         asks.with(u.expects.as_ref().map(expects)).with([expr(&u.timeout)])

@@ -278,7 +278,10 @@ impl Lower<'_> {
     fn exchange(&mut self, kids: &mut Kids) -> Exchange {
         let sends = kids.eat(Rule::sends).map(|node| Kids::of(node).all(Rule::string));
         let sends = sends.unwrap_or_default().iter().map(|s| self.filled(s)).collect();
-        let expects = self.answer(kids);
+        let replies = kids.eat(Rule::replies).map(|node| Kids::of(node).all(Rule::string)).unwrap_or_default();
+        let mut replies = replies.iter().map(|s| self.pattern(s));
+        let expects = replies.next();
+        let then = replies.collect();
         let until = kids.eat(Rule::wire_until).map(|node| {
             let span = self.span(&node);
             let kids = &mut Kids::of(node);
@@ -286,7 +289,7 @@ impl Lower<'_> {
             let (asks, expects) = (self.said(kids, span), self.answer(kids));
             Box::new(Until { asks, expects, timeout: self.expr_in(kids) })
         });
-        Exchange { sends, expects, until }
+        Exchange { sends, expects, then, until }
     }
 
     fn answer(&mut self, kids: &mut Kids) -> Option<Pattern> {

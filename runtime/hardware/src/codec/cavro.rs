@@ -140,6 +140,18 @@ fn number_of(error: &str) -> u8 {
     error.rsplit(' ').next().and_then(|n| n.parse().ok()).unwrap_or(0)
 }
 
+/// What ends a move: the one command that a busy pump takes. It acts at once; with an `R` behind it what was broken off would go on
+/// (manual of the XLP 6000, 734237-C, 3.5).
+const TERMINATE: &str = "T";
+
+/// Commands as one string, which `R` starts.
+pub(super) fn string(texts: &[String]) -> String {
+    match texts {
+        [only] if only == TERMINATE => only.clone(),
+        all => format!("{}R", all.concat()),
+    }
+}
+
 /// A string of commands, taken apart: a sign with its operands each. The `R` that starts it is left out.
 fn words(text: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();

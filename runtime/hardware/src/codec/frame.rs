@@ -39,8 +39,18 @@ enum Taken {
     /// So many bytes are none.
     Bad(usize, Garbled),
     /// So many bytes are one.
-    Whole { length: usize, data: Vec<u8>, address: Option<Vec<u8>>, number: Option<u64> },
+    Whole(usize, Whole),
 }
+
+/// What a whole frame says.
+struct Whole {
+    data: Vec<u8>,
+    address: Option<Vec<u8>>,
+    number: Option<u64>,
+}
+
+/// Bytes, and where they stand in a frame.
+type Placed = (Range<usize>, Vec<u8>);
 
 impl Frame {
     /// A line with a device at this address; in words why it can have none.
@@ -79,7 +89,7 @@ impl Frame {
 
     /// This request goes out: what comes answers it.
     pub(super) fn sent(&mut self, frame: &[u8]) {
-        let Some(Ok((data, _, number))) = self.take(Way::Request, &mut frame.to_vec()) else { return };
+        let Some(Ok(Whole { data, number, .. })) = self.take(Way::Request, &mut frame.to_vec()) else { return };
         self.awaited = number;
         if self.frames.carries == Carries::Modbus {
             self.asked = modbus::requested(&data).ok().map(|(_, asked)| asked);
@@ -96,7 +106,7 @@ impl Frame {
 
     pub(super) fn take_reply(&mut self, buffer: &mut Vec<u8>) -> Option<Result<Reply, Garbled>> {
         loop {
-            let (data, address, number) = match self.take(Way::Reply, buffer)? {
+            let Whole { data, address, number } = match self.take(Way::Reply, buffer)? {
                 Ok(whole) => whole,
                 Err(garbled) => return Some(Err(garbled)),
             };
@@ -115,7 +125,7 @@ impl Frame {
     }
 
     pub(super) fn take_request(&mut self, buffer: &mut Vec<u8>) -> Option<Result<Request, Garbled>> {
-        let (data, address, number) = match self.take(Way::Request, buffer)? {
+        let Whole { data, address, number } = match self.take(Way::Request, buffer)? {
             Ok(whole) => whole,
             Err(garbled) => return Some(Err(garbled)),
         };
@@ -207,12 +217,7 @@ impl Frame {
     }
 
     /// The checksum of a frame as it must be, and where; none where a frame has none.
-    fn check(
-        &self,
-        layout: &[Part],
-        places: &[Range<usize>],
-        frame: &[u8],
-    ) -> Result<Option<(Range<usize>, Vec<u8>)>, String> {
+    fn check(&self, layout: &[Part], places: &[Range<usize>], frame: &[u8]) -> Result<Option<Placed>, String> {
         let at = layout.iter().position(|p| matches!(p, Part::Check(_)));
         let (Some(at), Some(check)) = (at, &self.frames.check) else { return Ok(None) };
         let Part::Check(form) = &layout[at] else { return Ok(None) };
@@ -225,8 +230,7 @@ impl Frame {
     }
 
     /// The first frame that goes this way, which is taken away; empty texts are passed over.
-    #[allow(clippy::type_complexity)]
-    fn take(&self, way: Way, buffer: &mut Vec<u8>) -> Option<Result<(Vec<u8>, Option<Vec<u8>>, Option<u64>), Garbled>> {
+    fn take(&self, way: Way, buffer: &mut Vec<u8>) -> Option<Result<Whole, Garbled>> {
         let layout = self.layout(way);
         let is_bare =
             layout.iter().all(|p| matches!(p, Part::Fixed(_) | Part::Data)) && layout.first() == Some(&Part::Data);
@@ -247,12 +251,12 @@ impl Frame {
                     buffer.drain(..length.clamp(1, buffer.len()));
                     return Some(Err(garbled));
                 }
-                Taken::Whole { length, data, address, number } => {
+                Taken::Whole(length, whole) => {
                     buffer.drain(..length);
-                    if is_bare && self.frames.carries == Carries::Text && data.trim_ascii().is_empty() {
+                    if is_bare && self.frames.carries == Carries::Text && whole.data.trim_ascii().is_empty() {
                         continue;
                     }
-                    return Some(Ok((data, address, number)));
+                    return Some(Ok(whole));
                 }
             }
         }
@@ -278,7 +282,8 @@ impl Frame {
         if let Some(last) = self.end_of_line(layout) {
             let Some(end) = buffer[begins..].iter().position(|b| *b == last) else { return Taken::More };
             let length = begins + end + 1;
-            return Taken::Whole { length, data: buffer[begins..length].to_vec(), address: None, number: None };
+            let data = buffer[begins..length].to_vec();
+            return Taken::Whole(length, Whole { data, address: None, number: None });
         }
         let size = match self.size(way, &buffer[..begins], &buffer[begins..], &known) {
             Ok(Some(size)) => size,
@@ -292,7 +297,7 @@ impl Frame {
         }
         let Some(frame) = buffer.get(..length) else { return Taken::More };
         match self.judged(layout, &places, frame) {
-            Ok((data, address, number)) => Taken::Whole { length, data, address, number },
+            Ok(whole) => Taken::Whole(length, whole),
             Err(why) => Taken::Bad(length, why),
         }
     }
@@ -343,13 +348,7 @@ impl Frame {
     }
 
     /// What a whole frame says, if it is one.
-    #[allow(clippy::type_complexity)]
-    fn judged(
-        &self,
-        layout: &[Part],
-        places: &[Range<usize>],
-        frame: &[u8],
-    ) -> Result<(Vec<u8>, Option<Vec<u8>>, Option<u64>), Garbled> {
+    fn judged(&self, layout: &[Part], places: &[Range<usize>], frame: &[u8]) -> Result<Whole, Garbled> {
         let (mut data, mut address, mut number) = (Vec::new(), None, None);
         for (part, place) in layout.iter().zip(places) {
             let is = &frame[place.clone()];
@@ -373,7 +372,7 @@ impl Frame {
             let (is, right) = (shown(&frame[place]), shown(&check));
             return Err(Garbled::new(format!("the checksum of `{}` is `{is}`, not `{right}`", shown(frame))));
         }
-        Ok((data, address, number))
+        Ok(Whole { data, address, number })
     }
 
     /// Whether these are the same checksum: hexadecimal digits may be of either case.

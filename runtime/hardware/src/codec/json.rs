@@ -4,11 +4,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::message::{self, Field};
-use matterix_ir::wire::{Pattern, Piece, Slot, Template};
+use matterix_ir::scene::InstanceId;
+use matterix_ir::wire::{Driver, Pattern, Piece, Slot, Template};
 use serde_json::{Map, Value};
 
 use super::{Garbled, Reply, Request};
-use crate::pattern;
+use crate::pattern::{self, Said};
 use crate::template::{self, Found};
 
 /// Longest answer, bytes.
@@ -23,21 +24,39 @@ const REFUSED: u16 = 400;
 /// One end of a connection.
 #[derive(Clone, Debug, Default)]
 pub struct Json {
-    /// What answers said, by the words that drivers keep it under.
-    kept: BTreeMap<String, String>,
+    /// What answers said to each device, by the words that drivers keep it under.
+    kept: Kept,
+    /// Who speaks over the line, and the device whose line it is.
+    speaker: Option<(InstanceId, InstanceId)>,
     /// The server's end: what it gave out under these words.
     issued: BTreeSet<(String, String)>,
+    /// The server's end: what it gave out last under each word.
+    latest: BTreeMap<String, String>,
 }
+
+/// What answers said, by the device they were for and the word it is kept under.
+pub type Kept = BTreeMap<(InstanceId, String), String>;
 
 impl Json {
     /// What answers said so far.
-    pub fn kept(&self) -> &BTreeMap<String, String> {
+    pub fn kept(&self) -> &Kept {
         &self.kept
     }
 
-    /// Puts back what an answer said to an earlier process.
-    pub fn keep(&mut self, word: String, text: String) {
-        self.kept.insert(word, text);
+    /// Puts back what an answer said to an earlier process, or for something that goes on beside others.
+    pub fn keep(&mut self, device: InstanceId, word: String, text: String) {
+        self.kept.insert((device, word), text);
+    }
+
+    /// From here on this device speaks: it has words of its own, and knows those of the device whose line it is.
+    pub fn speak_for(&mut self, driver: &Driver) {
+        self.speaker = Some((driver.instance, driver.host.as_ref().map_or(driver.instance, |host| host.instance)));
+    }
+
+    fn known(&self, word: &str) -> Option<&String> {
+        let of = |device| self.kept.get(&(device, word.to_owned()));
+        let (own, host) = self.speaker?;
+        of(own).or_else(|| of(host))
     }
 
     /// A message as a line; what nobody has said yet is left as the driver has it.
@@ -86,8 +105,10 @@ impl Json {
 
     /// The numbers of an answer that looks like this, SI; what drivers keep of it is kept.
     pub(super) fn matched(&mut self, pattern: &Pattern, reply: &str) -> Option<Vec<f64>> {
-        let (numbers, kept) = look(pattern, reply)?;
-        self.kept.extend(kept);
+        let Said { numbers, kept } = self.look(pattern, reply)?;
+        if let Some((own, _)) = self.speaker {
+            self.kept.extend(kept.into_iter().map(|(word, text)| ((own, word), text)));
+        }
         Some(numbers)
     }
 
@@ -171,7 +192,9 @@ impl Json {
             match word.split_once('=').and_then(|(pointer, value)| Some((pointer, message::kept(value)?))) {
                 Some((pointer, kept)) => {
                     let name = format!("{kept}-{}", self.issued.len() + 1);
+                    let pointer = message::chosen(pointer, |word| self.latest.get(word).cloned());
                     out.push_str(&format!("{pointer}='{name}'"));
+                    self.latest.insert(kept.to_owned(), name.clone());
                     self.issued.insert((kept.to_owned(), name));
                 }
                 None => out.push_str(word),
@@ -185,11 +208,41 @@ impl Json {
         let Ok(request) = message::request(text) else { return false };
         let values = request.fields.iter().filter(|f| !f.quoted).map(|f| f.value);
         let mut words = request.target.split('/').chain(values).filter_map(message::kept);
-        words.any(|word| !self.kept.contains_key(word))
+        words.any(|word| self.known(word).is_none())
+    }
+
+    /// The numbers of an answer that looks like this, and what is kept of it.
+    fn look(&self, pattern: &Pattern, reply: &str) -> Option<Said> {
+        let (status, body) = parts(reply)?;
+        let text = pattern.with(MARK);
+        let answer = message::answer(&text).ok()?;
+        if answer.status.is_some_and(|wanted| wanted != status) {
+            return None;
+        }
+        let mut values = pattern.slots.iter().filter(|s| !matches!(s, Slot::Plain(_)));
+        let (mut numbers, mut kept) = (Vec::new(), Vec::new());
+        for field in &answer.fields {
+            let is = plain(at(&body, &message::chosen(&field.pointer, |word| self.known(word).cloned()))?);
+            if let Some(word) = message::kept(field.value) {
+                kept.push((word.to_owned(), is));
+                continue;
+            }
+            let mut slots = Vec::new();
+            for (i, text) in field.value.split(MARK).enumerate() {
+                if i > 0 {
+                    slots.extend(values.next().cloned());
+                }
+                if !text.is_empty() {
+                    slots.push(Slot::Plain(text.to_owned()));
+                }
+            }
+            numbers.extend(pattern::matched(&Pattern { slots, ..Pattern::default() }, &is)?);
+        }
+        Some(Said { numbers, kept })
     }
 
     fn filled(&self, target: &str) -> String {
-        let known = |word: &str| message::kept(word).and_then(|w| self.kept.get(w)).cloned();
+        let known = |word: &str| message::kept(word).and_then(|w| self.known(w)).cloned();
         target.split('/').map(|s| known(s).unwrap_or_else(|| s.to_owned())).collect::<Vec<_>>().join("/")
     }
 
@@ -197,7 +250,7 @@ impl Json {
     fn body(&self, fields: &[Field<'_>]) -> Option<Value> {
         let mut body = Value::Null;
         for field in fields {
-            let kept = message::kept(field.value).filter(|_| !field.quoted).and_then(|w| self.kept.get(w));
+            let kept = message::kept(field.value).filter(|_| !field.quoted).and_then(|w| self.known(w));
             let value = match (kept, field.quoted) {
                 (Some(text), _) => Value::from(text.as_str()),
                 (None, true) => Value::from(field.value),
@@ -209,10 +262,22 @@ impl Json {
     }
 }
 
+/// The value that a pointer says; `[member:text]` in it is the first of an array of which that member is the text.
+fn at<'v>(body: &'v Value, pointer: &str) -> Option<&'v Value> {
+    pointer.split('/').skip(1).try_fold(body, |at, token| match message::choice(token) {
+        Some((member, text)) => at.as_array()?.iter().find(|item| item.get(member).is_some_and(|is| plain(is) == text)),
+        None => at.pointer(&format!("/{token}")),
+    })
+}
+
 /// Puts a value where a pointer says, with what must be around it.
 fn put(whole: &mut Value, pointer: &str, value: Value) {
     let mut at = whole;
     for token in pointer.split('/').skip(1) {
+        if let Some((member, text)) = message::choice(token) {
+            at = one_of(at, member, text);
+            continue;
+        }
         let token = token.replace("~1", "/").replace("~0", "~");
         let number = token.parse::<usize>().ok();
         if at.is_null() {
@@ -233,6 +298,20 @@ fn put(whole: &mut Value, pointer: &str, value: Value) {
         };
     }
     *at = value;
+}
+
+/// The item of an array of which this member is this text; it is put there where there is none.
+fn one_of<'v>(at: &'v mut Value, member: &str, text: &str) -> &'v mut Value {
+    if !at.is_array() {
+        *at = Value::Array(Vec::new());
+    }
+    let Value::Array(items) = at else { return at };
+    let index = items.iter().position(|item| item.get(member).is_some_and(|is| plain(is) == text));
+    let index = index.unwrap_or_else(|| {
+        items.push(serde_json::json!({ member: text }));
+        items.len() - 1
+    });
+    &mut items[index]
 }
 
 /// The first whole line, which is taken away.
@@ -261,38 +340,6 @@ fn plain(value: &Value) -> String {
         Value::String(text) => text.clone(),
         other => other.to_string(),
     }
-}
-
-type Kept = Vec<(String, String)>;
-
-/// The numbers of an answer that looks like this, and what is kept of it.
-fn look(pattern: &Pattern, reply: &str) -> Option<(Vec<f64>, Kept)> {
-    let (status, body) = parts(reply)?;
-    let text = pattern.with(MARK);
-    let answer = message::answer(&text).ok()?;
-    if answer.status.is_some_and(|wanted| wanted != status) {
-        return None;
-    }
-    let mut values = pattern.slots.iter().filter(|s| !matches!(s, Slot::Plain(_)));
-    let (mut numbers, mut kept) = (Vec::new(), Vec::new());
-    for field in &answer.fields {
-        let is = plain(body.pointer(&field.pointer)?);
-        if let Some(word) = message::kept(field.value) {
-            kept.push((word.to_owned(), is));
-            continue;
-        }
-        let mut slots = Vec::new();
-        for (i, text) in field.value.split(MARK).enumerate() {
-            if i > 0 {
-                slots.extend(values.next().cloned());
-            }
-            if !text.is_empty() {
-                slots.push(Slot::Plain(text.to_owned()));
-            }
-        }
-        numbers.extend(pattern::matched(&Pattern { slots, ..Pattern::default() }, &is)?);
-    }
-    Some((numbers, kept))
 }
 
 fn shortened(text: &str) -> String {

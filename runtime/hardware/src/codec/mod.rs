@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use cavro::Cavro;
 use frame::Frame;
-pub use json::{Json, LONGEST as LONGEST_JSON};
+pub use json::{Json, Kept, LONGEST as LONGEST_JSON};
 use matterix_ir::wire::{Framing, Pattern, Slot, Template};
 
 use crate::pattern::{self, Said, Shown};
@@ -105,7 +105,7 @@ impl Codec {
     /// Commands as frames; an error in words where one has no room for what it says.
     pub fn say(&mut self, texts: &[String]) -> Result<Vec<Vec<u8>>, String> {
         match self {
-            Codec::Cavro(cavro) => Ok(vec![cavro.request(&format!("{}R", texts.concat()))]),
+            Codec::Cavro(cavro) => Ok(vec![cavro.request(&cavro::string(texts))]),
             _ => texts.iter().map(|t| self.ask(t)).collect(),
         }
     }
@@ -228,7 +228,7 @@ impl Codec {
             Slot::Any => Slot::Plain(failure.to_owned()),
             other => other.clone(),
         });
-        let worded = Pattern { slots: worded.collect(), span: pattern.span };
+        let worded = Pattern { slots: worded.collect(), ..Pattern::default() };
         json.named(&pattern::rendered(&worded, nothing).unwrap_or_default())
     }
 

@@ -6,6 +6,7 @@ use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
 use super::hardware::Hardware;
+use crate::link::Trouble;
 
 impl Hardware<'_, '_> {
     /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.
@@ -67,6 +68,15 @@ impl Hardware<'_, '_> {
         if !self.is_live() && !self.is_dry() {
             return self.replayed_fault().map_or(Ok(()), Err);
         }
-        self.say(device, &texts, served.exchange.expects.as_ref(), served.exchange.span).map(|_| ())
+        let said = self.say_again(device, &texts, served.exchange.expects.as_ref());
+        said.map(|_| ()).map_err(|trouble| {
+            let fault = self.trouble(device, &trouble, served.exchange.span);
+            match trouble {
+                Trouble::Refused { failure, .. } => {
+                    Fault { message: format!("{}: `{failure}`", fault.message), ..fault }
+                }
+                _ => fault,
+            }
+        })
     }
 }

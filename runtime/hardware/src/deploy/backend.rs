@@ -91,17 +91,7 @@ impl Backend for Hardware<'_, '_> {
         }
         let Some(running) = self.running.remove(&ticket) else { return };
         self.twin.halt(running.twin);
-        let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
-        if running.ready || !self.is_live() || self.unreached.is_some() {
-            return;
-        }
-        for exchange in &driver.halt {
-            let Ok(texts) = self.texts(&exchange.sends) else { continue };
-            // What goes wrong here ends what is ending already.
-            if let Err(trouble) = self.try_say(running.device, &texts, exchange.expects.as_ref()) {
-                self.trouble(running.device, &trouble, exchange.span);
-            }
-        }
+        self.break_off(&running);
     }
 
     fn admits(&mut self) -> bool {
@@ -121,12 +111,16 @@ impl Backend for Hardware<'_, '_> {
         }
         let ticket = Ticket(self.tickets);
         self.tickets += 1;
-        self.put(ticket, step, text.to_owned(), out)?;
+        self.noted = None;
+        let put = self.put(ticket, step, text.to_owned(), out);
+        put.map_err(|fault| self.from_outside(fault))?;
         Ok(Some(ticket))
     }
 
     fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
-        match self.answer(ticket)? {
+        self.noted = None;
+        let answer = self.answer(ticket);
+        match answer.map_err(|fault| self.from_outside(fault))? {
             Some(Answer { yes: false, who }) => {
                 // Who does not agree wants it to end.
                 self.settings.control.stop(&who);
@@ -190,7 +184,10 @@ impl Hardware<'_, '_> {
             self.beat(false, out)?;
             failed = match replayed {
                 Some(Begun::Told(outcome)) => outcome,
-                Some(Begun::Fault(fault)) => return Err(fault),
+                Some(Begun::Fault(fault, lost)) => {
+                    self.lose(lost, &fault);
+                    return Err(fault);
+                }
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
             self.beat(true, out)?;
@@ -216,7 +213,11 @@ impl Hardware<'_, '_> {
         if changed {
             self.commanded.extend(set);
         }
-        let running = Running { device, twin, exchange, deadline, ready, failed, changed, by_hand };
+        let words = match self.begun_with.remove(&number) {
+            Some(words) => words,
+            None => self.words_of(device),
+        };
+        let running = Running { device, twin, exchange, deadline, ready, failed, changed, words, by_hand };
         self.running.insert(ticket, running);
         Ok(ticket)
     }
@@ -265,6 +266,7 @@ impl Hardware<'_, '_> {
                 None => {
                     self.go_live(out)?;
                     let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
+                    self.recall(ticket);
                     let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
                     match asked {
                         Ok(true) => self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed: None })?,

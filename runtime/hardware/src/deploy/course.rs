@@ -1,5 +1,6 @@
 //! A program on devices from its bindings to what is left safe.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
@@ -20,6 +21,9 @@ use super::preflight::preflight;
 use crate::binding;
 use crate::link::Trouble;
 use crate::world::World;
+
+/// How a journal ends that was not gone on with.
+pub const REFUSED: &str = "refused";
 
 /// What a deployment is given beside a program.
 pub struct Course<'p> {
@@ -140,12 +144,21 @@ pub fn carry_out(
     if let Some(unfit) = unfit {
         return Ok(Ending::not_begun(made_safe(hardware, unfit)));
     }
-    if let Some(ending) = ready(&mut hardware, program, before, &digest, (seed, who)) {
+    if let Some(ending) = ready(&mut hardware, program, before, &digest, (seed, who, exposed)) {
         return Ok(ending);
     }
     let limits = Limits { cancel: Some(&ended), ..Limits::default() };
-    let execution = exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut Tee(&mut screen, out));
-    Ok(concluded(hardware, execution, screen, control))
+    let mut heard = Tee(&mut screen, out);
+    match unbroken(|| exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut heard)) {
+        Ok(execution) => Ok(concluded(hardware, execution, screen, (control, exposed))),
+        Err(why) => {
+            let mut found = vec![broken(&why)];
+            found.extend(secured(&mut hardware, exposed));
+            // The journal says what happened as far as it goes, and what was found says the rest.
+            let _ = unbroken(|| hardware.end_journal("failed"));
+            Ok(Ending::not_begun(found))
+        }
+    }
 }
 
 /// Comes to where the plan begins, or goes on; how it ended where it does not come so far.
@@ -154,7 +167,7 @@ fn ready(
     program: &Program,
     before: Option<Vec<Entry>>,
     digest: &str,
-    (seed, who): (u64, &str),
+    (seed, who, exposed): (u64, &str, &Exposed),
 ) -> Option<Ending> {
     let found = {
         let (observed, devices) = hardware.view();
@@ -178,26 +191,34 @@ fn ready(
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
         let mut found = vec![not_opened(failed)];
-        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
+        found.extend(secured(hardware, exposed));
         return Some(Ending { stopped: hardware.is_stopped(), ..Ending::not_begun(found) });
     }
     None
 }
 
 /// What is found after a plan has ended, with devices left safe where it did not end well.
-fn concluded(mut hardware: Hardware<'_, '_>, execution: Execution, screen: Screen<'_>, control: &Control) -> Ending {
+fn concluded(
+    mut hardware: Hardware<'_, '_>,
+    execution: Execution,
+    screen: Screen<'_>,
+    (control, exposed): (&Control, &Exposed),
+) -> Ending {
     if let Some(unreached) = hardware.unreached() {
         return Ending::not_begun(vec![not_reached(unreached, true)]);
     }
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    hardware.stop_late();
     let stopped = !well && control.is_stopped();
     let mut found = findings(&execution);
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
-    if !well {
-        found.extend(hardware.secure_all().into_iter().map(unsafe_left));
+    found.extend(hardware.unhalted().iter().cloned().map(not_halted));
+    if !well || !hardware.unhalted().is_empty() {
+        found.extend(secured(&mut hardware, exposed));
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
+        _ if hardware.is_refused() => REFUSED,
         (_, true) => "stopped by a person",
         (true, false) => "ended",
         (false, false) => "failed",
@@ -268,7 +289,7 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
         Unfit::Unknown(d) if !hardware.abandon() => return vec![d],
         Unfit::Unknown(d) => d,
     };
-    let left = hardware.secure_all();
+    let left = hardware.secure();
     let names = hardware.secured().join(", ");
     let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
     std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
@@ -283,7 +304,7 @@ pub fn of_fault(fault: Fault) -> Diagnostic {
 pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let Unreached { device, at, trouble } = unreached;
     let code = match trouble {
-        Trouble::Lost(_) => codes::DEVICE_LOST,
+        Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
         Trouble::Garbled(_) => codes::DEVICE_GARBLED,
         Trouble::Unsaid(_) => codes::UNSENDABLE,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
@@ -303,6 +324,36 @@ pub fn not_opened((fault, at): (Fault, Span)) -> Diagnostic {
     of_fault(fault).because(at, "bound here")
 }
 
+/// What comes of something that may break down: an error in this program leaves no device as it is.
+fn unbroken<T>(act: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(act)).map_err(|panic| {
+        let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
+        text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it does not say why".to_owned())
+    })
+}
+
+fn broken(why: &str) -> Diagnostic {
+    let headline = format!("this program broke down: {why}");
+    Diagnostic::error(codes::RUN_FAILED, Span::default(), headline, "an error in matterixc, not in the workflow")
+}
+
+/// Makes devices safe; what could not be.
+fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic> {
+    match unbroken(|| hardware.secure()) {
+        Ok(left) => left.into_iter().map(unsafe_left).collect(),
+        Err(why) => {
+            let all = exposed.names().into_iter().map(|name| unsafe_left((Span::default(), format!("`{name}`"))));
+            std::iter::once(broken(&why)).chain(all).collect()
+        }
+    }
+}
+
+/// That a device did not break off what it did, whatever made it safe afterwards.
+fn not_halted((at, why): (Span, String)) -> Diagnostic {
+    let headline = format!("a device did not stop when it was told to: {why}");
+    Diagnostic::error(codes::DEVICE_REFUSED, at, headline, "bound here")
+}
+
 /// That a device may be hot or moving: where it is bound, and why.
 pub fn unsafe_left((at, why): (Span, String)) -> Diagnostic {
     let headline = format!("a device could not be made safe: {why}");
@@ -318,4 +369,16 @@ fn findings(execution: &Execution) -> Vec<Diagnostic> {
     let others = others.map(exec::diagnostic);
     found.extend(others.map(|d| Diagnostic { severity: Severity::Warning, ..d }));
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::unbroken;
+
+    #[test]
+    fn what_breaks_down_says_why_and_takes_nothing_with_it() {
+        assert_eq!(unbroken(|| 7), Ok(7));
+        assert_eq!(unbroken(|| -> u8 { panic!("index {} of {}", 3, 2) }), Err("index 3 of 2".to_owned()));
+        assert_eq!(unbroken(|| -> u8 { std::panic::panic_any(1.5) }), Err("it does not say why".to_owned()));
+    }
 }

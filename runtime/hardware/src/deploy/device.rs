@@ -65,6 +65,8 @@ pub struct Device<'m> {
     pub codec: Option<Codec>,
     /// Something was said over its line.
     pub said: bool,
+    /// Something was said to it.
+    pub told: bool,
     /// Why nothing more is said to it.
     pub lost: Option<String>,
     /// Its line was opened anew after it was lost.
@@ -94,7 +96,19 @@ impl<'m> Device<'m> {
         };
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
-        Ok(Device { name, binding, driver, host, link: None, codec, said: false, lost: None, renewed: false, beats })
+        Ok(Device {
+            name,
+            binding,
+            driver,
+            host,
+            link: None,
+            codec,
+            said: false,
+            told: false,
+            lost: None,
+            renewed: false,
+            beats,
+        })
     }
 }
 

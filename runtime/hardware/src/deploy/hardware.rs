@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Exchange;
 use matterix_ir::{Code, NodeId, Program, Sources, Span, codes};
 use matterix_runtime::backend::{Backend, Sim, Ticket};
@@ -72,6 +73,8 @@ pub(super) struct Running<'m> {
     pub(super) failed: Option<(String, String)>,
     /// What it sets, for reading it back.
     pub(super) changed: bool,
+    /// What answers said when it began: others may speak for the same device before its end.
+    pub(super) words: Vec<(String, String)>,
     /// A person does it, and has not confirmed yet.
     pub(super) by_hand: bool,
 }
@@ -110,10 +113,14 @@ pub struct Hardware<'m, 't> {
     pub(super) securing: bool,
     /// Devices that have been.
     pub(super) made_safe: Vec<usize>,
+    /// Where devices are bound that did not break off what they did, and why.
+    pub(super) unhalted: Vec<(Span, String)>,
     /// Lab time and s since 1970 when it is last known that somebody looked after devices.
     pub(super) left_at: (f64, f64),
-    /// What answers to an earlier process said: the device whose line it was, the word, the text.
-    pub(super) kept: Vec<(usize, String, String)>,
+    /// What answers over an earlier line said: the device whose line it was, the one that had asked, the word, the text.
+    pub(super) kept: Vec<(usize, InstanceId, String, String)>,
+    /// What answers said when operations of an earlier process began, by ticket.
+    pub(super) begun_with: BTreeMap<u64, Vec<(String, String)>>,
     /// States that devices were told.
     pub(super) commanded: BTreeSet<u32>,
     pub(super) running: BTreeMap<Ticket, Running<'m>>,
@@ -123,6 +130,8 @@ pub struct Hardware<'m, 't> {
     pub(super) cancelled: bool,
     /// Who goes on after a journal.
     pub(super) who: String,
+    /// It is known by now that the journal cannot be written.
+    pub(super) is_unwritten: bool,
     /// The device whose line was lost last, until that is noted.
     pub(super) losing: Option<String>,
     /// The last fault that was noted.
@@ -173,8 +182,10 @@ impl<'m, 't> Hardware<'m, 't> {
             unreached: None,
             securing: false,
             made_safe: Vec::new(),
+            unhalted: Vec::new(),
             left_at: (0.0, 0.0),
             kept: Vec::new(),
+            begun_with: BTreeMap::new(),
             commanded: BTreeSet::new(),
             origin,
             dated: f64::NEG_INFINITY,
@@ -186,6 +197,7 @@ impl<'m, 't> Hardware<'m, 't> {
             fresh: BTreeMap::new(),
             cancelled: false,
             who: String::new(),
+            is_unwritten: false,
             losing: None,
             noted: None,
             caught_up: None,
@@ -200,6 +212,11 @@ impl<'m, 't> Hardware<'m, 't> {
     /// The device that did not answer when a journal was to be gone on with: nothing was said to any, and nothing may be.
     pub fn unreached(&self) -> Option<&Unreached> {
         self.unreached.as_ref()
+    }
+
+    /// Whether it was refused to go on.
+    pub(super) fn is_refused(&self) -> bool {
+        self.refused.get()
     }
 
     /// Whether a person has ended it.
@@ -248,17 +265,18 @@ impl<'m, 't> Hardware<'m, 't> {
     /// A trouble as the fault of a device.
     pub(super) fn trouble(&mut self, device: usize, trouble: &Trouble, span: Span) -> Fault {
         let code = match trouble {
-            Trouble::Lost(_) => codes::DEVICE_LOST,
+            Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
             Trouble::Garbled(_) => codes::DEVICE_GARBLED,
             Trouble::Unsaid(_) => codes::UNSENDABLE,
             Trouble::Refused { .. } => codes::DEVICE_REFUSED,
         };
-        if matches!(trouble, Trouble::Lost(_)) {
+        if matches!(trouble, Trouble::Lost(_) | Trouble::Silent(_)) {
             let line = self.line_of(device);
             self.devices[line].lost = Some(trouble.text().to_owned());
             self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
-                self.kept.extend(link.kept().into_iter().map(|(word, text)| (line, word, text)));
+                let kept = link.kept().into_iter();
+                self.kept.extend(kept.map(|((device, word), text)| (line, device, word, text)));
             }
         }
         let message = format!("`{}`: {}", self.devices[device].name, trouble.text());

@@ -14,13 +14,14 @@ mod people;
 mod preflight;
 mod replay;
 mod resume;
+mod safe;
 mod sense;
 mod speak;
 mod unbound;
 mod values;
 
 pub use control::{Answer, Control};
-pub use course::{Course, Ending, Kept, carry_out, not_opened, not_reached, of_fault, unsafe_left};
+pub use course::{Course, Ending, Kept, REFUSED, carry_out, not_opened, not_reached, of_fault, unsafe_left};
 pub use device::{Binding, Carrier, Device};
 pub use exposed::Exposed;
 pub use hardware::{Hardware, Mode, Settings, Unreached};

@@ -30,7 +30,7 @@ impl Hardware<'_, '_> {
     pub(super) fn pass(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
         loop {
             let is_live = self.join(until, out)?;
-            if let Some(fault) = self.replayed_fault() {
+            if is_live && let Some(fault) = self.unwritten() {
                 return Err(fault);
             }
             if self.heeded(is_live) {
@@ -48,9 +48,6 @@ impl Hardware<'_, '_> {
             }
             let advance = self.twin.advance(target, watches, out)?;
             self.beat(true, out)?;
-            if let Some(fault) = self.replayed_fault() {
-                return Err(fault);
-            }
             if is_live {
                 self.date();
             }
@@ -77,11 +74,7 @@ impl Hardware<'_, '_> {
                     Entry::Answered { .. } | Entry::Gate { .. } | Entry::Stop { .. } | Entry::Leap { .. }
                 );
                 let comes_too_soon = other.time() < until && other.time() <= self.twin.now() && !is_said_between;
-                match other {
-                    Entry::Fault { .. } => Ok(false),
-                    other if comes_too_soon => Err(self.mismatch("time passes", &other)),
-                    _ => Ok(false),
-                }
+                if comes_too_soon { Err(self.mismatch("time passes", &other)) } else { Ok(false) }
             }
             None if self.settings.mode == Mode::Replay && self.twin.now() < self.ends_at.min(until) => Ok(false),
             None if self.settings.mode == Mode::Replay && until <= self.ends_at => Ok(false),
@@ -91,6 +84,13 @@ impl Hardware<'_, '_> {
                 Ok(true)
             }
         }
+    }
+
+    /// That nothing more can be written down, once: what ends then is not held up by it.
+    fn unwritten(&mut self) -> Option<Fault> {
+        let why = self.journal.broken.clone().filter(|_| !std::mem::replace(&mut self.is_unwritten, true))?;
+        let message = format!("the journal cannot be written: {why}");
+        Some(self.fault(matterix_ir::codes::JOURNAL_MISMATCH, matterix_ir::Span::default(), message))
     }
 
     /// Heeds what people say at this moment, or said to the earlier process; whether that lets something go on or end.
@@ -115,23 +115,37 @@ impl Hardware<'_, '_> {
     }
 
     fn heeded_before(&mut self) -> bool {
-        match self.front() {
-            Some(entry) if entry.time() > self.twin.now() => false,
-            // Who asked for it takes it at this moment, or it is none that was asked for.
-            Some(Entry::Answered { .. }) => {
-                std::mem::replace(&mut self.answers, self.replay.len()) != self.replay.len()
+        loop {
+            match self.front() {
+                Some(entry) if entry.time() > self.twin.now() => return false,
+                // Who asked for it takes it at this moment, or it is none that was asked for.
+                Some(Entry::Answered { .. }) => {
+                    let left = self.replay.len();
+                    return std::mem::replace(&mut self.answers, left) != left;
+                }
+                Some(Entry::Stop { who, .. }) => {
+                    self.replay.pop_front();
+                    self.settings.control.stop(&who);
+                    self.stop();
+                    return true;
+                }
+                Some(Entry::Gate { to, .. }) => {
+                    self.replay.pop_front();
+                    if self.set_gate(to) {
+                        return true;
+                    }
+                }
+                _ => return false,
             }
-            Some(Entry::Stop { who, .. }) => {
-                self.replay.pop_front();
-                self.settings.control.stop(&who);
-                self.stop();
-                true
-            }
-            Some(Entry::Gate { to, .. }) => {
-                self.replay.pop_front();
-                self.set_gate(to)
-            }
-            _ => false,
+        }
+    }
+
+    /// Notes that a person stopped it where it was ending already, or that they did.
+    pub(super) fn stop_late(&mut self) {
+        if self.settings.mode == Mode::Replay {
+            self.heeded_before();
+        } else if self.settings.control.is_stopped() && !self.cancelled {
+            self.heed();
         }
     }
 

@@ -14,8 +14,8 @@ use super::journal::Entry;
 pub(super) enum Begun {
     /// Its device was told, or refused: the failure and what it says.
     Told(Option<(String, String)>),
-    /// It could not be told.
-    Fault(Fault),
+    /// It could not be told; the device whose line was lost by that.
+    Fault(Fault, Option<String>),
 }
 
 impl Hardware<'_, '_> {
@@ -39,6 +39,7 @@ impl Hardware<'_, '_> {
                 | Entry::Kept { .. }
                 | Entry::Out { .. }
                 | Entry::Back { .. }
+                | Entry::Again { .. }
                 | Entry::Begin { .. }
                 | Entry::Safe { .. }
                 | Entry::End { .. } => {
@@ -52,16 +53,27 @@ impl Hardware<'_, '_> {
 
     /// The fault that the earlier process met at this moment.
     pub(super) fn replayed_fault(&mut self) -> Option<Fault> {
+        let (fault, lost) = self.next_fault()?;
+        self.lose(lost, &fault);
+        Some(fault)
+    }
+
+    /// The same, and the device whose line was lost by it.
+    fn next_fault(&mut self) -> Option<(Fault, Option<String>)> {
         let Some(Entry::Fault { t, lost, code, text }) = self.front() else { return None };
         if t > self.twin.now() {
             return None;
         }
         self.replay.pop_front();
-        if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
-            device.lost = Some(text.clone());
-        }
         let code = codes::find(&code).unwrap_or(codes::RUN_FAILED);
-        Some(self.fault(code, Span::default(), text))
+        Some((self.fault(code, Span::default(), text), lost))
+    }
+
+    /// The line of a device was lost.
+    pub(super) fn lose(&mut self, lost: Option<String>, fault: &Fault) {
+        if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
+            device.lost = Some(fault.message.clone());
+        }
     }
 
     pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
@@ -105,8 +117,8 @@ impl Hardware<'_, '_> {
         let (sends, device) = (sends.clone(), device.clone());
         self.replay.pop_front();
         let next = self.next_entry();
-        if let Some(fault) = self.replayed_fault() {
-            return Ok(Some(Begun::Fault(fault)));
+        if let Some((fault, lost)) = self.next_fault() {
+            return Ok(Some(Begun::Fault(fault, lost)));
         }
         match next {
             Some(Entry::Started { ticket: t, .. }) if t == ticket => {

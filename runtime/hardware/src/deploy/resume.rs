@@ -23,19 +23,6 @@ impl Hardware<'_, '_> {
         self.keep(&Entry::Begin { version: VERSION, tool, digest, workflow, wall, speed, seed, pid, who })
     }
 
-    /// Makes devices safe, and notes what became of each.
-    pub(super) fn secure_all(&mut self) -> Vec<(matterix_ir::Span, String)> {
-        let troubles = self.secure();
-        let t = self.twin.now();
-        let names = |at: matterix_ir::Span| self.devices.iter().find(|d| d.binding.at == at).map_or("", |d| d.name);
-        let left = troubles.iter().map(|(at, why)| (names(*at).to_owned(), Some(why.clone())));
-        let safe = self.made_safe.iter().map(|index| (self.devices[*index].name.to_owned(), None));
-        for (device, trouble) in safe.chain(left).collect::<Vec<_>>() {
-            self.journal.note(&Entry::Safe { t, device, trouble });
-        }
-        troubles
-    }
-
     /// The last line of a journal.
     pub fn end_journal(&mut self, status: &str) -> Result<(), Fault> {
         let (t, wall, states) = (self.twin.now(), self.wall(), self.states());
@@ -44,10 +31,21 @@ impl Hardware<'_, '_> {
 
     /// Goes through what an earlier process wrote before anything is said; `who` goes on after it.
     pub fn follow_journal(&mut self, entries: Vec<Entry>, who: &str) {
+        let mut begins = None;
         for entry in &entries {
-            let Entry::Kept { device, word, text, .. } = entry else { continue };
-            if let Some(index) = self.devices.iter().position(|d| d.name == device) {
-                self.kept.push((self.line_of(index), word.clone(), text.clone()));
+            match entry {
+                Entry::Starting { ticket, .. } => begins = Some(*ticket),
+                Entry::Started { .. } | Entry::Ended { .. } => begins = None,
+                Entry::Kept { device, word, text, .. } => {
+                    if let Some(ticket) = begins {
+                        self.begun_with.entry(ticket).or_default().push((word.clone(), text.clone()));
+                    }
+                    if let Some(index) = self.devices.iter().position(|d| d.name == device) {
+                        let instance = self.devices[index].binding.instance;
+                        self.kept.push((self.line_of(index), instance, word.clone(), text.clone()));
+                    }
+                }
+                _ => {}
             }
         }
         self.ends_at = match entries.last() {
@@ -56,10 +54,7 @@ impl Hardware<'_, '_> {
         };
         self.left_at = self.last_seen(&entries);
         if self.settings.mode != Mode::Replay {
-            for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
-                device.said = true;
-                self.settings.exposed.told(device.name);
-            }
+            self.expose();
         }
         self.replay = entries.into();
         self.resuming = true;

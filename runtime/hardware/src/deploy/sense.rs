@@ -1,4 +1,4 @@
-//! Opening lines, holding what devices tell against the twin, going on after a journal, and leaving devices safe.
+//! Opening lines, holding what devices tell against the twin, and closing lines.
 
 use matterix_ir::wire::{Driver, Exchange, Piece, Slot};
 use matterix_ir::{Span, codes};
@@ -55,7 +55,7 @@ impl Hardware<'_, '_> {
         let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
         let tries = (self.twin.engine().eval(until.timeout) / 0.1).ceil().clamp(1.0, 1e6) as u32;
         for _ in 0..tries {
-            let asked = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
+            let asked = self.inquire(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
             if asked.map_err(|trouble| self.trouble(index, &trouble, exchange.span))? {
                 return Ok(());
             }
@@ -70,7 +70,7 @@ impl Hardware<'_, '_> {
     }
 
     /// A new line to a device, with what answers over an earlier one said.
-    fn linked(
+    pub(super) fn linked(
         &self,
         index: usize,
         driver: &Driver,
@@ -78,8 +78,8 @@ impl Hardware<'_, '_> {
         address: Option<&str>,
     ) -> Result<Box<dyn Line>, Trouble> {
         let mut link = link::open(&self.settings.world, place, driver, address)?;
-        for (_, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
-            link.keep(word.clone(), text.clone());
+        for (_, device, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
+            link.keep(*device, word.clone(), text.clone());
         }
         Ok(link)
     }
@@ -167,69 +167,6 @@ impl Hardware<'_, '_> {
             }
             _ => Ok(()),
         }
-    }
-
-    /// Nothing is gone on with: devices may be as an earlier process has left them. Whether there are any behind lines.
-    pub fn abandon(&mut self) -> bool {
-        if matches!(self.settings.mode, Mode::Dry | Mode::Replay) {
-            return false;
-        }
-        for device in self.devices.iter_mut().filter(|d| d.driver.is_some() && d.host.is_none()) {
-            device.said = true;
-            self.settings.exposed.told(device.name);
-        }
-        true
-    }
-
-    /// The names of the devices that have been made safe.
-    pub fn secured(&self) -> Vec<String> {
-        self.made_safe.iter().map(|index| format!("`{}`", self.devices[*index].name)).collect()
-    }
-
-    /// After a run that did not end well: every device to which something was said is told what makes it safe, whatever became
-    /// of the others, and for each answer there are seconds only. Where each is bound that is not known to be safe, and why.
-    pub fn secure(&mut self) -> Vec<(Span, String)> {
-        self.securing = true;
-        let mut troubles = Vec::new();
-        for index in 0..self.devices.len() {
-            let (Some(driver), line) = (self.devices[index].driver, self.line_of(index)) else { continue };
-            if driver.safe.is_empty() || !self.devices[line].said && !self.is_dry() {
-                continue;
-            }
-            if let (Carrier::Line { place, address, .. }, None, false) =
-                (self.devices[index].binding.carrier.clone(), &self.devices[index].link, self.is_dry())
-            {
-                // A line that was lost may be there again.
-                match self.linked(index, driver, &place, address.as_deref()) {
-                    Ok(link) => (self.devices[index].link, self.devices[index].lost) = (Some(link), None),
-                    Err(trouble) => self.devices[index].lost = Some(trouble.text().to_owned()),
-                }
-            }
-            let before = troubles.len();
-            let at = self.devices[index].binding.at;
-            for exchange in &driver.safe {
-                let texts = match self.texts(&exchange.sends) {
-                    Ok(texts) => texts,
-                    Err(fault) => {
-                        troubles.push((at, fault.message));
-                        break;
-                    }
-                };
-                if self.devices[line].link.as_ref().is_some_and(|link| link.lacks(&texts)) {
-                    continue;
-                }
-                if let Err(fault) = self.say(index, &texts, exchange.expects.as_ref(), exchange.span) {
-                    troubles.push((at, fault.message));
-                    break;
-                }
-            }
-            if troubles.len() == before {
-                self.made_safe.push(index);
-                self.settings.exposed.safe(self.devices[line].name);
-            }
-        }
-        self.securing = false;
-        troubles
     }
 
     /// Says what drivers say at the end, and closes all lines.

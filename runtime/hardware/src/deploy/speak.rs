@@ -1,9 +1,11 @@
 //! What is said to devices and asked of them, operation by operation.
 
+use std::time::Duration;
+
 use matterix_ir::plan::{Operation, StepId};
-use matterix_ir::wire::{Driver, Exchange, Pattern, Template};
-use matterix_ir::{Span, codes};
-use matterix_runtime::backend::Backend;
+use matterix_ir::wire::{Driver, Exchange, Framing, Pattern, Template};
+use matterix_ir::{Span, codes, message};
+use matterix_runtime::backend::{Backend, Ticket};
 use matterix_runtime::fault::Fault;
 
 use super::device::Ear;
@@ -11,6 +13,15 @@ use super::hardware::{Hardware, Mode};
 use super::journal::Entry;
 use crate::link::{Line, Overhear, Trouble};
 use crate::template;
+
+/// A question is put at most so often in a row.
+pub const ASKED: u32 = 3;
+
+/// The failure that a driver gives to what comes while its device has no time for it.
+const BUSY: &str = "busy";
+
+/// No question is put again that might be answered later than so many seconds after the first.
+const PATIENCE: f64 = 30.0;
 
 impl<'m> Hardware<'m, '_> {
     /// Messages with the values that they have now; a fault where one does not fit its form.
@@ -57,7 +68,11 @@ impl<'m> Hardware<'m, '_> {
         }
         let line = self.line_of(index);
         self.devices[line].said = true;
+        self.devices[index].told = true;
         self.settings.exposed.told(self.devices[line].name);
+        if self.devices[index].driver.is_some_and(|d| d.stays_on || !d.safe.is_empty()) {
+            self.settings.exposed.told(self.devices[index].name);
+        }
         self.over(index, |link, driver, ear| link.say(texts, expects, driver, ear))
     }
 
@@ -70,13 +85,63 @@ impl<'m> Hardware<'m, '_> {
         self.over_line(index, None, act)
     }
 
-    /// Asks something over the line of a device; what went over it is in the journal where that came to nothing.
+    /// Asks something over the line of a device, again where that comes to nothing; what went over it is in the journal then.
+    /// A refusal is an answer, as some devices say once only what is wrong with them, but for one that is busy.
     pub(super) fn inquire<T>(
         &mut self,
         index: usize,
-        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+        act: impl FnMut(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
     ) -> Result<T, Trouble> {
-        self.over_line(index, Some(Vec::new()), act)
+        self.again(index, true, act)
+    }
+
+    /// Says what is repeated anyway, again where that comes to nothing.
+    pub(super) fn say_again(
+        &mut self,
+        index: usize,
+        texts: &[String],
+        expects: Option<&Pattern>,
+    ) -> Result<Vec<f64>, Trouble> {
+        let is_open = self.devices[self.line_of(index)].lost.is_none();
+        let Some(driver) = self.devices[index].driver.filter(|_| is_open && self.speaks()) else {
+            return self.try_say(index, texts, expects);
+        };
+        let only_asks = driver.framing == Framing::Json && texts.iter().all(|text| message::only_asks(text));
+        self.again(index, only_asks, |link, driver, ear| link.say(texts, expects, driver, ear))
+    }
+
+    fn again<T>(
+        &mut self,
+        index: usize,
+        only_asks: bool,
+        mut act: impl FnMut(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
+    ) -> Result<T, Trouble> {
+        let begun = self.settings.world.elapsed();
+        let mut asked = 1;
+        loop {
+            let done = self.over_line(index, only_asks.then(Vec::new), &mut act);
+            let trouble = match done {
+                Err(trouble @ (Trouble::Silent(_) | Trouble::Garbled(_))) => trouble,
+                Err(Trouble::Refused { failure, text }) if only_asks && failure == BUSY => {
+                    Trouble::Refused { failure, text }
+                }
+                other => return other,
+            };
+            if asked == ASKED || !self.has_time(index, begun) {
+                return Err(trouble);
+            }
+            asked += 1;
+            let (t, device) = (self.twin.now(), self.devices[index].name.to_owned());
+            self.journal.note(&Entry::Again { t, device, why: trouble.text().to_owned() });
+            self.over_line(index, None, |link, driver, ear| link.settle(driver, ear))?;
+        }
+    }
+
+    /// Whether there is time for one more question: others wait meanwhile, and nobody waits who is to end.
+    fn has_time(&self, index: usize, begun: Duration) -> bool {
+        let timeout = self.devices[index].driver.map_or(0.0, |driver| driver.timeout);
+        let passed = self.settings.world.elapsed().saturating_sub(begun).as_secs_f64();
+        passed + timeout <= PATIENCE && !self.securing && !self.settings.control.is_stopped()
     }
 
     fn over_line<T>(
@@ -121,14 +186,10 @@ impl<'m> Hardware<'m, '_> {
             return Ok(self.twin.value(told.value, &mut ())?.unwrap_or(f64::NAN));
         }
         let asked = self.inquire(index, |link, driver, ear| match told.heard {
-            Some(_) => link.hear(line, driver, ear).map(|value| vec![value]),
-            None => link.ask(&text, &told.expects, driver, ear),
+            Some(_) => link.hear(line, driver, ear),
+            None => link.ask(&text, told, driver, ear),
         });
-        let numbers = asked.map_err(|trouble| self.trouble(index, &trouble, told.span))?;
-        numbers
-            .first()
-            .copied()
-            .ok_or_else(|| self.fault(codes::DEVICE_GARBLED, told.span, "no number was told".into()))
+        asked.map_err(|trouble| self.trouble(index, &trouble, told.span))
     }
 
     /// Tells an operation to its device.
@@ -164,6 +225,27 @@ impl<'m> Hardware<'m, '_> {
                 Ok(Some((failure, text)))
             }
             Err(trouble) => Err(self.trouble(device, &trouble, exchange.span)),
+        }
+    }
+
+    /// What answers said to a device by now.
+    pub(super) fn words_of(&self, device: usize) -> Vec<(String, String)> {
+        let Some(link) = self.devices.get(device).and_then(|_| self.devices[self.line_of(device)].link.as_deref())
+        else {
+            return Vec::new();
+        };
+        let own = self.devices[device].binding.instance;
+        let kept = link.kept().into_iter().filter(|((of, _), _)| *of == own);
+        kept.map(|((_, word), text)| (word, text)).collect()
+    }
+
+    /// What is asked now is asked about this operation: what answers said when it began is put in.
+    pub(super) fn recall(&mut self, ticket: Ticket) {
+        let Some(running) = self.running.get(&ticket) else { return };
+        let (line, own) = (self.line_of(running.device), self.devices[running.device].binding.instance);
+        let words = running.words.clone();
+        if let Some(link) = self.devices[line].link.as_mut() {
+            words.into_iter().for_each(|(word, text)| link.keep(own, word, text));
         }
     }
 

@@ -29,6 +29,8 @@ pub(super) struct Unit<'m> {
     running: Vec<(Ticket, &'m Operation)>,
     /// The last message of each form, by driver, command and its place among what that sends.
     heard: BTreeMap<(usize, usize, usize), Vec<Found>>,
+    /// What was said last: what is asked then is asked about it.
+    said: Option<&'m Exchange>,
     /// What was answered last.
     last: Vec<u8>,
     input: Vec<u8>,
@@ -43,13 +45,13 @@ impl<'m> Unit<'m> {
         let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
         let told = drivers.iter().flat_map(|d| &d.told).filter_map(|t| t.heard.map(|every| (t, every)));
         let (due, running, heard) = (told.collect(), Vec::new(), BTreeMap::new());
-        Ok(Unit { drivers, codec, running, heard, last: Vec::new(), input: Vec::new(), due })
+        Ok(Unit { drivers, codec, running, heard, said: None, last: Vec::new(), input: Vec::new(), due })
     }
 
     /// The device with what stands behind it.
     pub(super) fn with<'e>(&'e mut self, sim: &'e mut Sim<'m>) -> Device<'e, 'm> {
-        let Unit { drivers, codec, running, heard, last, input, due } = self;
-        Device { sim, drivers, codec, running, heard, last, input, due }
+        let Unit { drivers, codec, running, heard, said, last, input, due } = self;
+        Device { sim, drivers, codec, running, heard, said, last, input, due }
     }
 
     /// Changes to the line of another master, and takes what has come in over that of a request that is not whole.
@@ -75,6 +77,7 @@ pub(super) struct Device<'e, 'm> {
     codec: &'e mut Codec,
     running: &'e mut Vec<(Ticket, &'m Operation)>,
     heard: &'e mut BTreeMap<(usize, usize, usize), Vec<Found>>,
+    said: &'e mut Option<&'m Exchange>,
     last: &'e mut Vec<u8>,
     input: &'e mut Vec<u8>,
     due: &'e mut Vec<(&'m Told, f64)>,
@@ -156,8 +159,9 @@ impl<'m> Device<'_, 'm> {
         if let Some(told) = self.asked(word) {
             return Ok(Some(Reply::of(self.tells(told)?)));
         }
-        let endings =
-            self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open).chain(&d.play));
+        // What is asked for the end of something that was never said asks for something else.
+        let endings = self.drivers.iter().flat_map(|d| d.served.iter().map(|s| &s.exchange).chain(&d.open));
+        let endings = (*self.said).into_iter().chain(endings);
         let endings: Vec<_> = endings.filter_map(|e| e.until.as_ref()).collect();
         let answer = self.answer(word);
         for until in endings {
@@ -170,19 +174,20 @@ impl<'m> Device<'_, 'm> {
                 return Ok(Some(Reply::of(text)));
             }
         }
-        if let Some(text) = answer.transpose()? {
-            return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
-        }
         if let Some(reply) = self.command(word)? {
             return Ok(reply);
         }
-        for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<_>>() {
+        if let Some(text) = answer.transpose()? {
+            return Ok(Some(text).filter(|t| !t.is_empty()).map(Reply::of));
+        }
+        for (exchange, halts) in self.drivers.iter().flat_map(|d| fixed(d)).collect::<Vec<(&'m Exchange, bool)>>() {
             let mut is_it = |t: &Template| self.codec.is_word(&template::written(t), word) || self.says(t, word);
-            if exchange.sends.iter().any(&mut is_it) {
+            if let Some(place) = exchange.sends.iter().position(&mut is_it) {
                 if halts {
                     self.running.drain(..).for_each(|(ticket, _)| self.sim.halt(ticket));
                 }
-                return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p))));
+                *self.said = Some(exchange);
+                return Ok(exchange.expects.as_ref().map(|p| Reply::of(self.plain(p.of(place)))));
             }
         }
         Ok(self.refuse(NOT_UNDERSTOOD, &format!("the driver says nothing like `{}`", cut(word))))
@@ -246,7 +251,7 @@ impl<'m> Device<'_, 'm> {
         for (driver, index, served) in served {
             for (place, template) in served.exchange.sends.iter().enumerate() {
                 let Some(found) = self.codec.found(template, word) else { continue };
-                part = part.or(Some(served));
+                part = part.or_else(|| Some((served, place, found.clone())));
                 self.heard.insert((driver, index, place), found);
                 let whole = place + 1 == served.exchange.sends.len();
                 let all: Option<Vec<Found>> = (0..served.exchange.sends.len())
@@ -258,11 +263,11 @@ impl<'m> Device<'_, 'm> {
                 }
             }
         }
-        let Some(part) = part else { return Ok(None) };
+        let Some((part, place, found)) = part else { return Ok(None) };
         if complete.is_empty() {
             // The first part of something.
-            let expects = part.exchange.expects.as_ref();
-            return Ok(Some(expects.map(|p| Reply::of(self.plain(p)))));
+            let Some(expects) = &part.exchange.expects else { return Ok(Some(None)) };
+            return Ok(Some(Some(Reply::of(self.echo(expects.of(place), &found)?))));
         }
         let mut why = (NOT_UNDERSTOOD, format!("nothing here is meant by `{}`", cut(word)));
         for (served, all) in complete {
@@ -278,21 +283,26 @@ impl<'m> Device<'_, 'm> {
             if served.exchange.until.is_some() && !self.running.is_empty() {
                 return Ok(Some(self.refuse(BUSY, "it is busy")));
             }
-            return self.begin(served, &all).map(Some);
+            return self.begin(served, &all, word).map(Some);
         }
         Ok(Some(self.refuse(why.0, &why.1)))
     }
 
-    fn begin(&mut self, served: &'m Served, found: &[Found]) -> Result<Option<Reply>, Fault> {
+    fn begin(&mut self, served: &'m Served, found: &[Found], word: &str) -> Result<Option<Reply>, Fault> {
         let reply = match &served.exchange.expects {
-            Some(pattern) => Some(Reply::of(self.echo(pattern, found)?)),
+            Some(pattern) => {
+                let last = pattern.of(served.exchange.sends.len().saturating_sub(1));
+                Some(Reply::of(self.echo(last, found)?))
+            }
             None => None,
         };
+        *self.said = Some(&served.exchange);
         let ticket = self.sim.start(&served.operation, &mut ())?;
         if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
             self.running.push((ticket, &served.operation));
         }
-        Ok(reply)
+        // What the driver says that is answered comes before what it expects.
+        Ok(self.answer(word).transpose()?.filter(|text| !text.is_empty()).map(Reply::of).or(reply))
     }
 
     /// An answer that says numbers as they were sent, or else as they are told.
@@ -302,11 +312,11 @@ impl<'m> Device<'_, 'm> {
         for slot in pattern.slots.iter().filter(is_value) {
             let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(slot));
             let shown = match (found.first(), told) {
-                (Some(sent), _) => Shown { value: sent.value, digits: None },
-                (None, Some(told)) => {
+                (Some(sent), _) if matches!(slot, Slot::Number(..)) => Shown { value: sent.value, digits: None },
+                (_, Some(told)) => {
                     Shown { value: self.sim.value(told.value, &mut ())?.unwrap_or(0.0), digits: self.digits(told) }
                 }
-                (None, None) => Shown::default(),
+                (_, None) => Shown::default(),
             };
             values.push((slot, shown));
         }
@@ -333,8 +343,8 @@ fn cut(word: &str) -> &str {
 
 /// What is said apart from commands, and whether it breaks off what the device does.
 fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
-    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.safe).chain(&driver.play).map(|e| (e, false));
-    driver.halt.iter().map(|e| (e, true)).chain(quiet)
+    let quiet = driver.open.iter().chain(&driver.close).chain(&driver.play).map(|e| (e, false));
+    driver.halt.iter().chain(&driver.safe).map(|e| (e, true)).chain(quiet)
 }
 
 /// What the device would say has no room in the form that its driver declares.

@@ -23,14 +23,16 @@ pub fn serve_tcp(
     while !stop.cancel.load(Ordering::Relaxed) {
         match server.next(TICK).map_err(|e| format!("the port is gone: {e}"))? {
             Some(Heard::Said(client, bytes)) => {
+                // What devices say by themselves is for all.
+                server.publish(&turn(emulator, &clock, &[])?);
                 let input = unfinished.entry(client).or_default();
                 emulator.change_line(input);
-                let out = turn(emulator, &clock, &bytes)?;
+                let out = emulator.receive(&bytes).map_err(|f| f.message)?;
                 emulator.change_line(input);
                 server.send(client, &out);
             }
             Some(Heard::Left(client)) => drop(unfinished.remove(&client)),
-            None => drop(turn(emulator, &clock, &[])?),
+            None => server.publish(&turn(emulator, &clock, &[])?),
         }
     }
     Ok(())

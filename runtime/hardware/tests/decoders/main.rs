@@ -8,8 +8,18 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// What the inputs are made from, by decoder.
-const WIRE: &[&str] =
-    &["/0`1500\u{3}\r\n", "\u{2}0`\u{3}Q", "\u{2}11I1A1274R\u{3}k", "/1I1A1274R\r", "25.3 2 \r\nS S    12.34 g\r\n"];
+const WIRE: &[&str] = &[
+    "/0`1500\u{3}\r\n",
+    "\u{2}0`\u{3}Q",
+    "\u{2}11I1A1274R\u{3}k",
+    "/1I1A1274R\r",
+    "25.3 2 \r\nS S    12.34 g\r\n",
+    "[M010COK44\r[M0110ERR 3D8\r",
+    "\u{2}\u{8}SAF0UC\u{3}",
+    ":OK66;:T=23.410;",
+    "\u{1}\u{3}\u{4}A\0\0\0\u{1}\u{4}\0d\0\u{2}",
+    "\0\u{1}\0\0\0\u{5}\u{1}\u{3}\u{2}\0\t\0\u{1}\0\0\0\u{3}\u{1}A\u{2}",
+];
 const HTTP: &[&str] = &[
     "POST /runs/<run>/commands /data/volume=100 name='a b' params/x={}\n201 {\"data\":{\"id\":\"x\",\"volume\":100}}\n",
     "201 /data/id=<run> volume=\n404 {\"errors\":[{\"id\":\"none\",\"detail\":\"no\"}]}\n",

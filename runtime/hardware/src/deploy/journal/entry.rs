@@ -111,6 +111,15 @@ pub enum Entry {
         /// As shown.
         bytes: String,
     },
+    /// A question is put once more, as nothing that makes sense answered it.
+    Again {
+        /// s.
+        t: f64,
+        /// To whom.
+        device: String,
+        /// Why.
+        why: String,
+    },
     /// What an answer said that is put into later messages.
     Kept {
         /// s.
@@ -239,6 +248,7 @@ impl Entry {
             | Entry::Told { t, .. }
             | Entry::Out { t, .. }
             | Entry::Back { t, .. }
+            | Entry::Again { t, .. }
             | Entry::Kept { t, .. }
             | Entry::Asked { t, .. }
             | Entry::Answered { t, .. }

@@ -1,0 +1,231 @@
+//! Leaving devices safe: what breaks off what they do, what their drivers call safe, and who could not be brought to that.
+
+use std::time::Duration;
+
+use matterix_ir::Span;
+use matterix_ir::wire::{Driver, Exchange, Framing, Template, Until};
+
+use matterix_runtime::backend::Backend;
+
+use super::device::Carrier;
+use super::hardware::{Hardware, Mode, Running};
+use super::journal::Entry;
+use crate::link::Trouble;
+
+/// Longest time until a device that took what makes it safe says that it is.
+const SECURED: Duration = Duration::from_secs(30);
+
+/// How often it is asked.
+const POLL: Duration = Duration::from_millis(200);
+
+impl Hardware<'_, '_> {
+    /// Nothing is gone on with: devices may be as an earlier process has left them. Whether there are any behind lines.
+    pub fn abandon(&mut self) -> bool {
+        if matches!(self.settings.mode, Mode::Dry | Mode::Replay) {
+            return false;
+        }
+        self.expose();
+        true
+    }
+
+    /// Devices may be as somebody else has left them.
+    pub(super) fn expose(&mut self) {
+        for device in self.devices.iter_mut().filter(|d| d.driver.is_some()) {
+            device.told = true;
+            device.said = device.host.is_none();
+            if device.said {
+                self.settings.exposed.told(device.name);
+            }
+        }
+    }
+
+    /// The names of the devices that have been made safe.
+    pub fn secured(&self) -> Vec<String> {
+        self.made_safe.iter().map(|index| format!("`{}`", self.devices[*index].name)).collect()
+    }
+
+    /// Breaks off what a device does for an operation. Whether it did, is not known where it refuses.
+    pub(super) fn break_off(&mut self, running: &Running<'_>) {
+        let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
+        if running.ready || !self.is_live() || self.unreached.is_some() {
+            return;
+        }
+        for exchange in &driver.halt {
+            let why = match self.texts(&exchange.sends) {
+                Err(fault) => fault.message,
+                Ok(texts) => match self.try_say(running.device, &texts, exchange.expects.as_ref()) {
+                    Ok(_) => continue,
+                    Err(trouble) => self.trouble(running.device, &trouble, exchange.span).message,
+                },
+            };
+            self.unhalted.push((self.devices[running.device].binding.at, why));
+        }
+    }
+
+    /// Where each device is bound that did not break off what it did when it was told to, and why.
+    pub fn unhalted(&self) -> &[(Span, String)] {
+        &self.unhalted
+    }
+
+    /// After a run that did not end well: every device to which something was said is told what makes it safe, whatever became
+    /// of the others, and for each answer there are seconds only. Where each is bound that is not known to be safe, and why.
+    pub fn secure(&mut self) -> Vec<(Span, String)> {
+        self.securing = true;
+        let mut troubles = Vec::new();
+        // A device over the line of another one may be told something only when that one has ended what it did.
+        let mut all: Vec<usize> = (0..self.devices.len()).collect();
+        all.sort_by_key(|index| self.devices[*index].host.is_some());
+        for index in all {
+            if let Err(why) = self.secure_one(index) {
+                troubles.push((self.devices[index].binding.at, why));
+            }
+        }
+        self.securing = false;
+        troubles
+    }
+
+    /// Makes a device safe; why that is not known to have come about.
+    fn secure_one(&mut self, index: usize) -> Result<(), String> {
+        let (Some(driver), line) = (self.devices[index].driver, self.line_of(index)) else { return Ok(()) };
+        let named = |why: &str, name: &str| format!("`{name}`: {why}");
+        let name = self.devices[index].name;
+        let was_told = self.devices[line].said && self.speaks();
+        if !was_told && self.settings.mode != Mode::Dry {
+            return Ok(());
+        }
+        if driver.safe.is_empty() {
+            if !driver.stays_on || !self.devices[index].told || !self.speaks() {
+                return Ok(());
+            }
+            let why = "its driver has no line `safe`";
+            let (t, device, trouble) = (self.twin.now(), name.to_owned(), Some(why.to_owned()));
+            self.journal.note(&Entry::Safe { t, device, trouble });
+            return Err(named(why, name));
+        }
+        self.relink(line);
+        let mut done = self.say_safe(index, driver);
+        if let Err(Trouble::Lost(_) | Trouble::Silent(_) | Trouble::Garbled(_)) = done
+            && self.devices[line].lost.is_none()
+        {
+            // What was said may not have come through, and a line that was lost may be there again.
+            if !matches!(done, Err(Trouble::Garbled(_))) {
+                self.devices[line].link = None;
+                self.relink(line);
+            }
+            done = self.say_safe(index, driver);
+        }
+        let (t, device) = (self.twin.now(), name.to_owned());
+        if done != Ok(false) {
+            let trouble = done.as_ref().err().map(|trouble| trouble.text().to_owned());
+            self.journal.note(&Entry::Safe { t, device, trouble });
+        }
+        match done {
+            Ok(true) => {
+                self.made_safe.push(index);
+                self.settings.exposed.safe(name);
+                Ok(())
+            }
+            Ok(false) => Ok(()),
+            Err(trouble) => {
+                self.trouble(index, &trouble, driver.span);
+                Err(named(trouble.text(), name))
+            }
+        }
+    }
+
+    /// Opens a line anew that was lost.
+    fn relink(&mut self, line: usize) {
+        if let (Carrier::Line { place, address, .. }, Some(driver), None, false) = (
+            self.devices[line].binding.carrier.clone(),
+            self.devices[line].driver,
+            &self.devices[line].link,
+            !self.speaks(),
+        ) {
+            match self.linked(line, driver, &place, address.as_deref()) {
+                Ok(link) => (self.devices[line].link, self.devices[line].lost) = (Some(link), None),
+                Err(trouble) => self.devices[line].lost = Some(trouble.text().to_owned()),
+            }
+        }
+    }
+
+    /// Says what makes a device safe; whether there was something to say to it.
+    fn say_safe(&mut self, index: usize, driver: &Driver) -> Result<bool, Trouble> {
+        let line = self.line_of(index);
+        let (mut said, mut heard) = (false, false);
+        for exchange in &driver.safe {
+            let texts = self.sayable(&exchange.sends)?;
+            if self.devices[line].link.as_mut().is_some_and(|link| link.lacks(driver, &texts)) {
+                continue;
+            }
+            said = true;
+            heard |= exchange.expects.is_some() || exchange.until.is_some();
+            self.say_one(index, exchange, &texts)?;
+        }
+        if said && !heard && self.speaks() {
+            self.prove(index, driver)?;
+        }
+        Ok(said)
+    }
+
+    /// Messages with the values that they have now.
+    fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, Trouble> {
+        self.texts(sends).map_err(|fault| Trouble::Unsaid(fault.message))
+    }
+
+    /// With `until` it counts what the device tells in the end, not whether it took the command: a run that a person has stopped
+    /// refuses to be stopped.
+    fn say_one(&mut self, index: usize, exchange: &Exchange, texts: &[String]) -> Result<(), Trouble> {
+        let said = self.try_say(index, texts, exchange.expects.as_ref());
+        let Some(until) = exchange.until.as_ref().filter(|_| self.speaks()) else { return said.map(|_| ()) };
+        match said {
+            Ok(_) => self.wait_for(index, until),
+            Err(refused @ Trouble::Refused { .. }) => self.wait_for(index, until).map_err(|_| refused),
+            Err(other) => Err(other),
+        }
+    }
+
+    fn wait_for(&mut self, index: usize, until: &Until) -> Result<(), Trouble> {
+        let text = self.sayable(std::slice::from_ref(&until.asks))?.concat();
+        let timeout = Duration::try_from_secs_f64(self.twin.engine().eval(until.timeout)).unwrap_or(SECURED);
+        let begun = self.settings.world.elapsed();
+        loop {
+            let ready = self.over(index, |link, driver, ear| link.is_ready(&text, until, driver, ear));
+            if ready? {
+                return Ok(());
+            }
+            let passed = self.settings.world.elapsed().saturating_sub(begun);
+            if passed >= timeout.min(SECURED) {
+                let seconds = timeout.min(SECURED).as_secs_f64();
+                return Err(Trouble::Silent(format!("it did not tell within {seconds} s that it was safe")));
+            }
+            self.settings.world.sleep(POLL);
+        }
+    }
+
+    /// Nothing answered what makes the device safe: it is asked for anything that it tells, to know that it hears.
+    fn prove(&mut self, index: usize, driver: &Driver) -> Result<(), Trouble> {
+        if driver.framing == Framing::Calls
+            || self.devices[index].codec.as_ref().is_some_and(|codec| codec.acknowledges())
+        {
+            return Ok(());
+        }
+        let applies = driver.told.iter().find(|told| match told.condition {
+            Some(condition) => self.twin.engine().eval(condition) != 0.0,
+            None => true,
+        });
+        let Some(told) = applies else {
+            let why = "nothing that it answers says that it heard what makes it safe".to_owned();
+            return Err(Trouble::Silent(why));
+        };
+        let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
+        let line = driver.told.iter().position(|t| std::ptr::eq(t, told)).unwrap_or_default();
+        let asked = self.over(index, |link, driver, ear| match told.heard {
+            Some(_) => link.hear(line, driver, ear),
+            None => link.ask(&text, told, driver, ear),
+        });
+        match asked {
+            Ok(_) | Err(Trouble::Refused { .. }) => Ok(()),
+            Err(other) => Err(other),
+        }
+    }
+}

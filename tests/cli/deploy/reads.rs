@@ -1,0 +1,136 @@
+//! Readings that get lost, come late or make no sense are asked for again; commands never are.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::faulty::plate;
+use super::{Answer, Device, HEAT, bench, deploy};
+
+/// A plate that gets warm with its sixth temperature, and answers its third like this.
+fn third(name: &str, answer: fn() -> Answer) -> (crate::harness::Ended, Vec<String>, String) {
+    let asked = AtomicUsize::new(0);
+    let device = Device::start(b'\n', move |line, _| match line {
+        "IN_PV_2" => match asked.fetch_add(1, Ordering::SeqCst) {
+            2 => answer(),
+            0..=4 => plate(line),
+            _ => Answer::Says("35.0 2 \r\n"),
+        },
+        other => plate(other),
+    });
+    let dir = bench(name, HEAT, "plate", &device.address);
+    let ended = deploy(&dir, &["--mode", "real"]);
+    let journal = std::fs::read_to_string(dir.join("journal")).expect("a journal");
+    (ended, device.heard(), journal)
+}
+
+#[test]
+fn one_reading_that_is_lost_or_garbled_is_asked_for_again() {
+    let cases: [(&str, fn() -> Answer); 7] = [
+        ("lost", || Answer::Nothing),
+        ("garbled", || Answer::Says("2\u{7f}x.3 2 \r\n")),
+        ("half", || Answer::Says("25.")),
+        ("dashes", || Answer::Says("----- 2 \r\n")),
+        ("nan", || Answer::Says("NaN 2 \r\n")),
+        ("hot", || Answer::Says("999.0 2 \r\n")),
+        ("cold", || Answer::Says("-400.0 2 \r\n")),
+    ];
+    for (name, answer) in cases {
+        let (ended, heard, journal) = third(&format!("reads_{name}"), answer);
+        assert_eq!(ended.code, 0, "{name}: {}", ended.err);
+        assert_eq!(journal.matches("\"event\":\"again\"").count(), 1, "{name}: {journal}");
+        for command in ["START_1", "START_4"] {
+            assert_eq!(heard.iter().filter(|l| *l == command).count(), 1, "{name}: {heard:?}");
+        }
+    }
+}
+
+#[test]
+fn what_the_instrument_cannot_show_is_a_fault_where_it_stays_so() {
+    for (name, reply, shown) in
+        [("hot", "999.0 2 \r\n", "999 degC"), ("cold", "-400.0 2 \r\n", "-400 degC"), ("inf", "inf 2 \r\n", "inf")]
+    {
+        let device = Device::start(b'\n', move |line, _| match line {
+            "IN_PV_2" => Answer::Says(reply),
+            other => plate(other),
+        });
+        let dir = bench(&format!("reads_always_{name}"), HEAT, "plate", &device.address);
+        let ended = deploy(&dir, &["--mode", "real"]);
+        assert_eq!(ended.code, 1);
+        assert!(ended.err.contains("error[device-garbled]") && ended.err.contains(shown), "{name}: {}", ended.err);
+        assert_eq!(device.heard().iter().filter(|l| *l == "IN_PV_2").count(), 3, "{name}");
+        assert!(super::faulty::is_safe(&device.heard()), "{name}");
+    }
+}
+
+#[test]
+fn a_command_that_is_not_answered_is_never_said_again() {
+    let text = "mtx 1
+use std::glassware::Beaker50mL
+use std::pumps
+lab bench {
+    ambient: 22 degC
+    pump = CavroXlp6000 at (0, 0, 0) m
+    a = Beaker50mL at (1, 0, 0) m holding 20 mL of water
+    between pump and a { piped: true, port: 1 }
+}
+workflow dose in bench { draw 1 mL from a by pump }
+";
+    let device = Device::start(b'\r', |line, _| match line {
+        "/1I1A600R" => Answer::Nothing,
+        _ => Answer::Says("/0`\u{3}\r\n"),
+    });
+    let dir = bench("reads_command", text, "pump", &device.address);
+    crate::harness::write(
+        &dir,
+        "lab.toml",
+        format!("[pump]\naddress = \"{}\"\ndriver = \"CavroDt\"\n", device.address),
+    );
+    let ended = deploy(&dir, &["--mode", "real"]);
+    assert!(ended.code == 1 && ended.err.contains("error[device-lost]"), "{}", ended.err);
+    assert_eq!(device.heard().iter().filter(|l| *l == "/1I1A600R").count(), 1);
+}
+
+const WEIGH: &str = "mtx 1
+use std::balances::PrecisionBalance
+lab bench { ambient: 22 degC, scale = PrecisionBalance at (0, 0, 0) m }
+workflow weigh_it in bench {
+    tare scale
+    wait 1 s
+    let m = scale.net
+    note \"{m as g :.3}\"
+    expect m < 5 g
+}
+";
+
+#[test]
+fn a_balance_tells_its_weight_in_the_unit_that_it_is_set_to() {
+    for (name, reply) in [("g", "S S      1.25 g\r\n"), ("mg", "S S      1250 mg\r\n"), ("kg", "S S   0.00125 kg\r\n")]
+    {
+        let device = Device::start(b'\n', move |line, _| match line {
+            "@" => Answer::Says("I4 A \"1\"\r\n"),
+            "T" => Answer::Says("T S 1.00 g\r\n"),
+            _ => Answer::Says(reply),
+        });
+        let dir = bench(&format!("reads_unit_{name}"), WEIGH, "scale", &device.address);
+        let ended = deploy(&dir, &["--mode", "real"]);
+        assert!(ended.code == 0 && ended.err.contains("1.250"), "{name}: {}", ended.err);
+    }
+}
+
+#[test]
+fn a_balance_that_is_not_steady_is_asked_again_and_then_given_up() {
+    for (name, reply) in [("busy", "S I\r\n"), ("dynamic", "S D      1.31 g\r\n")] {
+        for (always, code) in [(false, 0), (true, 1)] {
+            let asked = AtomicUsize::new(0);
+            let device = Device::start(b'\n', move |line, _| match line {
+                "@" => Answer::Says("I4 A \"1\"\r\n"),
+                "T" => Answer::Says("T S 1.00 g\r\n"),
+                _ if always || asked.fetch_add(1, Ordering::SeqCst) == 0 => Answer::Says(reply),
+                _ => Answer::Says("S S 1.25 g\r\n"),
+            });
+            let dir = bench(&format!("reads_{name}_{always}"), WEIGH, "scale", &device.address);
+            let ended = deploy(&dir, &["--mode", "real"]);
+            assert_eq!(ended.code, code, "{name} {always}: {}", ended.err);
+            assert_eq!(ended.err.contains("error[device-refused]"), always, "{name}: {}", ended.err);
+        }
+    }
+}
