@@ -21,6 +21,8 @@ fn a_dry_run_prints_every_byte_and_sends_none() {
         "OUT_SP_1 50.0\\r\\n",
         "START_1\\r\\n",
         "STOP_1\\r\\n",
+        "STOP_1\\r\\n",
+        "STOP_4\\r\\n",
         "STOP_4\\r\\n",
         "OUT_WD2@0\\r\\n",
     ];

@@ -65,6 +65,7 @@ impl Hardware<'_, '_> {
             Some(Entry::Resumed { t, .. }) => {
                 if until > t {
                     self.next_entry();
+                    return self.join(until, out);
                 }
                 Ok(false)
             }
