@@ -28,6 +28,14 @@ fn a_definition_becomes_commands_and_readings() {
     let dir = bench("sila_import", &[]);
     let checked = matterixc_in(&dir, &["check", "lab.mtx"]);
     assert!(checked.code == 0 && !checked.out.contains("sila-file"), "{}", checked.out);
+    // Nothing in a definition says what is safe: the asset does.
+    let strict = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
+    assert!(strict.code == 1 && strict.out.contains("no-safe") && strict.out.contains("safe_call"), "{}", strict.out);
+    let definition = "capability HotPlate from sila \"hotplate.sila.xml\"";
+    let named = format!("{definition} {{\n    param safe_call: Text\n}}");
+    let power = "    supposed_power: 250 W\n";
+    let safe = [(definition, named.as_str()), (power, &format!("{power}    safe_call: \"Stop\"\n"))];
+    let dir = bench("sila_import", &safe);
     let strict = matterixc_in(&dir, &["check", "--strict", "lab.mtx"]);
     let found = strict.out.replace("\n  ", " ");
     assert!(strict.code == 0 && found.contains("warning[sila-file]"), "{found}");

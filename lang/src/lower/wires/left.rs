@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::scene::InstanceId;
-use matterix_ir::wire::Driver;
+use matterix_ir::wire::{Driver, Transport};
 use matterix_ir::{Diagnostic, codes};
 
 use super::command_sig;
@@ -34,7 +34,14 @@ impl<'a> Planner<'a, '_> {
         }
         let headline = format!("`{}` does not say how its device is made safe", driver.name);
         let d = Diagnostic::warning(codes::NO_SAFE, driver.span, headline, "may be left on");
-        self.lab.report(d.help("add a line `safe sends \"...\"`: it is sent after a run that did not end well"));
+        let help = match driver.transport {
+            Transport::Sila { .. } => {
+                "add a line `safe sends \"...\"`; where the driver comes from a definition, declare `param safe_call: Text` in its \
+                 capability and name the call in the asset"
+            }
+            _ => "add a line `safe sends \"...\"`: it is sent after a run that did not end well",
+        };
+        self.lab.report(d.help(help));
     }
 
     fn switched_on(&self, wires: &'a [Wire], instance: InstanceId) -> bool {
