@@ -433,12 +433,16 @@ module.exports = grammar({
       field('line', $.identifier), optional(alias($._loose_arguments, $.arguments)), field('body', $.wires),
     ),
     wires: ($) => block_of($, $._wire),
-    _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_ignores, $.wire_command),
+    _wire: ($) => choice($.wire_fixed, $.wire_alive, $.wire_repeat, $.wire_reply, $.wire_answers, $.wire_reading, $.wire_ignores, $.wire_command),
     wire_fixed: ($) => prec(1, seq(
       choice('open', 'close', 'halt', 'safe', 'play'), optional(seq('while', field('condition', $.expression))), $._exchange,
     )),
     wire_alive: ($) => seq(
-      'alive', 'while', field('condition', $.expression), 'every', $._operand,
+      'alive', 'while', field('condition', $.expression), 'every', $._operand, 'within', $._operand,
+      'by', $.verb, optional(seq('else', $.verb)),
+    ),
+    wire_repeat: ($) => seq(
+      'repeat', 'while', field('condition', $.expression), 'every', $._operand,
       'by', $.verb, optional(seq('else', $.verb)),
     ),
     wire_reply: ($) => seq('reply', $.string, 'fails', alias($._any_word, $.failure)),

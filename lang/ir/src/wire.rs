@@ -264,6 +264,8 @@ pub struct Alive {
     pub condition: NodeId,
     /// So often, s.
     pub every: NodeId,
+    /// So long the device waits before it stops by itself, s; none where it has no watchdog.
+    pub within: Option<NodeId>,
     /// Repeated.
     pub repeated: Served,
     /// At its end.

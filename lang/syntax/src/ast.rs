@@ -963,12 +963,14 @@ pub enum WireKind {
         /// What is said then.
         exchange: Exchange,
     },
-    /// `alive while active every 20 s by arm watchdog else disarm watchdog`.
+    /// `alive while active every 20 s within 60 s by arm watchdog else disarm watchdog`, or `repeat while active every 5 s by look`.
     Alive {
         /// As long as this holds.
         condition: Expr,
         /// So often.
         every: Expr,
+        /// So long a watchdog waits; none where a line only repeats.
+        within: Option<Expr>,
         /// The command that is repeated.
         by: Vec<Name>,
         /// The command for when it no longer holds.

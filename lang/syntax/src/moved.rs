@@ -297,7 +297,9 @@ impl Moved for WireKind {
             WireKind::Reply { text, fails } => each!(put: text fails),
             WireKind::Answers { asked, with } => each!(put: asked with),
             WireKind::Fixed { when, condition, exchange } => each!(put: when condition exchange),
-            WireKind::Alive { condition, every, by, otherwise } => each!(put: condition every by otherwise),
+            WireKind::Alive { condition, every, within, by, otherwise } => {
+                each!(put: condition every within by otherwise)
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Everything outside of a deployment that it rests on: the time and the ports of the machine. Tests put a simulated world in its place.
 
 use std::io;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use matterix_ir::wire::Driver;
 
@@ -10,7 +10,7 @@ use crate::port::{self, Port};
 
 /// Clocks and ports.
 pub trait World {
-    /// Time since some moment; it never goes back.
+    /// Time since some moment; it never goes back, and goes on while the machine sleeps.
     fn elapsed(&self) -> Duration;
 
     /// s since 1970, by the machine's clock, which may be set.
@@ -23,17 +23,36 @@ pub trait World {
     fn open(&self, place: &Place, driver: &Driver) -> io::Result<Box<dyn Port>>;
 }
 
+/// Time since the machine was started. What the standard library offers stands still on some machines while they sleep, and
+/// devices go on.
+#[cfg(unix)]
+fn awake_or_not() -> Duration {
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    const CLOCK: rustix::time::ClockId = rustix::time::ClockId::Boottime;
+    #[cfg(not(any(target_os = "linux", target_os = "android")))]
+    const CLOCK: rustix::time::ClockId = rustix::time::ClockId::Monotonic;
+    let now = rustix::time::clock_gettime(CLOCK);
+    Duration::new(u64::try_from(now.tv_sec).unwrap_or(0), u32::try_from(now.tv_nsec).unwrap_or(0))
+}
+
+/// Time since the first call.
+#[cfg(not(unix))]
+#[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
+fn awake_or_not() -> Duration {
+    static BEGUN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    BEGUN.get_or_init(std::time::Instant::now).elapsed()
+}
+
 /// The machine that the program runs on.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine {
-    begun: Instant,
+    begun: Duration,
 }
 
 impl Machine {
     /// From now on.
-    #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
     pub fn new() -> Self {
-        Machine { begun: Instant::now() }
+        Machine { begun: awake_or_not() }
     }
 }
 
@@ -45,7 +64,7 @@ impl Default for Machine {
 
 impl World for Machine {
     fn elapsed(&self) -> Duration {
-        self.begun.elapsed()
+        awake_or_not().saturating_sub(self.begun)
     }
 
     #[allow(clippy::disallowed_methods, reason = "a journal says when things were done")]

@@ -53,7 +53,11 @@ fn until(dir: &Path, word: &str, times: usize) {
 
 /// A deployment that was killed while it heated, on an emulator that goes on.
 fn killed(name: &str) -> (std::path::PathBuf, Emulated) {
-    let dir = bench(name, &text(), "plate", "");
+    killed_in(name, &text())
+}
+
+fn killed_in(name: &str, text: &str) -> (std::path::PathBuf, Emulated) {
+    let dir = bench(name, text, "plate", "");
     let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
     write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
     let mut process = deployed(&dir);
@@ -112,6 +116,32 @@ fn a_device_that_was_moved_to_another_port_is_gone_on_with() {
     write(&dir, "moved.toml", format!("# it has another converter now\n[plate]\naddress = \"{}\"\n", door.address));
     let ended = resumed(&dir, "moved.toml");
     assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+/// The plate of a lab, whose watchdog waits so long.
+fn patient(patience: &str) -> String {
+    let text = text().replace("IkaRetControl at", &format!("IkaRetControl {{ patience: {patience} }} at"));
+    assert!(text.contains("patience"), "{text}");
+    text
+}
+
+#[test]
+fn a_watchdog_that_has_not_tripped_lets_a_deployment_go_on() {
+    let (dir, _emulated) = killed_in("patient", &patient("60 s"));
+    // It hears something every 3.75 s of the clock, and waits 15 s.
+    std::thread::sleep(Duration::from_millis(4500));
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+}
+
+#[test]
+fn a_watchdog_that_may_have_tripped_does_not_and_the_plate_is_made_safe() {
+    let (dir, _emulated) = killed_in("impatient", &patient("6 s"));
+    std::thread::sleep(Duration::from_millis(2000));
+    let ended = resumed(&dir, "lab.toml");
+    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && said.contains("journal-mismatch") && said.contains("its watchdog waits 6 s"), "{said}");
+    assert!(said.contains("made safe meanwhile: `plate`"), "{said}");
 }
 
 #[test]

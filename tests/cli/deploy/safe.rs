@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use super::faulty::{is_safe, plate};
-use super::{Answer, Device, HEAT, SPEED, bench, deploy};
+use super::{Answer, Device, HEAT, SPEED, bench, deploy, deploy_at};
 use crate::harness::{command, matterixc_in, write};
 
 /// Arguments of a deployment on devices.
@@ -210,4 +210,46 @@ fn a_device_whose_driver_does_not_say_how_it_is_made_safe_is_named() {
     assert_eq!(ended.code, 1);
     let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(said.contains("could not be made safe: `plate`: its driver has no line `safe`"), "{}", ended.err);
+}
+
+/// With a watchdog that waits so long, and is fed so often.
+fn watched(every: &str, within: &str) -> String {
+    let lines = format!(
+        "    safe sends \"OFF\" expects \"OK\"\n    alive while active every {every} within {within} by say hello\n    say hello sends \"HELLO\" expects \"OK\"\n"
+    );
+    let text = OWN.replace("    reply \"NO\"", &(lines + "    reply \"NO\""));
+    text.replace("asset Block: Heater {", "capability Watched { command say hello }\nasset Block: Heater, Watched {")
+}
+
+#[test]
+fn a_watchdog_is_fed_before_it_trips() {
+    let dir = bench("watched", OWN, "plate", "127.0.0.1:1");
+    for (every, within, wrong) in [("6 s", "6 s", true), ("10 s", "6 s", true), ("5.9 s", "6 s", false)] {
+        let found = check(&dir, &watched(every, within));
+        assert_eq!(found.contains("a watchdog that waits 6 s hears something only every"), wrong, "{every}: {found}");
+        assert_eq!(found.contains("error"), wrong, "{every}: {found}");
+    }
+    // Without a patience it is no watchdog, and says so.
+    let found = check(&dir, &watched("2 s", "6 s").replace(" within 6 s", ""));
+    assert!(found.contains("error"), "{found}");
+    let found = check(&dir, &watched("2 s", "6 s").replace(" within 6 s", "").replace("alive while", "repeat while"));
+    assert!(!found.contains("error"), "{found}");
+}
+
+#[test]
+fn a_watchdog_that_heard_nothing_for_too_long_ends_the_run() {
+    // 20 s of lab time are a second: one reading takes 6 s of 5.
+    let device = Device::start(b'\n', |line, before| match line {
+        "T" if before > 6 => {
+            std::thread::sleep(std::time::Duration::from_millis(300));
+            Answer::Says("22.0\r\n")
+        }
+        "T" => Answer::Says("22.0\r\n"),
+        _ => Answer::Says("OK\r\n"),
+    });
+    let dir = bench("late_feed", &watched("1 s", "5 s"), "plate", &device.address);
+    let ended = deploy_at("20", &dir, &["--mode", "real"]);
+    let said = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && said.contains("diverged") && said.contains("its watchdog waits 5 s"), "{said}");
+    assert!(device.heard().iter().any(|line| line == "OFF"), "{:?}", device.heard());
 }

@@ -51,8 +51,8 @@ impl Walk<'_> {
                 self.exprs(condition);
                 self.exchange(exchange);
             }
-            WireKind::Alive { condition, every, by, otherwise } => {
-                self.exprs([condition, every]);
+            WireKind::Alive { condition, every, within, by, otherwise } => {
+                self.exprs([condition, every].into_iter().chain(within));
                 self.verb_of(by, &device);
                 self.verb_of(otherwise, &device);
             }

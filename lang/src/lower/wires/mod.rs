@@ -16,6 +16,7 @@ mod pattern;
 mod served;
 mod transport;
 
+use matterix_ir::NodeId;
 use matterix_ir::plan::StepId;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::{self, Driver};
@@ -25,7 +26,7 @@ pub(crate) use self::forms::Speech;
 use self::served::Arrangement;
 use super::call::Bound;
 use super::{Planner, script};
-use crate::ast::{ItemKind, Sig, Wire, WireKind};
+use crate::ast::{Expr, ItemKind, Sig, Wire, WireKind};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
@@ -80,6 +81,21 @@ impl<'a> Planner<'a, '_> {
                 }
             }
         }
+    }
+
+    /// How long a watchdog waits, s: longer than until it hears something again.
+    fn patience(&mut self, of: &'a Expr, every: NodeId, scope: &mut Scope) -> Option<NodeId> {
+        let node = self.duration_node(of, scope, "within")?;
+        let (every, patience) = (self.lab.graph.constant(every), self.lab.graph.constant(node));
+        if let (Some(every), Some(patience)) = (every, patience)
+            && every >= patience
+        {
+            let headline = format!("a watchdog that waits {patience} s hears something only every {every} s");
+            let d = Diagnostic::error(codes::TYPE_MISMATCH, of.span, headline, "its device stops before that");
+            self.lab.report(d.help("repeat the command at least twice in that time: one answer may be lost"));
+            return None;
+        }
+        Some(node)
     }
 
     /// Notes what is said for an operation.
@@ -246,12 +262,16 @@ impl<'a> Planner<'a, '_> {
                 }
             }
             WireKind::Ignores { text } => driver.ignores.extend(self.pattern(text).map(|(pattern, _)| pattern)),
-            WireKind::Alive { condition, every, by, otherwise } => {
+            WireKind::Alive { condition, every, within, by, otherwise } => {
                 let Some(node) = self.lab.truth(condition, &mut scope) else { return };
                 let Some(every) = self.duration_node(every, &mut scope, "every") else { return };
+                let within = match within.as_ref().map(|of| self.patience(of, every, &mut scope)) {
+                    Some(None) => return,
+                    patience => patience.flatten(),
+                };
                 let Some(repeated) = self.by_name(by, instance, module) else { return };
                 let at_end = if otherwise.is_empty() { None } else { self.by_name(otherwise, instance, module) };
-                driver.alive.push(wire::Alive { condition: node, every, repeated, at_end });
+                driver.alive.push(wire::Alive { condition: node, every, within, repeated, at_end });
             }
             WireKind::Command { sig, exchange } => {
                 let Some(mapped) = self.mapped(sig, instance, module) else { return };

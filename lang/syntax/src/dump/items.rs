@@ -332,9 +332,10 @@ fn wire(wire: &Wire) -> Sexp {
         WireKind::Fixed { when, condition, exchange: said } => {
             node(&when.text).with(maybe("while", condition.as_ref())).with(exchange(said))
         }
-        WireKind::Alive { condition, every, by, otherwise } => {
-            node("alive").with([expr(condition), expr(every), verb("by", by), verb("else", otherwise)])
-        }
+        WireKind::Alive { condition, every, within, by, otherwise } => node("alive")
+            .with([expr(condition), expr(every)])
+            .with(maybe("within", within.as_ref()))
+            .with([verb("by", by), verb("else", otherwise)]),
     }
 }
 

@@ -233,11 +233,12 @@ impl Lower<'_> {
                 let (when, condition) = (when.unwrap_or_else(|| nameless(span)), self.while_in(kids));
                 WireKind::Fixed { when, condition, exchange: self.exchange(kids) }
             }
-            Rule::wire_alive => {
+            Rule::wire_alive | Rule::wire_repeat => {
                 kids.has(Rule::kw_while);
                 let (condition, every) = self.path_and_range(kids);
+                let within = (rule == Rule::wire_alive).then(|| self.expr_in(kids));
                 let by = self.verb_in(kids);
-                WireKind::Alive { condition, every, by, otherwise: self.verb_in(kids) }
+                WireKind::Alive { condition, every, within, by, otherwise: self.verb_in(kids) }
             }
             Rule::wire_reply => WireKind::Reply { text: self.text_in(kids), fails: self.name_in(kids) },
             Rule::wire_answers => WireKind::Answers {

@@ -211,7 +211,7 @@ fn item() -> Text {
         members,
         (cond(), operand()).prop_map(|(c, o)| format!("asset P: A from urdf \"f\" {{ a: {c}, frame f at {o}\n lid = Lid {{ b: {c} }}\nwells[A1 .. H12] = Well {{ v: {c} }} at {o} pitch {o}\nslot[1 .. 11] = Slot\npitch {o} by {o}, one[A1] = Tip\n}}")),
         laws.prop_map(|l| format!("process p(a: A)\n{l}")),
-        (quoted(), operand()).prop_map(|(t, o)| format!("driver D for P over serial(baud: {o}) {{\nheat to(t) sends {t},\n{t} expects {t}\nreading a.b asks {t}\nexpects {t}; reply {t} fails slip\nanswers {t} with {t}\nopen sends {t} until asks {t} timeout {o}\nalive while {o} > 1 every {o} by run it else rest\nreading c while {o} > 1 asks {t} expects {t}\n}}")),
+        (quoted(), operand()).prop_map(|(t, o)| format!("driver D for P over serial(baud: {o}) {{\nheat to(t) sends {t},\n{t} expects {t}\nreading a.b asks {t}\nexpects {t}; reply {t} fails slip\nanswers {t} with {t}\nopen sends {t} until asks {t} timeout {o}\nalive while {o} > 1 every {o} within {o} by run it else rest\nrepeat while {o} > 1 every {o} by run it\nreading c while {o} > 1 asks {t} expects {t}\n}}")),
         (operand(), cond(), species()).prop_map(|(o, c, s)| format!("lab l(a: T) {{\nambient: {c}\nb = B {{ c: {c} }} on {o}\n holding {{\nA1: 2 g of {s} at {o}, B1 .. C12: {o}\n3: {o}\n}} at {o}\n at (1, 2) m on {o}\ninclude x as y at {o}, include x as y; include z as y\nbetween {o} and {o} {{ k: {c} }}\n}}")),
         (cond(), block.clone()).prop_map(|(c, b)| format!("skill do it(x: T) on(y: A & B) -> T\n needs {c} // why\n fails a, b\n{b} on slip {b}\nfinally {b}")),
         (cond(), operand()).prop_map(|(c, o)| format!("extern skill f(x: T) effect a.b = {c}, move({o}) option in: T = {c}")),

@@ -1,10 +1,13 @@
 //! Watchdogs: what is repeated so that a device goes on, and what tells it that it need not listen any more.
 
-use matterix_ir::wire::Served;
+use matterix_ir::codes;
+use matterix_ir::quantity::show_number;
+use matterix_ir::wire::{Alive, Served};
 use matterix_runtime::backend::Backend;
 use matterix_runtime::exec::Listener;
 use matterix_runtime::fault::Fault;
 
+use super::device::Beat;
 use super::hardware::Hardware;
 use crate::link::Trouble;
 
@@ -16,13 +19,13 @@ impl Hardware<'_, '_> {
                 continue;
             };
             for (index, alive) in driver.alive.iter().enumerate() {
-                let now = self.twin.now();
+                let (now, heard) = (self.twin.now(), self.settings.world.elapsed());
                 let holds = self.twin.engine().eval(alive.condition) != 0.0;
                 let every = self.twin.engine().eval(alive.every);
                 let last = self.devices[device].beats[index];
                 match (holds, last) {
                     (true, None) => {}
-                    (true, Some(last)) if now >= last + every => {}
+                    (true, Some(last)) if now >= last.at + every => {}
                     (false, Some(_)) if over => {
                         self.devices[device].beats[index] = None;
                         if let Some(end) = &alive.at_end {
@@ -32,11 +35,53 @@ impl Hardware<'_, '_> {
                     }
                     _ => continue,
                 }
-                self.devices[device].beats[index] = Some(now);
+                self.devices[device].beats[index] = Some(Beat { at: now, heard });
                 self.serve(device, &alive.repeated, out)?;
+                if self.is_live() && !self.is_dry() {
+                    self.heard_in_time(device, alive, last)?;
+                }
             }
         }
         Ok(())
+    }
+
+    /// A watchdog that heard nothing for longer than it waits may have stopped its device, whatever the device answers now.
+    fn heard_in_time(&mut self, device: usize, alive: &Alive, last: Option<Beat>) -> Result<(), Fault> {
+        let (Some(last), Some(within)) = (last, alive.within) else { return Ok(()) };
+        let patience = self.twin.engine().eval(within);
+        let alone = self.settings.world.elapsed().saturating_sub(last.heard).as_secs_f64() * self.settings.speed;
+        if alone <= patience {
+            return Ok(());
+        }
+        let message = format!(
+            "`{}` heard nothing for {} s, and its watchdog waits {} s: it may have stopped",
+            self.devices[device].name,
+            show_number(alone),
+            show_number(patience)
+        );
+        let mut fault = self.fault(codes::DIVERGED, alive.repeated.exchange.span, message);
+        fault.help.push(
+            "this machine was busy or asleep, or a line was slow: see what the device does, and begin anew".to_owned(),
+        );
+        Err(fault)
+    }
+
+    /// When watchdogs trip that hear nothing from now on: device, s from now, s that it waits.
+    pub(super) fn watchdogs(&mut self) -> Vec<(usize, f64, f64)> {
+        let mut found = Vec::new();
+        for device in 0..self.devices.len() {
+            let Some(driver) = self.devices[device].driver else { continue };
+            for (index, alive) in driver.alive.iter().enumerate() {
+                let Some(within) = alive.within else { continue };
+                if self.twin.engine().eval(alive.condition) == 0.0 {
+                    continue;
+                }
+                let patience = self.twin.engine().eval(within);
+                let waited = self.devices[device].beats[index].map_or(0.0, |last| self.twin.now() - last.at);
+                found.push((device, patience - waited, patience));
+            }
+        }
+        found
     }
 
     /// Devices were alone: what is to be repeated is said at once.
@@ -53,7 +98,7 @@ impl Hardware<'_, '_> {
             };
             for (index, alive) in driver.alive.iter().enumerate() {
                 if let Some(last) = self.devices[device].beats[index] {
-                    next = next.min(last + self.twin.engine().eval(alive.every));
+                    next = next.min(last.at + self.twin.engine().eval(alive.every));
                 }
             }
         }

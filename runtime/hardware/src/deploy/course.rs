@@ -215,6 +215,10 @@ fn concluded(
     found.extend(hardware.unhalted().iter().cloned().map(not_halted));
     if !well || !hardware.unhalted().is_empty() {
         found.extend(secured(&mut hardware, exposed));
+        if hardware.is_refused() && !found.is_empty() {
+            let why = found.remove(0);
+            found.insert(0, meanwhile(why, &hardware));
+        }
     }
     found.extend(hardware.close().err().map(of_fault));
     let status = match (well, stopped) {
@@ -290,9 +294,13 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
         Unfit::Unknown(d) => d,
     };
     let left = hardware.secure();
+    std::iter::once(meanwhile(unfit, &hardware)).chain(left.into_iter().map(unsafe_left)).collect()
+}
+
+/// Why a journal is not gone on with, and which devices were made safe.
+fn meanwhile(why: Diagnostic, hardware: &Hardware<'_, '_>) -> Diagnostic {
     let names = hardware.secured().join(", ");
-    let unfit = if names.is_empty() { unfit } else { unfit.help(format!("made safe meanwhile: {names}")) };
-    std::iter::once(unfit).chain(left.into_iter().map(unsafe_left)).collect()
+    if names.is_empty() { why } else { why.help(format!("made safe meanwhile: {names}")) }
 }
 
 /// A fault as a finding.

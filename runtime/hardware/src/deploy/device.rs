@@ -49,6 +49,15 @@ pub struct Binding {
     pub tolerances: Vec<(String, f64)>,
 }
 
+/// When something that is repeated was last said.
+#[derive(Clone, Copy, Debug)]
+pub struct Beat {
+    /// Lab time, s.
+    pub at: f64,
+    /// By the clock that never goes back.
+    pub heard: Duration,
+}
+
 /// A bound device.
 pub struct Device<'m> {
     /// Its name in the lab.
@@ -71,8 +80,8 @@ pub struct Device<'m> {
     pub lost: Option<String>,
     /// Its line was opened anew after it was lost.
     pub renewed: bool,
-    /// When what keeps its watchdog quiet was last said, by line of the driver, s.
-    pub beats: Vec<Option<f64>>,
+    /// When what is repeated was last said, by line of the driver.
+    pub beats: Vec<Option<Beat>>,
 }
 
 impl<'m> Device<'m> {

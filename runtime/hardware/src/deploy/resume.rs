@@ -107,7 +107,8 @@ impl Hardware<'_, '_> {
             fault.help.push("set the clock, or begin anew".to_owned());
             return Err(fault);
         }
-        self.heard_in_time()?;
+        let watchdogs = self.watchdogs();
+        self.in_time(&watchdogs)?;
         let then = self.catches_up_to();
         while self.twin.now() < then {
             self.twin.advance(then, &[], out)?;
@@ -115,6 +116,7 @@ impl Hardware<'_, '_> {
         self.forget_beats();
         self.set_clock();
         self.check_devices()?;
+        self.in_time(&watchdogs)?;
         // Only now: a watchdog has heard nothing yet, and where nobody answered the journal is as it was.
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
@@ -124,27 +126,20 @@ impl Hardware<'_, '_> {
     }
 
     /// Watchdogs have not tripped meanwhile.
-    fn heard_in_time(&mut self) -> Result<(), Fault> {
+    fn in_time(&mut self, watchdogs: &[(usize, f64, f64)]) -> Result<(), Fault> {
         let away = (self.wall() - self.left_at.1).max(0.0) * self.settings.speed;
-        for device in 0..self.devices.len() {
-            let Some(driver) = self.devices[device].driver else { continue };
-            for alive in &driver.alive {
-                let patience = self.twin.engine().eval(alive.every);
-                if self.twin.engine().eval(alive.condition) == 0.0 || away <= patience {
-                    continue;
-                }
-                let name = self.devices[device].name;
-                let message = format!(
-                    "nothing was said to `{name}` for {} s, while its driver says something every {} s so that it goes on",
-                    show_number(away),
-                    show_number(patience)
-                );
-                let mut fault = self.fault(codes::JOURNAL_MISMATCH, driver.span, message);
-                fault.help.push("its watchdog may have stopped it: begin anew".to_owned());
-                return Err(fault);
-            }
-        }
-        Ok(())
+        let Some((device, left, patience)) = watchdogs.iter().find(|(_, left, _)| away > *left) else { return Ok(()) };
+        let (device, span) =
+            (&self.devices[*device], self.devices[*device].driver.map_or_else(Default::default, |d| d.span));
+        let message = format!(
+            "`{}` has heard nothing for {} s, and its watchdog waits {} s: it may have stopped",
+            device.name,
+            show_number(away + patience - left),
+            show_number(*patience)
+        );
+        let mut fault = self.fault(codes::JOURNAL_MISMATCH, span, message);
+        fault.help.push("see what the device does, and begin anew".to_owned());
+        Err(fault)
     }
 
     /// Devices answer what the workflow asks of them, and are as they were told to be.
