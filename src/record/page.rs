@@ -73,6 +73,24 @@ pub fn page(report: &Report) -> String {
         }),
     );
     out += &table(
+        "Texts of devices",
+        &["lab time, s", "device", "name", "text"],
+        report.texts.iter().map(|t| vec![show_number(t.lab_time), t.device.clone(), t.name.clone(), t.text.clone()]),
+    );
+    out += &table(
+        "Asked again",
+        &["lab time, s", "device", "why"],
+        report.again.iter().map(|a| vec![show_number(a.lab_time), a.device.clone(), a.why.clone()]),
+    );
+    out += &table(
+        "Behind the clock",
+        &["times", "altogether, s", "longest, s", "at lab time, s"],
+        report
+            .behind
+            .iter()
+            .map(|b| [vec![b.count.to_string()], [b.total, b.longest, b.at].map(show_number).to_vec()].concat()),
+    );
+    out += &table(
         "Expectations",
         &["expectation", "lab time, s", "verdict"],
         report.expectations.iter().map(|e| {

@@ -80,6 +80,12 @@ pub struct Report {
     pub commands: Vec<Command>,
     /// What devices told.
     pub readings: Vec<Reading>,
+    /// Texts that devices told, such as serial numbers.
+    pub texts: Vec<Text>,
+    /// Questions that were put to a device once more.
+    pub again: Vec<Again>,
+    /// How far the lab was behind the clock; none where it kept up.
+    pub behind: Option<Behind>,
     /// Expectations.
     pub expectations: Vec<Expectation>,
     /// What went wrong.
@@ -165,6 +171,43 @@ pub struct Reading {
     pub greatest: f64,
 }
 
+/// A text that a device told.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Text {
+    /// s.
+    pub lab_time: f64,
+    /// The device.
+    pub device: String,
+    /// What its driver calls it.
+    pub name: String,
+    /// As it was told.
+    pub text: String,
+}
+
+/// A question that was put to a device once more.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Again {
+    /// s.
+    pub lab_time: f64,
+    /// The device.
+    pub device: String,
+    /// Why.
+    pub why: String,
+}
+
+/// Times that the lab went over at once, because it was behind the clock.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Behind {
+    /// How many.
+    pub count: u64,
+    /// All together, s.
+    pub total: f64,
+    /// The longest, s.
+    pub longest: f64,
+    /// When the longest began, s.
+    pub at: f64,
+}
+
 /// An expectation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Expectation {
@@ -196,14 +239,24 @@ pub struct MadeSafe {
     pub trouble: Option<String>,
 }
 
+/// Where rows of a report are that later entries are about.
+#[derive(Debug, Default)]
+struct Rows {
+    /// By number of the operation.
+    commands: BTreeMap<u64, usize>,
+    /// By number of the question.
+    asked: BTreeMap<u64, usize>,
+    /// By name.
+    readings: BTreeMap<String, usize>,
+}
+
 impl Report {
     /// Of a journal and of what came of the plan.
     pub fn of(about: About, entries: &[Entry], ending: &Ending) -> Report {
         let mut report = Report::empty(about, ending.passed);
-        let mut outcomes: BTreeMap<u64, usize> = BTreeMap::new();
-        let mut asked: BTreeMap<u64, usize> = BTreeMap::new();
+        let mut rows = Rows::default();
         for entry in entries {
-            report.take(entry, &mut outcomes, &mut asked);
+            report.take(entry, &mut rows);
         }
         let all = ending.execution.iter().flat_map(|e| &e.expectations);
         report.expectations =
@@ -225,13 +278,16 @@ impl Report {
             interventions: Vec::new(),
             commands: Vec::new(),
             readings: Vec::new(),
+            texts: Vec::new(),
+            again: Vec::new(),
+            behind: None,
             expectations: Vec::new(),
             faults: Vec::new(),
             made_safe: Vec::new(),
         }
     }
 
-    fn take(&mut self, entry: &Entry, outcomes: &mut BTreeMap<u64, usize>, asked: &mut BTreeMap<u64, usize>) {
+    fn take(&mut self, entry: &Entry, rows: &mut Rows) {
         match entry {
             Entry::Begin { digest, wall, pid, who, .. } => {
                 (self.begun, self.program) = (moment(*wall), digest.clone());
@@ -241,7 +297,7 @@ impl Report {
                 self.processes.push(Process { pid: *pid, who: who.clone(), at: moment(*wall), lab_time: *t });
             }
             Entry::Asked { t, ticket, text, wall, .. } => {
-                asked.insert(*ticket, self.questions.len());
+                rows.asked.insert(*ticket, self.questions.len());
                 let (yes, who, answered) = (None, None, None);
                 self.questions.push(Question {
                     text: text.clone(),
@@ -253,7 +309,7 @@ impl Report {
                 });
             }
             Entry::Answered { ticket, yes, who, wall, .. } => {
-                let question = asked.get(ticket).and_then(|i| self.questions.get_mut(*i));
+                let question = rows.asked.get(ticket).and_then(|i| self.questions.get_mut(*i));
                 if let Some(question) = question {
                     (question.yes, question.who) = (Some(*yes), Some(who.clone()));
                     question.answered = Some(moment(*wall));
@@ -269,7 +325,7 @@ impl Report {
             }
             Entry::Stop { t, who, wall } => self.intervened("stop", who, *wall, *t),
             Entry::Starting { t, ticket, label, span, device, sends, .. } => {
-                outcomes.insert(*ticket, self.commands.len());
+                rows.commands.insert(*ticket, self.commands.len());
                 self.commands.push(Command {
                     lab_time: *t,
                     step: label.clone(),
@@ -279,11 +335,19 @@ impl Report {
                     outcome: "unknown".to_owned(),
                 });
             }
-            Entry::Started { ticket, .. } => self.came_to(outcomes.get(ticket), "done".to_owned()),
+            Entry::Started { ticket, .. } => self.came_to(rows.commands.get(ticket), "done".to_owned()),
             Entry::Ended { ticket, failed: Some((name, text)), .. } => {
-                self.came_to(outcomes.get(ticket), format!("{name}: {text}"));
+                self.came_to(rows.commands.get(ticket), format!("{name}: {text}"));
             }
-            Entry::Told { name, value, .. } => self.told(name, *value),
+            Entry::Told { name, value, .. } => self.told(name, *value, rows),
+            Entry::Kept { t, device, word, text } => {
+                let (device, name, text) = (device.clone(), word.clone(), text.clone());
+                self.texts.push(Text { lab_time: *t, device, name, text });
+            }
+            Entry::Again { t, device, why } => {
+                self.again.push(Again { lab_time: *t, device: device.clone(), why: why.clone() });
+            }
+            Entry::Leap { t, to } => self.leapt(*t, to - t),
             Entry::Fault { t, code, text, .. } => {
                 self.faults.push(Fault { lab_time: *t, code: code.clone(), text: text.clone() });
             }
@@ -296,11 +360,8 @@ impl Report {
             Entry::Ended { .. }
             | Entry::Opened { .. }
             | Entry::Clock { .. }
-            | Entry::Leap { .. }
             | Entry::Out { .. }
-            | Entry::Back { .. }
-            | Entry::Again { .. }
-            | Entry::Kept { .. } => {}
+            | Entry::Back { .. } => {}
         }
     }
 
@@ -315,21 +376,24 @@ impl Report {
         }
     }
 
-    fn told(&mut self, name: &str, value: f64) {
-        match self.readings.iter_mut().find(|r| r.name == name) {
-            Some(r) => {
-                r.count += 1;
-                (r.last, r.least, r.greatest) = (value, r.least.min(value), r.greatest.max(value));
-            }
-            None => self.readings.push(Reading {
-                name: name.to_owned(),
-                count: 1,
-                first: value,
-                last: value,
-                least: value,
-                greatest: value,
-            }),
+    fn leapt(&mut self, at: f64, took: f64) {
+        let behind = self.behind.get_or_insert(Behind { count: 0, total: 0.0, longest: 0.0, at });
+        behind.count += 1;
+        behind.total += took;
+        if took > behind.longest {
+            (behind.longest, behind.at) = (took, at);
         }
+    }
+
+    fn told(&mut self, name: &str, value: f64, rows: &mut Rows) {
+        if let Some(r) = rows.readings.get(name).and_then(|at| self.readings.get_mut(*at)) {
+            r.count += 1;
+            (r.last, r.least, r.greatest) = (value, r.least.min(value), r.greatest.max(value));
+            return;
+        }
+        rows.readings.insert(name.to_owned(), self.readings.len());
+        let name = name.to_owned();
+        self.readings.push(Reading { name, count: 1, first: value, last: value, least: value, greatest: value });
     }
 
     /// As JSON.

@@ -141,3 +141,49 @@ fn what_is_refused_beforehand_leaves_no_record() {
     assert!(ended.code == 1 && ended.err.contains("nothing was said"), "{}", ended.err);
     assert!(!dir.join("signed").exists());
 }
+
+/// A heater of a user's own that says who it is.
+const OWN: &str = "mtx 1
+use std::thermal::Heater
+asset Block: Heater {
+    capacity: 500 J/K
+    air: 0.5 W/K
+    gain: 40 W/K
+    power: 500 W
+    limits: 0 degC .. 200 degC
+}
+driver BlockLine for Block over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 300 ms) {
+    open sends \"ID\" expects \"BLOCK {<serial>}\"
+    heat to(t) sends \"H{t as degC :.1}\" expects \"OK\"
+    stop heating sends \"OFF\" expects \"OK\"
+    reading temperature asks \"T\" expects \"{degC in -20 .. 250}\"
+    safe sends \"OFF\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, plate = Block }
+workflow warm in bench {
+    heat plate to 60 degC
+    wait until plate.temperature >= 50 degC timeout 2 h
+} finally { stop heating plate }
+";
+
+#[test]
+fn a_report_says_which_device_it_was_and_what_was_asked_twice() {
+    let device = Device::start(b'\n', |line, before| match line {
+        "ID" => Answer::Says("BLOCK no. 4711 | B\r\n"),
+        "T" if before == 4 => Answer::Nothing,
+        "T" if before > 8 => Answer::Says("51.0\r\n"),
+        "T" => Answer::Says("22.0\r\n"),
+        _ => Answer::Says("OK\r\n"),
+    });
+    let dir = bench("record_texts", OWN, "plate", &device.address);
+    let _ = std::fs::remove_dir_all(dir.join("signed"));
+    let ended = matterixc_in(&dir, &DEPLOY);
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let page = std::fs::read_to_string(dir.join("signed/report.md")).expect("a page");
+    let texts = page.split("## Texts of devices").nth(1).expect("texts");
+    assert!(texts.contains("| plate | serial | no. 4711 \\| B |"), "{page}");
+    let again = page.split("## Asked again").nth(1).expect("what was asked again");
+    assert!(again.contains("| plate | "), "{page}");
+    let checked = verified(&dir);
+    assert_eq!(checked.code, 0, "{}{}", checked.out, checked.err);
+}
