@@ -118,6 +118,29 @@ fn a_device_that_was_moved_to_another_port_is_gone_on_with() {
     assert_eq!(ended.code, 0, "{}", ended.err);
 }
 
+#[test]
+fn a_plate_that_was_set_twice_goes_on_from_the_second() {
+    let twice = HEAT.replace(
+        "wait until plate.temperature >= 30 degC timeout 1 h",
+        "wait until plate.temperature >= 26 degC timeout 1 h\n    heat plate to 55 degC\n    stir plate at 400 rpm\n    wait 10 s\n    wait until plate.temperature >= 40 degC timeout 1 h",
+    );
+    let dir = bench("set_twice", &twice, "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut process = deployed(&dir);
+    until(&dir, "OUT_SP_1 55.0", 2);
+    std::thread::sleep(Duration::from_millis(300));
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let journal = journal(&dir);
+    for set in ["OUT_SP_1 50.0", "OUT_SP_1 55.0", "OUT_SP_4 400"] {
+        let sent = format!("\"bytes\":\"{set}");
+        assert_eq!(journal.matches(&sent).count(), 1, "{set}: {journal}");
+    }
+}
+
 /// The plate of a lab, whose watchdog waits so long.
 fn patient(patience: &str) -> String {
     let text = text().replace("IkaRetControl at", &format!("IkaRetControl {{ patience: {patience} }} at"));

@@ -105,7 +105,7 @@ fn commands(heard: &str) -> Vec<String> {
     named.filter(|name| !name.starts_with("load") && *name != "home").map(str::to_owned).collect()
 }
 
-const LABS: [Lab; 2] = [
+const LABS: [Lab; 3] = [
     Lab {
         name: "pumped",
         text: PUMPED,
@@ -117,6 +117,12 @@ const LABS: [Lab; 2] = [
         text: include_str!("../../deploy/transfer.mtx"),
         devices: &[("ot2", "http", None)],
         moving: commands,
+    },
+    Lab {
+        name: "dosed",
+        text: include_str!("../../deploy/doses.mtx"),
+        devices: &[("pump", "address", Some("CavroDt"))],
+        moving: strokes,
     },
 ];
 
@@ -214,4 +220,9 @@ fn a_pump_and_a_plate_are_told_nothing_twice() {
 #[test]
 fn a_robot_is_told_nothing_twice() {
     what_a_killed_deployment_did(&LABS[1]);
+}
+
+#[test]
+fn a_pump_that_doses_in_a_loop_is_told_nothing_twice() {
+    what_a_killed_deployment_did(&LABS[2]);
 }
