@@ -376,6 +376,12 @@ pub struct DeployArgs {
     /// Go on with a deployment that was cut off, from its journal.
     #[arg(long)]
     pub resume: bool,
+    /// Serve a page on this machine that shows what goes on, and where people answer, pause, go on and stop; its address is printed.
+    #[arg(long)]
+    pub view: bool,
+    /// The port of that page; 0 takes any that is free.
+    #[arg(long, value_name = "PORT", default_value_t = 0, requires = "view")]
+    pub port: u16,
     /// Show all bytes that go out and come in.
     #[arg(long)]
     pub trace: bool,

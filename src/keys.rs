@@ -1,6 +1,6 @@
 //! The keyboard while devices are at work: answers to questions, and the keys that pause, go on and stop.
 
-use std::io::{BufRead, IsTerminal};
+use std::io::{BufRead, BufReader, IsTerminal};
 
 use matterix_hardware::deploy::{Answer, Control, Gate};
 
@@ -8,11 +8,15 @@ use crate::cancel;
 use crate::terminal::{Stream, print};
 
 const STOPPING: &str = "stopping: devices are halted, what `finally` says is done; Ctrl-C ends at once\n";
-const PAUSING: &str = "pausing: what goes on ends, nothing new begins; r goes on, s lets one step begin\n";
+const PAUSING: &str = "pausing: what goes on ends, nothing new begins; r and Enter goes on, s lets one step begin\n";
 const GOING_ON: &str = "going on\n";
 const STEPPING: &str = "one step\n";
 const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
 const CONFIRM: &str = "type y and Enter to confirm, n to stop: ";
+
+/// How often a process in the background looks whether it is in the foreground again.
+#[cfg(unix)]
+const BACKGROUND: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// What a person types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,10 +45,90 @@ pub fn listen(control: &'static Control) -> bool {
 }
 
 fn hear(control: &Control) {
-    for line in std::io::stdin().lock().lines() {
-        let Ok(line) = line else { return };
-        obey(&line, control);
+    let mut typed = BufReader::new(std::io::stdin().lock());
+    loop {
+        if typed.buffer().is_empty() {
+            turn();
+        }
+        let mut line = String::new();
+        match typed.read_line(&mut line) {
+            Ok(1..) => obey(line.trim_end_matches(['\r', '\n']), control),
+            _ => return,
+        }
     }
+}
+
+/// Waits until something is typed and this process is the one that it is typed for: a terminal stops a process in the background
+/// that reads, and a stopped one feeds no watchdog.
+#[cfg(unix)]
+fn turn() {
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+
+    let patience = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
+    let stdin = std::io::stdin();
+    loop {
+        let group = rustix::termios::tcgetpgrp(&stdin);
+        if group.is_ok_and(|group| group != rustix::process::getpgrp()) {
+            std::thread::sleep(BACKGROUND);
+            continue;
+        }
+        match poll(&mut [PollFd::new(&stdin, PollFlags::IN)], Some(&patience)) {
+            Ok(0) | Err(rustix::io::Errno::INTR) => {}
+            _ => return,
+        }
+    }
+}
+
+#[cfg(not(unix))]
+fn turn() {}
+
+/// A person stops a deployment.
+pub fn stop(who: &str, control: &Control) {
+    control.stop(who);
+    cancel::ask(STOPPING);
+}
+
+/// A person says what may begin.
+pub fn gate(gate: Gate, who: &str, control: &Control) {
+    control.set_gate(gate, who);
+    let said = match gate {
+        Gate::Pause => PAUSING,
+        Gate::Step => STEPPING,
+        Gate::Go => GOING_ON,
+    };
+    print(Stream::Err, said);
+}
+
+/// What a person said who is not at this terminal.
+pub fn told(what: &str, who: &str) {
+    print(Stream::Err, &format!("{what}: {who}\n"));
+}
+
+/// Signals that pause, let one step begin and go on. Ctrl-Z pauses too: a process that stands still feeds no watchdog.
+#[cfg(unix)]
+pub fn heed_signals(control: &'static Control) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGTSTP, SIGURG, SIGUSR1, SIGUSR2};
+
+    let mut signals = signal_hook::iterator::Signals::new([SIGUSR1, SIGURG, SIGUSR2, SIGTSTP])?;
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            let (to, name) = match signal {
+                SIGUSR1 => (Gate::Pause, "SIGUSR1"),
+                SIGURG => (Gate::Step, "SIGURG"),
+                SIGUSR2 => (Gate::Go, "SIGUSR2"),
+                _ => (Gate::Pause, "Ctrl-Z"),
+            };
+            let who = format!("a signal ({name})");
+            told("heard", &who);
+            gate(to, &who, control);
+        }
+    });
+    Ok(())
+}
+
+#[cfg(not(unix))]
+pub fn heed_signals(_: &'static Control) -> std::io::Result<()> {
+    Ok(())
 }
 
 fn obey(line: &str, control: &Control) {
@@ -53,19 +137,8 @@ fn obey(line: &str, control: &Control) {
         control.open().first().is_some_and(|(question, _)| control.answer(*question, Answer { yes, who: who.clone() }))
     };
     match meant(line) {
-        Word::Stop => {
-            control.stop(&who);
-            cancel::ask(STOPPING);
-        }
-        Word::Gate(gate) => {
-            control.set_gate(gate, &who);
-            let said = match gate {
-                Gate::Pause => PAUSING,
-                Gate::Step => STEPPING,
-                Gate::Go => GOING_ON,
-            };
-            print(Stream::Err, said);
-        }
+        Word::Stop => stop(&who, control),
+        Word::Gate(to) => gate(to, &who, control),
         Word::Yes if answer(true) => {}
         Word::No if answer(false) => {}
         _ if !control.open().is_empty() => print(Stream::Err, CONFIRM),

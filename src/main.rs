@@ -14,6 +14,7 @@ mod identity;
 mod keys;
 mod lsp;
 mod mcp;
+mod panel;
 mod pipeline;
 mod progress;
 mod reads;

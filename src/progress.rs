@@ -108,7 +108,7 @@ impl Count {
 }
 
 /// Whether a step is more than a grouping of others.
-fn is_shown(step: &Step) -> bool {
+pub fn is_shown(step: &Step) -> bool {
     !matches!(step, Step::Sequence(_) | Step::Guarded { .. } | Step::Let { .. })
 }
 

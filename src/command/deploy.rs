@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::time::Duration;
 
 use matterix_hardware::binding;
@@ -13,6 +14,7 @@ use matterix_ir::{Diagnostic, FileId, Program};
 
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
+use crate::panel::{Board, Panel, Watcher};
 use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
@@ -49,6 +51,9 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if args.resume && args.mode == DeployMode::Dry {
         return Err("a dry run has nothing to go on with".to_string());
     }
+    if args.view && args.mode == DeployMode::Dry {
+        return Err("a dry run is over before a page could show it: `--view` takes another `--mode`".to_string());
+    }
     let mut findings = Findings::new(RunFormat::Human, color);
     let measured = measured(args, &bindings);
     let options = Options { wires: Wires::Called, measured: measured.clone(), ..args.subject.options() };
@@ -84,19 +89,28 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if args.yes || mode == Mode::Dry {
         CONTROL.answer_all(Answer { yes: true, who: format!("{who}, by `--yes`") });
     }
-    if mode != Mode::Dry && !keys::listen(&CONTROL) && !args.yes {
-        CONTROL.answer_all(Answer::of_nobody());
+    if mode != Mode::Dry {
+        keys::heed_signals(&CONTROL).map_err(|e| format!("cannot listen for signals: {e}"))?;
+        if !keys::listen(&CONTROL) && !args.yes && !args.view {
+            CONTROL.answer_all(Answer::of_nobody());
+        }
     }
+    let about = about(args, &program, (file, &bindings), &measured);
+    let (board, panel) = panel(args, &program, &about)?;
     if mode != Mode::Dry && !args.resume && !stands(&measured) {
         findings.end();
         print(Stream::Err, "what was measured is not confirmed: nothing was sent\n");
         return Ok(Exit::Findings);
     }
     let record = recorded(args, &[read, imported], &bindings)?;
-    let journal = match &record {
+    let mut journal = match &record {
         Some((folder, _)) => journal(Some(&folder.journal()), args)?,
         None => journal(args.journal.as_deref(), args)?,
     };
+    if panel.is_some() {
+        shown(&mut journal, &board);
+    }
+    let mut watcher = Watcher::new(board, &program.plan);
     let plan = DeployPlan {
         bindings: (file, &bindings),
         mode,
@@ -108,13 +122,13 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         who: &who,
         world: Rc::new(Machine::new()),
         exposed: &EXPOSED,
+        beside: &mut watcher,
     };
     cancel::last_words(left_exposed);
     if args.speed != 1.0 && mode != Mode::Dry {
         let speed = show_number(args.speed);
         print(Stream::Err, &format!("lab time passes {speed} times as fast as the clock: for emulators only\n"));
     }
-    let bound = record.is_some().then(|| about(args, &program, (file, &bindings), &measured));
     let deployed = pipeline::deploy(&program, &sources, plan);
     if let (Some(path), false) = (&args.journal, args.resume) {
         forget_empty(path);
@@ -131,9 +145,9 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         }
     };
     let sealed = record
-        .zip(bound)
         .filter(|_| deployed.execution.is_some())
-        .map(|((folder, main), about)| folder.seal(About { main, ..about }, &deployed));
+        .map(|(folder, main)| folder.seal(About { main, ..about }, &deployed));
+    drop(panel);
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     if let Some(digest) = sealed.transpose()? {
@@ -152,6 +166,33 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
         print(Stream::Err, "the deployment was stopped by a person before it began\n");
     }
     Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
+}
+
+/// What is shown of a deployment, and the page that shows it where one is asked for.
+fn panel(args: &DeployArgs, program: &Program, about: &About) -> Result<(Arc<Board>, Option<Panel>), String> {
+    let told = program.drivers.iter().flat_map(|driver| &driver.told);
+    let file = args.subject.file.display().to_string();
+    let board = Arc::new(Board::new(told, file, args.subject.workflow.clone(), args.speed, &about.devices));
+    if !args.view {
+        return Ok((board, None));
+    }
+    let panel = Panel::open(Arc::clone(&board), &CONTROL, &EXPOSED, args.port)
+        .map_err(|e| format!("cannot serve the page at port {}: {}", args.port, files::reason(&e)))?;
+    print(Stream::Err, &format!("the page of this deployment: {}\n", panel.url()));
+    Ok((board, Some(panel)))
+}
+
+/// Puts on the board what a journal says and what is written from here on.
+fn shown(journal: &mut Kept, board: &Arc<Board>) {
+    let reader = Arc::clone(board);
+    match journal {
+        Kept::Left(journal, before) => {
+            before.iter().for_each(|entry| board.take(entry));
+            journal.show_to(Box::new(move |entry| reader.take(entry)));
+        }
+        Kept::New(journal) => journal.show_to(Box::new(move |entry| reader.take(entry))),
+        Kept::Not | Kept::Damaged(_) => {}
+    }
 }
 
 /// What the bindings say was measured of the lab.

@@ -7,7 +7,7 @@ use matterix_hardware::codec::shown;
 use matterix_hardware::deploy::{Control, Course, Ending, Exposed, Kept, Mode, carry_out};
 use matterix_hardware::world::World;
 use matterix_ir::{Diagnostic, FileId, Program, Sources};
-use matterix_runtime::exec::Listener;
+use matterix_runtime::exec::{Listener, Tee};
 use matterix_runtime::process::{Engine, Observer};
 
 use crate::terminal::{Stream, print};
@@ -34,18 +34,20 @@ pub struct Plan<'p> {
     pub world: Rc<dyn World>,
     /// Kept up to date with what is told to devices.
     pub exposed: &'p Exposed,
+    /// Hears what the executor does.
+    pub beside: &'p mut dyn Listener,
 }
 
 /// Carries a program out; what was wrong with the bindings, or how it ended.
 pub fn deploy(program: &Program, sources: &Sources, plan: Plan<'_>) -> Result<Result<Ending, Vec<Diagnostic>>, String> {
-    let Plan { mode, speed, seed, trace, journal, control, who, world, exposed, .. } = plan;
+    let Plan { mode, speed, seed, trace, journal, control, who, world, exposed, beside, .. } = plan;
     let (bindings, found) = binding::read(program, plan.bindings.0, plan.bindings.1);
     if found.iter().any(Diagnostic::is_error) {
         return Ok(Err(found));
     }
     let trace = Box::new(traced(trace || mode == Mode::Dry));
     let course = Course { bindings, mode, speed, seed, trace, journal, control, who, world, exposed };
-    let ending = carry_out(program, sources, course, &mut Told)?;
+    let ending = carry_out(program, sources, course, &mut Tee(&mut Told, beside))?;
     let led = |d: Diagnostic| super::run::led_by_the_user(d, sources);
     let diagnostics = ending.diagnostics.into_iter().map(led).collect();
     Ok(Ok(Ending { diagnostics, ..ending }))

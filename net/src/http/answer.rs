@@ -33,6 +33,11 @@ impl Answer {
         Answer { status: 200, headers: vec![("Content-Type", "text/event-stream")], body: None }
     }
 
+    /// Its status code.
+    pub fn status(&self) -> u16 {
+        self.status
+    }
+
     /// The answer with one more header.
     #[must_use]
     pub fn with(mut self, name: &'static str, value: &'static str) -> Self {

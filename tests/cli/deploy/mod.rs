@@ -7,6 +7,7 @@ mod framed;
 mod journal;
 mod kills;
 mod modules;
+mod panel;
 mod reads;
 mod record;
 mod safe;

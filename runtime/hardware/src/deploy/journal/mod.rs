@@ -53,6 +53,9 @@ struct Line<E> {
     entry: E,
 }
 
+/// Is shown lines of a journal.
+pub type Reader = dyn FnMut(&Entry);
+
 /// A journal being written.
 #[derive(Default)]
 pub struct Journal {
@@ -60,6 +63,8 @@ pub struct Journal {
     chain: Chain,
     /// Why nothing more was written.
     pub broken: Option<String>,
+    /// Is shown each line as it is written.
+    reader: Option<Box<Reader>>,
 }
 
 /// A journal that was read.
@@ -97,12 +102,12 @@ impl Journal {
     pub fn on(mut paper: Box<dyn Paper>) -> std::io::Result<Self> {
         let chain = Chain::default();
         paper.append(chain.head().as_bytes())?;
-        Ok(Journal { paper: Some(paper), chain, broken: None })
+        Ok(Journal { paper: Some(paper), chain, ..Journal::default() })
     }
 
     /// One that is gone on with, as it was read from the same paper.
     pub fn after(paper: Box<dyn Paper>, past: &Past) -> Self {
-        Journal { paper: Some(paper), chain: past.chain.clone(), broken: None }
+        Journal { paper: Some(paper), chain: past.chain.clone(), ..Journal::default() }
     }
 
     /// One that is gone on with, and what it says so far. A last line that broke off is cut away.
@@ -129,8 +134,16 @@ impl Journal {
         self.paper = None;
     }
 
+    /// From here on `reader` is shown each line as it is written, also where writing fails.
+    pub fn show_to(&mut self, reader: Box<Reader>) {
+        self.reader = Some(reader);
+    }
+
     /// Writes a line that may get lost with the machine.
     pub fn note(&mut self, entry: &Entry) {
+        if let Some(reader) = &mut self.reader {
+            reader(entry);
+        }
         let Some(paper) = self.paper.as_mut().filter(|_| self.broken.is_none()) else { return };
         let line = Line { after: self.chain.last.clone(), entry };
         let written = serde_json::to_string(&line).map_err(|e| e.to_string()).and_then(|text| {
