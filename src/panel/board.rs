@@ -302,7 +302,13 @@ mod tests {
     fn a_lost_device_says_so_until_it_tells_something() {
         let board = board();
         let lost = Some("plate".to_owned());
-        board.take(&Entry::Fault { t: 2.0, lost, code: "device-lost".to_owned(), text: "no answer".to_owned() });
+        board.take(&Entry::Fault {
+            t: 2.0,
+            tickets: 0,
+            lost,
+            code: "device-lost".to_owned(),
+            text: "no answer".to_owned(),
+        });
         assert_eq!(state(&board)["devices"][0]["trouble"], "no answer");
         board.take(&Entry::Told { t: 3.0, name: "plate.temperature".to_owned(), value: 300.0 });
         assert_eq!(state(&board)["devices"][0]["trouble"], serde_json::Value::Null);

@@ -15,6 +15,8 @@ pub struct Part {
     pub binding: &'static str,
     /// Its driver.
     pub driver: &'static str,
+    /// Its line, which others may share, and its address there.
+    pub line: (&'static str, Option<&'static str>),
     /// States that are 0 when it is safe.
     pub off: &'static [&'static str],
 }
@@ -24,7 +26,7 @@ pub struct Lab {
     /// What it is known by.
     pub name: &'static str,
     /// Its text.
-    pub text: &'static str,
+    pub text: fn() -> String,
     /// Its devices.
     pub parts: &'static [Part],
     /// What of what a device heard moves matter.
@@ -146,14 +148,45 @@ workflow stir_a_while in bench {
 } finally { stop stirring plate; stop heating plate }
 ";
 
+const SHARED: &str = "lab bench { ambient: 22 degC, acid = Ne1000, base = Ne1000 }
+workflow neutralise in bench {
+    set diameter acid to 14.43 mm
+    set diameter base to 14.43 mm
+    infuse 0.25 mL at 3 mL/min by acid
+    ask \"is it pink?\"
+    infuse 0.3 mL at 3 mL/min by base
+    wait 15 s
+    infuse 0.1 mL at 3 mL/min by acid
+}
+";
+
+const MODBUS: &str = "lab bench { ambient: 22 degC, block = HeatedBlock at (0, 0, 0) m }
+workflow warm in bench {
+    heat block to 40 degC
+    wait until block.temperature >= 24 degC timeout 10 min
+    ask \"is the vial in?\"
+    heat block to 60 degC
+    wait 30 s
+    expect block.temperature >= 24 degC
+} finally { stop heating block }
+";
+
 /// Strings of a pump that move its plunger, without what frames them.
 fn strokes(heard: &str) -> Vec<String> {
     let string = |frame: &str| {
         let from = frame.find(['I', 'A'])?;
         let to = from + frame[from..].find('R')?;
-        frame[from..to].contains('A').then(|| frame[from..=to].to_owned())
+        let is_stroke = |(at, _): (usize, char)| frame[at + 1..to].starts_with(|c: char| c.is_ascii_digit());
+        let mut strokes = frame[..to].char_indices().skip(from).filter(|(_, c)| *c == 'A');
+        strokes.any(is_stroke).then(|| frame[from..=to].to_owned())
     };
     heard.split(['\r', '\u{3}']).filter_map(string).collect()
+}
+
+/// Commands of a syringe pump that let it run, with its address and how much it is to pump.
+fn runs(heard: &str) -> Vec<String> {
+    let said = |word: &&str| word.contains("VOL") || word.contains("RUN");
+    heard.split(|c: char| c.is_control() || !c.is_ascii()).filter(|w| said(w)).map(str::to_owned).collect()
 }
 
 fn nothing(_: &str) -> Vec<String> {
@@ -162,19 +195,21 @@ fn nothing(_: &str) -> Vec<String> {
 
 const PLATE: Part = Part {
     name: "plate",
+    line: ("plate", None),
     binding: "[plate]\naddress = \"plate:1\"\n",
     driver: "IkaNamur",
     off: &["plate.active", "plate.stirring"],
 };
 
-static LABS: [Lab; 4] = [
+static LABS: [Lab; 6] = [
     Lab {
         name: "pumped",
-        text: PUMPED,
+        text: || PUMPED.to_owned(),
         parts: &[
             PLATE,
             Part {
                 name: "pump",
+                line: ("pump", None),
                 binding: "[pump]\naddress = \"pump:1\"\ndriver = \"CavroDt\"\n",
                 driver: "CavroDt",
                 off: &[],
@@ -184,9 +219,10 @@ static LABS: [Lab; 4] = [
     },
     Lab {
         name: "numbered",
-        text: NUMBERED,
+        text: || NUMBERED.to_owned(),
         parts: &[Part {
             name: "pump",
+            line: ("pump", None),
             binding: "[pump]\naddress = \"pump:1\"\ndriver = \"CavroOem\"\n",
             driver: "CavroOem",
             off: &[],
@@ -195,12 +231,57 @@ static LABS: [Lab; 4] = [
     },
     Lab {
         name: "weighed",
-        text: WEIGHED,
-        parts: &[Part { name: "scale", binding: "[scale]\naddress = \"scale:1\"\n", driver: "MtSics", off: &[] }],
+        text: || WEIGHED.to_owned(),
+        parts: &[Part {
+            name: "scale",
+            line: ("scale", None),
+            binding: "[scale]\naddress = \"scale:1\"\n",
+            driver: "MtSics",
+            off: &[],
+        }],
         moves: nothing,
     },
-    Lab { name: "stirred", text: STIRRED, parts: &[PLATE], moves: nothing },
+    Lab { name: "stirred", text: || STIRRED.to_owned(), parts: &[PLATE], moves: nothing },
+    Lab {
+        name: "shared",
+        text: || with(include_str!("../../../examples/devices/new_era.mtx"), SHARED),
+        parts: &[
+            Part {
+                name: "acid",
+                line: ("pumps", Some("3")),
+                binding: "[acid]\naddress = \"pumps:1\"\nunit = \"3\"\n",
+                driver: "Ne1000Safe",
+                off: &["acid.running"],
+            },
+            Part {
+                name: "base",
+                line: ("pumps", Some("7")),
+                binding: "[base]\naddress = \"pumps:1\"\nunit = \"7\"\n",
+                driver: "Ne1000Safe",
+                off: &["base.running"],
+            },
+        ],
+        moves: runs,
+    },
+    Lab {
+        name: "modbus",
+        text: || with(include_str!("../../../examples/devices/watlow.mtx"), MODBUS),
+        parts: &[Part {
+            name: "block",
+            line: ("block", None),
+            binding: "[block]\naddress = \"block:1\"\ndriver = \"EzZoneTcp\"\n",
+            driver: "EzZoneTcp",
+            off: &["block.active"],
+        }],
+        moves: nothing,
+    },
 ];
+
+/// The devices of an example, in another lab.
+fn with(example: &str, lab: &str) -> String {
+    let devices = example.split("\nlab ").next().unwrap_or_default();
+    format!("{devices}\n{lab}")
+}
 
 /// All labs, compiled once.
 pub fn all() -> &'static [Compiled] {
@@ -218,7 +299,7 @@ fn compiled(lab: &'static Lab) -> Compiled {
 
 fn program(lab: &Lab, wires: Wires) -> (Sources, Program) {
     let mut sources = Sources::default();
-    let file = sources.add("lab.mtx", lab.text);
+    let file = sources.add("lab.mtx", (lab.text)());
     let options = Options { wires, ..Options::default() };
     match matterix_lang::compile(&mut sources, file, &LibraryOnly, &options) {
         (Some(program), _) => (sources, program),

@@ -17,7 +17,7 @@ use matterix_runtime::process::{Engine, Options};
 use matterix_soundness::random::Random;
 
 use crate::disk::Disk;
-use crate::labs::Compiled;
+use crate::labs::{Compiled, Part};
 
 /// Seconds of lab time per second.
 pub const SPEED: f64 = 20.0;
@@ -83,6 +83,19 @@ pub struct Fate {
 }
 
 impl Fate {
+    /// Nothing happens.
+    pub fn calm() -> Fate {
+        Fate {
+            faults: Vec::new(),
+            deaths: VecDeque::new(),
+            people: VecDeque::new(),
+            hesitation: Duration::from_millis(100),
+            agree: true,
+            set: 0.0,
+            disk: usize::MAX,
+        }
+    }
+
     /// By lot: most of what may happen does not.
     pub fn drawn(random: &mut Random, frames: usize, lasts: Duration) -> Fate {
         let faults = if random.chance(60) { random.within(1, 3) } else { 0 };
@@ -151,14 +164,20 @@ pub struct Room {
 impl Room {
     /// With fresh emulators.
     pub fn new(lab: &'static Compiled, random: Random, fate: Fate, control: &'static Control) -> Rc<Room> {
-        let desks = lab.lab.parts.iter().map(|part| {
+        let is_first =
+            |(at, part): &(usize, &Part)| lab.lab.parts.iter().position(|p| p.line.0 == part.line.0) == Some(*at);
+        let first = lab.lab.parts.iter().enumerate().filter(is_first);
+        let desks = first.map(|(at, part)| {
             let params = lab.served.model.params.iter().map(|p| p.value).collect();
             let engine = Engine::new(&lab.prepared.model, params, lab.served.plan.locals.len(), Options::default());
             let mut engine = engine.expect("the model of a lab");
             engine.start(&mut ()).expect("it starts");
             let sim = Sim::new(engine, &lab.prepared, 0);
-            let emulator = Emulator::new(sim, lab.drivers(part), None).expect("an emulator");
-            let place = part.name;
+            let place = part.line.0;
+            let mut emulator = Emulator::new(sim, lab.drivers(part), part.line.1).expect("an emulator");
+            for other in lab.lab.parts[at + 1..].iter().filter(|p| p.line.0 == place) {
+                emulator.join(lab.drivers(other), other.line.1).expect("another at the line");
+            }
             Desk { place, emulator, back: VecDeque::new(), cut: Duration::ZERO, heard: Vec::new() }
         });
         Rc::new(Room {
@@ -185,6 +204,11 @@ impl Room {
     pub fn lost(&self) -> usize {
         let fate = self.fate.borrow();
         fate.faults.iter().filter(|(_, f)| matches!(f, Fault::Lost | Fault::Garbled)).count()
+    }
+
+    /// Frames that are to come to a device with a wrong bit.
+    pub fn garbled(&self) -> usize {
+        self.fate.borrow().faults.iter().filter(|(_, f)| *f == Fault::Garbled).count()
     }
 
     /// Frames that went out.
@@ -227,20 +251,20 @@ impl Room {
     }
 
     /// What a device has heard.
-    pub fn heard(&self, part: &str) -> String {
+    pub fn heard(&self, line: &str) -> String {
         let desks = self.desks.borrow();
         desks
             .iter()
-            .find(|d| d.place == part)
+            .find(|d| d.place == line)
             .map(|d| String::from_utf8_lossy(&d.heard).into_owned())
             .unwrap_or_default()
     }
 
     /// States of a device by their names, as they are by now.
-    pub fn states(&self, part: &str, lab: &Compiled, names: &[&str]) -> Vec<(String, f64)> {
+    pub fn states(&self, line: &str, lab: &Compiled, names: &[&str]) -> Vec<(String, f64)> {
         let now = self.clock.get().as_secs_f64() * SPEED;
         let mut desks = self.desks.borrow_mut();
-        let Some(desk) = desks.iter_mut().find(|d| d.place == part) else { return Vec::new() };
+        let Some(desk) = desks.iter_mut().find(|d| d.place == line) else { return Vec::new() };
         desk.emulator.pass(now).expect("the model goes on");
         let states = desk.emulator.sim().engine().states().to_vec();
         let of = |name: &&str| {

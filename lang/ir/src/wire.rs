@@ -91,6 +91,11 @@ pub struct Template {
 }
 
 impl Template {
+    /// Whether it says nothing at all.
+    pub fn is_blank(&self) -> bool {
+        self.pieces.iter().all(|piece| matches!(piece, Piece::Plain(text) if text.is_empty()))
+    }
+
     /// The text with the same in place of every value.
     pub fn with(&self, value: &str) -> String {
         let piece = |piece: &Piece| match piece {

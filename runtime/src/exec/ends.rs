@@ -7,21 +7,29 @@ use matterix_ir::scene::InstanceId;
 use super::failure::FailureTrace;
 use super::frame::End;
 use super::{Executor, tree};
+use crate::fault::Fault;
 
 impl<'p> Executor<'p, '_> {
-    /// What of it holds now, at the start.
-    pub(super) fn in_order(&mut self) -> Vec<&'p Limit> {
+    /// What of it holds now, at the start. Fails where that cannot be asked for.
+    pub(super) fn in_order(&mut self) -> Result<Vec<&'p Limit>, Fault> {
         let plan = self.plan;
-        plan.ends.iter().filter(|end| matches!(self.holds(&end.condition), Ok(Some(true)))).collect()
+        let mut begun = Vec::new();
+        for end in &plan.ends {
+            if self.holds(&end.condition)? == Some(true) {
+                begun.push(end);
+            }
+        }
+        Ok(begun)
     }
 
-    /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are.
-    pub(super) fn judge_ends(&mut self, begun: &[&Limit]) {
+    /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are. Fails where
+    /// it cannot be asked for: what nobody knows to be off may be on.
+    pub(super) fn judge_ends(&mut self, begun: &[&Limit]) -> Result<(), Fault> {
         if self.abort.is_some() || !matches!(self.end, Some(End::Done)) {
-            return;
+            return Ok(());
         }
         for end in begun {
-            if !matches!(self.holds(&end.condition), Ok(Some(false))) {
+            if self.holds(&end.condition)? != Some(false) {
                 continue;
             }
             let how = end.condition.refusal.as_ref().map_or("unfinished".to_owned(), |r| r.failure.replace('_', " "));
@@ -43,6 +51,7 @@ impl<'p> Executor<'p, '_> {
             };
             self.unfinished.push(trace);
         }
+        Ok(())
     }
 
     /// The latest operation that used a thing and the steps around it, innermost first.

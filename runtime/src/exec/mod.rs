@@ -254,14 +254,17 @@ impl<'p, 'b> Executor<'p, 'b> {
 
     /// Runs to the end: tasks first, then time.
     fn drive(&mut self) {
-        let begun = self.in_order();
+        let begun = match self.in_order() {
+            Ok(begun) => begun,
+            Err(fault) => return self.abort(FailureTrace::of_fault(fault)),
+        };
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);
         self.alarmed();
         self.drain();
         while self.end.is_none() {
-            if self.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed)) {
+            if self.is_to_end() {
                 self.abort = Some(Abort::Cancelled);
                 self.stop_all(Stop::Now, false);
                 self.drain();
@@ -270,7 +273,14 @@ impl<'p, 'b> Executor<'p, 'b> {
             self.begin_asked();
             self.pass_time();
         }
-        self.judge_ends(&begun);
+        if let Err(fault) = self.judge_ends(&begun) {
+            self.abort(FailureTrace::of_fault(fault));
+        }
+    }
+
+    /// Whether somebody has ended it early, which has not been heeded yet.
+    fn is_to_end(&self) -> bool {
+        self.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed))
     }
 
     /// Works off all tasks.

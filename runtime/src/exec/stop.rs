@@ -71,7 +71,7 @@ impl Executor<'_, '_> {
         FailureTrace { fault: true, time: fault.time, help: fault.help, ..self.trace(id, raised) }
     }
 
-    fn abort(&mut self, trace: FailureTrace) {
+    pub(super) fn abort(&mut self, trace: FailureTrace) {
         self.out.failure(&trace);
         match self.abort {
             None => self.abort = Some(Abort::Fault(Box::new(trace))),

@@ -54,6 +54,8 @@ impl Executor<'_, '_> {
         let fired = if !agenda.progress { self.unblock() } else { self.advance(&agenda) };
         let looked = fired.and_then(|fired| self.sample().map(|()| fired));
         match looked {
+            // Nothing new begins at the instant at which it was ended early.
+            Ok(_) if self.is_to_end() => {}
             Ok(fired) => {
                 self.alarmed();
                 self.look_at_all(&fired);

@@ -220,3 +220,51 @@ fn a_journal_is_its_users_own_and_small() {
     let (bytes, per_hour) = (about.len() as f64, 0.5e6);
     assert!(bytes <= 8e3 + per_hour * hours, "{bytes} bytes in {hours} h with {told} readings");
 }
+
+/// A stirrer of a user's own, which confirms what it is told.
+const STIRRER: &str = "mtx 1
+capability Spins { state spinning: Bool = false { counts_as: running }
+    command spin effect spinning = true
+    command rest effect spinning = false }
+asset Spinner: Spins { }
+driver SpinnerLine for Spinner over serial(baud: 9600, frame: \"8N1\", framing: line, timeout: 5 s) {
+    spin sends \"ON\" expects \"OK\"
+    rest sends \"OFF\" expects \"OK\"
+    safe sends \"OFF\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, stirrer = Spinner }
+workflow mix in bench {
+    spin stirrer
+    wait 12 s
+    rest stirrer
+}
+";
+
+#[test]
+fn what_was_half_said_begins_when_it_is_said_once_more() {
+    let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+    let noted = std::sync::Arc::clone(&told);
+    let device = super::Device::start(b'\n', move |line, before| {
+        noted.lock().expect("not poisoned").push((line.to_owned(), std::time::SystemTime::now()));
+        if before == 0 {
+            // The process that waits for this answer is killed meanwhile.
+            std::thread::sleep(Duration::from_millis(1500));
+        }
+        super::Answer::Says("OK\r\n")
+    });
+    let dir = bench("half_said", STIRRER, "stirrer", &device.address);
+    let mut process = deployed(&dir);
+    until(&dir, "\"starting\"", 1);
+    std::thread::sleep(Duration::from_millis(300));
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    // As long as the wait would take.
+    std::thread::sleep(Duration::from_secs(4));
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let told = told.lock().expect("not poisoned");
+    let words: Vec<&str> = told.iter().map(|(line, _)| line.as_str()).collect();
+    assert_eq!(words, ["ON", "ON", "OFF"]);
+    let spins = told[2].1.duration_since(told[1].1).expect("later").as_secs_f64();
+    assert!((2.5..6.0).contains(&spins), "12 s at four times the speed of the clock are 3 s: {spins} s");
+}

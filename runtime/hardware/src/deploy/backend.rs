@@ -178,6 +178,10 @@ impl Hardware<'_, '_> {
             Some(_) => self.replayed_start(number, step, label, &texts)?,
             None => None,
         };
+        if exchange.is_some() && replayed.is_none() {
+            // What an earlier process said in part begins now, on the twin too.
+            self.go_live(out)?;
+        }
         let twin = self.twin.start(operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
@@ -226,8 +230,12 @@ impl Hardware<'_, '_> {
         Ok(ticket)
     }
 
+    /// It goes on: it is looked at again soon.
+    fn polled_again(&self) -> Status {
+        Status::Running { until: Some(self.twin.now() + POLL), watch: None }
+    }
+
     fn poll_operation(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
-        let now = self.twin.now();
         let Some(running) = self.running.get_mut(&ticket) else { return Ok(Status::Done) };
         let (device, twin, exchange) = (running.device, running.twin, running.exchange);
         if let Some((name, text)) = running.failed.take() {
@@ -237,7 +245,7 @@ impl Hardware<'_, '_> {
         }
         if running.by_hand {
             match self.answer(ticket)? {
-                None => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
+                None => return Ok(self.polled_again()),
                 Some(Answer { yes: true, .. }) => {}
                 Some(Answer { yes: false, who }) => {
                     self.running.remove(&ticket);
@@ -258,7 +266,7 @@ impl Hardware<'_, '_> {
                 return Err(fault);
             }
             match next {
-                Some(Entry::Ended { t, ticket: before, failed }) if before == ticket.0 && t <= now => {
+                Some(Entry::Ended { t, ticket: before, failed }) if before == ticket.0 && t <= self.twin.now() => {
                     self.replay.pop_front();
                     if let Some((name, text)) = failed {
                         self.running.remove(&ticket);
@@ -266,9 +274,10 @@ impl Hardware<'_, '_> {
                         return Ok(Status::Failed { name, text });
                     }
                 }
-                Some(_) => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
+                Some(_) => return Ok(self.polled_again()),
                 None => {
                     self.go_live(out)?;
+                    let now = self.twin.now();
                     let text = self.texts(std::slice::from_ref(&until.asks))?.concat();
                     self.recall(ticket);
                     let asked = self.inquire(device, |link, driver, ear| link.is_ready(&text, until, driver, ear));
@@ -278,7 +287,7 @@ impl Hardware<'_, '_> {
                             let message = format!("`{}` was not ready in time", self.devices[device].name);
                             return Err(self.fault(codes::DEVICE_LOST, exchange.span, message));
                         }
-                        Ok(false) => return Ok(Status::Running { until: Some(now + POLL), watch: None }),
+                        Ok(false) => return Ok(self.polled_again()),
                         Err(Trouble::Refused { failure, text }) => {
                             let text = format!("`{}` has stopped: {text}", self.devices[device].name);
                             let failed = Some((failure.clone(), text.clone()));

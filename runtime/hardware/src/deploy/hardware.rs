@@ -121,6 +121,8 @@ pub struct Hardware<'m, 't> {
     pub(super) kept: Vec<(usize, InstanceId, String, String)>,
     /// What answers said when operations of an earlier process began, by ticket.
     pub(super) begun_with: BTreeMap<u64, Vec<(String, String)>>,
+    /// States that a command sets of which it is not known whether its device was told it.
+    pub(super) half_said: Vec<u32>,
     /// States that devices were told.
     pub(super) commanded: BTreeSet<u32>,
     pub(super) running: BTreeMap<Ticket, Running<'m>>,
@@ -186,6 +188,7 @@ impl<'m, 't> Hardware<'m, 't> {
             left_at: (0.0, 0.0),
             kept: Vec::new(),
             begun_with: BTreeMap::new(),
+            half_said: Vec::new(),
             commanded: BTreeSet::new(),
             origin,
             dated: f64::NEG_INFINITY,
@@ -308,7 +311,7 @@ impl<'m, 't> Hardware<'m, 't> {
             let (t, code, text) = (self.twin.now(), fault.code.name.to_owned(), fault.message.clone());
             self.noted = Some(fault.message.clone());
             let lost = self.losing.take();
-            self.journal.note(&Entry::Fault { t, lost, code, text });
+            self.journal.note(&Entry::Fault { t, tickets: self.tickets, lost, code, text });
         }
         fault
     }

@@ -48,8 +48,9 @@ impl Hardware<'_, '_> {
             }
             let advance = self.twin.advance(target, watches, out)?;
             self.beat(true, out)?;
-            if is_live {
-                self.date();
+            match is_live {
+                true => self.date(),
+                false => self.has_kept_pace()?,
             }
             match advance {
                 Advance::Reached if self.twin.now() < until => {}
@@ -64,27 +65,37 @@ impl Hardware<'_, '_> {
         match self.front() {
             Some(Entry::Resumed { t, .. }) => {
                 if until > t {
-                    self.next_entry();
+                    // Only this one: before the next of them went on, time passed.
+                    self.next_process(t);
                     return self.join(until, out);
                 }
                 Ok(false)
             }
-            Some(other) => {
-                let is_said_between = matches!(
-                    other,
-                    Entry::Answered { .. } | Entry::Gate { .. } | Entry::Stop { .. } | Entry::Leap { .. }
-                );
-                let comes_too_soon = other.time() < until && other.time() <= self.twin.now() && !is_said_between;
-                if comes_too_soon { Err(self.mismatch("time passes", &other)) } else { Ok(false) }
-            }
-            None if self.settings.mode == Mode::Replay && self.twin.now() < self.ends_at.min(until) => Ok(false),
-            None if self.settings.mode == Mode::Replay && until <= self.ends_at => Ok(false),
+            Some(_) => Ok(false),
+            // What came about at the very end did so in a step that was to lead further.
+            None if self.settings.mode == Mode::Replay && self.twin.now() <= self.ends_at => Ok(false),
             None if self.resuming && until <= self.catches_up_to() => Ok(false),
             None => {
                 self.go_live(out)?;
                 Ok(true)
             }
         }
+    }
+
+    /// Nothing that an earlier process wrote lies behind: a step may come to its end at the moment at which it began, as what was
+    /// waited for had come about by then, but leads no further.
+    fn has_kept_pace(&mut self) -> Result<(), Fault> {
+        let Some(next) = self.front() else { return Ok(()) };
+        let is_said_between = matches!(
+            next,
+            Entry::Answered { .. }
+                | Entry::Gate { .. }
+                | Entry::Stop { .. }
+                | Entry::Leap { .. }
+                | Entry::Resumed { .. }
+        );
+        let is_behind = next.time() < self.twin.now() && !is_said_between;
+        if is_behind { Err(self.mismatch("time passes", &next)) } else { Ok(()) }
     }
 
     /// That nothing more can be written down, once: what ends then is not held up by it.
@@ -143,9 +154,8 @@ impl Hardware<'_, '_> {
 
     /// Notes that a person stopped it where it was ending already, or that they did.
     pub(super) fn stop_late(&mut self) {
-        if self.settings.mode == Mode::Replay {
-            self.heeded_before();
-        } else if self.settings.control.is_stopped() && !self.cancelled {
+        self.heeded_before();
+        if self.settings.mode != Mode::Replay && self.settings.control.is_stopped() && !self.cancelled {
             self.heed();
         }
     }

@@ -28,8 +28,10 @@ impl Hardware<'_, '_> {
             None => {
                 self.go_live(out)?;
                 let (t, wall) = (self.twin.now(), self.wall());
-                self.keep(&Entry::Asked { t, ticket: ticket.0, step: step.0, text: text.clone(), wall })?;
+                // Put first: whoever reads in the journal that it was asked can answer it.
                 self.settings.control.ask(ticket.0, &text);
+                let asked = self.keep(&Entry::Asked { t, ticket: ticket.0, step: step.0, text: text.clone(), wall });
+                asked.inspect_err(|_| self.settings.control.withdraw(ticket.0))?;
             }
         }
         self.questions.insert(ticket, text);

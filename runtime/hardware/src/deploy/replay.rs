@@ -25,11 +25,16 @@ impl Hardware<'_, '_> {
     /// come to the time of that.
     pub(super) fn next_entry(&mut self) -> Option<Entry> {
         while let Some(Entry::Resumed { t, .. }) = self.front() {
-            self.replay.pop_front();
-            while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
-            self.forget_beats();
+            self.next_process(t);
         }
         self.front()
+    }
+
+    /// Another process went on here: the lab has come to the time of that, s.
+    pub(super) fn next_process(&mut self, t: f64) {
+        self.replay.pop_front();
+        while self.twin.now() < t && self.twin.advance(t, &[], &mut ()).is_ok() {}
+        self.forget_beats();
     }
 
     /// The next line that matters to the plan, wherever the lab is by then.
@@ -62,8 +67,8 @@ impl Hardware<'_, '_> {
 
     /// The same, and the device whose line was lost by it.
     fn next_fault(&mut self) -> Option<(Fault, Option<String>)> {
-        let Some(Entry::Fault { t, lost, code, text }) = self.front() else { return None };
-        if t > self.twin.now() {
+        let Some(Entry::Fault { t, tickets, lost, code, text }) = self.front() else { return None };
+        if t > self.twin.now() || tickets != self.tickets {
             return None;
         }
         self.replay.pop_front();
@@ -101,56 +106,66 @@ impl Hardware<'_, '_> {
         label: &str,
         texts: &[String],
     ) -> Result<Option<Begun>, Fault> {
-        let Some(entry) = self.next_entry() else { return Ok(None) };
-        if matches!(&entry, Entry::Fault { t, .. } if *t <= self.twin.now()) {
-            return Ok(Some(Begun::Not));
-        }
-        let begins = format!("`{label}` begins at {} s", show_number(self.twin.now()));
-        let Entry::Starting { t, ticket: before, step: at, sends, device, .. } = &entry else {
-            return Err(self.mismatch(&begins, &entry));
-        };
-        if *before != ticket || *at != step.0 || *t != self.twin.now() {
-            return Err(self.mismatch(&begins, &entry));
-        }
-        if sends != texts {
-            let sends = texts.join("`, `");
-            return Err(self.mismatch(&format!("`{label}` sends `{sends}`"), &entry));
-        }
-        let (sends, device) = (sends.clone(), device.clone());
-        self.replay.pop_front();
-        let next = self.next_entry();
-        if let Some((fault, lost)) = self.next_fault() {
-            return Ok(Some(Begun::Fault(fault, lost)));
-        }
-        match next {
-            Some(Entry::Started { ticket: t, .. }) if t == ticket => {
-                self.replay.pop_front();
-                Ok(Some(Begun::Told(None)))
+        let mut half_said = false;
+        loop {
+            let Some(entry) = self.next_entry() else {
+                return if half_said { self.once_more(step, texts).map(|()| None) } else { Ok(None) };
+            };
+            if matches!(&entry, Entry::Fault { t, tickets, .. } if *t <= self.twin.now() && *tickets == self.tickets) {
+                return Ok(Some(match half_said {
+                    true => self.next_fault().map_or(Begun::Not, |(fault, lost)| Begun::Fault(fault, lost)),
+                    false => Begun::Not,
+                }));
             }
-            Some(Entry::Ended { ticket: t, failed, .. }) if t == ticket => {
-                self.replay.pop_front();
-                Ok(Some(Begun::Told(failed)))
-            }
-            None => {
-                // It was cut off while this was being said: said once more only where that changes nothing.
-                let operation = match &self.program.plan.get(step).step {
-                    Step::Operation(operation) => operation,
-                    _ => return Ok(None),
-                };
-                if self.is_repeatable(operation, step) {
-                    return Ok(None);
+            match entry {
+                Entry::Started { ticket: t, .. } if half_said && t == ticket => {
+                    self.replay.pop_front();
+                    return Ok(Some(Begun::Told(None)));
                 }
-                self.refused.set(true);
-                let message = format!(
-                    "it is not known whether `{device}` was told `{}` for `{label}` before the journal broke off",
-                    sends.join("`, `")
-                );
-                let mut fault = self.fault(codes::JOURNAL_MISMATCH, self.program.plan.get(step).span, message);
-                fault.help.push("it may have moved something: look, and begin anew from there".to_owned());
-                Err(fault)
+                Entry::Ended { ticket: t, failed, .. } if half_said && t == ticket => {
+                    self.replay.pop_front();
+                    return Ok(Some(Begun::Told(failed)));
+                }
+                // Another process has said it once more.
+                Entry::Starting { t, ticket: before, step: at, ref sends, .. }
+                    if before == ticket && at == step.0 && t == self.twin.now() =>
+                {
+                    if sends != texts {
+                        let sends = texts.join("`, `");
+                        return Err(self.mismatch(&format!("`{label}` sends `{sends}`"), &entry));
+                    }
+                    self.replay.pop_front();
+                    half_said = true;
+                }
+                other => {
+                    let now = show_number(self.twin.now());
+                    return Err(self.mismatch(&format!("`{label}` begins at {now} s"), &other));
+                }
             }
-            Some(other) => Err(self.mismatch(&format!("`{label}` has begun"), &other)),
         }
+    }
+
+    /// What was cut off while it was being said is said once more only where that changes nothing.
+    fn once_more(&mut self, step: StepId, sends: &[String]) -> Result<(), Fault> {
+        let planned = self.program.plan.get(step);
+        let Step::Operation(operation) = &planned.step else { return Ok(()) };
+        if self.is_repeatable(operation, step) {
+            let set = |action: &Action| match action {
+                Action::Assign { state, .. } => Some(*state),
+                Action::Move { .. } => None,
+            };
+            self.half_said = operation.at_start.iter().chain(&operation.at_end).filter_map(set).collect();
+            return Ok(());
+        }
+        self.refused.set(true);
+        let message = format!(
+            "it is not known whether its device was told `{}` for `{}` before the journal broke off",
+            sends.join("`, `"),
+            planned.label
+        );
+        let mut fault = self.fault(codes::JOURNAL_MISMATCH, planned.span, message);
+        fault.help.push("it may have moved something: look, and begin anew from there".to_owned());
+        Err(fault)
     }
 
     /// Whether saying it twice does what saying it once does: it only sets what does not depend on itself, at once.

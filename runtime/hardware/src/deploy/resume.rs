@@ -121,6 +121,7 @@ impl Hardware<'_, '_> {
         let (t, wall, pid, who) = (self.twin.now(), self.wall(), std::process::id(), self.who.clone());
         self.keep(&Entry::Resumed { t, wall, pid, who })?;
         self.answers = 0;
+        self.half_said.clear();
         self.ask_again();
         Ok(())
     }
@@ -150,7 +151,8 @@ impl Hardware<'_, '_> {
             for (line, told) in driver.told.iter().enumerate() {
                 let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
                 let was_set = told.state.is_some_and(|s| self.commanded.contains(&s));
-                if !holds || !(was_set || used.contains(&told.value)) {
+                let is_unknown = told.state.is_some_and(|s| self.half_said.contains(&s));
+                if !holds || is_unknown || !(was_set || used.contains(&told.value)) {
                     continue;
                 }
                 let value = match self.tell(device, line) {

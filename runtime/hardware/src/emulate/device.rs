@@ -251,10 +251,17 @@ impl<'m> Device<'_, 'm> {
         for (driver, index, served) in served {
             for (place, template) in served.exchange.sends.iter().enumerate() {
                 let Some(found) = self.codec.found(template, word) else { continue };
+                if word.is_empty() && served.exchange.sends.len() > 1 {
+                    continue;
+                }
                 part = part.or_else(|| Some((served, place, found.clone())));
                 self.heard.insert((driver, index, place), found);
-                let whole = place + 1 == served.exchange.sends.len();
-                let all: Option<Vec<Found>> = (0..served.exchange.sends.len())
+                let sends = &served.exchange.sends;
+                let whole = place + 1 == sends.len();
+                // A blank line between others only ends what may have gone before it.
+                let says = |p: &usize| sends.len() == 1 || !sends[*p].is_blank();
+                let all: Option<Vec<Found>> = (0..sends.len())
+                    .filter(says)
                     .map(|p| self.heard.get(&(driver, index, p)).cloned())
                     .collect::<Option<Vec<_>>>()
                     .map(|all| all.concat());

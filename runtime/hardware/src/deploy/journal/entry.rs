@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the form.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// One line. Times are seconds of lab time, walls seconds since 1970.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -181,6 +181,8 @@ pub enum Entry {
     Fault {
         /// s.
         t: f64,
+        /// How many operations and questions had begun: two steps at one moment may each have met it.
+        tickets: u64,
         /// The device whose line is lost by it.
         lost: Option<String>,
         /// The code.
