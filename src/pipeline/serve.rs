@@ -13,7 +13,7 @@ use matterix_hardware::deploy::{
 use matterix_hardware::serve::{Attendant, Catalogue, Desk, Paced, catalogue};
 use matterix_hardware::world::Machine;
 use matterix_hardware::{binding, calibration};
-use matterix_ir::offer::{Offer, Shown};
+use matterix_ir::offer::{Failure, Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
 use matterix_ir::{Diagnostic, FileId, Program, Sources};
 use matterix_runtime::backend::{Backend, Prepared, Sim};
@@ -89,9 +89,9 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         let refusable = |mut offer: Offer| {
             let drivers = devices.iter().filter_map(|d| d.driver);
             let refused = drivers.flat_map(|d| d.refusals.iter().map(|r| r.failure.clone()));
-            for failure in refused.collect::<Vec<_>>() {
-                if !offer.fails.contains(&failure) {
-                    offer.fails.push(failure);
+            for name in refused.collect::<Vec<_>>() {
+                if !offer.fails.iter().any(|f| f.name == name) {
+                    offer.fails.push(Failure { name, help: None });
                 }
             }
             offer
@@ -131,9 +131,9 @@ fn attend(
     shown: Vec<&Shown>,
     service: Service<'_>,
 ) -> Result<(Vec<Diagnostic>, bool), String> {
-    let catalogue = catalogue(&program.scene, offers, shown);
+    let catalogue = catalogue(&program.scene, &program.offers, offers, shown);
     let (name, features) = (program.scene.lab.clone(), catalogue.features.clone());
-    let about = format!("The lab `{name}`.");
+    let about = format!("The lab `{name}`. {}", program.offers.docs(None, "")).trim_end().to_owned();
     let version = env!("CARGO_PKG_VERSION");
     let (server, requests) = answer(service.address, &name, &about, version, &service.uuid, features)?;
     (service.ready)(server.address, &catalogue);

@@ -43,6 +43,7 @@ LAB = """mtx 1
 use std::heating::IkaRetControl
 use std::pumps::TubePump
 use std::glassware::Beaker250mL
+/// A bench by the window.
 lab bench {
     ambient: 22 degC
     plate = IkaRetControl at (0, 0, 0) m
@@ -53,9 +54,12 @@ capability Turner {
     state turns: Ratio = 0
     command turn for_a_while with(speed: Frequency)
         needs speed <= limit else too_fast "turn more slowly"
+        needs turns < 3 else worn_out "take a rest"
         fails jammed
         effect turns = turns + 1
         takes 3 s in 1 s .. 10 s
+    command rest
+        effect turns = 0
 }
 /// Warms a plate and lets it be.
 skill warm_up(plate: Heater) to(t: Temperature)
@@ -65,6 +69,16 @@ skill warm_up(plate: Heater) to(t: Temperature)
     heat plate to t
     wait 2 s
     stop heating plate
+}
+/// Weighs what stands on a balance.
+skill weigh(scale: Balance) -> Mass {
+    let seen <- read scale
+    return seen
+}
+skill count(n: Int) -> Int
+    needs n in 1 .. 7
+{
+    return 2 * n
 }
 workflow idle in bench { wait 1 s }
 """
@@ -155,8 +169,11 @@ def served():
         time.sleep(1.5)
         after = client.PlateWarm.Temperature.get()
         verdict("the twin heats", after > before + 1, f"{before:.2f} to {after:.2f} degC")
-        needs = raised(lambda: plate.Heat(T=500.0), DefinedExecutionError)
-        verdict("a need that does not hold is a defined error", needs is not None, f"{needs!r:.160}")
+        outside = raised(lambda: plate.Heat(T=500.0), ValidationError)
+        verdict("a set point outside of its range is refused by the client", outside is not None, f"{outside!r:.120}")
+        said = call(host, port, names, "PlateHeater", "Heat", b"\x0a\x09\x09" + struct.pack("<d", 500.0))
+        verdict("and by the server", "T" in said and "above 340" in said, said)
+        described(service, names)
 
         turner = client.TurnerTurner
         began = time.monotonic()
@@ -174,16 +191,20 @@ def served():
         moved = sorted({p for _, p in news if p is not None})
         verdict("an observable command", 0.2 < took < 3 and len(moved) > 1, f"{took:.2f} s, progress {moved}")
         verdict("its effect", turner.Turns.get() == 1.0, turner.Turns.get())
-        fast = turner.TurnForAWhile(Speed=9.0)
-        while not fast.done:
-            time.sleep(0.02)
-        error = raised(fast.get_responses, DefinedExecutionError)
-        verdict("a failure of an observable command", error is not None and error.identifier == "TooFast", f"{error!r:.160}")
+        for _ in range(2):
+            ended(turner.TurnForAWhile(Speed=5.0))
+        error = raised(lambda: ended(turner.TurnForAWhile(Speed=5.0)), DefinedExecutionError)
+        good = error is not None and error.identifier == "WornOut"
+        verdict("a need that does not hold is a defined error", good, f"{error!r:.160}")
+        turner.Rest()
         warming = client.BenchSkills.WarmUp(Plate="plate", T=45.0)
         held = raised(lambda: plate.Heat(T=30.0), CommandExecutionNotAccepted)
         while not warming.done:
             time.sleep(0.02)
         warming.get_responses()
+        weighed = ended(client.BenchSkills.Weigh(Scale="plate")).Result
+        counted = ended(client.BenchSkills.Count(N=6)).Result
+        verdict("results of skills arrive", 150 < weighed < 250 and counted == 12, f"{weighed} g, {counted}")
         verdict("a skill of the file", held is not None and plate.Target.get() == 45.0 and plate.Active.get() is False, held)
         wrong = raised(lambda: client.BenchSkills.WarmUp(Plate="beaker", T=45.0), ValidationError)
         verdict("a thing that does not fit", wrong is not None, f"{wrong!r:.120}")
@@ -224,6 +245,41 @@ def served():
         verdict("its UUID stays", first == second, first)
     finally:
         process.kill()
+
+
+def call(host, port, names, feature, command, message):
+    """The error of a call, decoded as far as it can be read."""
+    import base64
+
+    originator, category, identifier, version = next(n for n in names if f"/{feature}/" in n).split("/")
+    path = f"/sila2.{originator}.{category}.{identifier.lower()}.{version}.{identifier}/{command}"
+    channel = grpc.insecure_channel(f"{host}:{port}")
+    try:
+        channel.unary_unary(path)(message, timeout=5)
+        return "it was done"
+    except grpc.RpcError as error:
+        return base64.b64decode(error.details()).decode(errors="replace")
+    finally:
+        channel.close()
+
+
+def described(service, names):
+    """Whether features say what declarations of the lab say: ranges, units, texts."""
+    text = "".join(service.GetFeatureDefinition(n).FeatureDefinition for n in names if "bench" in n)
+    wanted = [
+        "<MaximalInclusive>340</MaximalInclusive>",
+        "<MinimalInclusive>0</MinimalInclusive>",
+        "<MaximalInclusive>5</MaximalInclusive>",
+        "<MinimalInclusive>1</MinimalInclusive>",
+        "<Label>degC</Label>",
+        "Warms a plate and lets it be.",
+        "Set it to `t` and switch its heating on.",
+        "The failure `worn_out`. To mend it: take a rest.",
+        "The IKA RET control-visc",
+    ]
+    lacking = [w for w in wanted if w not in text]
+    verdict("features have ranges, units and texts", not lacking, lacking or "")
+    verdict("the server says what it is", service.ServerDescription.get() == "The lab `bench`. A bench by the window.")
 
 
 def ended(command):

@@ -126,7 +126,8 @@ impl Writer {
             return self.leaf(tag, &least.to_string());
         }
         for (size, prefix) in [(sizes.0, "Minimal"), (sizes.1, "Maximal")] {
-            if let Some(size) = size {
+            // The schema has no least size of 0, which every value has.
+            if let Some(size) = size.filter(|s| *s > 0) {
                 self.leaf(&format!("{prefix}{tag}"), &size.to_string());
             }
         }

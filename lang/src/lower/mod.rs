@@ -154,7 +154,7 @@ impl<'a, 'e> Planner<'a, 'e> {
         self.begin_wires();
         if self.wires == wires::Wires::Offered {
             self.lab.readings_live = true;
-            self.begin_offers();
+            self.begin_offers(task.lab);
             self.offer_skills(decl.module);
         }
         let mut arguments = Vec::new();

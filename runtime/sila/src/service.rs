@@ -70,15 +70,35 @@ pub fn feature() -> Feature {
     }
 }
 
-/// An identifier for people: `Get Feature Definition`.
+/// An identifier for people: `Get Feature Definition`, `Turn For A While`, `Server UUID`.
 pub fn spaced(identifier: &str) -> String {
     let mut out = String::new();
-    for (i, c) in identifier.chars().enumerate() {
-        let lower = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
-        if i > 0 && c.is_ascii_uppercase() && out.ends_with(lower) {
+    let mut before = None;
+    let mut rest = identifier.chars();
+    while let Some(c) = rest.next() {
+        let is_small = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+        let begins = rest.as_str().starts_with(is_small);
+        if c.is_ascii_uppercase() && before.is_some_and(|b: char| is_small(b) || begins) {
             out.push(' ');
         }
         out.push(c);
+        before = Some(c);
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn identifiers_are_spaced_into_words() {
+        for (identifier, words) in [
+            ("GetFeatureDefinition", "Get Feature Definition"),
+            ("TurnForAWhile", "Turn For A While"),
+            ("ServerUUID", "Server UUID"),
+            ("ServerVendorURL", "Server Vendor URL"),
+            ("T", "T"),
+        ] {
+            assert_eq!(super::spaced(identifier), words);
+        }
+    }
 }

@@ -13,6 +13,7 @@ mod message;
 mod modbus;
 mod offers;
 mod pattern;
+mod ranges;
 mod served;
 mod transport;
 

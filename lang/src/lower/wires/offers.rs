@@ -1,24 +1,31 @@
 //! What a lab offers to others: every command of its devices, written out apart from any workflow, and what they show.
 
-use matterix_ir::offer::{Arranged, Kind, Offer, Parameter, Shown};
-use matterix_ir::plan::Step;
+use std::sync::Arc;
+
+use matterix_ir::graph::Op;
+use matterix_ir::offer::{About, Arranged, Failure, Kind, Offer, Parameter, Shown};
+use matterix_ir::plan::{Condition, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Unit};
 
-use super::{Arrangement, Mapped};
-use crate::ast::{Clause, ClauseKind, ItemKind, Member, MemberKind, Param, Role, Sig};
+use super::ranges::bounds;
+use super::{Arrangement, Mapped, SELF};
+use crate::ast::{Clause, ClauseKind, ExprKind, ItemKind, Member, MemberKind, Param, Role, Sig, TextPart, Type as Ty};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::lower::Planner;
 use crate::lower::call::Bound;
-use crate::names::verb_text;
+use crate::names::{DeclId, verb_text};
 
 /// A command with more arrangements is left to workflows.
 const MOST: usize = 200;
 
 impl<'a> Planner<'a, '_> {
     /// Notes everything that the devices of the lab can be told, and show.
-    pub(in crate::lower) fn begin_offers(&mut self) {
+    pub(in crate::lower) fn begin_offers(&mut self, lab: DeclId) {
+        if !self.draft {
+            self.describe(lab);
+        }
         for index in 0..self.lab.instances.len() as u32 {
             let id = InstanceId(index);
             let members = self.lab.all_members(id);
@@ -44,8 +51,8 @@ impl<'a> Planner<'a, '_> {
         if arrangements.len() > MOST {
             return;
         }
-        let Some(asked) = self.asked_for(sig, clauses, &arrangements, m.module) else { return };
-        let (mut arranged, mut lasts, mut fails) = (Vec::new(), false, Vec::new());
+        let Some(mut asked) = self.asked_for(sig, clauses, &arrangements, m.module) else { return };
+        let (mut arranged, mut lasts, mut fails, mut needs) = (Vec::new(), false, Vec::new(), Vec::new());
         for Arrangement { values, locals } in arrangements {
             let things = things(&asked, &values);
             let bound = Bound { values: values.clone() };
@@ -58,12 +65,9 @@ impl<'a> Planner<'a, '_> {
                 continue;
             }
             lasts |= operation.takes.is_some() || operation.until.is_some();
-            let needs = operation.needs.iter().map(|n| n.failure().to_owned());
-            for failure in operation.fails.iter().cloned().chain(needs) {
-                if !fails.contains(&failure) {
-                    fails.push(failure);
-                }
-            }
+            let declared = operation.fails.iter().map(|name| Failure { name: name.clone(), help: None });
+            note(&mut fails, declared.chain(operation.needs.iter().map(|n| failure_of(n))));
+            needs.push((operation.needs.clone(), locals.clone()));
             let verb = verb_text(&sig.verb);
             let label = format!("{verb} {}", self.lab.instances[id.0 as usize].name);
             let span = sig.span;
@@ -79,19 +83,21 @@ impl<'a> Planner<'a, '_> {
                 }
             };
             let locals = locals.into_iter().map(|(_, local)| local).collect();
-            arranged.push(Arranged { things, locals, step });
+            arranged.push(Arranged { things, locals, step, result: None });
         }
         if arranged.is_empty() {
             return;
         }
+        self.bound(&mut asked, &needs);
         self.offers.commands.push(Offer {
             device: Some(id),
             capability: self.lab.tables.kind_name(m.owner).to_string(),
             verb: verb_text(&sig.verb),
-            docs: docs(m.member),
+            docs: described(docs(m.member), clauses),
             parameters: asked,
             arrangements: arranged,
             lasts,
+            result: None,
             fails,
         });
     }
@@ -106,18 +112,22 @@ impl<'a> Planner<'a, '_> {
             if arrangements.len() > MOST {
                 continue;
             }
-            let Some(asked) = self.asked_for(sig, clauses, &arrangements, module) else { continue };
-            let mut fails = vec!["need".to_string()];
+            let Some(mut asked) = self.asked_for(sig, clauses, &arrangements, module) else { continue };
+            let mut fails = vec![Failure { name: "need".to_string(), help: None }];
             for clause in clauses {
                 match &clause.kind {
-                    ClauseKind::Fails(names) => fails.extend(names.iter().map(|n| n.text.clone())),
-                    ClauseKind::Needs { refusal: Some(refusal), .. } => fails.push(refusal.failure.text.clone()),
+                    ClauseKind::Fails(names) => {
+                        note(&mut fails, names.iter().map(|n| Failure { name: n.text.clone(), help: None }));
+                    }
+                    ClauseKind::Needs { refusal: Some(refusal), .. } => {
+                        let (name, help) = (refusal.failure.text.clone(), refusal.help.clone());
+                        note(&mut fails, std::iter::once(Failure { name, help }));
+                    }
                     _ => {}
                 }
             }
-            fails.dedup();
             let verb = verb_text(&sig.verb);
-            let mut arranged = Vec::new();
+            let (mut arranged, mut needs, mut result) = (Vec::new(), Vec::new(), None);
             for Arrangement { values, locals } in arrangements {
                 let things = things(&asked, &values);
                 let mut scope = Scope::module(module);
@@ -129,26 +139,89 @@ impl<'a> Planner<'a, '_> {
                 // What makes no sense with these things is not offered with them.
                 let wrong = self.lab.diagnostics[found..].iter().any(Diagnostic::is_error);
                 self.lab.diagnostics.truncate(found);
-                match lowered.filter(|_| !wrong && !self.never(steps)) {
-                    Some((step, _)) => {
-                        let locals = locals.into_iter().map(|(_, local)| local).collect();
-                        arranged.push(Arranged { things, locals, step });
-                    }
-                    None => continue,
+                let Some((step, value)) = lowered.filter(|_| !wrong && !self.never(steps)) else { continue };
+                let returned = self.returned(value);
+                if let (None, Some(local), Some(ty)) = (&result, returned, &sig.result) {
+                    result = Some(self.result_kind(ty, local, module));
                 }
+                needs.push((self.needs_of(step), locals.clone()));
+                let locals = locals.into_iter().map(|(_, local)| local).collect();
+                arranged.push(Arranged { things, locals, step, result: returned });
             }
             if !arranged.is_empty() {
+                self.bound(&mut asked, &needs);
                 self.offers.commands.push(Offer {
                     device: None,
                     capability: String::new(),
                     verb,
-                    docs: item.docs.join(" "),
+                    docs: described(item.docs.join(" "), clauses),
                     parameters: asked,
                     arrangements: arranged,
                     lasts: true,
+                    result,
                     fails,
                 });
             }
+        }
+    }
+
+    /// Notes what the declarations of the devices, their capabilities and the lab say to people.
+    fn describe(&mut self, lab: DeclId) {
+        let names = self.lab.tables.names;
+        let docs = |id: DeclId| plain(&names.decl(id).item.docs.join(" "));
+        let mut about = vec![About { device: None, capability: String::new(), docs: docs(lab) }];
+        for index in 0..self.lab.instances.len() as u32 {
+            let id = InstanceId(index);
+            let own: Vec<String> = self.lab.instances[index as usize].kinds.iter().map(|k| docs(*k)).collect();
+            about.push(About { device: Some(id), capability: String::new(), docs: own.join(" ") });
+            let mut capabilities: Vec<DeclId> = self.lab.all_members(id).iter().map(|m| m.owner).collect();
+            capabilities.sort_unstable();
+            capabilities.dedup();
+            about.extend(capabilities.into_iter().map(|owner| About {
+                device: Some(id),
+                capability: self.lab.tables.kind_name(owner).to_string(),
+                docs: docs(owner),
+            }));
+        }
+        about.retain(|a| !a.docs.is_empty());
+        self.offers.about = about;
+    }
+
+    /// Notes the ranges that the needs of a command set for its parameters, whatever things it is about.
+    fn bound(&self, asked: &mut [Parameter], needs: &[(Vec<Arc<Condition>>, Vec<(String, u32)>)]) {
+        let known = |node| self.lab.glance(node);
+        for parameter in asked.iter_mut().filter(|p| matches!(p.kind, Kind::Quantity { .. } | Kind::Whole)) {
+            let each = needs.iter().filter_map(|(needs, locals)| {
+                let local = locals.iter().find(|(name, _)| *name == parameter.name)?.1;
+                Some(bounds(&self.lab.graph, needs, local, &known))
+            });
+            parameter.bounds = each.reduce(matterix_ir::offer::Bounds::around).unwrap_or_default();
+        }
+    }
+
+    /// The needs of a skill that is written out.
+    fn needs_of(&self, step: StepId) -> Vec<Arc<Condition>> {
+        match &self.steps[step.0 as usize].step {
+            Step::Skill { needs, .. } => needs.clone(),
+            Step::Guarded { body, .. } => self.needs_of(*body),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The local that receives what a skill returns.
+    fn returned(&self, value: Option<Value>) -> Option<u32> {
+        let Some(Value::Num(n)) = value else { return None };
+        match self.lab.graph.op(n.node) {
+            Op::Local(local) => Some(local),
+            _ => None,
+        }
+    }
+
+    /// What values a skill returns, in the unit of what is returned.
+    fn result_kind(&mut self, ty: &'a Ty, local: u32, module: usize) -> Kind {
+        match self.lab.resolve_type(ty, module) {
+            Type::Int => Kind::Whole,
+            ty => self.number_kind(&ty, Some(self.locals[local as usize].unit.clone())),
         }
     }
 
@@ -177,7 +250,8 @@ impl<'a> Planner<'a, '_> {
         let mut parameters = Vec::new();
         for p in asked {
             let kind = self.kind_of(p, arrangements, module)?;
-            parameters.push(Parameter { name: p.name.text.clone(), kind });
+            let declared = p.ty.as_ref().map_or(String::new(), |ty| self.text(ty.span));
+            parameters.push(Parameter { name: p.name.text.clone(), kind, declared, bounds: Default::default() });
         }
         Some(parameters)
     }
@@ -238,7 +312,7 @@ impl<'a> Planner<'a, '_> {
             device: id,
             capability: self.lab.tables.kind_name(m.owner).to_string(),
             name: name.text.clone(),
-            docs: docs(m.member),
+            docs: plain(&docs(m.member)),
             kind,
             value,
         })
@@ -256,4 +330,73 @@ fn things(asked: &[Parameter], values: &[(String, Value)]) -> Vec<InstanceId> {
 
 fn docs(member: &Member) -> String {
     member.docs.join(" ")
+}
+
+/// A comment without the targets of its links, which lead to pages of the library.
+fn plain(docs: &str) -> String {
+    let mut out = String::new();
+    let mut rest = docs;
+    while let Some((before, link)) = rest.split_once('[') {
+        out += before;
+        let parts = link.split_once("](").and_then(|(text, after)| Some((text, after.split_once(')')?.1)));
+        (rest, out) = match parts.filter(|(text, _)| !text.contains('[')) {
+            Some((text, after)) => (after, out + text),
+            None => (link, out + "["),
+        };
+    }
+    out + rest
+}
+
+/// A documentation comment; without one, the words in which a protocol for people says it.
+fn described(docs: String, clauses: &[Clause]) -> String {
+    if !docs.is_empty() {
+        return plain(&docs);
+    }
+    let mut out = String::new();
+    for clause in clauses {
+        let ClauseKind::Says { text, when: None } = &clause.kind else { continue };
+        for part in &text.parts {
+            match part {
+                TextPart::Plain(plain) => out += plain,
+                TextPart::Value { value, .. } => match &*value.kind {
+                    ExprKind::Name(name) if name.text == SELF => out += "it",
+                    ExprKind::Name(name) => out += &format!("`{}`", name.text),
+                    _ => out += "...",
+                },
+            }
+        }
+    }
+    let mut letters = out.chars();
+    match letters.next() {
+        Some(first) => format!("{}{}.", first.to_uppercase(), letters.as_str()),
+        None => out,
+    }
+}
+
+fn failure_of(need: &Condition) -> Failure {
+    Failure { name: need.failure().to_owned(), help: need.advice() }
+}
+
+/// Adds failures to a list that has each name once, with the first advice that is given for it.
+fn note(fails: &mut Vec<Failure>, more: impl Iterator<Item = Failure>) {
+    for failure in more {
+        match fails.iter_mut().find(|f| f.name == failure.name) {
+            Some(known) => known.help = known.help.take().or(failure.help),
+            None => fails.push(failure),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+
+    #[test]
+    fn links_lose_their_targets() {
+        assert_eq!(
+            plain("An [`IntegratingHeater`](thermal.mtx) (a [1, 2] list)."),
+            "An `IntegratingHeater` (a [1, 2] list)."
+        );
+        assert_eq!(plain("[a [b](c)"), "[a b");
+    }
 }

@@ -12,13 +12,15 @@ use matterix_runtime::exec::{Asked, FailureTrace, Listener, StepState};
 use matterix_runtime::process::{Engine, Observer};
 use matterix_sila_wire::{Call, Failure, News, Read, Request};
 
-use super::features::{Catalogue, defined};
+use super::features::{Catalogue, error_name};
 use super::values;
 
 /// A command that goes on.
-struct Going {
+struct Going<'p> {
     call: Call,
     device: Option<InstanceId>,
+    /// The local that receives what it returns, and what values that has.
+    result: Option<(u32, &'p Kind)>,
     begun: f64,
     takes: Option<f64>,
     /// When news of it went out last, s.
@@ -28,7 +30,7 @@ struct Going {
     given_up: bool,
 }
 
-impl Going {
+impl Going<'_> {
     fn is_to_be_given_up(&self) -> bool {
         self.call.is_cancelled() && !self.given_up
     }
@@ -42,7 +44,9 @@ pub struct Desk<'p> {
     requests: Receiver<Request>,
     calls: RefCell<VecDeque<Call>>,
     reads: RefCell<VecDeque<Read>>,
-    going: RefCell<BTreeMap<StepId, Going>>,
+    going: RefCell<BTreeMap<StepId, Going<'p>>>,
+    /// Values of locals that receive results, SI.
+    returned: RefCell<BTreeMap<u32, f64>>,
     /// Whether something was told to devices.
     busy: Cell<bool>,
 }
@@ -50,8 +54,8 @@ pub struct Desk<'p> {
 impl<'p> Desk<'p> {
     /// Nothing has been asked yet.
     pub fn new(catalogue: Catalogue<'p>, scene: &'p Scene, plan: &'p Plan, requests: Receiver<Request>) -> Self {
-        let (calls, reads, going) = Default::default();
-        Desk { catalogue, scene, plan, requests, calls, reads, going, busy: Cell::new(false) }
+        let (calls, reads, going, returned) = Default::default();
+        Desk { catalogue, scene, plan, requests, calls, reads, going, returned, busy: Cell::new(false) }
     }
 
     /// Takes in what has come; whether a command is waiting, or is to be broken off.
@@ -118,6 +122,29 @@ impl<'p> Desk<'p> {
         }
     }
 
+    /// Notes what the plan keeps, SI: it may be what a command returns.
+    pub(super) fn kept(&self, local: u32, value: Option<f64>) {
+        let is_result = |g: &Going<'_>| g.result.is_some_and(|(result, _)| result == local);
+        if !self.going.borrow().values().any(is_result) {
+            return;
+        }
+        let mut returned = self.returned.borrow_mut();
+        match value {
+            Some(value) => returned.insert(local, value),
+            None => returned.remove(&local),
+        };
+    }
+
+    /// How a command that is done has ended: with its result, or because there is none.
+    fn done(&self, going: &Going<'_>) -> News {
+        let Some((local, kind)) = going.result else { return News::Done(Vec::new()) };
+        let number = self.returned.borrow_mut().remove(&local);
+        match number.and_then(|n| values::value(self.scene, kind, n)) {
+            Some(value) => News::Done(vec![value]),
+            None => News::Failed(Failure::Garbled("it ended without a result that is known".to_owned())),
+        }
+    }
+
     /// Tells how far commands have come, once a second of lab time and at least at their beginning.
     pub(super) fn tell(&self, now: f64) {
         for going in self.going.borrow_mut().values_mut() {
@@ -172,6 +199,10 @@ impl<'p> Desk<'p> {
             let taken = self.claims(*step).into_iter().chain(going.device).find(|c| mine.contains(c));
             taken.map(|instance| (instance, *step))
         });
+        if self.going.borrow().contains_key(&arranged.step) {
+            not_now(&call, format!("`{}` goes on already", self.plan.get(arranged.step).label));
+            return None;
+        }
         if let Some((instance, by)) = busy {
             let (name, label) = (&self.scene.get(instance).name, &self.plan.get(by).label);
             not_now(&call, format!("`{name}` is in use: `{label}` goes on"));
@@ -180,6 +211,7 @@ impl<'p> Desk<'p> {
         let going = Going {
             call,
             device: offer.device,
+            result: arranged.result.zip(offer.result.as_ref()),
             begun: now,
             takes: None,
             told: f64::NEG_INFINITY,
@@ -207,7 +239,7 @@ impl<'p> Desk<'p> {
     }
 
     fn failed(&self, call: &Call, (name, text): &(String, String)) -> News {
-        let identifier = defined(name).identifier;
+        let identifier = error_name(name);
         let feature = self.catalogue.features.get(call.feature);
         let command = feature.and_then(|f| f.commands.get(call.command));
         let known = command.is_some_and(|c| c.errors.contains(&identifier));
@@ -274,13 +306,14 @@ impl Listener for Attendant<'_, '_> {
         let Some(going) = self.desk.going.borrow_mut().remove(&step) else { return };
         let label = &self.desk.plan.get(step).label;
         let news = match (&going.failure, state) {
-            (_, StepState::Done) => News::Done(Vec::new()),
+            (_, StepState::Done) => self.desk.done(&going),
             (Some(failure), _) => self.desk.failed(&going.call, failure),
             (None, _) if going.call.is_cancelled() => News::Failed(Failure::Garbled("it was cancelled".to_owned())),
             (None, _) => News::Failed(Failure::Garbled("it was broken off".to_owned())),
         };
         let how = match &news {
             News::Done(_) => "is done".to_owned(),
+            News::Failed(Failure::Garbled(text)) if state == StepState::Done => format!("fails: {text}"),
             _ => format!("fails: {}", going.failure.as_ref().map_or("broken off", |(_, text)| text.as_str())),
         };
         (self.say)(&format!("{time:10.3} s  {label} {how}\n"));

@@ -1,7 +1,7 @@
 //! What a lab offers, as features: one for each device and capability.
 
 use matterix_ir::Unit;
-use matterix_ir::offer::{Kind, Offer, Shown};
+use matterix_ir::offer::{Bound, Bounds, Failure, Kind, Offer, Offers, Shown};
 use matterix_ir::scene::{InstanceId, Scene};
 use matterix_sila::Feature;
 use matterix_sila::feature::{BASES, Basic, Command, Constraints, DataType, Element, Named, Property, SiUnit};
@@ -27,8 +27,8 @@ pub struct Catalogue<'p> {
     pub properties: Vec<Vec<&'p Shown>>,
 }
 
-/// The features of what is offered in a lab.
-pub fn catalogue<'p>(scene: &'p Scene, offers: Vec<&'p Offer>, shown: Vec<&'p Shown>) -> Catalogue<'p> {
+/// The features of a lab for these of its commands and quantities; `texts` has the comments of their declarations.
+pub fn catalogue<'p>(scene: &'p Scene, texts: &Offers, offers: Vec<&'p Offer>, shown: Vec<&'p Shown>) -> Catalogue<'p> {
     let mut out = Catalogue { features: Vec::new(), commands: Vec::new(), properties: Vec::new() };
     let mut places: Vec<(Option<InstanceId>, &str)> = Vec::new();
     let of_offers = offers.iter().map(|o| (o.device, o.capability.as_str()));
@@ -45,12 +45,16 @@ pub fn catalogue<'p>(scene: &'p Scene, offers: Vec<&'p Offer>, shown: Vec<&'p Sh
             Some(name) => (
                 format!("{name} {capability}"),
                 format!("{name}: {capability}"),
-                format!("What `{name}` of the lab `{}` does as a {capability}.", scene.lab),
+                joined(&[
+                    &format!("`{name}` of the lab `{}` as a {capability}.", scene.lab),
+                    texts.docs(device, capability),
+                    texts.docs(device, ""),
+                ]),
             ),
             None => (
                 format!("{} skills", scene.lab),
                 "Skills".to_owned(),
-                format!("What is done with several things of the lab `{}`.", scene.lab),
+                format!("The skills of the lab `{}`, each with several of its things.", scene.lab),
             ),
         };
         let mut feature = Feature {
@@ -68,9 +72,11 @@ pub fn catalogue<'p>(scene: &'p Scene, offers: Vec<&'p Offer>, shown: Vec<&'p Sh
         let commands: Vec<&Offer> = offers.iter().copied().filter(|o| is_here(o.device, &o.capability)).collect();
         for offer in &commands {
             let command = command(scene, offer, &feature);
-            for error in offer.fails.iter().map(|f| defined(f)) {
-                if !feature.errors.iter().any(|e| e.identifier == error.identifier) {
-                    feature.errors.push(error);
+            for error in offer.fails.iter().map(defined) {
+                match feature.errors.iter_mut().find(|e| e.identifier == error.identifier) {
+                    Some(known) if known.description.len() >= error.description.len() => {}
+                    Some(known) => known.description = error.description,
+                    None => feature.errors.push(error),
                 }
             }
             feature.commands.push(command);
@@ -88,7 +94,7 @@ pub fn catalogue<'p>(scene: &'p Scene, offers: Vec<&'p Offer>, shown: Vec<&'p Sh
                 identifier,
                 description: said(&shown.docs, &format!("`{}`.", shown.name), &shown.kind),
                 observable: true,
-                ty: data_type(scene, &shown.kind),
+                ty: data_type(scene, &shown.kind, Bounds::default()),
                 errors: Vec::new(),
             });
         }
@@ -107,8 +113,8 @@ fn command(scene: &Scene, offer: &Offer, feature: &Feature) -> Command {
         parameters.push(Element {
             display: spaced(&identifier),
             identifier,
-            description: said("", &format!("`{}`.", parameter.name), &parameter.kind),
-            ty: data_type(scene, &parameter.kind),
+            description: said("", &format!("`{}: {}`.", parameter.name, parameter.declared), &parameter.kind),
+            ty: data_type(scene, &parameter.kind, parameter.bounds),
         });
     }
     Command {
@@ -117,9 +123,9 @@ fn command(scene: &Scene, offer: &Offer, feature: &Feature) -> Command {
         description: said(&offer.docs, &format!("`{}`.", offer.verb), &Kind::Truth),
         observable: offer.lasts,
         parameters,
-        responses: Vec::new(),
+        responses: offer.result.iter().map(|kind| result(scene, kind)).collect(),
         intermediate: Vec::new(),
-        errors: offer.fails.iter().map(|f| defined(f).identifier).collect(),
+        errors: offer.fails.iter().map(|f| error_name(&f.name)).collect(),
     }
 }
 
@@ -137,13 +143,42 @@ fn said(docs: &str, otherwise: &str, kind: &Kind) -> String {
 /// The failure of a need that names none.
 const NEED: &str = "need";
 
+/// The response of a command that returns a number.
+fn result(scene: &Scene, kind: &Kind) -> Element {
+    Element {
+        identifier: RESULT.to_owned(),
+        display: RESULT.to_owned(),
+        description: said("", "The number that it returns.", kind),
+        ty: data_type(scene, kind, Bounds::default()),
+    }
+}
+
+/// The only response of a command.
+const RESULT: &str = "Result";
+
+/// The identifier of the defined error for a failure.
+pub(super) fn error_name(failure: &str) -> String {
+    match failure {
+        NEED => "NeedUnmet".to_owned(),
+        other => identifier(other),
+    }
+}
+
 /// A failure as a defined error.
-pub(super) fn defined(failure: &str) -> Named {
-    let (identifier, description) = match failure {
-        NEED => ("NeedUnmet".to_owned(), "What the command needs does not hold.".to_owned()),
-        other => (identifier(other), format!("The failure `{other}`.")),
+fn defined(failure: &Failure) -> Named {
+    let identifier = error_name(&failure.name);
+    let what = match failure.name.as_str() {
+        NEED => "What the command needs does not hold.".to_owned(),
+        other => format!("The failure `{other}`."),
     };
-    Named { display: spaced(&identifier), identifier, description }
+    let help = failure.help.as_ref().map_or(String::new(), |help| format!("To mend it: {help}."));
+    Named { display: spaced(&identifier), identifier, description: joined(&[&what, &help]) }
+}
+
+/// Sentences in a row.
+fn joined(texts: &[&str]) -> String {
+    let texts: Vec<&str> = texts.iter().copied().filter(|t| !t.is_empty()).collect();
+    texts.join(" ")
 }
 
 /// A name that is not taken: with a number at its end where it would be.
@@ -154,25 +189,34 @@ fn unique(name: String, taken: impl Fn(&str) -> bool) -> String {
     (2..).map(|n| format!("{name}{n}")).find(|n| !taken(n)).unwrap_or(name)
 }
 
-fn data_type(scene: &Scene, kind: &Kind) -> DataType {
-    let basic = DataType::Basic;
-    let among = |set: Vec<String>| {
-        let constraints = Constraints { set, ..Constraints::default() };
-        DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))
+fn data_type(scene: &Scene, kind: &Kind, bounds: Bounds) -> DataType {
+    let constrained = |basic: Basic, constraints: Constraints| match constraints == Constraints::default() {
+        true => DataType::Basic(basic),
+        false => DataType::Constrained(Box::new(DataType::Basic(basic)), Box::new(constraints)),
     };
+    let among = |set: Vec<String>| constrained(Basic::String, Constraints { set, ..Constraints::default() });
     match kind {
-        Kind::Quantity { unit, bases } => match si_unit(unit, bases.as_deref()) {
-            Some(unit) => {
-                let constraints = Constraints { unit: Some(unit), ..Constraints::default() };
-                DataType::Constrained(Box::new(basic(Basic::Real)), Box::new(constraints))
-            }
-            None => basic(Basic::Real),
-        },
-        Kind::Whole => basic(Basic::Integer),
-        Kind::Truth => basic(Basic::Boolean),
+        Kind::Quantity { unit, bases } => {
+            let end = |bound: Option<Bound>| bound.map(|b| (rounded(unit.of_si(b.number)), b.is_open));
+            let (least, greatest) = (end(bounds.least), end(bounds.greatest));
+            let unit = si_unit(unit, bases.as_deref());
+            constrained(Basic::Real, Constraints { unit, least, greatest, ..Constraints::default() })
+        }
+        Kind::Whole => {
+            let end = |bound: Option<Bound>| bound.map(|b| (b.number, b.is_open));
+            let (least, greatest) = (end(bounds.least), end(bounds.greatest));
+            constrained(Basic::Integer, Constraints { least, greatest, ..Constraints::default() })
+        }
+        Kind::Truth => DataType::Basic(Basic::Boolean),
         Kind::Words(words) => among(words.clone()),
         Kind::Things(things) => among(things.iter().map(|t| scene.get(*t).name.clone()).collect()),
     }
+}
+
+/// A number as people write it: without the last digits, which come from the conversion of units. A value between the rounded
+/// bound and the exact one is still refused by the need itself.
+fn rounded(number: f64) -> f64 {
+    format!("{number:.11e}").parse().unwrap_or(number)
 }
 
 /// A unit as the standard has it; nothing where it has no such thing.

@@ -101,6 +101,7 @@ impl Backend for Paced<'_, '_, '_> {
     }
 
     fn set_local(&mut self, local: u32, value: Option<f64>) {
+        self.desk.kept(local, value);
         self.inner.set_local(local, value);
     }
 
@@ -215,8 +216,9 @@ mod tests {
             verb: "heat".to_owned(),
             docs: String::new(),
             parameters: Vec::new(),
-            arrangements: vec![Arranged { things: Vec::new(), locals: Vec::new(), step: StepId(0) }],
+            arrangements: vec![Arranged { things: Vec::new(), locals: Vec::new(), step: StepId(0), result: None }],
             lasts: true,
+            result: None,
             fails: Vec::new(),
         };
         let (scene, sources, cancel) = (Scene::default(), Sources::default(), AtomicBool::new(false));
