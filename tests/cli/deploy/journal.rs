@@ -241,6 +241,7 @@ workflow mix in bench {
 ";
 
 #[test]
+#[allow(clippy::disallowed_methods, reason = "how long it spins is told by the clock")]
 fn what_was_half_said_begins_when_it_is_said_once_more() {
     let told = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
     let noted = std::sync::Arc::clone(&told);

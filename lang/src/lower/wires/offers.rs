@@ -20,6 +20,9 @@ use crate::names::{DeclId, verb_text};
 /// A command with more arrangements is left to workflows.
 const MOST: usize = 200;
 
+/// What must hold before something is done, and the parameters that stand in it with their locals.
+type Need = (Vec<Arc<Condition>>, Vec<(String, u32)>);
+
 impl<'a> Planner<'a, '_> {
     /// Notes everything that the devices of the lab can be told, and show.
     pub(in crate::lower) fn begin_offers(&mut self, lab: DeclId) {
@@ -188,7 +191,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     /// Notes the ranges that the needs of a command set for its parameters, whatever things it is about.
-    fn bound(&self, asked: &mut [Parameter], needs: &[(Vec<Arc<Condition>>, Vec<(String, u32)>)]) {
+    fn bound(&self, asked: &mut [Parameter], needs: &[Need]) {
         let known = |node| self.lab.glance(node);
         for parameter in asked.iter_mut().filter(|p| matches!(p.kind, Kind::Quantity { .. } | Kind::Whole)) {
             let each = needs.iter().filter_map(|(needs, locals)| {
