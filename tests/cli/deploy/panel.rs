@@ -175,6 +175,9 @@ fn signals_pause_let_one_step_begin_and_go_on() {
     served.until(|s| s["gate"] == "go");
     signal("-USR1", &served.process);
     served.until(|s| s["gate"] == "pause");
+    // Said again it changes nothing, and is no second entry.
+    signal("-USR1", &served.process);
+    std::thread::sleep(Duration::from_millis(300));
     signal("-USR2", &served.process);
     let (code, said, journal) = served.end();
     assert_eq!(code, Some(0), "{said}");

@@ -18,11 +18,7 @@ fn a_dry_run_prints_every_byte_and_sends_none() {
         "OUT_WD1@60\\r\\n",
         "OUT_SP_4 300\\r\\n",
         "START_4\\r\\n",
-        "\\r\\n",
-        "START_4\\r\\n",
         "OUT_SP_1 50.0\\r\\n",
-        "START_1\\r\\n",
-        "\\r\\n",
         "START_1\\r\\n",
         "STOP_1\\r\\n",
         "\\r\\n",
@@ -132,8 +128,7 @@ fn a_deployment_that_was_killed_goes_on_from_its_journal() {
     let after = std::fs::read_to_string(dir.join("journal")).expect("a journal");
     let whole = &before[..before.rfind('\n').map_or(0, |n| n + 1)];
     assert!(lines(&after).starts_with(lines(whole)), "nothing is rewritten");
-    let starts = after.matches("START_1\\\\r").count();
-    assert_eq!(starts, 2, "told once, which is twice for a plate that acknowledges nothing: {after}");
+    assert_eq!(after.matches("START_1\\\\r").count(), 1, "told once: {after}");
     // What has come to its end is not gone on with.
     let again = deploy_at(SLOW, &dir, &["--mode", "real", "--resume"]);
     assert_eq!(again.code, 1);

@@ -48,10 +48,19 @@ struct Said {
     /// Questions that are open, by number.
     open: BTreeMap<u64, String>,
     answers: BTreeMap<u64, Answer>,
+    /// Answers that were ever given.
+    given: usize,
     /// Answers every question at once.
     standing: Option<Answer>,
     gates: VecDeque<(Gate, String)>,
     stopped_by: Option<String>,
+}
+
+impl Said {
+    fn give(&mut self, question: u64, answer: Answer) {
+        self.answers.insert(question, answer);
+        self.given += 1;
+    }
 }
 
 impl Control {
@@ -61,6 +70,7 @@ impl Control {
         let said = Said {
             open: BTreeMap::new(),
             answers: BTreeMap::new(),
+            given: 0,
             standing: None,
             gates: VecDeque::new(),
             stopped_by: None,
@@ -78,7 +88,7 @@ impl Control {
         let mut said = self.said();
         (self.show)(text, said.standing.is_none());
         match said.standing.clone() {
-            Some(answer) => drop(said.answers.insert(question, answer)),
+            Some(answer) => said.give(question, answer),
             None => drop(said.open.insert(question, text.to_owned())),
         }
     }
@@ -93,7 +103,7 @@ impl Control {
         let mut said = self.said();
         let is_open = said.open.remove(&question).is_some();
         if is_open {
-            said.answers.insert(question, answer);
+            said.give(question, answer);
         }
         is_open
     }
@@ -103,9 +113,9 @@ impl Control {
         self.said().answers.remove(&question)
     }
 
-    /// Answers that nobody has taken note of.
+    /// How many answers were given so far.
     pub fn answers(&self) -> usize {
-        self.said().answers.len()
+        self.said().given
     }
 
     /// A question is open no longer.

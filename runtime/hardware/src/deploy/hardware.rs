@@ -99,7 +99,7 @@ pub struct Hardware<'m, 't> {
     pub(super) dated: f64,
     /// What may begin.
     pub(super) gate: Gate,
-    /// Answers that were waiting when it was last looked; while a journal is gone through, lines that were left then.
+    /// Answers that had been given when it was last looked; while a journal is gone through, lines that were left then.
     pub(super) answers: usize,
     /// Questions that are open, as they were put.
     pub(super) questions: BTreeMap<Ticket, String>,

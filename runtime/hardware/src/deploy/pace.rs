@@ -119,6 +119,10 @@ impl Hardware<'_, '_> {
             return true;
         }
         if let Some((to, who)) = self.settings.control.next_gate() {
+            // Pausing twice, or going on twice, is one event; each step is its own.
+            if to == self.gate && to != Gate::Step {
+                return false;
+            }
             self.journal.note(&Entry::Gate { t, to, who, wall });
             return self.set_gate(to);
         }
