@@ -94,7 +94,8 @@ fn data_type() -> impl Strategy<Value = DataType> {
         let constraints = Constraints { set, ..Default::default() };
         DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))
     });
-    let sizes = || (proptest::option::of(0..4u64), proptest::option::of(4..9u64));
+    // A least size of 0 is none.
+    let sizes = || (proptest::option::of(1..4u64), proptest::option::of(4..9u64));
     let long = (sizes(), proptest::option::of("[a-z]{1,5}")).prop_map(|(length, pattern)| {
         let constraints = Constraints { length, pattern, ..Default::default() };
         DataType::Constrained(Box::new(DataType::Basic(Basic::String)), Box::new(constraints))

@@ -10,16 +10,11 @@ use super::{Executor, tree};
 use crate::fault::Fault;
 
 impl<'p> Executor<'p, '_> {
-    /// What of it holds now, at the start. Fails where that cannot be asked for.
-    pub(super) fn in_order(&mut self) -> Result<Vec<&'p Limit>, Fault> {
+    /// What of it holds now, at the start. What cannot be asked for is not known to, as of a device that shows something else
+    /// before it is told anything.
+    pub(super) fn in_order(&mut self) -> Vec<&'p Limit> {
         let plan = self.plan;
-        let mut begun = Vec::new();
-        for end in &plan.ends {
-            if self.holds(&end.condition)? == Some(true) {
-                begun.push(end);
-            }
-        }
-        Ok(begun)
+        plan.ends.iter().filter(|end| matches!(self.holds(&end.condition), Ok(Some(true)))).collect()
     }
 
     /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are. Fails where

@@ -254,10 +254,7 @@ impl<'p, 'b> Executor<'p, 'b> {
 
     /// Runs to the end: tasks first, then time.
     fn drive(&mut self) {
-        let begun = match self.in_order() {
-            Ok(begun) => begun,
-            Err(fault) => return self.abort(FailureTrace::of_fault(fault)),
-        };
+        let begun = self.in_order();
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);
