@@ -141,7 +141,7 @@ def volumes(commands):
 def whole(file):
     name = pathlib.Path(file).stem
     folder = place(name, pathlib.Path(file).read_text())
-    ended = ran(folder, *DEPLOY)
+    ended = ran(folder, *DEPLOY, "--yes")
     done, _ = told(folder)
     emitted = json.loads(ran(folder, "emit", "lab.mtx", "--target", "opentrons-json").stdout)
     expected = volumes((c["commandType"], c["params"]) for c in emitted["commands"])

@@ -234,7 +234,7 @@ def deploy(command, folder, name, text, address, files={}):
     for name, content in files.items():
         (place / name).write_text(content)
     (place / "lab.toml").write_text(f'[ot2]\nhttp = "{address}"\n')
-    arguments = ["--bind", "lab.toml", "--mode", "real", "--journal", "journal", "--speed", SPEED]
+    arguments = ["--bind", "lab.toml", "--mode", "real", "--yes", "--journal", "journal", "--speed", SPEED]
     return subprocess.run([command, "deploy", "lab.mtx", *arguments], cwd=place, capture_output=True, text=True, timeout=600)
 
 
