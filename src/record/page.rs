@@ -127,7 +127,19 @@ fn table(headline: &str, columns: &[&str], rows: impl Iterator<Item = Vec<String
     format!("## {headline}\n\n| {} |\n| {rule} |\n{}\n", columns.join(" | "), rows.concat())
 }
 
-/// A text that stays in its cell.
+/// A text that stays in its cell, and is no markup of the page: people and devices may have said anything.
 fn cell(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace('|', "\\|")
+    let plain: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    plain.replace('\\', "\\\\").replace('|', "\\|").replace('<', "\\<")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cell;
+
+    #[test]
+    fn what_somebody_said_is_no_markup() {
+        assert_eq!(cell("Ann | <b>\nx"), "Ann \\| \\<b> x");
+        assert_eq!(cell("a\\|b"), "a\\\\\\|b");
+    }
 }
