@@ -63,6 +63,9 @@ pub enum Command {
     /// Offer the devices of a lab to others, as features of SiLA 2: on the digital twin, or with `--bind` on devices.
     #[cfg(feature = "sila")]
     Serve(ServeArgs),
+    /// List the servers of SiLA 2 on the network.
+    #[cfg(feature = "sila")]
+    Discover(DiscoverArgs),
     /// Write a workflow as a file that another program runs.
     Emit(EmitArgs),
     /// Judge what a recording says robots did: limits, kinematics, contacts of their true shapes, grips.
@@ -443,6 +446,22 @@ pub struct EmulateArgs {
     pub seed: u64,
 }
 
+/// `matterixc discover`.
+#[cfg(feature = "sila")]
+#[derive(Debug, Args)]
+pub struct DiscoverArgs {
+    /// How long to wait for answers, s.
+    #[arg(long = "for", value_name = "SECONDS", default_value_t = 3.0, value_parser = waiting)]
+    pub time: f64,
+}
+
+/// A time to wait, s.
+#[cfg(feature = "sila")]
+fn waiting(text: &str) -> Result<f64, String> {
+    let time = text.parse::<f64>().ok().filter(|time| (0.1..=600.0).contains(time));
+    time.ok_or_else(|| format!("`{text}` is no time from 0.1 s to 600 s"))
+}
+
 /// `matterixc serve`.
 #[cfg(feature = "sila")]
 #[derive(Debug, Args)]
@@ -456,10 +475,24 @@ pub struct ServeArgs {
     /// The port; 0 takes any that is free.
     #[arg(long, value_name = "PORT")]
     pub tcp: u16,
-    /// The address of this machine to answer at. Connections are not encrypted: no other than this machine's own unless
-    /// everybody on the network may use the lab.
+    /// The address of this machine to answer at; 0.0.0.0 is every one it has.
     #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
     pub host: String,
+    /// Do not encrypt connections: whoever is on the network can read and change what is said.
+    #[arg(long, conflicts_with_all = ["certificate", "users"])]
+    pub insecure: bool,
+    /// The certificate to show, in PEM, with those that signed it behind it; the server's own without it.
+    #[arg(long, value_name = "FILE", requires = "key")]
+    pub certificate: Option<PathBuf>,
+    /// The private key of the certificate, in PEM.
+    #[arg(long, value_name = "FILE", requires = "certificate")]
+    pub key: Option<PathBuf>,
+    /// Who must log in before they call: names and passwords as `htpasswd -B` writes them.
+    #[arg(long, value_name = "FILE")]
+    pub users: Option<PathBuf>,
+    /// Do not say to the network that the server is there.
+    #[arg(long)]
+    pub no_discovery: bool,
     /// The identifier of the server; without it, the same whenever this lab of this file is served on this machine.
     #[arg(long, value_name = "UUID")]
     pub uuid: Option<String>,

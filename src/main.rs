@@ -93,6 +93,8 @@ fn obey(cli: Cli) -> Exit {
         Command::Emulate(args) => command::emulate(&args, cli.color),
         #[cfg(feature = "sila")]
         Command::Serve(args) => command::serve(&args, cli.color),
+        #[cfg(feature = "sila")]
+        Command::Discover(args) => command::discover(&args),
         Command::Verify(args) => command::verify(&args),
         Command::View(args) => command::view(&args, cli.color),
         Command::Lsp(args) => command::lsp(&args),

@@ -3,6 +3,8 @@
 mod bill;
 mod check;
 mod deploy;
+#[cfg(feature = "sila")]
+mod discover;
 mod doc;
 mod emit;
 mod emulate;
@@ -27,6 +29,8 @@ mod watch;
 pub use bill::bill;
 pub use check::check;
 pub use deploy::deploy;
+#[cfg(feature = "sila")]
+pub use discover::discover;
 pub use doc::doc;
 pub use emit::emit;
 pub use emulate::emulate;

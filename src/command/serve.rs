@@ -1,9 +1,12 @@
 //! `matterixc serve`.
 
 use std::net::{SocketAddr, ToSocketAddrs};
+use std::path::Path;
 
 use matterix_hardware::deploy::Journal;
 use matterix_ir::Diagnostic;
+use matterix_sila_wire::tls::{Identity, hosts};
+use matterix_sila_wire::{Door, Users};
 
 use super::run::Findings;
 use crate::args::{Color, RunFormat, ServeArgs};
@@ -56,9 +59,12 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         Some(given) => matterix_sila_wire::uuid(given).ok_or_else(|| format!("`{given}` is no UUID"))?,
         None => crate::identity::of(&args.file, &program.scene.lab)?,
     };
+    let door = door(args, address, &uuid)?;
     let service = Service {
         address,
         uuid,
+        door,
+        announced: !args.no_discovery,
         bindings: file,
         speed: args.speed,
         seed: args.seed,
@@ -76,4 +82,28 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     findings.show(&sources, found);
     findings.end();
     Ok(if failed { Exit::Findings } else { Exit::Fine })
+}
+
+/// Whom the server answers, and how.
+fn door(args: &ServeArgs, address: SocketAddr, uuid: &str) -> Result<Door, String> {
+    let text = |path: &Path| {
+        let text = String::from_utf8(files::read(path)?);
+        text.map_err(|_| format!("`{}` is not text in UTF-8", path.display()))
+    };
+    let users = args
+        .users
+        .as_deref()
+        .map(|path| Users::read(&text(path)?).map_err(|why| format!("`{}`: {why}", path.display())));
+    let (identity, file) = match (&args.certificate, &args.key) {
+        _ if args.insecure => return Ok(Door { identity: None, users: users.transpose()? }),
+        (Some(chain), Some(key)) => {
+            let identity = Identity { chain: text(chain)?, key: text(key)? };
+            identity.is_sound().map_err(|why| format!("`{}`, `{}`: {why}", chain.display(), key.display()))?;
+            (identity, chain.clone())
+        }
+        _ => crate::identity::certificate(uuid, &hosts(&args.host, address.ip()))?,
+    };
+    let fingerprint = identity.fingerprint()?;
+    print(Stream::Err, &format!("certificate: {}\nfingerprint: {fingerprint}\n", file.display()));
+    Ok(Door { identity: Some(identity), users: users.transpose()? })
 }

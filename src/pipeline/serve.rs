@@ -19,7 +19,8 @@ use matterix_ir::{Diagnostic, FileId, Program, Sources};
 use matterix_runtime::backend::{Backend, Prepared, Sim};
 use matterix_runtime::exec::{self, Limits, RunStatus};
 use matterix_runtime::process::{Engine, Options};
-use matterix_sila_wire::serve as answer;
+use matterix_sila_wire::discovery::announce;
+use matterix_sila_wire::{About, Door, serve as answer};
 
 use super::deploy::traced;
 use crate::terminal::{Stream, print};
@@ -30,6 +31,10 @@ pub struct Service<'p> {
     pub address: SocketAddr,
     /// Its identifier.
     pub uuid: String,
+    /// Whom it answers, and how.
+    pub door: Door,
+    /// Whether it says to the network that it is there.
+    pub announced: bool,
     /// The text of the bindings and the file they are in; the twin alone without them.
     pub bindings: Option<(FileId, &'p str)>,
     /// Seconds of lab time per second.
@@ -134,8 +139,14 @@ fn attend(
     let catalogue = catalogue(&program.scene, &program.offers, offers, shown);
     let (name, features) = (program.scene.lab.clone(), catalogue.features.clone());
     let about = format!("The lab `{name}`. {}", program.offers.docs(None, "")).trim_end().to_owned();
-    let version = env!("CARGO_PKG_VERSION");
-    let (server, requests) = answer(service.address, &name, &about, version, &service.uuid, features)?;
+    let version = env!("CARGO_PKG_VERSION").to_owned();
+    let about = About { name, description: about, version, uuid: service.uuid };
+    let chain = service.door.identity.as_ref().map(|identity| identity.chain.clone());
+    let (server, requests) = answer(service.address, about.clone(), service.door, features)?;
+    // Whoever knows the address needs no network to find it.
+    let announced = service.announced.then(|| announce(&about, server.address, chain.as_deref()));
+    let _announced = announced
+        .and_then(|announced| announced.map_err(|why| print(Stream::Err, &format!("not announced: {why}\n"))).ok());
     (service.ready)(server.address, &catalogue);
     let desk = Desk::new(catalogue, &program.scene, &program.plan, requests);
     let mut say = |text: &str| print(Stream::Err, text);

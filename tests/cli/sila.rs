@@ -126,6 +126,17 @@ fn a_binding_fits_what_the_driver_speaks_to() {
         ("[plate]\nsila = \"x:1\"\nport = \"y\"", "two lines"),
         ("[plate]\nsila = 3", "`sila` is a text"),
         ("[plate]\nsila = \"x:1\"\nby = \"hand\"", "by hand and bound to a line"),
+        ("[plate]\nsila = \"x:1\"\nfingerprint = \"AB:CD\"", "a fingerprint is 32 bytes in hexadecimal"),
+        (
+            "[plate]\nsila = \"x:1\"\ncertificate = \"a.pem\"\nfingerprint = \"AB\"",
+            "by its certificate or by its fingerprint",
+        ),
+        ("[plate]\nsila = \"x:1\"\nlock = \"10 minutes\"", "a lock lasts for a time"),
+        ("[plate]\nsila = \"x:1\"\nlock = \"1 s\"", "a lock lasts for a time"),
+        ("[plate]\nsila = \"x:1\"\nuser = \"ana\"", "a user has a password"),
+        ("[plate]\nsila = \"x:1\"\npassword_env = \"P\"", "a password belongs to a user"),
+        ("[plate]\nsila = \"x:1\"\nuser = \"ana\"\npassword_env = \"P\"", "a password is not sent without encryption"),
+        ("[plate]\nport = \"/dev/null\"\nlock = \"1 h\"", "`lock` belongs to a server of SiLA 2"),
     ] {
         write(&dir, "lab.toml", bindings);
         let ended = matterixc_in(&dir, &["deploy", "lab.mtx", "--bind", "lab.toml"]);

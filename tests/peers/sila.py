@@ -125,7 +125,7 @@ def start(folder, text, *more):
     os.makedirs(folder, exist_ok=True)
     (pathlib.Path(folder) / "lab.mtx").write_text(text)
     process = subprocess.Popen(
-        [COMMAND, "serve", "lab.mtx", "--tcp", "0", "--speed", str(SPEED), *more],
+        [COMMAND, "serve", "lab.mtx", "--tcp", "0", "--speed", str(SPEED), *(more or ["--insecure", "--no-discovery"])],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=open(os.path.join(folder, "said"), "w"),
@@ -544,7 +544,7 @@ def served_on_devices():
     folder = os.path.join(FOLDER, "on devices")
     os.makedirs(folder)
     (pathlib.Path(folder) / "lab.toml").write_text(f'[plate]\nsila = "{address}"\n')
-    process, host, port = start(folder, OWN, "--bind", "lab.toml", "--journal", "journal")
+    process, host, port = start(folder, OWN, "--insecure", "--bind", "lab.toml", "--journal", "journal")
     try:
         client = SilaClient(host, port, insecure=True)
         client.PlateHeater.Heat(T=70.0)
@@ -566,7 +566,7 @@ def served_on_devices():
         verdict("and keeps a journal", "SetTarget" in journal and '"event":"end"' in journal)
     finally:
         process.kill()
-    process, host, port = start(folder, OWN, "--bind", "lab.toml", "--journal", "journal2")
+    process, host, port = start(folder, OWN, "--insecure", "--bind", "lab.toml", "--journal", "journal2")
     try:
         client = SilaClient(host, port, insecure=True)
         one.cut()
@@ -629,9 +629,17 @@ def another_author():
     process.kill()
 
 
-logging.disable(logging.CRITICAL)
-served()
-driven()
-served_on_devices()
-another_author()
-sys.exit(1 if BAD else 0)
+def main():
+    import sila_secure
+
+    logging.disable(logging.CRITICAL)
+    served()
+    driven()
+    served_on_devices()
+    another_author()
+    sila_secure.main(sys.modules[__name__])
+    sys.exit(1 if BAD else 0)
+
+
+if __name__ == "__main__":
+    main()

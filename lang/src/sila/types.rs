@@ -81,7 +81,12 @@ impl<'f> Types<'f> {
                 }
                 plain(&constraints.set.join(" | "), format!("{{{option}}}"))
             }
-            Basic::String => plain("Text", format!("\\\"{{{option}}}\\\"")),
+            // Moments are written as texts: `2026-11-23+01:00`.
+            Basic::String | Basic::Date | Basic::Time | Basic::Timestamp => {
+                plain("Text", format!("\\\"{{{option}}}\\\""))
+            }
+            // The path of a file with the bytes.
+            Basic::Binary => plain("Text", format!("file \\\"{{{option}}}\\\"")),
             Basic::Real | Basic::Integer => {
                 let whole = basic == Basic::Integer;
                 let (ty, unit, piece) = match &constraints.unit {
@@ -102,7 +107,7 @@ impl<'f> Types<'f> {
                 let needs = [bound(constraints.least, ">"), bound(constraints.greatest, "<")];
                 Given { ty, piece, needs: needs.into_iter().flatten().collect() }
             }
-            other => return Err(format!("is of type {}", other.name())),
+            Basic::Any => return Err(format!("is of type {}", basic.name())),
         })
     }
 

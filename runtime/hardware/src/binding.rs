@@ -13,9 +13,26 @@ use toml::de::{DeTable, DeValue};
 
 use crate::calibration::CALIBRATION;
 use crate::deploy::{Binding, Carrier};
-use crate::place::Place;
+use crate::place::{Place, SilaServer};
 
-const KEYS: [&str; 9] = ["port", "address", "http", "sila", "driver", "unit", "by", "tolerance", CALIBRATION];
+mod sila;
+
+const KEYS: [&str; 14] = [
+    "port",
+    "address",
+    "http",
+    "sila",
+    "driver",
+    "unit",
+    "by",
+    "tolerance",
+    CALIBRATION,
+    sila::CERTIFICATE,
+    sila::FINGERPRINT,
+    sila::USER,
+    sila::PASSWORD,
+    sila::LOCK,
+];
 const HAND: &str = "hand";
 
 /// The bindings of a file for the lab of a program, with what is wrong with them.
@@ -137,7 +154,8 @@ impl Reader<'_> {
             return (self.found.len() == before).then_some(binding);
         }
         let Said { driver, unit, places, .. } = said;
-        let (place, at) = self.place(key, places, name.span())?;
+        let (mut place, at) = self.place(key, places, name.span())?;
+        self.access(table, &mut place);
         let driver = self.driver(key, instance, driver, name.span())?;
         self.fits(driver, &place, &at)?;
         let place = match place.checked() {
@@ -192,24 +210,27 @@ impl Reader<'_> {
 
     /// The texts of a binding; what is none is reported.
     fn said(&mut self, table: &DeTable<'_>) -> Said {
-        let mut text = |wanted: &str| -> Option<Text> {
-            let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
-            if let DeValue::String(text) = value.get_ref() {
-                return Some((text.to_string(), value.span()));
-            }
-            let headline = format!("`{wanted}` is a text");
-            self.wrong(value.span(), &headline, "no text", Some("write it in quotes".into()));
-            None
-        };
+        let mut text = |wanted: &str| self.text(table, wanted);
         let mut place = |key: &str, of: fn(String) -> Place| text(key).map(|(said, at)| (of(said), at));
         let places = [
             place("port", Place::Serial),
             place("address", Place::Tcp),
             place("http", Place::Http),
-            place("sila", Place::Sila),
+            place("sila", |at| Place::Sila(Box::new(SilaServer { at, ..SilaServer::default() }))),
         ];
         let places = places.into_iter().flatten().collect();
         Said { places, driver: text("driver"), unit: text("unit"), by: text("by") }
+    }
+
+    /// The text of a key, if it is there; what is no text is reported.
+    fn text(&mut self, table: &DeTable<'_>, wanted: &str) -> Option<Text> {
+        let value = table.iter().find(|(k, _)| k.get_ref() == wanted)?.1;
+        if let DeValue::String(text) = value.get_ref() {
+            return Some((text.to_string(), value.span()));
+        }
+        let headline = format!("`{wanted}` is a text");
+        self.wrong(value.span(), &headline, "no text", Some("write it in quotes".into()));
+        None
     }
 
     /// Reports what does not go with a device that a person does by hand.

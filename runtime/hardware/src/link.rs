@@ -10,7 +10,7 @@ use matterix_ir::wire::{Driver, Pattern, Slot, Told, Transport, Until};
 
 use crate::codec::{Codec, Kept, Reply, shown};
 use crate::pattern::written;
-use crate::place::{self, Place};
+use crate::place::{self, Place, SilaServer};
 use crate::port::Port;
 use crate::world::World;
 
@@ -135,14 +135,14 @@ pub fn open(
 }
 
 #[cfg(feature = "sila")]
-fn sila(server: &str, feature: &str, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
+fn sila(server: &SilaServer, feature: &str, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
     Ok(Box::new(crate::sila::Server::connect(server, feature, timeout)?))
 }
 
 #[cfg(not(feature = "sila"))]
-fn sila(server: &str, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
+fn sila(server: &SilaServer, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
     let why = "this build does not speak SiLA 2: build it with `--features sila`";
-    Err(Trouble::Lost(format!("cannot connect to `{server}`: {why}")))
+    Err(Trouble::Lost(format!("cannot connect to `{}`: {why}", server.at)))
 }
 
 /// An open line to a device.

@@ -62,7 +62,8 @@ fn canonical(place: &Place) -> String {
             let path = std::fs::canonicalize(path).unwrap_or_else(|_| PathBuf::from(path));
             format!("serial {}", path.display())
         }
-        Place::Tcp(at) | Place::Http(at) | Place::Sila(at) => {
+        Place::Tcp(_) | Place::Http(_) | Place::Sila(_) => {
+            let at = place.to_string();
             let first = at.to_socket_addrs().ok().and_then(|mut all| all.next());
             format!("network {}", first.map_or_else(|| at.clone(), |a| a.to_string()))
         }

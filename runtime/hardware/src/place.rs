@@ -10,10 +10,55 @@ pub enum Place {
     Serial(String),
     /// `HOST:PORT`.
     Tcp(String),
-    /// A server of SiLA 2, `HOST:PORT`.
-    Sila(String),
+    /// A server of SiLA 2.
+    Sila(Box<SilaServer>),
     /// A server at `HOST:PORT`.
     Http(String),
+}
+
+/// A server of SiLA 2, and how it is spoken to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SilaServer {
+    /// `HOST:PORT`, or its UUID, by which it is looked for on the network.
+    pub at: String,
+    /// How it is known to be the right one.
+    pub trust: SilaTrust,
+    /// Who calls: the name of a user, and the variable of the environment that holds the password.
+    pub user: Option<(String, String)>,
+    /// It is taken for oneself; it lets go by itself when nothing is heard for so long, s.
+    pub lock: Option<u64>,
+}
+
+/// How a server of SiLA 2 is known to be the right one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum SilaTrust {
+    /// It is not: connections are not encrypted.
+    #[default]
+    None,
+    /// By certificates in a file in PEM, its own or those that signed it.
+    Certificate(String),
+    /// By the SHA-256 of its certificate.
+    Fingerprint([u8; 32]),
+}
+
+/// A fingerprint as it is written: 32 bytes in hexadecimal, with or without colons.
+pub fn fingerprint(text: &str) -> Option<[u8; 32]> {
+    let digits: Vec<u32> = text.chars().filter(|c| *c != ':').map(|c| c.to_digit(16)).collect::<Option<_>>()?;
+    let mut out = [0; 32];
+    if digits.len() != 2 * out.len() {
+        return None;
+    }
+    for (byte, pair) in out.iter_mut().zip(digits.chunks(2)) {
+        *byte = u8::try_from(16 * pair[0] + pair[1]).ok()?;
+    }
+    Some(out)
+}
+
+/// Whether a text is a UUID as it is written: `7f3f5b0e-8c57-4d56-9a3e-2c1f0d9b6a11`.
+pub(crate) fn is_uuid(text: &str) -> bool {
+    let groups: Vec<&str> = text.split('-').collect();
+    let hexadecimal = text.bytes().all(|b| b == b'-' || b.is_ascii_hexdigit());
+    hexadecimal && groups.iter().map(|g| g.len()).eq([8, 4, 4, 4, 12])
 }
 
 impl Place {
@@ -25,8 +70,10 @@ impl Place {
 
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (Place::Serial(text) | Place::Tcp(text) | Place::Sila(text) | Place::Http(text)) = self;
-        f.write_str(text)
+        f.write_str(match self {
+            Place::Serial(text) | Place::Tcp(text) | Place::Http(text) => text,
+            Place::Sila(server) => &server.at,
+        })
     }
 }
 
@@ -58,7 +105,8 @@ impl Place {
         match self {
             Place::Serial(path) => serial(&path).map(|()| Place::Serial(path)),
             Place::Tcp(text) => endpoint(&text, "address").map(|()| Place::Tcp(text)),
-            Place::Sila(text) => endpoint(&text, "sila").map(|()| Place::Sila(text)),
+            Place::Sila(server) if is_uuid(&server.at) => Ok(Place::Sila(server)),
+            Place::Sila(server) => endpoint(&server.at, "sila").map(|()| Place::Sila(server)),
             Place::Http(text) => {
                 let bare = text.strip_prefix(HTTP).map_or(text.as_str(), |t| t.strip_suffix('/').unwrap_or(t));
                 endpoint(bare, "http").map(|()| Place::Http(bare.to_owned()))
@@ -156,7 +204,7 @@ fn plain(error: &io::Error) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::Place;
+    use super::{Place, fingerprint, is_uuid};
 
     #[test]
     fn places_are_hosts_with_ports_and_paths() {
@@ -167,6 +215,18 @@ mod tests {
         let http = |text: &str| Place::Http(text.to_owned()).checked();
         assert_eq!(http("http://robot:31950/"), Ok(Place::Http("robot:31950".to_owned())));
         assert!(Place::Serial("COM3".to_owned()).checked().is_ok());
+    }
+
+    #[test]
+    fn fingerprints_are_32_bytes_in_hexadecimal() {
+        let plain = "ab".repeat(31) + "01";
+        let read = fingerprint(&plain).expect("it is one");
+        assert_eq!((read[0], read[31]), (0xab, 1));
+        assert_eq!(fingerprint(&("AB:".repeat(31) + "01")), Some(read));
+        for text in ["", "AB:CD", &"G0".repeat(32), &"é".repeat(32), &"AB".repeat(33), &"+1".repeat(32)] {
+            assert_eq!(fingerprint(text), None, "{text}");
+        }
+        assert!(is_uuid("7f3f5b0e-8c57-4d56-9a3e-2c1f0d9b6a11") && !is_uuid("plate.lab:50052"));
     }
 
     #[test]

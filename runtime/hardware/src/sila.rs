@@ -3,31 +3,74 @@
 use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Told, Until};
-use matterix_sila_wire::{Client, Failure, is_of};
+use matterix_sila_wire::tls::Trust;
+use matterix_sila_wire::{Access, Client, Failure, Lock, Login, discovery, is_of};
 
 use crate::link::{Line, Overhear, Trouble, forms, showable};
 use crate::pattern::{matched, written};
+use crate::place::{SilaServer, SilaTrust, is_uuid};
 use crate::template;
 
 /// A server that is connected.
 pub struct Server(Client);
 
 impl Server {
-    /// Connects to `HOST:PORT`, which must offer the feature.
-    pub fn connect(address: &str, feature: &str, timeout: f64) -> Result<Server, Trouble> {
+    /// Connects to a server, which must offer the feature.
+    pub fn connect(server: &SilaServer, feature: &str, timeout: f64) -> Result<Server, Trouble> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .ok()
             .filter(|t| !t.is_zero())
             .ok_or_else(|| Trouble::Lost("the timeout is no duration".to_owned()))?;
-        match Client::connect(address, feature, timeout) {
-            Ok(client) => Ok(Server(client)),
-            Err(Failure::Refused { name, message }) => {
-                Err(Trouble::Garbled(format!("it answered `{name}`: {message}")))
+        let mut access = access(server).map_err(Trouble::Lost)?;
+        let mut failed = None;
+        for address in addresses(server, timeout).map_err(Trouble::Lost)? {
+            access.address = address;
+            match Client::connect(&access, feature, timeout) {
+                Ok(client) => return Ok(Server(client)),
+                // It may be reached by another of its addresses.
+                Err(Failure::Lost(why)) => failed = failed.or(Some(why)),
+                Err(Failure::Refused { name, message }) => {
+                    return Err(Trouble::Garbled(format!("it answered `{name}`: {message}")));
+                }
+                Err(Failure::Garbled(why)) => return Err(Trouble::Garbled(why)),
             }
-            Err(Failure::Lost(why)) => Err(Trouble::Lost(why)),
-            Err(Failure::Garbled(why)) => Err(Trouble::Garbled(why)),
         }
+        let missing = || format!("no server with the UUID `{}` is on the network", server.at);
+        Err(Trouble::Lost(failed.unwrap_or_else(missing)))
     }
+}
+
+/// Where a server is, as said or as it says to the network.
+fn addresses(server: &SilaServer, timeout: Duration) -> Result<Vec<String>, String> {
+    if !is_uuid(&server.at) {
+        return Ok(vec![server.at.clone()]);
+    }
+    let found = discovery::look(timeout, Some(&server.at.to_lowercase()))?;
+    Ok(found.iter().flat_map(|f| &f.addresses).map(ToString::to_string).collect())
+}
+
+fn access(server: &SilaServer) -> Result<Access, String> {
+    let trust = match &server.trust {
+        SilaTrust::None => Trust::Plain,
+        SilaTrust::Fingerprint(digest) => Trust::Fingerprint(*digest),
+        SilaTrust::Certificate(path) => {
+            let read = std::fs::read_to_string(path);
+            Trust::Certificates(read.map_err(|e| format!("the certificate `{path}` cannot be read: {e}"))?)
+        }
+    };
+    let login = server.user.as_ref().map(|(user, variable)| {
+        let password = std::env::var(variable);
+        let password = password.map_err(|_| format!("the variable `{variable}` of the environment holds no password"));
+        Ok::<_, String>(Login { user: user.clone(), password: password? })
+    });
+    let lock = server.lock.map(|seconds| Lock { name: who(), lapse: Duration::from_secs(seconds) });
+    Ok(Access { address: String::new(), trust, login: login.transpose()?, lock })
+}
+
+/// Who takes a server for themselves: the same after a restart, so that what a process that was killed has taken can be used again.
+fn who() -> String {
+    let user = std::env::var("USER").or_else(|_| std::env::var("LOGNAME")).unwrap_or_else(|_| "somebody".to_owned());
+    format!("matterixc {user}@{}", rustix::system::uname().nodename().to_string_lossy())
 }
 
 /// What went wrong as what the driver calls it.

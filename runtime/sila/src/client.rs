@@ -1,16 +1,15 @@
 //! A client: commands and properties of one server, by the features that it says it has. It blocks.
 
-mod encrypted;
+mod beside;
+mod bytes;
+mod dial;
 mod given;
 mod wire;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use hyper_util::rt::TokioIo;
 use matterix_sila::feature::{Command, Element, Feature};
-use tokio::net::TcpStream;
 use tokio::runtime::{Builder, Runtime};
 use tonic::Streaming;
 use tonic::client::Grpc;
@@ -21,7 +20,11 @@ use crate::framework::{Confirmation, Execution, Info, Stage};
 use crate::raw::Raw;
 use crate::service;
 use crate::text::{self, Call, named, shown};
+use crate::tls::Trust;
 use crate::value::{Value, decode, encode};
+use beside::Beside;
+pub use beside::{Lock, Login};
+use dial::Dial;
 use given::arguments;
 pub use given::is_of;
 use wire::{source, within};
@@ -33,11 +36,27 @@ const GLANCE: Duration = Duration::from_millis(20);
 /// but servers of gRPC turn those away who send more than one in some minutes.
 const WATCH: Duration = Duration::from_secs(5);
 
+/// Longest wait for the answer to a farewell.
+const FAREWELL: Duration = Duration::from_secs(2);
+
 /// A command that goes on.
 struct Running {
     execution: Execution,
     news: Streaming<Info>,
     told: Option<Streaming<Raw>>,
+}
+
+/// How a server is spoken to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Access {
+    /// `HOST:PORT`.
+    pub address: String,
+    /// Whether it is the right one.
+    pub trust: Trust,
+    /// Who calls, where the server asks for that.
+    pub login: Option<Login>,
+    /// How it is taken for oneself, if it is.
+    pub lock: Option<Lock>,
 }
 
 /// A server that is connected.
@@ -54,56 +73,70 @@ pub struct Client {
     last: BTreeMap<(usize, String), Vec<(String, Value)>>,
     /// When it was last asked whether it is there.
     seen: Instant,
+    /// What goes beside calls.
+    beside: Vec<Beside>,
+    /// The name by which it was taken for oneself.
+    locked: Option<String>,
+}
+
+impl Drop for Client {
+    /// Others may have it again. One that does not hear this lets go by itself.
+    fn drop(&mut self) {
+        if let Some(name) = self.locked.take() {
+            self.timeout = self.timeout.min(FAREWELL);
+            let _ = self.release(&name);
+        }
+    }
 }
 
 impl Client {
-    /// A connection to a server, `HOST:PORT`, that must offer this feature; no call lasts longer than `timeout`. The
-    /// connection is not encrypted.
-    pub fn connect(address: &str, feature: &str, timeout: Duration) -> Result<Client, Failure> {
-        Client::connected(address, feature, timeout).map_err(|failure| match failure {
-            Failure::Lost(_) if encrypted::is_encrypted(address, timeout) => Failure::Garbled(format!(
-                "the server at `{address}` is encrypted (TLS), and calls are made without encryption only: start it without"
-            )),
-            other => other,
-        })
-    }
-
-    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
-    fn connected(address: &str, feature: &str, timeout: Duration) -> Result<Client, Failure> {
-        let lost = |why: String| Failure::Lost(format!("cannot connect to `{address}`: {why}"));
+    /// A connection to a server that must offer this feature; no call lasts longer than `timeout`.
+    pub fn connect(access: &Access, feature: &str, timeout: Duration) -> Result<Client, Failure> {
+        let lost = |why: String| Failure::Lost(format!("cannot connect to `{}`: {why}", access.address));
         let runtime = Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.map_err(|e| lost(e.to_string()))?;
-        let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(|e| lost(e.to_string()))?;
-        // A connection that is gone is not made again in silence: nobody knows what became of the device meanwhile.
-        let once = AtomicBool::new(false);
-        let place = address.to_owned();
-        let connector = tower::service_fn(move |_: http::Uri| {
-            let (again, place) = (once.swap(true, Ordering::SeqCst), place.clone());
-            async move {
-                if again {
-                    return Err(std::io::Error::other("it was cut"));
-                }
-                let stream = TcpStream::connect(place).await?;
-                stream.set_nodelay(true)?;
-                Ok(TokioIo::new(stream))
+        let dial = Dial::new(&access.address, &access.trust).map_err(Failure::Garbled)?;
+        let endpoint = Endpoint::from_shared(dial.uri()).map_err(|e| lost(e.to_string()))?;
+        let channel = within(&runtime, timeout, endpoint.connect_with_connector(dial.clone()));
+        let channel = channel.ok_or_else(|| lost("it did not answer in time".to_owned()))?;
+        let channel = channel.map_err(|e| match dial.distrusted() {
+            Some(shown) => Failure::Garbled(format!(
+                "the server at `{}` is not trusted: its certificate has the fingerprint {shown}",
+                access.address
+            )),
+            None if access.trust != Trust::Plain && dial::is_plain(&e) => {
+                lost(format!("it does not speak TLS ({}): leave out its certificate or fingerprint", source(&e)))
             }
+            None => lost(source(&e)),
         });
-        let channel = within(&runtime, timeout, endpoint.connect_with_connector(connector))
-            .ok_or_else(|| lost("it did not answer in time".to_owned()))?
-            .map_err(|e| lost(source(&e)))?;
-        let grpc = Grpc::new(channel).max_decoding_message_size(16 << 20);
-        let features = vec![service::feature()];
         let mut client = Client {
             runtime,
-            grpc,
+            grpc: Grpc::new(channel?).max_decoding_message_size(16 << 20),
             timeout,
             usual: timeout,
-            features,
+            features: vec![service::feature()],
             running: BTreeMap::new(),
             last: BTreeMap::new(),
-            seen: Instant::now(),
+            seen: now(),
+            beside: Vec::new(),
+            locked: None,
         };
-        let offered = client.read(0, "ImplementedFeatures")?;
+        match client.learn(feature) {
+            // Servers that speak TLS hang up on those who do not.
+            Err(Failure::Lost(why)) if access.trust == Trust::Plain => {
+                let named = dial::encrypted(&client.runtime, &access.address, timeout);
+                return Err(named.unwrap_or(Failure::Lost(why)));
+            }
+            other => other?,
+        }
+        access.login.iter().try_for_each(|login| client.log_in(login))?;
+        access.lock.iter().try_for_each(|lock| client.take(lock))?;
+        Ok(client)
+    }
+
+    /// Asks what the server offers; the feature that is meant must be there.
+    fn learn(&mut self, feature: &str) -> Result<(), Failure> {
+        let offered = self.read(0, "ImplementedFeatures")?;
         let offered: Vec<String> = match offered {
             Value::List(list) => list.iter().map(shown).collect(),
             other => vec![shown(&other)],
@@ -112,16 +145,16 @@ impl Client {
             let list: Vec<String> = offered.iter().map(|o| format!("`{o}`")).collect();
             return Err(Failure::Garbled(format!("it does not offer `{feature}`, but {}", list.join(", "))));
         }
-        let main = client.fetch(feature)?;
-        client.features.insert(0, main);
+        let main = self.fetch(feature)?;
+        self.features.insert(0, main);
         let own = service::feature().id();
         for other in offered.iter().filter(|o| *o != feature && **o != own) {
             // What cannot be read is not spoken to.
-            if let Ok(read) = client.fetch(other) {
-                client.features.push(read);
+            if let Ok(read) = self.fetch(other) {
+                self.features.push(read);
             }
         }
-        Ok(client)
+        Ok(())
     }
 
     /// From here on no call lasts longer than this, where that is less than was given.
@@ -215,12 +248,11 @@ impl Client {
     }
 
     /// Asks now and then for something that every server knows.
-    #[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
     fn is_there(&mut self) -> Result<(), Failure> {
         if self.seen.elapsed() < WATCH {
             return Ok(());
         }
-        self.seen = Instant::now();
+        self.seen = now();
         let service = self.features.iter().position(|f| f.identifier == service::IDENTIFIER).unwrap_or(0);
         self.read(service, "ServerUUID").map(|_| ())
     }
@@ -260,13 +292,11 @@ impl Client {
             return Err(Failure::Garbled(format!("`{}` has no property `{name}`", feature.id())));
         };
         let raw: Raw = if property.observable {
-            let path = self.path(index, &format!("Subscribe_{name}"))?;
-            let mut all = self.stream(path, Raw::default())?;
+            let mut all = self.stream(index, &format!("Subscribe_{name}"), Raw::default())?;
             let first = within(&self.runtime, self.timeout, all.message()).ok_or_else(|| self.silent(name))?;
             first.map_err(|s| Failure::of(&s))?.ok_or_else(|| Failure::Garbled(format!("`{name}` told nothing")))?
         } else {
-            let path = self.path(index, &format!("Get_{name}"))?;
-            self.unary(path, Raw::default())?
+            self.unary(index, &format!("Get_{name}"), Raw::default())?
         };
         let told = Element {
             identifier: property.identifier,
@@ -274,8 +304,9 @@ impl Client {
             description: String::new(),
             ty: property.ty,
         };
-        let values = decode(&self.features[index], std::slice::from_ref(&told), &raw).map_err(Failure::Garbled)?;
-        values.into_iter().next().ok_or_else(|| Failure::Garbled(format!("`{name}` told nothing")))
+        let values = self.answered(index, std::slice::from_ref(&told), &raw)?;
+        let value = values.into_iter().next().map(|(_, value)| value);
+        value.ok_or_else(|| Failure::Garbled(format!("`{name}` told nothing")))
     }
 
     /// A command that does not last, from its beginning to its end.
@@ -285,30 +316,35 @@ impl Client {
         command: &Command,
         values: &[Value],
     ) -> Result<Vec<(String, Value)>, Failure> {
-        let raw = encode(&self.features[index], &command.parameters, values).map_err(Failure::Garbled)?;
-        let path = self.path(index, &command.identifier)?;
-        let answer: Raw = self.unary(path, raw)?;
+        let raw = self.given(index, command, values)?;
+        let answer: Raw = self.unary(index, &command.identifier, raw)?;
         self.answered(index, &command.responses, &answer)
     }
 
-    fn answered(&self, index: usize, elements: &[Element], raw: &Raw) -> Result<Vec<(String, Value)>, Failure> {
+    /// The arguments of a command as a message; long bytes are sent before it.
+    fn given(&mut self, index: usize, command: &Command, values: &[Value]) -> Result<Raw, Failure> {
+        let of = format!("{}/Command/{}/Parameter", self.features[index].id(), command.identifier);
+        let given = command.parameters.iter().zip(values);
+        let given: Result<Vec<Value>, Failure> =
+            given.map(|(parameter, value)| self.sent(value, &format!("{of}/{}", parameter.identifier))).collect();
+        encode(&self.features[index], &command.parameters, &given?).map_err(Failure::Garbled)
+    }
+
+    /// The values of a message, by their names; long bytes are fetched.
+    fn answered(&mut self, index: usize, elements: &[Element], raw: &Raw) -> Result<Vec<(String, Value)>, Failure> {
         let values = decode(&self.features[index], elements, raw).map_err(Failure::Garbled)?;
-        Ok(elements.iter().map(|e| e.identifier.clone()).zip(values).collect())
+        let names = elements.iter().map(|e| e.identifier.clone());
+        names.zip(values).map(|(name, value)| Ok((name, self.fetched(value)?))).collect()
     }
 
     fn begin(&mut self, index: usize, command: &Command, values: &[Value]) -> Result<(), Failure> {
-        let raw = encode(&self.features[index], &command.parameters, values).map_err(Failure::Garbled)?;
-        let path = self.path(index, &command.identifier)?;
-        let confirmed: Confirmation = self.unary(path, raw)?;
+        let raw = self.given(index, command, values)?;
+        let confirmed: Confirmation = self.unary(index, &command.identifier, raw)?;
         let execution = confirmed.execution.ok_or_else(|| Failure::Garbled("it names no execution".to_owned()))?;
-        let path = self.path(index, &format!("{}_Info", command.identifier))?;
-        let news = self.stream(path, execution.clone())?;
+        let news = self.stream(index, &format!("{}_Info", command.identifier), execution.clone())?;
         let told = match command.intermediate.as_slice() {
             [] => None,
-            _ => {
-                let path = self.path(index, &format!("{}_Intermediate", command.identifier))?;
-                Some(self.stream(path, execution.clone())?)
-            }
+            _ => Some(self.stream(index, &format!("{}_Intermediate", command.identifier), execution.clone())?),
         };
         let key = (index, command.identifier.clone());
         self.last.remove(&key);
@@ -337,12 +373,16 @@ impl Client {
     fn end(&mut self, key: &(usize, String), command: &Command) -> Result<(), Failure> {
         self.glance(key)?;
         let Some(running) = self.running.remove(key) else { return Ok(()) };
-        let path = self.path(key.0, &format!("{}_Result", command.identifier))?;
-        let raw: Raw = self.unary(path, running.execution)?;
+        let raw: Raw = self.unary(key.0, &format!("{}_Result", command.identifier), running.execution)?;
         let answered = self.answered(key.0, &command.responses, &raw)?;
         self.last.entry(key.clone()).or_default().extend(answered);
         Ok(())
     }
+}
+
+#[allow(clippy::disallowed_methods, reason = "servers live by the wall clock")]
+fn now() -> Instant {
+    Instant::now()
 }
 
 fn has_ended(info: &Info) -> bool {

@@ -3,25 +3,30 @@
 mod answer;
 mod cancel;
 mod executions;
+mod guard;
+mod own;
 mod streams;
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
-use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use hyper::server::conn::http2;
 use hyper_util::rt::{TokioExecutor, TokioIo, TokioTimer};
 use matterix_sila::feature::Feature;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
-use tokio::sync::{mpsc as news, oneshot};
+use tokio::sync::{Semaphore, mpsc as news, oneshot};
 
 use crate::call::Failure;
-use crate::service;
+use crate::tls::{self, Identity};
 use crate::value::Value;
 use answer::Answers;
+use guard::Guard;
+pub use guard::Users;
 
 /// What others ask for.
 #[derive(Debug)]
@@ -41,6 +46,8 @@ pub struct Call {
     pub command: usize,
     /// In the order of its parameters.
     pub arguments: Vec<Value>,
+    /// Who calls, where people log in.
+    pub user: Option<String>,
     /// Told how it stands; nobody listens any more where this is closed.
     pub news: news::UnboundedSender<News>,
     /// Set when whoever called it wants it no more.
@@ -93,6 +100,15 @@ pub struct About {
     pub uuid: String,
 }
 
+/// Whom a server answers, and how.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Door {
+    /// The certificate that it shows; connections are not encrypted without one.
+    pub identity: Option<Identity>,
+    /// Who must log in; everybody may call where there are none.
+    pub users: Option<Users>,
+}
+
 /// A server that answers until it is dropped.
 pub struct Server {
     runtime: Option<Runtime>,
@@ -121,51 +137,63 @@ pub fn uuid(text: &str) -> Option<String> {
 /// Longest time in which connections that are open may end.
 const IDLE: Duration = Duration::from_secs(20);
 
+/// Longest time in which a connection is agreed on.
+const GREETING: Duration = Duration::from_secs(10);
+
+/// The most connections at once: whoever comes later waits until one ends.
+const MOST: usize = 256;
+
 /// Offers features at an address; what is called comes out of the channel.
 pub fn serve(
     address: SocketAddr,
-    name: &str,
-    description: &str,
-    version: &str,
-    uuid: &str,
+    about: About,
+    door: Door,
     features: Vec<Feature>,
 ) -> Result<(Server, mpsc::Receiver<Request>), String> {
     let failed = |e: std::io::Error| format!("cannot answer at `{address}`: {e}");
+    let tls = door.identity.as_ref().map(tls::acceptor).transpose()?;
     let runtime = Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(failed)?;
     let listener = runtime.block_on(TcpListener::bind(address)).map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let (sender, requests) = mpsc::channel();
-    let about = About {
-        name: name.to_owned(),
-        description: description.to_owned(),
-        version: version.to_owned(),
-        uuid: uuid.to_owned(),
-    };
-    let mut all = vec![service::feature()];
-    all.extend(features);
-    all.push(cancel::feature());
-    let answers = Arc::new(Answers::new(all, Mutex::new(about), sender));
+    let answers = Arc::new(Answers::new(features, about, Guard::new(door.users), sender));
+    let places = Arc::new(Semaphore::new(MOST));
     runtime.spawn(async move {
         loop {
+            let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
             let Ok((stream, _)) = listener.accept().await else {
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;
             };
             let _ = stream.set_nodelay(true);
-            let answers = Arc::clone(&answers);
+            let (answers, tls) = (Arc::clone(&answers), tls.clone());
             tokio::spawn(async move {
-                let service = hyper::service::service_fn(move |request| {
-                    let answers = Arc::clone(&answers);
-                    async move { Ok::<_, std::convert::Infallible>(answers.answer(request).await) }
-                });
-                // What is no HTTP/2 ends the connection, and nothing else.
-                let _ = http2::Builder::new(TokioExecutor::new())
-                    .timer(TokioTimer::new())
-                    .keep_alive_interval(Some(IDLE))
-                    .serve_connection(TokioIo::new(stream), service)
-                    .await;
+                let _place = place;
+                match tls {
+                    None => converse(stream, answers).await,
+                    Some(tls) => {
+                        // What is no TLS ends the connection, and nothing else.
+                        if let Ok(Ok(stream)) = tokio::time::timeout(GREETING, tls.accept(stream)).await {
+                            converse(stream, answers).await;
+                        }
+                    }
+                }
             });
         }
     });
     Ok((Server { runtime: Some(runtime), address }, requests))
+}
+
+/// Answers what comes over a connection until it ends.
+async fn converse(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, answers: Arc<Answers>) {
+    let service = hyper::service::service_fn(move |request| {
+        let answers = Arc::clone(&answers);
+        async move { Ok::<_, std::convert::Infallible>(answers.answer(request).await) }
+    });
+    // What is no HTTP/2 ends the connection, and nothing else.
+    let _ = http2::Builder::new(TokioExecutor::new())
+        .timer(TokioTimer::new())
+        .keep_alive_interval(Some(IDLE))
+        .serve_connection(TokioIo::new(stream), service)
+        .await;
 }

@@ -1,7 +1,15 @@
 //! What goes over the wire as people and drivers write it: `SetTargetTemperature(Target: 60)`, `FinalTemperature: 59.8`.
 
-use matterix_sila::feature::{Basic, DataType, Feature};
+use std::fmt::Write;
+use std::io::Read;
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use matterix_sila::feature::{Basic, DataType, Feature};
+use sha2::{Digest, Sha256};
+
+use crate::binary::LONGEST;
+use crate::moment::{self, Which};
 use crate::value::{Value, fits};
 
 /// A command or a question, taken apart.
@@ -100,7 +108,11 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
             "false" | "0" => Value::Boolean(false),
             _ => return Err(format!("`{text}` is neither `true` nor `false`")),
         },
-        DataType::Basic(other) => return Err(format!("a value of type {} cannot be written here", other.name())),
+        DataType::Basic(Basic::Binary) => Value::Bytes(bytes(text)?),
+        DataType::Basic(Basic::Date) => Value::Moment(moment::written(Which::Date, &unquoted(text)?)?),
+        DataType::Basic(Basic::Time) => Value::Moment(moment::written(Which::Time, &unquoted(text)?)?),
+        DataType::Basic(Basic::Timestamp) => Value::Moment(moment::written(Which::Stamp, &unquoted(text)?)?),
+        DataType::Basic(Basic::Any) => return Err("a value of type Any cannot be written here".to_owned()),
         DataType::List(of) => {
             let inner = text.strip_prefix('[').and_then(|t| t.strip_suffix(']'));
             let inner = inner.ok_or_else(|| format!("`{text}` is no list: write `[1, 2]`"))?;
@@ -119,6 +131,22 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
             Value::Structure(elements.iter().map(part).collect::<Result<_, _>>()?)
         }
     })
+}
+
+/// Bytes in Base64, or those of a file: `file "methods/warm.bin"`.
+fn bytes(text: &str) -> Result<Vec<u8>, String> {
+    let Some(path) = text.strip_prefix("file ") else {
+        return STANDARD.decode(unquoted(text)?).map_err(|e| format!("`{text}` is no Base64: {e}"));
+    };
+    let path = unquoted(path.trim())?;
+    let failed = |e: std::io::Error| format!("`{path}` cannot be read: {e}");
+    let mut file = std::fs::File::open(&path).map_err(failed)?.take(LONGEST + 1);
+    let mut bytes = Vec::new();
+    file.read_to_end(&mut bytes).map_err(failed)?;
+    match bytes.len() as u64 {
+        size if size > LONGEST => Err(format!("`{path}` is longer than {} MiB", LONGEST >> 20)),
+        _ => Ok(bytes),
+    }
 }
 
 /// A text without its quotes, in which `\"` is a quote and `\\` a backslash; one without quotes is as it stands.
@@ -140,7 +168,7 @@ fn unquoted(text: &str) -> Result<String, String> {
     }
 }
 
-/// A value as text: numbers as they are, truth as 1 and 0.
+/// A value as text: numbers as they are, truth as 1 and 0, bytes by their number and SHA-256.
 pub fn shown(value: &Value) -> String {
     let list = |values: &[Value]| values.iter().map(shown).collect::<Vec<_>>().join(", ");
     match value {
@@ -150,8 +178,20 @@ pub fn shown(value: &Value) -> String {
         Value::Boolean(b) => u8::from(*b).to_string(),
         Value::List(values) => format!("[{}]", list(values)),
         Value::Structure(parts) => format!("{{{}}}", named(parts)),
+        // Whole, they would fill journals; by these two they are known again.
+        Value::Bytes(bytes) => format!("({} bytes, SHA-256 {})", bytes.len(), hexadecimal(&Sha256::digest(bytes))),
+        Value::Kept(uuid) => format!("(bytes {uuid})"),
+        Value::Moment(moment) => moment.to_string(),
         Value::Other(basic) => format!("({})", basic.name()),
     }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut out, byte| {
+        // Writing to a text cannot fail.
+        let _ = write!(out, "{byte:02x}");
+        out
+    })
 }
 
 /// Values with their names as text.

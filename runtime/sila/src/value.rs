@@ -3,7 +3,9 @@
 use matterix_sila::feature::{Basic, Constraints, DataType, Element, Feature};
 use prost::Message;
 
+use crate::binary::{Binary, Held};
 use crate::framework;
+use crate::moment::{self, Moment, Which};
 use crate::raw::Raw;
 
 /// A value.
@@ -21,6 +23,12 @@ pub enum Value {
     List(Vec<Value>),
     /// By the names of its parts.
     Structure(Vec<(String, Value)>),
+    /// Bytes.
+    Bytes(Vec<u8>),
+    /// Bytes that the server keeps, by the identifier that it gave them.
+    Kept(String),
+    /// A day, a time of day, or both.
+    Moment(Moment),
     /// A value of a type that is only passed on.
     Other(Basic),
 }
@@ -50,6 +58,15 @@ fn message(feature: &Feature, ty: &DataType, value: &Value) -> Result<Vec<u8>, S
         (DataType::Basic(Basic::Integer), Value::Integer(n)) => framework::Integer { value: *n }.encode_to_vec(),
         (DataType::Basic(Basic::Real), Value::Real(n)) => framework::Real { value: *n }.encode_to_vec(),
         (DataType::Basic(Basic::Boolean), Value::Boolean(b)) => framework::Boolean { value: *b }.encode_to_vec(),
+        (DataType::Basic(Basic::Binary), Value::Bytes(bytes)) => {
+            Binary { held: Some(Held::Here(bytes.clone())) }.encode_to_vec()
+        }
+        (DataType::Basic(Basic::Binary), Value::Kept(uuid)) => {
+            Binary { held: Some(Held::Kept(uuid.clone())) }.encode_to_vec()
+        }
+        (DataType::Basic(Basic::Date), Value::Moment(moment @ Moment::Date(..)))
+        | (DataType::Basic(Basic::Time), Value::Moment(moment @ Moment::Time(..)))
+        | (DataType::Basic(Basic::Timestamp), Value::Moment(moment @ Moment::Stamp(_))) => moment::encoded(moment),
         (DataType::Structure(parts), Value::Structure(given)) => {
             let mut raw = Raw::default();
             for (part, number) in parts.iter().zip(1..) {
@@ -107,7 +124,15 @@ fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, S
         DataType::Basic(Basic::Integer) => Value::Integer(read::<framework::Integer>(bytes)?.value),
         DataType::Basic(Basic::Real) => Value::Real(read::<framework::Real>(bytes)?.value),
         DataType::Basic(Basic::Boolean) => Value::Boolean(read::<framework::Boolean>(bytes)?.value),
-        DataType::Basic(other) => Value::Other(*other),
+        DataType::Basic(Basic::Binary) => match read::<Binary>(bytes)?.held {
+            Some(Held::Here(bytes)) => Value::Bytes(bytes),
+            Some(Held::Kept(uuid)) => Value::Kept(uuid),
+            None => return Err("it holds no bytes".to_owned()),
+        },
+        DataType::Basic(Basic::Date) => Value::Moment(moment::decoded(Which::Date, bytes)?),
+        DataType::Basic(Basic::Time) => Value::Moment(moment::decoded(Which::Time, bytes)?),
+        DataType::Basic(Basic::Timestamp) => Value::Moment(moment::decoded(Which::Stamp, bytes)?),
+        DataType::Basic(Basic::Any) => Value::Other(Basic::Any),
         DataType::Structure(parts) => {
             let raw = read::<Raw>(bytes)?;
             let part = |(part, number): (&Element, u32)| {
@@ -166,6 +191,7 @@ pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
             constraints.pattern.as_ref().map_or(Ok(()), |pattern| matches(text, pattern))
         }
         Value::List(values) => within(values.len(), constraints.count, "elements"),
+        Value::Bytes(bytes) => within(bytes.len(), constraints.length, "bytes"),
         _ => Ok(()),
     }
 }

@@ -7,7 +7,10 @@ use std::time::Duration;
 use matterix_sila::feature::{Basic, Constraints, DataType, Element};
 use matterix_sila::{Feature, read};
 use matterix_sila_wire::text::{call, shown, value};
-use matterix_sila_wire::{Client, Failure, News, Raw, Request, Value, decode, encode, serve};
+use matterix_sila_wire::tls::{Trust, own};
+use matterix_sila_wire::{
+    About, Access, Client, Door, Failure, Lock, Login, News, Raw, Request, Server, Users, Value, decode, encode, serve,
+};
 use proptest::prelude::*;
 use prost::Message;
 
@@ -17,6 +20,15 @@ const ID: &str = "org.example/heating/HotPlate/v1";
 
 fn plate() -> Feature {
     read(PLATE).expect("the feature is sound")
+}
+
+fn about() -> About {
+    let [name, description, version, uuid] = ["plate", "a plate", "1.0", UUID].map(str::to_owned);
+    About { name, description, version, uuid }
+}
+
+fn plain(address: &str) -> Access {
+    Access { address: address.to_owned(), ..Access::default() }
 }
 
 /// Does what is asked until nobody asks any more.
@@ -65,10 +77,10 @@ fn refused(result: Result<String, Failure>) -> (String, String) {
 #[test]
 fn a_client_and_a_server_understand_each_other() {
     let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    let (server, requests) = serve(any, "plate", "a plate", "1.0", UUID, vec![plate()]).expect("a port is free");
+    let (server, requests) = serve(any, about(), Door::default(), vec![plate()]).expect("a port is free");
     let working = std::thread::spawn(move || lab(requests));
     let (address, time) = (server.address.to_string(), Duration::from_secs(5));
-    let mut client = Client::connect(&address, ID, time).expect("it answers");
+    let mut client = Client::connect(&plain(&address), ID, time).expect("it answers");
     assert_eq!(client.feature().id(), ID);
     assert_eq!(client.ask("CurrentTemperature"), Ok("25".into()));
     assert_eq!(client.ask("SiLAService.ServerName"), Ok("plate".into()));
@@ -98,7 +110,7 @@ fn a_client_and_a_server_understand_each_other() {
     ] {
         assert!(matches!(client.say(wrong, false), Err(Failure::Garbled(_))), "{wrong}");
     }
-    let other = Client::connect(&address, "org.example/heating/Oven/v1", time).err();
+    let other = Client::connect(&plain(&address), "org.example/heating/Oven/v1", time).err();
     assert!(matches!(other, Some(Failure::Garbled(why)) if why.contains("does not offer")));
     drop(server);
     assert!(matches!(client.say(said, false), Err(Failure::Lost(_))));
@@ -162,15 +174,139 @@ fn answering(first: &'static [u8]) -> String {
 fn an_encrypted_server_is_named_as_such() {
     // An alert of TLS: a protocol version that the server does not speak.
     let address = answering(&[21, 3, 3, 0, 2, 2, 70]);
-    let failed = Client::connect(&address, ID, Duration::from_secs(1)).err();
+    let failed = Client::connect(&plain(&address), ID, Duration::from_secs(1)).err();
     assert!(matches!(&failed, Some(Failure::Garbled(why)) if why.contains("is encrypted (TLS)")), "{failed:?}");
-    let failed = Client::connect(&answering(b"HTTP/1.1 400"), ID, Duration::from_secs(1)).err();
+    let failed = Client::connect(&plain(&answering(b"HTTP/1.1 400")), ID, Duration::from_secs(1)).err();
     assert!(failed.is_some_and(|f| !format!("{f:?}").contains("TLS")));
+}
+
+/// A plate that is served, and where.
+fn served(door: Door) -> (Server, String) {
+    let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+    let (server, requests) = serve(any, about(), door, vec![plate()]).expect("a port is free");
+    std::thread::spawn(move || lab(requests));
+    let address = server.address.to_string();
+    (server, address)
+}
+
+const TIME: Duration = Duration::from_secs(10);
+
+#[test]
+fn encrypted_servers_are_trusted_by_certificate_or_fingerprint_and_no_others() {
+    let identity = own(UUID, &["localhost".to_owned(), "127.0.0.1".to_owned()]).expect("it is made");
+    let (_server, address) = served(Door { identity: Some(identity.clone()), users: None });
+    let trusting = |trust| Access { trust, ..plain(&address) };
+    let shown = identity.fingerprint().expect("it has one");
+
+    let failed = Client::connect(&plain(&address), ID, TIME).err();
+    assert!(matches!(&failed, Some(Failure::Garbled(why)) if why.contains(&shown)), "{failed:?}");
+
+    let mut client =
+        Client::connect(&trusting(Trust::Certificates(identity.chain.clone())), ID, TIME).expect("it is known");
+    assert_eq!(client.ask("CurrentTemperature"), Ok("25".into()));
+
+    let mut digest = [0; 32];
+    for (byte, pair) in digest.iter_mut().zip(shown.split(':')) {
+        *byte = u8::from_str_radix(pair, 16).expect("it is hexadecimal");
+    }
+    assert!(Client::connect(&trusting(Trust::Fingerprint(digest)), ID, TIME).is_ok());
+    digest[0] ^= 1;
+    let other = own(UUID, &["127.0.0.1".to_owned()]).expect("it is made");
+    for wrong in [Trust::Fingerprint(digest), Trust::Certificates(other.chain)] {
+        let failed = Client::connect(&trusting(wrong), ID, TIME).err();
+        let named =
+            matches!(&failed, Some(Failure::Garbled(why)) if why.contains("not trusted") && why.contains(&shown));
+        assert!(named, "{failed:?}");
+    }
+    let none = Client::connect(&trusting(Trust::Certificates("no PEM".into())), ID, TIME).err();
+    assert!(none.is_some_and(|f| format!("{f:?}").contains("no certificate in PEM")));
+
+    let (_server, address) = served(Door::default());
+    let failed = Client::connect(&Access { trust: Trust::Fingerprint(digest), ..plain(&address) }, ID, TIME).err();
+    assert!(failed.is_some_and(|f| format!("{f:?}").contains("does not speak TLS")));
+}
+
+#[test]
+fn a_client_that_hangs_while_it_greets_holds_nobody_else() {
+    let identity = own(UUID, &["127.0.0.1".to_owned()]).expect("it is made");
+    let (server, address) = served(Door { identity: Some(identity.clone()), users: None });
+    let _silent: Vec<_> = (0..20).map(|_| std::net::TcpStream::connect(server.address).expect("it listens")).collect();
+    let trust = Trust::Certificates(identity.chain);
+    assert!(Client::connect(&Access { trust, ..plain(&address) }, ID, TIME).is_ok());
+}
+
+#[test]
+fn a_server_that_is_taken_answers_nobody_else() {
+    let (_server, address) = served(Door::default());
+    let lock = |name: &str| Some(Lock { name: name.to_owned(), lapse: Duration::from_secs(60) });
+    let taking = |name: &str| Client::connect(&Access { lock: lock(name), ..plain(&address) }, ID, TIME);
+    let mut other = Client::connect(&plain(&address), ID, TIME).expect("it answers");
+    assert_eq!(other.ask("LockController.IsLocked"), Ok("0".into()));
+    let mut ana = taking("ana").expect("it is free");
+    assert_eq!(ana.ask("CurrentTemperature"), Ok("25".into()));
+    assert_eq!(ana.say("HoldTemperature(Time: 0.5)", true), Ok("FinalTemperature: 25".into()));
+    assert_eq!(ana.say("CancelController.CancelAll", true), Ok(String::new()));
+    assert_eq!(other.ask("LockController.IsLocked"), Ok("1".into()));
+    assert_eq!(refused(other.ask("CurrentTemperature")).0, "InvalidMetadata");
+    assert_eq!(refused(other.say("Stop", false)).0, "InvalidMetadata");
+    assert_eq!(refused(other.say("CancelController.CancelAll", true)).0, "InvalidMetadata");
+    let failed = taking("bob").err();
+    assert!(matches!(&failed, Some(Failure::Refused { name, .. }) if name == "ServerAlreadyLocked"), "{failed:?}");
+    // Who was cut off takes it again.
+    let again = taking("ana").expect("it is hers");
+    drop(again);
+    assert_eq!(other.ask("CurrentTemperature"), Ok("25".into()));
+}
+
+#[test]
+fn only_those_who_log_in_may_call() {
+    let hash = "$2y$04$abcdefghijklmnopqrstuu2r9OfJnfCsdneAXAGHnS4UpFFP8WIrW";
+    let users = Users::read(&format!("ana:{hash}")).expect("it is sound");
+    let (_server, address) = served(Door { identity: None, users: Some(users) });
+    let mut nobody = Client::connect(&plain(&address), ID, TIME).expect("it answers");
+    assert_eq!(nobody.ask("SiLAService.ServerName"), Ok("plate".into()));
+    assert_eq!(refused(nobody.ask("CurrentTemperature")).0, "InvalidMetadata");
+    assert_eq!(
+        refused(nobody.say("LockController.LockServer(LockIdentifier: me, Timeout: 0)", true)).0,
+        "InvalidMetadata"
+    );
+    let login = |user: &str, password: &str| Access {
+        login: Some(Login { user: user.to_owned(), password: password.to_owned() }),
+        lock: Some(Lock { name: "ana".to_owned(), lapse: Duration::from_secs(60) }),
+        ..plain(&address)
+    };
+    for (user, password) in [("ana", "wrong"), ("bob", "secret"), ("", "")] {
+        let failed = Client::connect(&login(user, password), ID, TIME).err();
+        assert!(matches!(&failed, Some(Failure::Refused { name, .. }) if name == "AuthenticationFailed"), "{failed:?}");
+    }
+    let mut ana = Client::connect(&login("ana", "secret"), ID, TIME).expect("she is known");
+    assert_eq!(ana.ask("CurrentTemperature"), Ok("25".into()));
+    assert_eq!(ana.say("HoldTemperature(Time: 0.5)", true), Ok("FinalTemperature: 25".into()));
+}
+
+#[test]
+fn bytes_and_moments_are_written_and_shown() {
+    let feature = plate();
+    let basic = |basic, text: &str| value(&feature, &DataType::Basic(basic), text);
+    let file = std::env::temp_dir().join(format!("matterixc-bytes-{}", std::process::id()));
+    std::fs::write(&file, b"abc").expect("it is written");
+    let read = basic(Basic::Binary, &format!("file \"{}\"", file.display()));
+    std::fs::remove_file(&file).expect("it was written");
+    assert_eq!(read, Ok(Value::Bytes(b"abc".into())));
+    assert_eq!(basic(Basic::Binary, "\"YWJj\""), read);
+    // FIPS 180-2, appendix B.1.
+    let digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+    assert_eq!(shown(&read.expect("it is read")), format!("(3 bytes, SHA-256 {digest})"));
+    assert!(basic(Basic::Binary, "file \"/nowhere\"").is_err_and(|why| why.contains("cannot be read")));
+    assert!(basic(Basic::Binary, "%%").is_err());
+    let stamp = basic(Basic::Timestamp, "\"2026-11-23T14:30:00+01:00\"").expect("it is one");
+    assert_eq!(shown(&stamp), "2026-11-23T14:30:00+01:00");
+    assert!(basic(Basic::Date, "today").is_err());
 }
 
 #[test]
 fn a_server_that_is_not_there_is_lost() {
-    let gone = Client::connect("127.0.0.1:1", ID, Duration::from_millis(500)).err();
+    let gone = Client::connect(&plain("127.0.0.1:1"), ID, Duration::from_millis(500)).err();
     assert!(matches!(gone, Some(Failure::Lost(_))), "{gone:?}");
 }
 

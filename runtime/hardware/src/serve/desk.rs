@@ -283,7 +283,10 @@ impl Listener for Attendant<'_, '_> {
         let asked = next.and_then(|call| self.desk.begin(call, time));
         if let Some(asked) = &asked {
             self.last = time;
-            (self.say)(&format!("{time:10.3} s  {} begins\n", self.desk.plan.get(asked.step).label));
+            let going = self.desk.going.borrow();
+            let user = going.get(&asked.step).and_then(|g| g.call.user.as_ref());
+            let by = user.map_or_else(String::new, |user| format!(", called by {user}"));
+            (self.say)(&format!("{time:10.3} s  {} begins{by}\n", self.desk.plan.get(asked.step).label));
         }
         asked.into_iter().collect()
     }

@@ -230,6 +230,7 @@ mod tests {
             feature: 0,
             command: 0,
             arguments: Vec::new(),
+            user: None,
             news: told,
             cancelled: Default::default(),
         }))
@@ -239,10 +240,11 @@ mod tests {
         let begun = listener.asked(0.0);
         assert_eq!(begun.len(), 1);
         let mut backend = Noting::default();
-        let mut paced = Paced::new(&mut backend, &desk, &cancel, 1.0);
-        paced.start(&heats(), &mut listener).expect("it starts");
-        paced.answer(&mut listener).expect("it answers");
-        drop(paced);
+        {
+            let mut paced = Paced::new(&mut backend, &desk, &cancel, 1.0);
+            paced.start(&heats(), &mut listener).expect("it starts");
+            paced.answer(&mut listener).expect("it answers");
+        }
         assert_eq!(backend.asked, ["value", "start"]);
         assert!(heard.try_recv().is_ok());
     }

@@ -1,5 +1,6 @@
 //! Calls of gRPC, answered.
 
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,18 +10,19 @@ use hyper::body::Incoming;
 use matterix_sila::feature::{Element, Feature};
 use tokio::sync::{mpsc as news, oneshot, watch};
 use tonic::body::Body;
+use tonic::metadata::MetadataMap;
 use tonic::{Response, Status};
 use tonic_prost::ProstCodec;
 use tower::service_fn;
 
-use super::cancel;
 use super::executions::{Executions, Known, State};
+use super::guard::{self, Guard};
 use super::streams::{LIFETIME, Streamed, follow, infos, subscribed};
-use super::{About, Call, News, Read, Request};
+use super::{About, Call, News, Read, Request, cancel};
 use crate::call::{Failure, refused, status};
 use crate::framework::{self, Confirmation, Execution, Fully, Info, Kind, Refusal};
 use crate::raw::Raw;
-use crate::service::UNIMPLEMENTED;
+use crate::service;
 use crate::value::{Value, decode, encode};
 
 /// Longest request, bytes.
@@ -29,31 +31,40 @@ const LONGEST: usize = 1 << 20;
 /// Longest time until the lab answers; it looks at what is asked many times a second.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Index of the feature that every server has.
-const SERVICE: usize = 0;
-
 /// What is offered, and whoever carries it out.
 pub struct Answers {
-    features: Vec<Feature>,
-    about: Mutex<About>,
+    pub(super) features: Vec<Feature>,
+    /// Those of the lab; the others are the standard's own.
+    of_lab: Range<usize>,
+    pub(super) about: Mutex<About>,
     lab: Mutex<mpsc::Sender<Request>>,
-    executions: Executions,
+    pub(super) executions: Executions,
+    pub(super) guard: Guard,
 }
 
 /// What a call of gRPC means.
-enum Meant {
+#[derive(Clone, Copy)]
+pub(super) enum Meant {
     Command(usize, usize),
     Info(usize, usize),
     Intermediate(usize, usize),
     Result(usize, usize),
     Get(usize, usize),
     Subscribe(usize, usize),
+    /// What calls a metadata belongs to.
+    Affected(usize),
 }
 
 impl Answers {
-    /// Features, the standard's own first.
-    pub fn new(features: Vec<Feature>, about: Mutex<About>, lab: mpsc::Sender<Request>) -> Self {
-        Answers { features, about, lab: Mutex::new(lab), executions: Executions::default() }
+    /// The features of a lab, beside the standard's own.
+    pub fn new(lab: Vec<Feature>, about: About, guard: Guard, sender: mpsc::Sender<Request>) -> Self {
+        let of_lab = 1..1 + lab.len();
+        let mut features = vec![service::feature()];
+        features.extend(lab);
+        features.push(cancel::feature());
+        features.extend(guard::features(guard.has_users()));
+        let (about, lab, executions) = (Mutex::new(about), Mutex::new(sender), Executions::default());
+        Answers { features, of_lab, about, lab, executions, guard }
     }
 
     fn meant(&self, path: &str) -> Option<Meant> {
@@ -65,6 +76,9 @@ impl Answers {
         let property = |name: &str| feature.properties.iter().position(|p| p.identifier == name);
         if let Some(c) = command(method) {
             return Some(Meant::Command(f, c));
+        }
+        if let Some(name) = method.strip_prefix("Get_FCPAffectedByMetadata_") {
+            return feature.metadata.iter().any(|m| m.identifier == name).then_some(Meant::Affected(f));
         }
         if let Some(p) = method.strip_prefix("Get_").and_then(property) {
             return Some(Meant::Get(f, p)).filter(|_| !feature.properties[p].observable);
@@ -82,21 +96,34 @@ impl Answers {
         }
     }
 
+    /// Whether a call may be made; who makes it, if that is known.
+    fn admits(&self, meant: &Meant, beside: &MetadataMap) -> Result<Option<String>, Status> {
+        // What follows the beginning of a command names its execution, which only those know who began it.
+        let (Meant::Command(f, _) | Meant::Get(f, _) | Meant::Subscribe(f, _)) = meant else { return Ok(None) };
+        let feature = &self.features[*f];
+        match self.of_lab.contains(f) || self.is_guarded(feature, meant) {
+            true => self.guard.admits(feature, beside),
+            false => Ok(None),
+        }
+    }
+
     /// Answers one call.
-    pub async fn answer(self: std::sync::Arc<Self>, request: http::Request<Incoming>) -> http::Response<Body> {
+    pub async fn answer(self: Arc<Self>, request: http::Request<Incoming>) -> http::Response<Body> {
         let (this, path) = (self, request.uri().path().to_owned());
-        let beside = request.headers().keys().find(|k| k.as_str().starts_with("sila-")).is_some();
+        let known = this.guard.knows(request.headers());
+        let Some(meant) = this.meant(&path) else {
+            return Status::unimplemented("there is no such call").into_http();
+        };
         macro_rules! unary {
-            ($of:ty => $to:ty, |$message:ident| $answer:expr) => {
+            ($of:ty => $to:ty, |$message:ident, $user:ident| $answer:expr) => {
                 tonic::server::Grpc::new(ProstCodec::<$to, $of>::default())
                     .max_decoding_message_size(LONGEST)
                     .unary(
                         service_fn(move |request: tonic::Request<$of>| {
-                            let this = std::sync::Arc::clone(&this);
+                            let (this, known) = (Arc::clone(&this), known.clone());
                             async move {
-                                if beside {
-                                    return Err(refused(Refusal::NoMetadata, "nothing goes beside calls here"));
-                                }
+                                known?;
+                                let $user = this.admits(&meant, request.metadata())?;
                                 let $message = request.into_inner();
                                 $answer(this).await.map(Response::new)
                             }
@@ -112,11 +139,10 @@ impl Answers {
                     .max_decoding_message_size(LONGEST)
                     .server_streaming(
                         service_fn(move |request: tonic::Request<$of>| {
-                            let this = std::sync::Arc::clone(&this);
+                            let (this, known) = (Arc::clone(&this), known.clone());
                             async move {
-                                if beside {
-                                    return Err(refused(Refusal::NoMetadata, "nothing goes beside calls here"));
-                                }
+                                known?;
+                                this.admits(&meant, request.metadata())?;
                                 let $message = request.into_inner();
                                 let all: Result<Streamed<$to>, Status> = $answer(this).await;
                                 all.map(Response::new)
@@ -127,34 +153,35 @@ impl Answers {
                     .await
             };
         }
-        type This = std::sync::Arc<Answers>;
-        match this.meant(&path) {
-            None => Status::unimplemented("there is no such call").into_http(),
-            Some(Meant::Command(f, c)) if this.features[f].commands[c].observable => {
-                unary!(Raw => Confirmation, |raw| async |this: This| this.begin(f, c, raw).await)
+        type This = Arc<Answers>;
+        match meant {
+            Meant::Command(f, c) if !this.of_lab.contains(&f) => {
+                unary!(Raw => Raw, |raw, _user| async |this: This| this.own_command(f, c, raw).await)
             }
-            Some(Meant::Command(SERVICE, c)) => {
-                unary!(Raw => Raw, |raw| async |this: This| this.own_command(c, &raw))
+            Meant::Command(f, c) if this.features[f].commands[c].observable => {
+                unary!(Raw => Confirmation, |raw, user| async |this: This| this.begin(f, c, raw, user).await)
             }
-            Some(Meant::Command(f, c)) if this.features[f].identifier == cancel::IDENTIFIER => {
-                unary!(Raw => Raw, |raw| async |this: This| this.cancel(f, c, &raw))
+            Meant::Command(f, c) => {
+                unary!(Raw => Raw, |raw, user| async |this: This| this.whole(f, c, raw, user).await)
             }
-            Some(Meant::Command(f, c)) => unary!(Raw => Raw, |raw| async |this: This| this.whole(f, c, raw).await),
-            Some(Meant::Get(SERVICE, p)) => unary!(Raw => Raw, |_raw| async |this: This| this.own_property(p)),
-            Some(Meant::Get(f, p)) => unary!(Raw => Raw, |_raw| async |this: This| this.read(f, p).await),
-            Some(Meant::Result(f, c)) => {
-                unary!(Execution => Raw, |which| async |this: This| this.result(f, c, &which))
+            Meant::Get(f, p) if !this.of_lab.contains(&f) => {
+                unary!(Raw => Raw, |_raw, _user| async |this: This| this.own_property(f, p))
             }
-            Some(Meant::Info(f, c)) => {
+            Meant::Get(f, p) => unary!(Raw => Raw, |_raw, _user| async |this: This| this.read(f, p).await),
+            Meant::Affected(f) => unary!(Raw => Raw, |_raw, _user| async |this: This| this.affected(f)),
+            Meant::Result(f, c) => {
+                unary!(Execution => Raw, |which, _user| async |this: This| this.result(f, c, &which))
+            }
+            Meant::Info(f, c) => {
                 streamed!(Execution => Info, |which| async |this: This| this.known(f, c, &which).map(infos))
             }
-            Some(Meant::Intermediate(f, c)) => {
+            Meant::Intermediate(f, c) => {
                 // No command of a lab tells anything while it lasts.
                 streamed!(Execution => Raw, |which| async |this: This| {
                     this.known(f, c, &which).map(|_| Box::pin(tokio_stream::empty()) as Streamed<Raw>)
                 })
             }
-            Some(Meant::Subscribe(f, p)) => {
+            Meant::Subscribe(f, p) => {
                 streamed!(Raw => Raw, |_raw| async |this: This| Ok(subscribed(this, f, p)))
             }
         }
@@ -166,7 +193,13 @@ impl Answers {
     }
 
     /// The arguments of a call.
-    fn arguments(&self, f: usize, elements: &[Element], path: &str, raw: &Raw) -> Result<Vec<Value>, Status> {
+    pub(super) fn arguments(
+        &self,
+        f: usize,
+        elements: &[Element],
+        path: &str,
+        raw: &Raw,
+    ) -> Result<Vec<Value>, Status> {
         let feature = &self.features[f];
         let mut values = Vec::new();
         for (at, element) in elements.iter().enumerate() {
@@ -186,6 +219,7 @@ impl Answers {
         f: usize,
         c: usize,
         raw: &Raw,
+        user: Option<String>,
     ) -> Result<(news::UnboundedReceiver<News>, Arc<AtomicBool>), Status> {
         let command = &self.features[f].commands[c];
         let path = format!("Command/{}", command.identifier);
@@ -193,34 +227,19 @@ impl Answers {
         let (news, heard) = news::unbounded_channel();
         let cancelled = Arc::new(AtomicBool::new(false));
         self.send(Request::Call(Call {
-            feature: f - 1,
+            feature: f - self.of_lab.start,
             command: c,
             arguments,
+            user,
             news,
             cancelled: Arc::clone(&cancelled),
         }))?;
         Ok((heard, cancelled))
     }
 
-    /// Breaks off a command that goes on, or all.
-    fn cancel(&self, f: usize, c: usize, raw: &Raw) -> Result<Raw, Status> {
-        let feature = &self.features[f];
-        let command = &feature.commands[c];
-        let path = format!("Command/{}", command.identifier);
-        let arguments = self.arguments(f, &command.parameters, &path, raw)?;
-        let named = arguments.first().map(crate::text::shown);
-        if !self.executions.cancel(named.as_deref())
-            && let Some(name) = named
-        {
-            let message = format!("no command with the execution `{name}` goes on");
-            return Err(Failure::Refused { name: cancel::UNKNOWN.to_owned(), message }.status(&feature.id()));
-        }
-        Ok(Raw::default())
-    }
-
     /// A command that does not last.
-    async fn whole(&self, f: usize, c: usize, raw: Raw) -> Result<Raw, Status> {
-        let (mut heard, _) = self.call(f, c, &raw).await?;
+    async fn whole(&self, f: usize, c: usize, raw: Raw, user: Option<String>) -> Result<Raw, Status> {
+        let (mut heard, _) = self.call(f, c, &raw, user).await?;
         let feature = &self.features[f];
         loop {
             match tokio::time::timeout(PATIENCE, heard.recv()).await {
@@ -236,8 +255,8 @@ impl Answers {
     }
 
     /// A command that lasts: its execution is named as soon as it has begun.
-    async fn begin(&self, f: usize, c: usize, raw: Raw) -> Result<Confirmation, Status> {
-        let (mut heard, cancelled) = self.call(f, c, &raw).await?;
+    async fn begin(&self, f: usize, c: usize, raw: Raw, user: Option<String>) -> Result<Confirmation, Status> {
+        let (mut heard, cancelled) = self.call(f, c, &raw, user).await?;
         let (state, watched) = watch::channel(State::default());
         let first = tokio::time::timeout(PATIENCE, heard.recv()).await;
         match first {
@@ -282,55 +301,12 @@ impl Answers {
     pub(super) async fn read(&self, f: usize, p: usize) -> Result<Raw, Status> {
         let feature = &self.features[f];
         let (answer, value) = oneshot::channel();
-        self.send(Request::Read(Read { feature: f - 1, property: p, answer }))?;
+        self.send(Request::Read(Read { feature: f - self.of_lab.start, property: p, answer }))?;
         let value = match tokio::time::timeout(PATIENCE, value).await {
             Ok(Ok(value)) => value.map_err(|failure| failure.status(&feature.id()))?,
             _ => return Err(gone()),
         };
         told(feature, p, value)
-    }
-
-    /// What a server says of itself.
-    fn own_property(&self, p: usize) -> Result<Raw, Status> {
-        let feature = &self.features[SERVICE];
-        let about = self.about.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let text = match feature.properties[p].identifier.as_str() {
-            "ServerName" => about.name,
-            "ServerType" => "Matterixc".to_owned(),
-            "ServerUUID" => about.uuid,
-            "ServerDescription" => about.description,
-            "ServerVersion" => about.version,
-            "ServerVendorURL" => "https://matterixc.invalid".to_owned(),
-            _ => {
-                let all = self.features.iter().map(|f| Value::Text(f.id())).collect();
-                return told(feature, p, Value::List(all));
-            }
-        };
-        told(feature, p, Value::Text(text))
-    }
-
-    fn own_command(&self, c: usize, raw: &Raw) -> Result<Raw, Status> {
-        let feature = &self.features[SERVICE];
-        let command = &feature.commands[c];
-        let path = format!("Command/{}", command.identifier);
-        let arguments = self.arguments(SERVICE, &command.parameters, &path, raw)?;
-        let text = arguments.first().map(crate::text::shown).unwrap_or_default();
-        if command.responses.is_empty() {
-            if text.chars().count() > 255 {
-                let identifier = format!("{}/{path}/Parameter/ServerName", feature.id());
-                let message = "a name has at most 255 characters".to_owned();
-                return Err(status(Kind::Validation(Fully { identifier, message })));
-            }
-            self.about.lock().unwrap_or_else(PoisonError::into_inner).name = text;
-            return Ok(Raw::default());
-        }
-        let Some(asked) = self.features.iter().find(|f| f.id() == text) else {
-            let message = format!("`{text}` is not offered here");
-            let failure = Failure::Refused { name: UNIMPLEMENTED.to_owned(), message };
-            return Err(failure.status(&feature.id()));
-        };
-        let values = [Value::Text(matterix_sila::write(asked))];
-        encode(feature, &command.responses, &values).map_err(Status::internal)
     }
 }
 
@@ -339,7 +315,7 @@ fn gone() -> Status {
 }
 
 /// The value of a property as an answer.
-fn told(feature: &Feature, p: usize, value: Value) -> Result<Raw, Status> {
+pub(super) fn told(feature: &Feature, p: usize, value: Value) -> Result<Raw, Status> {
     let property = &feature.properties[p];
     let element = Element {
         identifier: property.identifier.clone(),

@@ -1,0 +1,82 @@
+//! How a server of SiLA 2 is spoken to: whom it is trusted by, who calls, and whether it is taken for oneself.
+
+use toml::de::DeTable;
+
+use super::Reader;
+use crate::place::{Place, SilaTrust, fingerprint};
+
+pub(super) const CERTIFICATE: &str = "certificate";
+pub(super) const FINGERPRINT: &str = "fingerprint";
+pub(super) const USER: &str = "user";
+pub(super) const PASSWORD: &str = "password_env";
+pub(super) const LOCK: &str = "lock";
+
+/// The shortest lock, s: a program that was killed keeps others out for so long, and one that waits must not lose it.
+const SHORTEST: u64 = 10;
+
+/// The longest, s: a week.
+const LONGEST: u64 = 7 * 24 * 3600;
+
+impl Reader<'_> {
+    /// Adds to a server what its binding says of it; what is wrong is reported.
+    pub(super) fn access(&mut self, table: &DeTable<'_>, place: &mut Place) {
+        let [certificate, print, user, password, lock] =
+            [CERTIFICATE, FINGERPRINT, USER, PASSWORD, LOCK].map(|key| self.text(table, key).map(|text| (key, text)));
+        let Place::Sila(server) = place else {
+            for (key, (_, at)) in [certificate, print, user, password, lock].into_iter().flatten() {
+                self.wrong(at, &format!("`{key}` belongs to a server of SiLA 2"), "this is none", None);
+            }
+            return;
+        };
+        match (certificate, print) {
+            (Some(_), Some((_, (_, at)))) => {
+                let headline = "a server is trusted by its certificate or by its fingerprint";
+                self.wrong(at, headline, "one or the other", None);
+            }
+            (Some((_, (path, _))), None) => server.trust = SilaTrust::Certificate(path),
+            (None, Some((_, (text, at)))) => match fingerprint(&text) {
+                Some(digest) => server.trust = SilaTrust::Fingerprint(digest),
+                None => {
+                    let help =
+                        "write the SHA-256 of the certificate: `openssl x509 -in FILE -noout -fingerprint -sha256`";
+                    self.wrong(at, "a fingerprint is 32 bytes in hexadecimal", "it is none", Some(help.to_owned()));
+                }
+            },
+            (None, None) => {}
+        }
+        match (user, password) {
+            (Some((_, (_, at))), Some(_)) if server.trust == SilaTrust::None => {
+                let help = format!("say whom it is trusted by: `{FINGERPRINT} = ...` or `{CERTIFICATE} = ...`");
+                self.wrong(at, "a password is not sent without encryption", "to this server", Some(help));
+            }
+            (Some((_, (user, _))), Some((_, (variable, _)))) => server.user = Some((user, variable)),
+            (None, None) => {}
+            (Some((_, (_, at))), None) => {
+                let help = format!("`{PASSWORD} = \"NAME\"` names the variable of the environment that holds it");
+                self.wrong(at, "a user has a password", "without one", Some(help));
+            }
+            (None, Some((_, (_, at)))) => self.wrong(at, "a password belongs to a user", "without one", None),
+        }
+        let Some((_, (text, at))) = lock else { return };
+        match seconds(&text) {
+            Some(seconds) if (SHORTEST..=LONGEST).contains(&seconds) => server.lock = Some(seconds),
+            _ => {
+                let help =
+                    "the server lets go when it hears nothing for so long: `lock = \"10 min\"`, from 10 s to 168 h";
+                self.wrong(at, "a lock lasts for a time", "it is none", Some(help.to_owned()));
+            }
+        }
+    }
+}
+
+/// Whole seconds as they are written: `90 s`, `10 min`, `1 h`.
+fn seconds(text: &str) -> Option<u64> {
+    let (number, unit) = text.trim().split_once(' ')?;
+    let factor = match unit.trim() {
+        "s" => 1,
+        "min" => 60,
+        "h" => 3600,
+        _ => return None,
+    };
+    number.parse::<u64>().ok()?.checked_mul(factor)
+}
