@@ -13,7 +13,6 @@ import uuid
 import warnings
 
 import bcrypt
-import grpc
 from sila2.client import SilaClient
 from sila2.features.lockcontroller import (
     InvalidLockIdentifier,
@@ -24,7 +23,7 @@ from sila2.features.lockcontroller import (
     ServerNotLocked,
     UnlockServer_Responses,
 )
-from sila2.framework import DefinedExecutionError, Feature, InvalidMetadata
+from sila2.framework import DefinedExecutionError, Feature, InvalidMetadata, SilaConnectionError
 from sila2.server import FeatureImplementationBase, MetadataInterceptor, SilaServer
 
 STORE = """<?xml version="1.0" encoding="utf-8"?>
@@ -52,9 +51,9 @@ STORE = """<?xml version="1.0" encoding="utf-8"?>
 
 STORING = """mtx 1
 capability Store from sila "store.sila.xml"
-asset Shelf: Store { supposed_count: 0 }
+asset Shelf: Store { supposed_count: SIZE }
 lab bench { ambient: 22 degC, shelf = Shelf at (0, 0, 0) m }
-workflow keep in bench {
+workflow store in bench {
     put shelf { data: "data.bin", at: "2028-02-28T23:30:00.250-03:30", day: "2026-11-23+01:00", hour: "14:30:00+00:00" }
     expect shelf.count == SIZE
 }
@@ -133,7 +132,7 @@ def encrypted(peer):
         openssl = ["openssl", "x509", "-noout", "-subject", "-ext", "subjectAltName"]
         text = subprocess.run(openssl, input=pem, capture_output=True, text=True).stdout
         peer.verdict("its name is the standard's", re.search("CN ?= ?SiLA2", text) and "127.0.0.1" in text, " ".join(text.split()))
-        plain = peer.raised(lambda: SilaClient("127.0.0.1", port, insecure=True), grpc.RpcError)
+        plain = peer.raised(lambda: SilaClient("127.0.0.1", port, insecure=True), SilaConnectionError)
         peer.verdict("nobody is answered without encryption", plain is not None)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -301,7 +300,7 @@ def stored(peer):
                 (2026, 11, 23, zone(1)),
                 datetime.time(14, 30, tzinfo=zone(0)),
             )
-            heard = store.heard and (*store.heard[:2], (store.heard[2].year, store.heard[2].month, store.heard[2].day, store.heard[2].timezone), store.heard[3])
+            heard = store.heard and (*store.heard[:2], (store.heard[2].date.year, store.heard[2].date.month, store.heard[2].date.day, store.heard[2].timezone), store.heard[3])
             peer.verdict(f"{size} bytes and moments arrive", ended.returncode == 0 and heard == wanted, peer.last(ended) if ended.returncode else "")
             if heard != wanted:
                 print(heard, wanted, ended.stderr)

@@ -20,7 +20,7 @@ pub struct Feature {
     /// What it tells.
     pub properties: Vec<Property>,
     /// What goes beside calls.
-    pub metadata: Vec<Element>,
+    pub metadata: Vec<Metadata>,
     /// What can go wrong.
     pub errors: Vec<Named>,
     /// Types with a name of their own.
@@ -80,6 +80,15 @@ pub struct Element {
     pub description: String,
     /// What values it takes.
     pub ty: DataType,
+}
+
+/// What goes beside calls.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metadata {
+    /// Its name and type.
+    pub element: Element,
+    /// The errors that a call may end with because of it, by identifier.
+    pub errors: Vec<String>,
 }
 
 /// What a server can be told.

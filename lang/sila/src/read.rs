@@ -5,7 +5,9 @@ use std::fmt;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use crate::feature::{BASES, Basic, Command, Constraints, DataType, Element, Feature, Named, Property, SiUnit};
+use crate::feature::{
+    BASES, Basic, Command, Constraints, DataType, Element, Feature, Metadata, Named, Property, SiUnit,
+};
 
 /// Longer texts are refused, bytes.
 pub const MOST_BYTES: usize = 4 << 20;
@@ -93,7 +95,7 @@ pub fn read(text: &str) -> Result<Feature, Problem> {
             "Identifier" | "DisplayName" | "Description" => {}
             "Command" => feature.commands.push(command(child)?),
             "Property" => feature.properties.push(property(child)?),
-            "Metadata" => feature.metadata.push(element(child)?),
+            "Metadata" => feature.metadata.push(Metadata { element: element(child)?, errors: errors(child)? }),
             "DefinedExecutionError" => feature.errors.push(named(child)?),
             "DataTypeDefinition" => feature.types.push(element(child)?),
             other => return Err(wrong(child, format!("a feature has no `{other}`"))),
@@ -112,11 +114,12 @@ fn judge(feature: &Feature, root: Node<'_, '_>) -> Result<(), Problem> {
         let holds = |n: &Node<'_, '_>| n.has_tag_name_of("Identifier") && n.text().map(str::trim) == Some(identifier);
         root.descendants().rfind(holds).unwrap_or(root)
     };
-    let groups: [Vec<&String>; 4] = [
+    let groups: [Vec<&String>; 5] = [
         feature.commands.iter().map(|c| &c.identifier).collect(),
         feature.properties.iter().map(|p| &p.identifier).collect(),
         feature.errors.iter().map(|e| &e.identifier).collect(),
         feature.types.iter().map(|t| &t.identifier).collect(),
+        feature.metadata.iter().map(|m| &m.element.identifier).collect(),
     ];
     let elements = feature.commands.iter().flat_map(|c| [&c.parameters, &c.responses, &c.intermediate]);
     let elements: Vec<&Vec<Element>> = elements.collect();
@@ -127,14 +130,15 @@ fn judge(feature: &Feature, root: Node<'_, '_>) -> Result<(), Problem> {
         }
     }
     let raised = feature.commands.iter().flat_map(|c| &c.errors);
-    for error in raised.chain(feature.properties.iter().flat_map(|p| &p.errors)) {
+    let raised = raised.chain(feature.properties.iter().flat_map(|p| &p.errors));
+    for error in raised.chain(feature.metadata.iter().flat_map(|m| &m.errors)) {
         if !feature.errors.iter().any(|e| e.identifier == *error) {
             return Err(wrong(at(error), format!("the error `{error}` is not defined")));
         }
     }
     let of_commands = elements.iter().flat_map(|list| list.iter().map(|e| &e.ty));
     let types = of_commands.chain(feature.properties.iter().map(|p| &p.ty)).chain(feature.types.iter().map(|t| &t.ty));
-    for ty in types {
+    for ty in types.chain(feature.metadata.iter().map(|m| &m.element.ty)) {
         of_lists(ty).map_err(|message| wrong(root, message))?;
         for name in named_in(ty) {
             if !feature.types.iter().any(|t| t.identifier == *name) {

@@ -35,7 +35,12 @@ pub fn write(feature: &Feature) -> String {
         out.errors(&property.errors);
         out.close("Property");
     }
-    feature.metadata.iter().for_each(|e| out.element("Metadata", e));
+    for metadata in &feature.metadata {
+        out.open("Metadata");
+        out.inner(&metadata.element);
+        out.errors(&metadata.errors);
+        out.close("Metadata");
+    }
     for error in &feature.errors {
         out.open("DefinedExecutionError");
         out.named(&error.identifier, &error.display, &error.description);
@@ -79,9 +84,13 @@ impl Writer {
 
     fn element(&mut self, tag: &str, element: &Element) {
         self.open(tag);
+        self.inner(element);
+        self.close(tag);
+    }
+
+    fn inner(&mut self, element: &Element) {
         self.named(&element.identifier, &element.display, &element.description);
         self.data_type(&element.ty);
-        self.close(tag);
     }
 
     fn errors(&mut self, errors: &[String]) {

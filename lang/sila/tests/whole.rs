@@ -1,6 +1,8 @@
 //! Features are read, written and read again; what is no feature is refused in words.
 
-use matterix_sila::feature::{Basic, Command, Constraints, DataType, Element, Feature, Named, Property, SiUnit};
+use matterix_sila::feature::{
+    Basic, Command, Constraints, DataType, Element, Feature, Metadata, Named, Property, SiUnit,
+};
 use matterix_sila::words::{identifier, name, words};
 use matterix_sila::{read, write};
 use proptest::prelude::*;
@@ -20,6 +22,10 @@ fn a_feature_is_read_whole() {
     assert_eq!(read(&write(&feature)).as_ref(), Ok(&feature));
 }
 
+/// Metadata that names an error that the feature does not define.
+const METADATA: &str = "<Metadata><Identifier>Token</Identifier><DisplayName/><Description/><DataType><Basic>String</Basic>\
+    </DataType><DefinedExecutionErrors><Identifier>Unknown</Identifier></DefinedExecutionErrors></Metadata></Feature>";
+
 #[test]
 fn what_is_wrong_is_said_with_its_line() {
     let cases = [
@@ -33,6 +39,7 @@ fn what_is_wrong_is_said_with_its_line() {
         ("<Factor>60</Factor>", "<Factor>0</Factor>", "not 0"),
         ("FeatureVersion=\"1.0\"", "FeatureVersion=\"one\"", "as in `1.0`"),
         ("<Set>", "<Sets>", "no constraint `Sets`"),
+        ("</Feature>", METADATA, "the error `Unknown` is not defined"),
         ("</Feature>", "", "line"),
     ];
     for (from, to, wanted) in cases {
@@ -131,7 +138,7 @@ type Told = (Head, bool, DataType, DataType);
 fn feature() -> impl Strategy<Value = Feature> {
     let commands = proptest::collection::vec((named(), any::<bool>(), data_type(), data_type()), 0..3);
     let properties = proptest::collection::vec((named(), any::<bool>(), data_type()), 0..3);
-    (named(), commands, properties, named()).prop_map(|(head, commands, properties, error)| {
+    (named(), commands, properties, data_type(), named()).prop_map(|(head, commands, properties, beside, error)| {
         let numbered = |name: &str, i: usize| format!("{name}N{i}");
         let element = |ty| Element { identifier: "A".into(), display: "a".into(), description: String::new(), ty };
         let command = |(i, (head, observable, given, answered)): (usize, Told)| Command {
@@ -161,7 +168,7 @@ fn feature() -> impl Strategy<Value = Feature> {
             version: (1, 2),
             commands: commands.into_iter().enumerate().map(command).collect(),
             properties: properties.into_iter().enumerate().map(property).collect(),
-            metadata: Vec::new(),
+            metadata: vec![Metadata { element: element(beside), errors: vec![error.0.clone()] }],
             errors: vec![Named { identifier: error.0.clone(), display: error.1.clone(), description: error.2.clone() }],
             types: Vec::new(),
         }

@@ -109,7 +109,7 @@ impl Client {
         let missing = || Failure::Garbled(format!("it offers no `{feature}` with the metadata `{name}`"));
         let index = self.standard(feature).ok_or_else(missing)?;
         let of = &self.features[index];
-        of.metadata.iter().find(|m| m.identifier == name).ok_or_else(missing)?;
+        of.metadata.iter().find(|m| m.element.identifier == name).ok_or_else(missing)?;
         let key = BinaryMetadataKey::from_bytes(key(&of.id(), name).as_bytes());
         let key = key.map_err(|e| Failure::Garbled(e.to_string()))?;
         let answer: Raw = self.unary(index, &format!("Get_FCPAffectedByMetadata_{name}"), Raw::default())?;

@@ -78,7 +78,7 @@ impl Answers {
             return Some(Meant::Command(f, c));
         }
         if let Some(name) = method.strip_prefix("Get_FCPAffectedByMetadata_") {
-            return feature.metadata.iter().any(|m| m.identifier == name).then_some(Meant::Affected(f));
+            return feature.metadata.iter().any(|m| m.element.identifier == name).then_some(Meant::Affected(f));
         }
         if let Some(p) = method.strip_prefix("Get_").and_then(property) {
             return Some(Meant::Get(f, p)).filter(|_| !feature.properties[p].observable);
