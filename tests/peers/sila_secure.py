@@ -305,8 +305,8 @@ def stored(peer):
             if heard != wanted:
                 print(heard, wanted, ended.stderr)
             journal = (folder / "journal").read_text()
-            back = hashlib.sha256(data[::-1]).hexdigest()
-            peer.verdict("and what comes back", f"({size} bytes, SHA-256 {back})" in journal and "2028-02-29T23:30:00.250-03:30" in journal)
+            sent, back = (f"({size} bytes, SHA-256 {hashlib.sha256(d).hexdigest()})" for d in (data, data[::-1]))
+            peer.verdict("and what comes back", sent in journal and back in journal and "2028-02-29T23:30:00.250-03:30" in journal)
     finally:
         server.stop()
 

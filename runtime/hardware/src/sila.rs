@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Told, Until};
 use matterix_sila_wire::tls::Trust;
-use matterix_sila_wire::{Access, Client, Failure, Lock, Login, discovery, is_of};
+use matterix_sila_wire::{Access, Client, Failure, Lock, Login, Said, discovery, is_of};
 
 use crate::link::{Line, Overhear, Trouble, forms, showable};
 use crate::pattern::{matched, written};
@@ -110,8 +110,12 @@ impl Line for Server {
         let mut numbers = Vec::new();
         self.0.wait_at_most(ear.patience());
         for (place, text) in texts.iter().enumerate() {
-            ear.out(text.as_bytes());
-            let reply = self.0.say(text, !goes_on(driver, text)).map_err(|f| trouble(f, driver, ear))?;
+            let said = self.0.understood(text);
+            // A file may be another one later: what is kept of a run says which one it was.
+            let bytes = said.as_ref().map(Said::bytes).unwrap_or_default();
+            ear.out([vec![text.clone()], bytes].concat().join(", ").as_bytes());
+            let reply = said.and_then(|said| self.0.send(&said, !goes_on(driver, text)));
+            let reply = reply.map_err(|f| trouble(f, driver, ear))?;
             ear.back(reply.as_bytes());
             if let Some(expects) = expects {
                 numbers = understood(text, &reply, expects.of(place))?;

@@ -46,6 +46,23 @@ struct Running {
     told: Option<Streaming<Raw>>,
 }
 
+/// A command with its arguments.
+pub struct Said {
+    /// The place of its feature.
+    index: usize,
+    command: Command,
+    arguments: Vec<Value>,
+}
+
+impl Said {
+    /// The bytes among its arguments, each by its number and SHA-256 under the name of its parameter.
+    pub fn bytes(&self) -> Vec<String> {
+        let given = self.command.parameters.iter().zip(&self.arguments);
+        let given = given.filter(|(_, value)| value.holds_bytes());
+        given.map(|(parameter, value)| format!("{}: {}", parameter.identifier, shown(value))).collect()
+    }
+}
+
 /// How a server is spoken to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Access {
@@ -175,8 +192,8 @@ impl Client {
         matterix_sila::read(&text).map_err(|p| Failure::Garbled(format!("its feature `{id}` cannot be read: {p}")))
     }
 
-    /// Says a command; what it answers. One that lasts has only begun, unless it is `waited` for.
-    pub fn say(&mut self, said: &str, waited: bool) -> Result<String, Failure> {
+    /// A command as it would be sent: the files that it names are read.
+    pub fn understood(&self, said: &str) -> Result<Said, Failure> {
         let call = text::call(said).map_err(Failure::Garbled)?;
         let (index, name) = self.place(&call)?;
         let feature = &self.features[index];
@@ -186,14 +203,26 @@ impl Client {
             return Err(Failure::Garbled(format!("`{id}` has no command `{name}`; it has {list}")));
         };
         let arguments = arguments(feature, &command, &call).map_err(Failure::Garbled)?;
-        let key = (index, name);
+        Ok(Said { index, command, arguments })
+    }
+
+    /// Says a command; what it answers. One that lasts has only begun, unless it is `waited` for.
+    pub fn say(&mut self, said: &str, waited: bool) -> Result<String, Failure> {
+        let said = self.understood(said)?;
+        self.send(&said, waited)
+    }
+
+    /// As [`Client::say`] says it.
+    pub fn send(&mut self, said: &Said, waited: bool) -> Result<String, Failure> {
+        let Said { index, command, arguments } = said;
+        let (index, key) = (*index, (*index, command.identifier.clone()));
         if !command.observable {
-            let answered = self.carry_out(index, &command, &arguments)?;
+            let answered = self.carry_out(index, command, arguments)?;
             let text = named(&answered);
             self.last.insert(key, answered);
             return Ok(text);
         }
-        self.begin(index, &command, &arguments)?;
+        self.begin(index, command, arguments)?;
         if !waited {
             return Ok(String::new());
         }
@@ -212,7 +241,7 @@ impl Client {
                 return Err(failure);
             }
         }
-        self.end(&key, &command)?;
+        self.end(&key, command)?;
         Ok(self.last.get(&key).map(|answered| named(answered)).unwrap_or_default())
     }
 

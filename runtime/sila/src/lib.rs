@@ -17,7 +17,7 @@ pub mod tls;
 mod value;
 
 pub use call::Failure;
-pub use client::{Access, Client, Lock, Login, is_of};
+pub use client::{Access, Client, Lock, Login, Said, is_of};
 pub use moment::Moment;
 pub use raw::Raw;
 pub use server::{About, Call, Door, News, Read, Request, Server, Users, new_uuid, serve, uuid};

@@ -33,6 +33,18 @@ pub enum Value {
     Other(Basic),
 }
 
+impl Value {
+    /// Whether there are bytes in it.
+    pub(crate) fn holds_bytes(&self) -> bool {
+        match self {
+            Value::Bytes(_) => true,
+            Value::List(all) => all.iter().any(Value::holds_bytes),
+            Value::Structure(parts) => parts.iter().any(|(_, value)| value.holds_bytes()),
+            _ => false,
+        }
+    }
+}
+
 /// The fields of a message: one for each of these, from 1.
 pub fn encode(feature: &Feature, elements: &[Element], values: &[Value]) -> Result<Raw, String> {
     let mut raw = Raw::default();
