@@ -49,7 +49,10 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         print(Stream::Out, &format!("{address}\n"));
         for feature in &catalogue.features {
             let (commands, properties) = (feature.commands.len(), feature.properties.len());
-            print(Stream::Err, &format!("{}: {commands} commands, {properties} properties\n", feature.id()));
+            let count = |n: usize, one: &str, more: &str| format!("{n} {}", if n == 1 { one } else { more });
+            let (commands, properties) =
+                (count(commands, "command", "commands"), count(properties, "property", "properties"));
+            print(Stream::Err, &format!("{}: {commands}, {properties}\n", feature.id()));
         }
     };
     let journal = args.journal.as_deref().map(Journal::create).transpose().map_err(|e| e.text().to_owned())?;
@@ -93,9 +96,10 @@ fn door(args: &ServeArgs, address: SocketAddr, uuid: &str) -> Result<Door, Strin
     let users = args
         .users
         .as_deref()
-        .map(|path| Users::read(&text(path)?).map_err(|why| format!("`{}`: {why}", path.display())));
+        .map(|path| Users::read(&text(path)?).map_err(|why| format!("`{}`: {why}", path.display())))
+        .transpose()?;
     let (identity, file) = match (&args.certificate, &args.key) {
-        _ if args.insecure => return Ok(Door { identity: None, users: users.transpose()? }),
+        _ if args.insecure => return Ok(Door { identity: None, users }),
         (Some(chain), Some(key)) => {
             let identity = Identity { chain: text(chain)?, key: text(key)? };
             identity.is_sound().map_err(|why| format!("`{}`, `{}`: {why}", chain.display(), key.display()))?;
@@ -105,5 +109,5 @@ fn door(args: &ServeArgs, address: SocketAddr, uuid: &str) -> Result<Door, Strin
     };
     let fingerprint = identity.fingerprint()?;
     print(Stream::Err, &format!("certificate: {}\nfingerprint: {fingerprint}\n", file.display()));
-    Ok(Door { identity: Some(identity), users: users.transpose()? })
+    Ok(Door { identity: Some(identity), users })
 }

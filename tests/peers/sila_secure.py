@@ -60,6 +60,16 @@ workflow store in bench {
 """
 
 
+# A driver that asks for what is not there, and would make its device safe with a command that is not there either.
+DRIVER = r"""
+driver OwnStore for Shelf over sila(feature: "org.example/data/Store/v1", timeout: 5 s) {
+    put sends "Put(Data: file \"{data}\", At: \"{at}\", Day: \"{day}\", Hour: \"{hour}\")"
+    reading count asks "Put.Counting" expects "{}"
+    safe sends "Shut"
+}
+"""
+
+
 class Store(FeatureImplementationBase):
     heard = None
 
@@ -307,6 +317,23 @@ def stored(peer):
             journal = (folder / "journal").read_text()
             sent, back = (f"({size} bytes, SHA-256 {hashlib.sha256(d).hexdigest()})" for d in (data, data[::-1]))
             peer.verdict("and what comes back", sent in journal and back in journal and "2028-02-29T23:30:00.250-03:30" in journal)
+        for name, wrong, said in (
+            ("a day that there is not", ("2026-11-23+01:00", "2026-02-30+01:00"), "2026-02-30"),
+            ("a file that there is not", ("data.bin", "other.bin"), "other.bin"),
+        ):
+            store.heard = None
+            ended, _ = bound(peer, name, f'[shelf]\nsila = "127.0.0.1:{port}"\n', text.replace(*wrong), files)
+            good = ended.returncode == 1 and "error[unsendable]" in ended.stderr and said in ended.stderr
+            peer.verdict(f"{name}: nothing is told", good and store.heard is None, peer.last(ended))
+            if not good:
+                print(ended.stderr)
+        binding = f'[shelf]\nsila = "127.0.0.1:{port}"\ndriver = "OwnStore"\n'
+        ended, _ = bound(peer, "driver", binding, text + DRIVER, files)
+        said = " ".join(ended.stderr.split())
+        good = "`Put` answers no `Counting`" in said and "has no command `Shut`" in said
+        peer.verdict("a driver's lines are judged before one is needed", good and store.heard is None, peer.last(ended))
+        if not good:
+            print(ended.stderr)
     finally:
         server.stop()
 

@@ -87,6 +87,16 @@ pub trait Line {
         ear: &mut dyn Overhear,
     ) -> Result<Vec<f64>, Trouble>;
 
+    /// Whether the device takes a command, as far as that is known without saying it; why not.
+    fn judge(&self, _text: &str) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// The same of a question.
+    fn judge_question(&self, _text: &str) -> Result<(), String> {
+        Ok(())
+    }
+
     /// Asks for a quantity; what the answer says of it, SI.
     fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble>;
 

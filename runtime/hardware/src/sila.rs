@@ -124,6 +124,17 @@ impl Line for Server {
         Ok(numbers)
     }
 
+    fn judge(&self, text: &str) -> Result<(), String> {
+        match self.0.understood(text) {
+            Err(Failure::Garbled(why)) => Err(why),
+            _ => Ok(()),
+        }
+    }
+
+    fn judge_question(&self, text: &str) -> Result<(), String> {
+        self.0.answers(text)
+    }
+
     fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
         self.0.wait_at_most(ear.patience());
         ear.out(text.as_bytes());

@@ -195,7 +195,7 @@ impl Client {
     /// A command as it would be sent: the files that it names are read.
     pub fn understood(&self, said: &str) -> Result<Said, Failure> {
         let call = text::call(said).map_err(Failure::Garbled)?;
-        let (index, name) = self.place(&call)?;
+        let (index, name) = self.place(&call).map_err(Failure::Garbled)?;
         let feature = &self.features[index];
         let Some(command) = feature.command(&name).cloned() else {
             let known: Vec<String> = feature.commands.iter().map(|c| format!("`{}`", c.identifier)).collect();
@@ -248,7 +248,7 @@ impl Client {
     /// Whether a command that was begun has ended; its failure, if that is how.
     pub fn is_done(&mut self, asked: &str) -> Result<bool, Failure> {
         let call = text::call(asked).map_err(Failure::Garbled)?;
-        let key = self.place(&call)?;
+        let key = self.place(&call).map_err(Failure::Garbled)?;
         let Some(command) = self.features[key.0].command(&key.1).cloned() else {
             return Err(Failure::Garbled(format!("`{asked}` is no command")));
         };
@@ -298,20 +298,46 @@ impl Client {
             let found = known.map(|(_, value)| shown(value));
             return found.ok_or_else(|| Failure::Garbled(format!("`{command}` has not told `{response}`")));
         }
-        let (index, name) = self.place(&call)?;
+        let (index, name) = self.place(&call).map_err(Failure::Garbled)?;
         self.read(index, &name).map(|value| shown(&value))
     }
 
+    /// Whether there is what a text asks for; why not.
+    pub fn answers(&self, asked: &str) -> Result<(), String> {
+        let call = text::call(asked)?;
+        let responses = |c: &Command| c.responses.iter().chain(&c.intermediate).map(|e| e.identifier.clone()).collect();
+        let (of, known, name): (String, Vec<String>, &str) = match call.path.as_slice() {
+            [command, response] if self.features[0].command(command).is_some() => {
+                let known = self.features[0].command(command).map(responses).unwrap_or_default();
+                (format!("the command `{command}` answers no"), known, response)
+            }
+            _ => {
+                let (index, _) = self.place(&call)?;
+                let feature = &self.features[index];
+                let known = feature.properties.iter().map(|p| p.identifier.clone()).collect();
+                let name = call.path.last().map(String::as_str).unwrap_or_default();
+                (format!("`{}` has no property", feature.id()), known, name)
+            }
+        };
+        match known.iter().any(|known| known == name) {
+            true => Ok(()),
+            false => {
+                let list: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
+                Err(format!("{of} `{name}`; it has {}", list.join(", ")))
+            }
+        }
+    }
+
     /// The feature and the name in it that a text means.
-    fn place(&self, call: &Call) -> Result<(usize, String), Failure> {
+    fn place(&self, call: &Call) -> Result<(usize, String), String> {
         match call.path.as_slice() {
             [name] => Ok((0, name.clone())),
             [feature, name] => {
                 let found = self.features.iter().position(|f| f.identifier == *feature);
-                let found = found.ok_or_else(|| Failure::Garbled(format!("it offers no feature `{feature}`")))?;
+                let found = found.ok_or_else(|| format!("it offers no feature `{feature}`"))?;
                 Ok((found, name.clone()))
             }
-            _ => Err(Failure::Garbled("nothing is named".to_owned())),
+            _ => Err("nothing is named".to_owned()),
         }
     }
 

@@ -91,9 +91,9 @@ impl std::fmt::Display for Moment {
 /// A moment as it is written; why it is none.
 pub(crate) fn written(which: Which, text: &str) -> Result<Moment, String> {
     let form = match which {
-        Which::Date => "a day, `2026-11-23+01:00`",
-        Which::Time => "a time of day, `14:30:00+01:00`",
-        Which::Stamp => "a day and a time, `2026-11-23T14:30:00+01:00`",
+        Which::Date => "no day, which is written as in `2026-11-23+01:00`",
+        Which::Time => "no time of day, which is written as in `14:30:00+01:00`",
+        Which::Stamp => "no day with a time, which are written as in `2026-11-23T14:30:00+01:00`",
     };
     let read = || {
         let stamp = match which {
@@ -118,7 +118,7 @@ pub(crate) fn written(which: Which, text: &str) -> Result<Moment, String> {
             Which::Stamp => Moment::Stamp(stamp),
         })
     };
-    read().ok_or_else(|| format!("`{text}` is not {form}"))
+    read().ok_or_else(|| format!("`{text}` is {form}"))
 }
 
 /// A zone as a message. Behind universal time both numbers go back: -3:30 is three hours and 30 minutes behind.

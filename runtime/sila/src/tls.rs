@@ -10,9 +10,9 @@ pub(crate) use trust::{Seen, connector, fingerprint};
 use std::sync::Arc;
 
 use tokio_rustls::TlsAcceptor;
-use tokio_rustls::rustls::ServerConfig;
 use tokio_rustls::rustls::crypto::CryptoProvider;
 use tokio_rustls::rustls::crypto::ring::default_provider;
+use tokio_rustls::rustls::{Error, ServerConfig};
 
 /// The protocol inside, as it is agreed on (RFC 7301).
 const HTTP2: &[u8] = b"h2";
@@ -27,7 +27,10 @@ pub(crate) fn acceptor(identity: &Identity) -> Result<TlsAcceptor, String> {
     let (chain, key) = identity.read()?;
     let config = ServerConfig::builder_with_provider(provider()).with_safe_default_protocol_versions();
     let config = config.map_err(|e| e.to_string())?.with_no_client_auth().with_single_cert(chain, key);
-    let mut config = config.map_err(|e| format!("the certificate and the key do not go together: {e}"))?;
+    let mut config = config.map_err(|e| match e {
+        Error::InconsistentKeys(_) => "the certificate and the key do not go together".to_owned(),
+        other => format!("the certificate and the key cannot be used: {other}"),
+    })?;
     config.alpn_protocols = vec![HTTP2.to_vec()];
     Ok(TlsAcceptor::from(Arc::new(config)))
 }

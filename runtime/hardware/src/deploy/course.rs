@@ -185,6 +185,10 @@ fn ready(
     if !unreached.is_empty() {
         return Some(Ending::not_begun(unreached.iter().map(|u| not_reached(u, goes_on)).collect()));
     }
+    let untellable = hardware.untellable();
+    if !goes_on && !untellable.is_empty() {
+        return Some(Ending::not_begun(untellable));
+    }
     if !goes_on && let Err(fault) = hardware.begin_journal(digest, seed, who) {
         return Some(Ending::not_begun(vec![of_fault(fault)]));
     }

@@ -2,6 +2,7 @@
 
 mod alive;
 mod backend;
+mod calls;
 mod control;
 mod course;
 mod device;

@@ -95,7 +95,7 @@ pub fn carrier(step: StepId, operation: &Operation, devices: &[Device<'_>]) -> O
 }
 
 /// The steps that a run may come to.
-fn reachable(plan: &Plan) -> Vec<(StepId, &Step)> {
+pub(super) fn reachable(plan: &Plan) -> Vec<(StepId, &Step)> {
     let mut out = Vec::new();
     let mut open = vec![plan.root];
     while let Some(id) = open.pop() {
