@@ -7,9 +7,12 @@ use matterix_soundness::random::Random;
 
 const TRIALS: u64 = 200;
 
+/// Seeds that once were wrong. 20302: a pause and a step at the moment at which another process went on.
+const FOUND: [u64; 1] = [20302];
+
 #[test]
 fn nothing_is_done_twice_and_nothing_is_left_on_in_silence() {
-    let verdicts: Vec<_> = (0..TRIALS).map(|seed| (seed, trial(seed))).collect();
+    let verdicts: Vec<_> = (0..TRIALS).chain(FOUND).map(|seed| (seed, trial(seed))).collect();
     let wrong: Vec<String> = verdicts
         .iter()
         .filter(|(_, v)| !v.wrong.is_empty())

@@ -33,6 +33,8 @@ impl Hardware<'_, '_> {
             if is_live && let Some(fault) = self.unwritten() {
                 return Err(fault);
             }
+            // Before people are heeded, so that it stands at the same place where their words are gone through again all at once.
+            self.beat(false, out)?;
             if self.heeded(is_live) {
                 return Ok(Advance::Watch(Vec::new()));
             }
