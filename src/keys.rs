@@ -14,8 +14,10 @@ const STEPPING: &str = "one step\n";
 const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
 const CONFIRM: &str = "type y and Enter to confirm, n to stop: ";
 
+/// So many ends of the input in a row are those of a terminal that is gone.
+const MOST_ENDS: usize = 20;
+
 /// How often a process in the background looks whether it is in the foreground again.
-#[cfg(unix)]
 const BACKGROUND: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// What a person types.
@@ -46,13 +48,23 @@ pub fn listen(control: &'static Control) -> bool {
 
 fn hear(control: &Control) {
     let mut typed = BufReader::new(std::io::stdin().lock());
+    let mut ends = 0;
     loop {
         if typed.buffer().is_empty() {
             turn();
         }
         let mut line = String::new();
         match typed.read_line(&mut line) {
-            Ok(1..) => obey(line.trim_end_matches(['\r', '\n']), control),
+            Ok(1..) => {
+                ends = 0;
+                obey(line.trim_end_matches(['\r', '\n']), control);
+            }
+            // Ctrl-D is no word; a terminal that is gone says the same without end.
+            Ok(0) if ends < MOST_ENDS => {
+                ends += 1;
+                print(Stream::Err, HINT);
+                std::thread::sleep(BACKGROUND);
+            }
             _ => return,
         }
     }

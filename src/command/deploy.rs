@@ -150,20 +150,26 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     drop(panel);
     findings.show(&sources, deployed.diagnostics);
     findings.end();
-    if let Some(digest) = sealed.transpose()? {
-        print(Stream::Err, &format!("the record is sealed: {digest}\n"));
-    }
+    let stopped = match CONTROL.stopped_by().as_deref() {
+        Some(Answer::NOBODY) => "was stopped, as nobody was there to confirm: run it on a terminal, or with `--yes`",
+        _ => "was stopped by a person",
+    };
     if let Some(end) = deployed.end {
         let [judged, met, unseen] = deployed.counts;
         let how = match (deployed.stopped, deployed.passed) {
-            (true, _) => "was stopped by a person",
+            (true, _) => stopped,
             (false, true) => "passed",
             (false, false) => "did not pass",
         };
         let seen = format!("{judged} expectations: {met} met, {unseen} not observed");
         print(Stream::Err, &format!("the deployment {how} after {} s; {seen}\n", show_number(end)));
     } else if deployed.stopped {
-        print(Stream::Err, "the deployment was stopped by a person before it began\n");
+        print(Stream::Err, &format!("the deployment {stopped}, before it began\n"));
+    }
+    // After the verdict: that stands whatever becomes of the record.
+    let sealed = sealed.transpose().map_err(|why| format!("{why}; the record is not sealed"))?;
+    if let Some(digest) = sealed {
+        print(Stream::Err, &format!("the record is sealed: {digest}\n"));
     }
     Ok(if deployed.passed { Exit::Fine } else { Exit::Findings })
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use matterix_ir::hidden::visible;
 use matterix_sila_wire::discovery::{Found, look};
 
 use crate::Exit;
@@ -21,11 +22,13 @@ pub fn discover(args: &DiscoverArgs) -> Exit {
 
 fn shown(server: &Found) -> String {
     let addresses: Vec<String> = server.addresses.iter().map(ToString::to_string).collect();
-    let mut out = format!("{}  {}\n  {}\n", server.uuid, server.name, addresses.join(", "));
+    // What a server says of itself is one line each, whatever is in it.
+    let line = |text: &str| visible(&text.split_whitespace().collect::<Vec<_>>().join(" ")).into_owned();
+    let mut out = format!("{}  {}\n  {}\n", line(&server.uuid), line(&server.name), addresses.join(", "));
     for (name, text) in [("certificate", server.fingerprint.as_deref().unwrap_or_default()), ("", &server.description)]
     {
         if !text.is_empty() {
-            out.push_str(&format!("  {}{}{text}\n", name, if name.is_empty() { "" } else { ": " }));
+            out.push_str(&format!("  {}{}{}\n", name, if name.is_empty() { "" } else { ": " }, line(text)));
         }
     }
     out

@@ -19,6 +19,9 @@ pub fn emulate(args: &EmulateArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
+    if args.link.is_some() && !args.pty {
+        return Err("`--link` is to a pseudo-terminal: it takes `--pty`".to_owned());
+    }
     let named: Vec<(&str, Option<&str>)> = args
         .device
         .iter()

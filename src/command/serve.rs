@@ -1,6 +1,6 @@
 //! `matterixc serve`.
 
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::{SocketAddr, TcpListener, ToSocketAddrs};
 use std::path::Path;
 
 use matterix_hardware::deploy::Journal;
@@ -43,6 +43,8 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
     matterix_hardware::serve::wait_for_ever(&mut program);
     let place = (args.host.as_str(), args.tcp).to_socket_addrs().ok().and_then(|mut all| all.next());
     let address: SocketAddr = place.ok_or_else(|| format!("there is no host `{}`", args.host))?;
+    // Before anything is made for it: a certificate is for the address.
+    drop(TcpListener::bind(address).map_err(|e| format!("`{address}` cannot be listened at: {e}"))?);
     let file =
         bindings.as_ref().map(|(path, text)| (sources.add(path.display().to_string(), text.clone()), text.as_str()));
     let mut ready = |address: SocketAddr, catalogue: &matterix_hardware::serve::Catalogue<'_>| {

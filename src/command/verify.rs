@@ -16,6 +16,10 @@ fn attempt(args: &VerifyArgs) -> Result<Exit, String> {
     if args.recording.join(record::MANIFEST).is_file() {
         return deployed(args);
     }
+    if args.recording.join(record::JOURNAL).is_file() {
+        let folder = args.recording.display();
+        return Err(format!("the record in `{folder}` was not sealed: it has a journal and no `{}`", record::MANIFEST));
+    }
     let file = if args.recording.is_dir() { &args.recording.join("recording.mcap") } else { &args.recording };
     let verdict = matterix_judge::judge(&files::read_recording(file)?)
         .map_err(|why| format!("cannot judge `{}`: {why}", file.display()))?;

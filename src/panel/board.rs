@@ -162,7 +162,7 @@ impl Board {
             state.log(t, kind, text);
         }
         match entry {
-            Entry::Told { name, value, .. } => {
+            Entry::Told { name, value, .. } | Entry::ReadBack { name, value, .. } => {
                 let shown = self.shown(name, *value);
                 if let Some(device) = state.of(name) {
                     device.trouble = None;

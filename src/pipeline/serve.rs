@@ -15,6 +15,7 @@ use matterix_hardware::world::Machine;
 use matterix_hardware::{binding, calibration};
 use matterix_ir::offer::{Failure, Offer, Shown};
 use matterix_ir::plan::{Plan, Step, StepId};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, FileId, Program, Sources};
 use matterix_runtime::backend::{Backend, Prepared, Sim};
 use matterix_runtime::exec::{self, Limits, RunStatus};
@@ -83,13 +84,17 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
     let journal = std::mem::take(&mut service.journal);
     let mut hardware = Hardware::new(program, sources, twin, devices, settings, journal, Box::new(over));
     // What no device does or tells is not offered.
-    let (offers, shown) = {
+    let (offers, shown, left_out) = {
         let (observed, devices) = hardware.view();
         let driven = |o: &&Offer| {
             let said = |step| devices.iter().any(|d| d.driver.is_some_and(|driver| driver.call(step).is_some()));
             o.arrangements.iter().all(|a| operations(&program.plan, a.step).into_iter().all(said))
         };
         let seen = |s: &&Shown| !observed.asks(&program.model, s.value).1;
+        let left_out = program.offers.commands.iter().filter(|o| !driven(o)).map(|o| named(program, o.device, &o.verb));
+        let unseen = program.offers.shown.iter().filter(|s| !seen(s));
+        let left_out = left_out.chain(unseen.map(|s| named(program, Some(s.device), &s.name)));
+        let left_out: Vec<String> = left_out.collect();
         let offers = program.offers.commands.iter().filter(driven).cloned();
         let refusable = |mut offer: Offer| {
             let drivers = devices.iter().filter_map(|d| d.driver);
@@ -103,8 +108,12 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         };
         let offers: Vec<Offer> = offers.map(refusable).collect();
         let shown: Vec<&Shown> = program.offers.shown.iter().filter(seen).collect();
-        (offers, shown)
+        (offers, shown, left_out)
     };
+    if !left_out.is_empty() {
+        let list = left_out.join(", ");
+        print(Stream::Err, &format!("not offered, as no driver that is bound does or tells it: {list}\n"));
+    }
     let unreached = hardware.connect();
     if !unreached.is_empty() {
         return Ok(unreached.iter().map(|u| not_reached(u, false)).collect());
@@ -136,7 +145,7 @@ fn attend(
     shown: Vec<&Shown>,
     service: Service<'_>,
 ) -> Result<(Vec<Diagnostic>, bool), String> {
-    let catalogue = catalogue(&program.scene, &program.offers, offers, shown);
+    let catalogue = catalogue(&program.scene, &program.offers, offers, shown)?;
     let (name, features) = (program.scene.lab.clone(), catalogue.features.clone());
     let about = format!("The lab `{name}`. {}", program.offers.docs(None, "")).trim_end().to_owned();
     let version = env!("CARGO_PKG_VERSION").to_owned();
@@ -162,6 +171,14 @@ fn attend(
     let fault = execution.failure.iter().filter(|_| !well);
     let found = fault.map(exec::diagnostic).map(|d| super::run::led_by_the_user(d, sources)).collect();
     Ok((found, well && !desk.was_busy()))
+}
+
+/// A command or quantity of a thing, as people say it.
+fn named(program: &Program, device: Option<InstanceId>, what: &str) -> String {
+    match device {
+        Some(device) => format!("`{what}` of `{}`", program.scene.get(device).name),
+        None => format!("`{what}`"),
+    }
 }
 
 /// The operations below a node of the plan.

@@ -339,7 +339,7 @@ impl Report {
             Entry::Ended { ticket, failed: Some((name, text)), .. } => {
                 self.came_to(rows.commands.get(ticket), format!("{name}: {text}"));
             }
-            Entry::Told { name, value, .. } => self.told(name, *value, rows),
+            Entry::Told { name, value, .. } | Entry::ReadBack { name, value, .. } => self.told(name, *value, rows),
             Entry::Kept { t, device, word, text } => {
                 let (device, name, text) = (device.clone(), word.clone(), text.clone());
                 self.texts.push(Text { lab_time: *t, device, name, text });
@@ -347,7 +347,7 @@ impl Report {
             Entry::Again { t, device, why } => {
                 self.again.push(Again { lab_time: *t, device: device.clone(), why: why.clone() });
             }
-            Entry::Leap { t, to } => self.leapt(*t, to - t),
+            Entry::Leap { t, to } | Entry::Late { t, to, .. } => self.leapt(*t, to - t),
             Entry::Fault { t, code, text, .. } => {
                 self.faults.push(Fault { lab_time: *t, code: code.clone(), text: text.clone() });
             }

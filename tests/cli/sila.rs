@@ -132,7 +132,7 @@ fn a_binding_fits_what_the_driver_speaks_to() {
             "by its certificate or by its fingerprint",
         ),
         ("[plate]\nsila = \"x:1\"\nlock = \"10 minutes\"", "a lock lasts for a time"),
-        ("[plate]\nsila = \"x:1\"\nlock = \"1 s\"", "a lock lasts for a time"),
+        ("[plate]\nsila = \"x:1\"\nlock = \"1 s\"", "a lock lasts from 10 s to 168 h"),
         ("[plate]\nsila = \"x:1\"\nuser = \"ana\"", "a user has a password"),
         ("[plate]\nsila = \"x:1\"\npassword_env = \"P\"", "a password belongs to a user"),
         ("[plate]\nsila = \"x:1\"\nuser = \"ana\"\npassword_env = \"P\"", "a password is not sent without encryption"),

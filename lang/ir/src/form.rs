@@ -99,6 +99,9 @@ pub struct Read {
     pub length: usize,
 }
 
+/// A number below this is the rounding of one that is nothing.
+const NOTHING: f64 = 1e-9;
+
 /// Longest width of a decimal.
 const WIDEST: u8 = 24;
 /// The last whole number before which all are told apart.
@@ -213,8 +216,12 @@ impl Form {
             Encoding::Decimal { digits, width, zeros, plus } => {
                 let text = match digits.or(width.map(|_| 0)) {
                     Some(digits) => fixed(scaled, digits),
-                    None => show_number(scaled),
+                    None => plain(scaled),
                 };
+                let is_lost = scaled.abs() > NOTHING && text.bytes().all(|b| !(b'1'..=b'9').contains(&b));
+                if is_lost {
+                    return Err(format!("`{text}` says nothing of {}: it has too few digits", plain(scaled)));
+                }
                 let text = if plus && !text.starts_with('-') { format!("+{text}") } else { text };
                 let Some(width) = width.map(usize::from) else { return Ok(text) };
                 if text.len() > width {
@@ -306,9 +313,19 @@ impl Form {
     }
 }
 
+/// A number as devices understand it, with all of its digits but those that conversions of units leave behind, and without an
+/// exponent.
+pub fn plain(number: f64) -> String {
+    let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
+    fixed_sign(format!("{short}"))
+}
+
 /// A number with so many digits after the point; rounded to nothing it has no sign.
 pub fn fixed(number: f64, digits: u8) -> String {
-    let text = format!("{number:.*}", usize::from(digits));
+    fixed_sign(format!("{number:.*}", usize::from(digits)))
+}
+
+fn fixed_sign(text: String) -> String {
     match text.strip_prefix('-') {
         Some(rest) if !rest.bytes().any(|b| b.is_ascii_digit() && b != b'0') => rest.to_owned(),
         _ => text,

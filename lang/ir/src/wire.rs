@@ -28,6 +28,8 @@ pub enum Transport {
     Sila {
         /// Full identifier of the feature that is meant where a text names none.
         feature: String,
+        /// The definition that the driver was made from, as `matterix_sila::form` packs it: what the server offers must be that.
+        definition: Option<String>,
     },
     /// Requests to a server, bodies in JSON; see [`crate::message`].
     Http {

@@ -3,14 +3,14 @@
 use matterix_sila::feature::Command;
 use matterix_sila::words::{name, words};
 
-use super::{Writer, docs};
+use super::{Writer, docs, member, option};
 
 impl Writer<'_> {
     pub(super) fn command(&mut self, command: &Command) {
         let verb = verb(&command.identifier);
         let (mut options, mut needs, mut arguments) = (Vec::new(), Vec::new(), Vec::new());
         for parameter in &command.parameters {
-            let option = name(&parameter.identifier);
+            let option = option(&parameter.identifier);
             let given = match self.types.given(&option, &parameter.ty) {
                 Ok(given) => given,
                 Err(why) => {
@@ -22,7 +22,7 @@ impl Writer<'_> {
             needs.extend(given.needs);
             arguments.push(format!("{}: {}", parameter.identifier, given.piece));
         }
-        let key = name(&command.identifier);
+        let key = member(&command.identifier);
         if command.observable {
             let [takes, timeout] = [format!("{key}_takes"), format!("{key}_timeout")];
             for (param, says) in [(&takes, "How long it takes in simulation."), (&timeout, "How long it may take.")] {
@@ -60,7 +60,7 @@ impl Writer<'_> {
         self.wire(&format!("{verb} sends \"{said}\"{until}"));
         for answer in command.responses.iter().chain(&command.intermediate) {
             let asks = format!("{}.{}", command.identifier, answer.identifier);
-            self.reading(&asks, &name(&answer.identifier), &answer.ty, &answer.description);
+            self.reading(&asks, &member(&answer.identifier), &answer.ty, &answer.description);
         }
     }
 }
@@ -70,6 +70,6 @@ fn verb(identifier: &str) -> String {
     let words = words(identifier);
     match words.iter().all(|w| matterix_syntax::is_name(w)) {
         true => words.join(" "),
-        false => name(identifier),
+        false => member(identifier),
     }
 }

@@ -12,6 +12,7 @@ use std::fmt::Write;
 
 use matterix_ir::hidden::visible;
 use matterix_sila::Feature;
+use matterix_sila::form::{form, packed};
 use matterix_sila::words::name;
 
 use crate::ast::{Member, MemberKind};
@@ -63,7 +64,7 @@ pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTr
     };
     // Properties first: a response of the same name gets a longer one.
     for property in &feature.properties {
-        writer.reading(&property.identifier, &name(&property.identifier), &property.ty, &property.description);
+        writer.reading(&property.identifier, &member(&property.identifier), &property.ty, &property.description);
     }
     feature.commands.iter().for_each(|c| writer.command(c));
     for error in &feature.errors {
@@ -78,12 +79,25 @@ pub fn declarations(feature: &Feature, capability: &str, units: &Units, own: BTr
     // Writing to a text cannot fail.
     let _ = writeln!(text, "{}capability {capability} {{\n{}}}", docs(&feature.description, ""), writer.members);
     let id = feature.id();
+    let form = packed(&form(feature));
     let _ = writeln!(
         text,
-        "/// Calls of the feature `{id}`.\ndriver {capability}Sila for {capability} over sila(feature: \"{id}\", timeout: {PATIENCE}) {{\n{}}}",
+        "/// Calls of the feature `{id}`.\ndriver {capability}Sila for {capability} over sila(feature: \"{id}\", timeout: {PATIENCE},\n    definition: \"{form}\") {{\n{}}}",
         writer.wires
     );
     Declared { text, left_out }
+}
+
+/// An identifier as a name of the language; one that is a word of the language ends in a line below.
+fn member(identifier: &str) -> String {
+    let name = name(identifier);
+    if matterix_syntax::is_name(&name) { name } else { format!("{name}_") }
+}
+
+/// An identifier as the name of an option, which prepositions may be.
+fn option(identifier: &str) -> String {
+    let name = name(identifier);
+    if matterix_syntax::is_option(&name) { name } else { format!("{name}_") }
 }
 
 /// The parameter that a capability declares where assets say by which call they are made safe.
@@ -118,7 +132,7 @@ impl Writer<'_> {
             Err(why) => return self.leave_out(asks, format!("which {why}")),
         };
         let member = match self.told.contains(member) {
-            true => name(&asks.replace('.', "")),
+            true => self::member(&asks.replace('.', "")),
             false => member.to_owned(),
         };
         if !self.told.insert(member.clone()) {

@@ -107,6 +107,11 @@ pub fn is_name(word: &str) -> bool {
     Grammar::parse(Rule::ident, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
 }
 
+/// Whether a word can be the name of an option: it reads as a value where it is used.
+pub fn is_option(word: &str) -> bool {
+    Grammar::parse(Rule::cond, word).is_ok_and(|mut pairs| pairs.next().is_some_and(|p| p.as_str() == word))
+}
+
 /// Where the line with the version ends; where there is none, at the start.
 pub fn header_end(text: &str) -> usize {
     let mut at = 0;

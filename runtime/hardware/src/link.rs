@@ -115,6 +115,16 @@ pub trait Line {
         Ok(())
     }
 
+    /// Whether the device has to hear soon that somebody is there, whatever the plan says to it.
+    fn is_to_be_held(&self) -> bool {
+        false
+    }
+
+    /// Lets it hear that.
+    fn hold(&mut self, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        Ok(())
+    }
+
     /// What answers said that is put in later.
     fn kept(&self) -> Kept {
         Kept::new()
@@ -136,8 +146,8 @@ pub fn open(
     driver: &Driver,
     address: Option<&str>,
 ) -> Result<Box<dyn Line>, Trouble> {
-    if let (Place::Sila(server), Transport::Sila { feature }) = (place, &driver.transport) {
-        return sila(server, feature, driver.timeout);
+    if let (Place::Sila(server), Transport::Sila { feature, definition }) = (place, &driver.transport) {
+        return sila(server, feature, definition.as_deref(), driver.timeout);
     }
     let opened = world.open(place, driver).map_err(|e| place::trouble(place, &e));
     let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(Trouble::Lost)?;
@@ -145,12 +155,12 @@ pub fn open(
 }
 
 #[cfg(feature = "sila")]
-fn sila(server: &SilaServer, feature: &str, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
-    Ok(Box::new(crate::sila::Server::connect(server, feature, timeout)?))
+fn sila(server: &SilaServer, feature: &str, definition: Option<&str>, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
+    Ok(Box::new(crate::sila::Server::connect(server, feature, definition, timeout)?))
 }
 
 #[cfg(not(feature = "sila"))]
-fn sila(server: &SilaServer, _: &str, _: f64) -> Result<Box<dyn Line>, Trouble> {
+fn sila(server: &SilaServer, _: &str, _: Option<&str>, _: f64) -> Result<Box<dyn Line>, Trouble> {
     let why = "this build does not speak SiLA 2: build it with `--features sila`";
     Err(Trouble::Lost(format!("cannot connect to `{}`: {why}", server.at)))
 }

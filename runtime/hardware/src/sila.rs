@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use matterix_ir::wire::{Driver, Pattern, Told, Until};
+use matterix_sila::form::{difference, form, unpacked};
 use matterix_sila_wire::tls::Trust;
 use matterix_sila_wire::{Access, Client, Failure, Lock, Login, Said, discovery, is_of};
 
@@ -15,18 +16,36 @@ use crate::template;
 pub struct Server(Client);
 
 impl Server {
-    /// Connects to a server, which must offer the feature.
-    pub fn connect(server: &SilaServer, feature: &str, timeout: f64) -> Result<Server, Trouble> {
+    /// Connects to a server, which must offer the feature, by the definition that the driver was made from if it was made from one.
+    pub fn connect(
+        server: &SilaServer,
+        feature: &str,
+        definition: Option<&str>,
+        timeout: f64,
+    ) -> Result<Server, Trouble> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .ok()
             .filter(|t| !t.is_zero())
             .ok_or_else(|| Trouble::Lost("the timeout is no duration".to_owned()))?;
-        let mut access = access(server).map_err(Trouble::Lost)?;
+        let mut access = access(server).map_err(Trouble::Unsaid)?;
         let mut failed = None;
         for address in addresses(server, timeout).map_err(Trouble::Lost)? {
             access.address = address;
             match Client::connect(&access, feature, timeout) {
-                Ok(client) => return Ok(Server(client)),
+                Ok(mut client) => {
+                    client.lacks_nothing().map_err(|failure| match failure {
+                        Failure::Lost(why) => Trouble::Lost(why),
+                        Failure::Garbled(why) => Trouble::Garbled(why),
+                        Failure::Refused { name, message } => {
+                            Trouble::Garbled(format!("it answered `{name}`: {message}"))
+                        }
+                    })?;
+                    let promised = definition.and_then(unpacked).unwrap_or_default();
+                    return match difference(&promised, &form(client.feature())) {
+                        None => Ok(Server(client)),
+                        Some(how) => Err(Trouble::Garbled(format!("its `{feature}` is another: {how}"))),
+                    };
+                }
                 // It may be reached by another of its addresses.
                 Err(Failure::Lost(why)) => failed = failed.or(Some(why)),
                 Err(Failure::Refused { name, message }) => {
@@ -55,12 +74,18 @@ fn access(server: &SilaServer) -> Result<Access, String> {
         SilaTrust::Fingerprint(digest) => Trust::Fingerprint(*digest),
         SilaTrust::Certificate(path) => {
             let read = std::fs::read_to_string(path);
-            Trust::Certificates(read.map_err(|e| format!("the certificate `{path}` cannot be read: {e}"))?)
+            let text = read.map_err(|e| format!("its `certificate = \"{path}\"` cannot be read: {e}"))?;
+            if !text.contains("BEGIN CERTIFICATE") {
+                return Err(format!("its `certificate = \"{path}\"` holds no certificate in PEM"));
+            }
+            Trust::Certificates(text)
         }
     };
     let login = server.user.as_ref().map(|(user, variable)| {
         let password = std::env::var(variable);
-        let password = password.map_err(|_| format!("the variable `{variable}` of the environment holds no password"));
+        let password = password.map_err(|_| {
+            format!("the variable `{variable}` of the environment, which `password_env` names, is not set")
+        });
         Ok::<_, String>(Login { user: user.clone(), password: password? })
     });
     let lock = server.lock.map(|seconds| Lock { name: who(), lapse: Duration::from_secs(seconds) });
@@ -122,6 +147,15 @@ impl Line for Server {
             }
         }
         Ok(numbers)
+    }
+
+    fn is_to_be_held(&self) -> bool {
+        self.0.lapses_soon()
+    }
+
+    fn hold(&mut self, driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+        self.0.wait_at_most(ear.patience());
+        self.0.hold().map_err(|f| trouble(f, driver, ear))
     }
 
     fn judge(&self, text: &str) -> Result<(), String> {

@@ -27,7 +27,7 @@ pub use beside::{Lock, Login};
 use dial::Dial;
 use given::arguments;
 pub use given::is_of;
-use wire::{source, within};
+use wire::{Latest, source, within};
 
 /// Longest time in which news of an execution is waited for when it is only looked at.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -43,7 +43,7 @@ const FAREWELL: Duration = Duration::from_secs(2);
 struct Running {
     execution: Execution,
     news: Streaming<Info>,
-    told: Option<Streaming<Raw>>,
+    told: Option<Latest>,
 }
 
 /// A command with its arguments.
@@ -94,6 +94,11 @@ pub struct Client {
     beside: Vec<Beside>,
     /// The name by which it was taken for oneself.
     locked: Option<String>,
+    /// When it lets go by itself, and when it heard from the one who has taken it last.
+    lapse: Option<Duration>,
+    heard: Instant,
+    /// Whether it knows who calls.
+    is_known: bool,
 }
 
 impl Drop for Client {
@@ -137,6 +142,9 @@ impl Client {
             seen: now(),
             beside: Vec::new(),
             locked: None,
+            lapse: None,
+            heard: now(),
+            is_known: false,
         };
         match client.learn(feature) {
             // Servers that speak TLS hang up on those who do not.
@@ -293,10 +301,22 @@ impl Client {
             && self.features[0].command(command).is_some()
         {
             let key = (0, command.clone());
-            self.glance(&key)?;
-            let known = self.last.get(&key).into_iter().flatten().find(|(name, _)| name == response);
-            let found = known.map(|(_, value)| shown(value));
-            return found.ok_or_else(|| Failure::Garbled(format!("`{command}` has not told `{response}`")));
+            let tells = self.features[0]
+                .command(command)
+                .is_some_and(|c| c.intermediate.iter().any(|e| e.identifier == *response));
+            let asked = now();
+            loop {
+                self.glance(&key)?;
+                let known = self.last.get(&key).into_iter().flatten().find(|(name, _)| name == response);
+                if let Some((_, value)) = known {
+                    return Ok(shown(value));
+                }
+                // The first news of a command come when the server has them.
+                if !(tells && self.running.contains_key(&key)) || asked.elapsed() >= self.timeout {
+                    return Err(Failure::Garbled(format!("`{command}` has not told `{response}`")));
+                }
+                std::thread::sleep(GLANCE);
+            }
         }
         let (index, name) = self.place(&call).map_err(Failure::Garbled)?;
         self.read(index, &name).map(|value| shown(&value))
@@ -399,7 +419,7 @@ impl Client {
         let news = self.stream(index, &format!("{}_Info", command.identifier), execution.clone())?;
         let told = match command.intermediate.as_slice() {
             [] => None,
-            _ => Some(self.stream(index, &format!("{}_Intermediate", command.identifier), execution.clone())?),
+            _ => Some(self.follow(index, &format!("{}_Intermediate", command.identifier), execution.clone())?),
         };
         let key = (index, command.identifier.clone());
         self.last.remove(&key);
@@ -411,12 +431,7 @@ impl Client {
     fn glance(&mut self, key: &(usize, String)) -> Result<(), Failure> {
         let Some(command) = self.features[key.0].command(&key.1) else { return Ok(()) };
         let elements = command.intermediate.clone();
-        let mut latest = None;
-        if let Some(told) = self.running.get_mut(key).and_then(|r| r.told.as_mut()) {
-            while let Some(Ok(Some(raw))) = within(&self.runtime, GLANCE, told.message()) {
-                latest = Some(raw);
-            }
-        }
+        let latest = self.running.get(key).and_then(|r| r.told.as_ref()).and_then(Latest::take);
         if let Some(raw) = latest {
             let values = self.answered(key.0, &elements, &raw)?;
             self.last.insert(key.clone(), values);
@@ -426,6 +441,9 @@ impl Client {
 
     /// Asks for what came of a command that has ended.
     fn end(&mut self, key: &(usize, String), command: &Command) -> Result<(), Failure> {
+        if let Some(told) = self.running.get_mut(key).and_then(|r| r.told.as_mut()) {
+            told.ended(&self.runtime, GLANCE);
+        }
         self.glance(key)?;
         let Some(running) = self.running.remove(key) else { return Ok(()) };
         let raw: Raw = self.unary(key.0, &format!("{}_Result", command.identifier), running.execution)?;

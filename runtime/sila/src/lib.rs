@@ -24,4 +24,4 @@ pub use server::{About, Call, Door, News, Read, Request, Server, Users, new_uuid
 pub use service::spaced;
 /// The channels by which news of a call goes out.
 pub use tokio::sync::mpsc as news;
-pub use value::{Value, decode, encode, fits};
+pub use value::{ROUNDING, Value, decode, encode, fits};

@@ -122,11 +122,27 @@ fn within(feature: &Feature, ty: &DataType, text: &str, depth: usize) -> Result<
         DataType::Structure(elements) => {
             let inner = text.strip_prefix('{').and_then(|t| t.strip_suffix('}'));
             let inner = inner.ok_or_else(|| format!("`{text}` is no structure: write `{{Part: value}}`"))?;
-            let given: Vec<(&str, &str)> = parts(inner)?.into_iter().filter_map(|p| p.split_once(':')).collect();
+            let named = |p: &'_ str| {
+                let (name, value) = p.split_once(':')?;
+                Some((name.trim().to_owned(), value.trim().to_owned()))
+            };
+            let mut given: Vec<(String, String)> = Vec::new();
+            for part in parts(inner)? {
+                let (name, value) =
+                    named(part).ok_or_else(|| format!("`{}` has no name: write `Part: value`", part.trim()))?;
+                if !elements.iter().any(|e| e.identifier == name) {
+                    let known: Vec<String> = elements.iter().map(|e| format!("`{}`", e.identifier)).collect();
+                    return Err(format!("there is no part `{name}`; there are {}", known.join(", ")));
+                }
+                if given.iter().any(|(other, _)| *other == name) {
+                    return Err(format!("`{name}` is given twice"));
+                }
+                given.push((name, value));
+            }
             let part = |element: &matterix_sila::feature::Element| {
-                let found = given.iter().find(|(name, _)| name.trim() == element.identifier);
+                let found = given.iter().find(|(name, _)| *name == element.identifier);
                 let (_, text) = found.ok_or_else(|| format!("`{}` is missing", element.identifier))?;
-                Ok::<_, String>((element.identifier.clone(), within(feature, &element.ty, text.trim(), depth + 1)?))
+                Ok::<_, String>((element.identifier.clone(), within(feature, &element.ty, text, depth + 1)?))
             };
             Value::Structure(elements.iter().map(part).collect::<Result<_, _>>()?)
         }

@@ -167,6 +167,9 @@ fn understood(feature: &Feature, ty: &DataType, bytes: &[u8]) -> Result<Value, S
     })
 }
 
+/// A number beyond a bound by no more than this share of it is the bound: units are converted on the way to either.
+pub const ROUNDING: f64 = 1e-12;
+
 /// Whether a value is one of those that are allowed; why it is not.
 pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
     let number = match value {
@@ -176,13 +179,14 @@ pub fn fits(value: &Value, constraints: &Constraints) -> Result<(), String> {
     };
     let shown = crate::text::shown(value);
     if let Some(number) = number {
+        let rounding = |bound: f64| ROUNDING * bound.abs();
         if let Some((least, out)) = constraints.least
-            && (number < least || out && number == least)
+            && (number < least - rounding(least) || out && number <= least)
         {
             return Err(format!("{shown} is below {least}"));
         }
         if let Some((greatest, out)) = constraints.greatest
-            && (number > greatest || out && number == greatest)
+            && (number > greatest + rounding(greatest) || out && number >= greatest)
         {
             return Err(format!("{shown} is above {greatest}"));
         }

@@ -119,9 +119,9 @@ pub trait Backend {
         Ok(None)
     }
 
-    /// Whether a question has been answered with yes; one that has is forgotten.
-    fn answered(&mut self, _question: Ticket, _out: &mut dyn Listener) -> Result<bool, Fault> {
-        Ok(true)
+    /// What was answered to a question, once; none while it is open.
+    fn answered(&mut self, _question: Ticket, _out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
+        Ok(Some(true))
     }
 
     /// What an operation that is about to begin would bring about and must not, by what is known of the world here.

@@ -54,6 +54,8 @@ const PATIENCE: f64 = 0.25;
 /// An operation that goes on.
 struct Running {
     ends: Ends,
+    /// The states that its beginning set.
+    set: Vec<u32>,
     at_end: Vec<Action>,
     motion: Option<Motion>,
 }
@@ -225,6 +227,27 @@ impl<'m> Sim<'m> {
         self.engine.eval(node)
     }
 
+    /// An operation that takes its time is over, as its device says: its effects come about when it is asked next.
+    pub fn hasten(&mut self, ticket: Ticket) {
+        let now = self.engine.time();
+        if let Some(running) = self.running.get_mut(&ticket)
+            && matches!(running.ends, Ends::At(_))
+        {
+            running.ends = Ends::At(now);
+        }
+    }
+
+    /// An operation has been broken off on its device: what its beginning had set and its end would set back is set back now.
+    pub fn break_off(&mut self, ticket: Ticket) -> Result<(), Fault> {
+        let Some(running) = self.running.remove(&ticket) else { return Ok(()) };
+        if let Some(stage) = self.stage.as_mut() {
+            stage.let_go(running.motion.as_ref());
+        }
+        let back = |action: &&Action| matches!(action, Action::Assign { state, .. } if running.set.contains(state));
+        let back: Vec<Action> = running.at_end.iter().filter(back).cloned().collect();
+        self.act(&back, &mut ())
+    }
+
     /// A reading as a device has just reported it: within this instant it stands in place of what the model supposes.
     pub fn give(&mut self, reading: u32, value: f64) {
         let now = self.engine.time();
@@ -388,8 +411,12 @@ impl Backend for Sim<'_> {
         };
         let ticket = Ticket(self.started);
         self.started += 1;
-        self.running
-            .insert(ticket, Running { ends, at_end: operation.at_end.clone(), motion: operation.motion.clone() });
+        let assigned = operation.at_start.iter().filter_map(|action| match action {
+            Action::Assign { state, .. } => Some(*state),
+            Action::Move { .. } => None,
+        });
+        let (set, at_end, motion) = (assigned.collect(), operation.at_end.clone(), operation.motion.clone());
+        self.running.insert(ticket, Running { ends, set, at_end, motion });
         Ok(ticket)
     }
 

@@ -179,6 +179,8 @@ pub(super) struct Frame {
     pub stop: Option<Stop>,
     /// Whether it runs beside its parent's body.
     pub job: bool,
+    /// Whether somebody outside has asked for it: what becomes of it is nobody else's business.
+    pub asked: bool,
     /// Whether it stands in a `finally`.
     pub finally: bool,
     pub kind: Kind,

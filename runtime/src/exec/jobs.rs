@@ -48,7 +48,7 @@ impl<'p> Executor<'p, '_> {
             }
             let frame = self.insert(Some(ROOT), Some(asked.step));
             if let Some(new) = self.frames.get_mut(&frame) {
-                new.job = true;
+                (new.job, new.asked) = (true, true);
             }
             if let Some(root) = self.frames.get_mut(&ROOT) {
                 root.jobs.retain(|j| j.end.is_none());

@@ -212,6 +212,8 @@ struct Executor<'p, 'b> {
     end: Option<End>,
     suppressed: Vec<FailureTrace>,
     unfinished: Vec<FailureTrace>,
+    /// The first question of a `finally` that was answered with no, which held nothing up.
+    declined: Option<FailureTrace>,
     expectations: Vec<ExpectationResult>,
     assumptions: Vec<Assumption>,
 }
@@ -247,6 +249,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             end: None,
             suppressed: Vec::new(),
             unfinished: Vec::new(),
+            declined: None,
             expectations: Vec::new(),
             assumptions: Vec::new(),
         }
@@ -319,6 +322,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             started: self.now,
             stop: None,
             job: false,
+            asked: false,
             finally,
             kind: Kind::New,
             jobs: Vec::new(),
@@ -384,6 +388,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             (Some(Abort::Fault(trace)), _) => (RunStatus::Fault, Some(*trace)),
             (Some(Abort::Cancelled), _) => (RunStatus::Cancelled, None),
             (None, Some(End::Failed(trace))) => (RunStatus::Failed, Some(*trace)),
+            (None, _) if self.declined.is_some() => (RunStatus::Failed, self.declined),
             (None, _) if unmet || !self.unfinished.is_empty() => (RunStatus::ExpectationFailed, None),
             (None, _) => (RunStatus::Passed, None),
         };

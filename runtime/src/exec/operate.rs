@@ -48,9 +48,19 @@ impl<'p> Executor<'p, '_> {
     /// Goes on where a question has been answered.
     pub(super) fn look_at_question(&mut self, id: FrameId) -> Result<(), Fault> {
         let Some(Kind::Asked { ticket }) = self.frames.get(&id).map(|f| &f.kind) else { return Ok(()) };
-        if self.backend.answered(*ticket, self.out)? {
-            self.set_kind(id, Kind::Pass);
-            self.push_end(id, End::Done);
+        let finally = self.frames.get(&id).is_some_and(|f| f.finally);
+        match self.backend.answered(*ticket, self.out)? {
+            // Who says no wants it to end; what leaves things as they should be goes on all the same.
+            Some(yes) if yes || finally => {
+                if !yes {
+                    let trace = self.trace(id, Raised::named("refused", "a question was answered with no".to_owned()));
+                    self.out.failure(&trace);
+                    self.declined.get_or_insert(trace);
+                }
+                self.set_kind(id, Kind::Pass);
+                self.push_end(id, End::Done);
+            }
+            Some(_) | None => {}
         }
         Ok(())
     }
@@ -159,7 +169,10 @@ impl<'p> Executor<'p, '_> {
             let new = Use { frame: id, step, within: within.clone(), running: true, time: self.now };
             self.claims.begin(instance, new);
         }
-        let ticket = self.backend.start(operation, self.out)?;
+        let started = self.backend.start(operation, self.out);
+        // Who was told may have taken time to say so.
+        self.now = self.backend.now().max(self.now);
+        let ticket = started?;
         self.set_kind(id, Kind::Operation { ticket, until: None, watch: None });
         self.out.operation(self.now, step, operation, OperationState::Started);
         self.changed();
@@ -176,7 +189,9 @@ impl<'p> Executor<'p, '_> {
         let (Kind::Operation { ticket, .. }, Some(step)) = (&frame.kind, frame.step) else { return Ok(()) };
         let Step::Operation(operation) = &plan.get(step).step else { return Ok(()) };
         let ticket = *ticket;
-        match self.backend.poll(ticket, self.out)? {
+        let status = self.backend.poll(ticket, self.out);
+        self.now = self.backend.now().max(self.now);
+        match status? {
             Status::Running { until, watch } => {
                 self.set_kind(id, Kind::Operation { ticket, until, watch });
                 self.alarmed_by(id);

@@ -1,5 +1,7 @@
 //! Stopping: of subtrees after failures and breaches, of the whole run on cancellation and fault.
 
+use matterix_ir::codes;
+
 use super::failure::FailureTrace;
 use super::frame::{End, FrameId, Kind, Stop};
 use super::judge::Raised;
@@ -34,6 +36,16 @@ impl Executor<'_, '_> {
 
     /// A frame cannot go on: the run ends, or the `finally` it stands in if the run is ending already.
     pub(super) fn fault(&mut self, id: FrameId, fault: Fault) {
+        let is_asked = |id| self.frames.get(&id).is_some_and(|f| f.asked);
+        let is_of_numbers = matches!(
+            fault.code,
+            codes::UNUSABLE_NUMBER | codes::TRANSFER_FRACTION | codes::NOT_A_NUMBER | codes::ENDLESS_INSTANT
+        );
+        // Who asks for what cannot be is told so; others are left alone.
+        if is_of_numbers && (is_asked(id) || self.ancestors(id).any(is_asked)) {
+            return self
+                .fail(id, Raised { code: fault.code, span: fault.span, ..Raised::named("unusable", fault.message) });
+        }
         let trace = self.fault_trace(id, fault);
         self.abort(trace);
         self.stop_all(Stop::Now, false);

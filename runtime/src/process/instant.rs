@@ -84,9 +84,12 @@ impl Engine<'_> {
         match *action {
             Action::Assign { state, value, span } => {
                 let value = self.eval(value);
+                if !value.is_finite() {
+                    return Err(self.no_value(state, value).at(span));
+                }
                 self.suspicion.count(self.model, state, value - self.states[state as usize]);
                 self.write(state, value);
-                self.check_states(Some(&[state])).map_err(|f| f.at(span))
+                Ok(())
             }
             Action::Move { fraction, from, to, span } => {
                 let fraction = self.eval(fraction);

@@ -342,11 +342,14 @@ impl<'m> Engine<'m> {
             Some(list) => list.iter().map(|&s| s as usize).find(|&s| !self.states[s].is_finite()),
             None => all.into_iter().find(|&s| !self.states[s].is_finite()),
         };
-        let Some(state) = broken else { return Ok(()) };
-        let declared = &self.model.states[state];
-        let value = self.states[state];
+        broken.map_or(Ok(()), |state| Err(self.no_value(state as u32, self.states[state])))
+    }
+
+    /// The fault of a state that is, or would be, no finite number.
+    fn no_value(&self, state: u32, value: f64) -> Fault {
+        let declared = &self.model.states[state as usize];
         let message = format!("`{}` has no finite value: it is {value}", declared.name);
-        Err(Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span))
+        Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span)
     }
 
     /// Fails where a sum does not close: at the law that breaks it, else at `cause`.

@@ -6,6 +6,8 @@ mod faulty;
 mod framed;
 mod journal;
 mod kills;
+mod late;
+mod left;
 mod modules;
 mod panel;
 mod reads;

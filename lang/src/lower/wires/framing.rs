@@ -256,7 +256,15 @@ impl<'a> Planner<'a, '_> {
             Some(ExprKind::Text(text)) => u32::from_str_radix(text, 16).ok(),
             _ => None,
         };
-        let width = given("width").and_then(number).filter(|w| [8.0, 16.0, 32.0].contains(w));
+        let width = given("width").and_then(number);
+        if let Some(e) = given("width").filter(|_| width.is_some_and(|w| ![8.0, 16.0, 32.0].contains(&w))) {
+            return self.no_framing(
+                e.span,
+                "a cyclic redundancy check has 8, 16 or 32 bits",
+                "not so many",
+                "as in `width: 16`",
+            );
+        }
         let reflected = match given("reflected").map(|e| &*e.kind) {
             Some(ExprKind::Name(n)) if n.text == "true" => Some(true),
             Some(ExprKind::Name(n)) if n.text == "false" => Some(false),

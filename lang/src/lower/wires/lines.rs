@@ -158,7 +158,11 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<Told> {
         let asks = self.template(asks, scope)?;
-        self.tells(path, asks, expects, span, scope)
+        let told = self.tells(path, asks, expects, span, scope)?;
+        if self.speech == Speech::Modbus && !self.modbus_fits(&told.asks, &told.expects.slots, expects.span) {
+            return None;
+        }
+        Some(told)
     }
 
     /// A quantity that a device tells by itself.

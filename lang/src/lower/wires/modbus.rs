@@ -1,7 +1,7 @@
 //! Messages of Modbus, put into their one spelling: registers are hexadecimal digits behind `0x`.
 
 use matterix_ir::modbus::{HEX, Request};
-use matterix_ir::wire::{Piece, Slot};
+use matterix_ir::wire::{Piece, Slot, Template};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::lower::Planner;
@@ -67,6 +67,31 @@ impl Planner<'_, '_> {
             });
         }
         Some(out)
+    }
+
+    /// Whether an answer is as long as the registers that are asked for; reported where it is not.
+    pub(super) fn modbus_fits(&mut self, asks: &Template, slots: &[Slot], at: Span) -> bool {
+        let plain = |piece: &Piece| match piece {
+            Piece::Plain(text) => Some(text.clone()),
+            _ => None,
+        };
+        let asked = asks.pieces.iter().map(plain).collect::<Option<String>>();
+        let Some(asked) = asked.and_then(|text| Request::parse(&text).ok()) else { return true };
+        let length = |slot: &Slot| match slot {
+            Slot::Plain(text) => Some(text.len()),
+            Slot::Number(_, form) => form.width(),
+            Slot::Word(choices) => choices.iter().find_map(|c| c.sent.as_ref()).map(String::len),
+            _ => None,
+        };
+        let Some(told) = slots.iter().map(length).sum::<Option<usize>>() else { return true };
+        let is_spoken = !matches!(slots.first(), Some(Slot::Plain(text)) if text.starts_with(HEX));
+        let (count, digits) = (asked.count.unwrap_or(1), told.saturating_sub(HEX.len()));
+        if is_spoken || asked.values.is_some() || digits == 4 * usize::from(count) {
+            return true;
+        }
+        let headline = format!("{count} registers are asked for, and the answer is read as {} bytes", digits / 2);
+        self.wrong(at, &headline, "a register has two bytes", "ask for as many registers as the number takes");
+        false
     }
 
     /// An answer with what registers hold as digits.

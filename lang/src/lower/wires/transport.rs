@@ -19,10 +19,10 @@ pub(super) struct Line {
 
 const SERIAL: &[&str] = &["baud", "frame", "framing", "address", "timeout"];
 const TCP: &[&str] = &["framing", "address", "timeout"];
-const SILA: &[&str] = &["feature", "timeout"];
+const SILA: &[&str] = &["feature", "timeout", "definition"];
 const HTTP: &[&str] = &["header", "timeout"];
 /// What a line may go without.
-const OPTIONAL: &[&str] = &["address", "header"];
+const OPTIONAL: &[&str] = &["address", "header", "definition"];
 const BAUDS: std::ops::RangeInclusive<f64> = 50.0..=4_000_000.0;
 
 impl<'a> Planner<'a, '_> {
@@ -79,7 +79,7 @@ impl<'a> Planner<'a, '_> {
             return None;
         }
         if name.text == "sila" {
-            let transport = self.sila(given("feature")?)?;
+            let transport = self.sila(given("feature")?, given("definition"))?;
             let timeout = self.timeout(given("timeout")?, module)?;
             return Some(Line { transport, framing: Framing::Calls, address: None, timeout });
         }
@@ -103,11 +103,28 @@ impl<'a> Planner<'a, '_> {
 
     fn timeout(&mut self, e: &'a Expr, module: usize) -> Option<f64> {
         let timeout = self.duration_node(e, &mut Scope::module(module), "timeout")?;
-        self.lab.known(timeout)
+        let known = self.lab.known(timeout)?;
+        if known <= 0.0 {
+            self.wrong(e.span, "no answer comes in no time", "not above 0 s", "as in `timeout: 1 s`");
+            return None;
+        }
+        Some(known)
     }
 
     /// `org.example/heating/Hotplate/v1`.
-    fn sila(&mut self, feature: &'a Expr) -> Option<Transport> {
+    fn sila(&mut self, feature: &'a Expr, definition: Option<&'a Expr>) -> Option<Transport> {
+        let packed = definition.map(|e| match &*e.kind {
+            ExprKind::Text(text) if matterix_sila::form::unpacked(text).is_some() => Ok(text.clone()),
+            _ => Err(e.span),
+        });
+        let definition = match packed.transpose() {
+            Ok(definition) => definition,
+            Err(at) => {
+                let help = "leave it out: drivers that are made from a definition have it";
+                self.wrong(at, "this is no definition of a feature", "not understood", help);
+                return None;
+            }
+        };
         let parts: Vec<&str> = match &*feature.kind {
             ExprKind::Text(text) => text.split('/').collect(),
             _ => Vec::new(),
@@ -115,7 +132,7 @@ impl<'a> Planner<'a, '_> {
         let word = |p: &str| !p.is_empty() && p.chars().all(|c| c.is_ascii_alphanumeric() || c == '.');
         match parts.as_slice() {
             [_, _, _, version] if parts.iter().all(|p| word(p)) && version.starts_with('v') => {
-                Some(Transport::Sila { feature: parts.join("/") })
+                Some(Transport::Sila { feature: parts.join("/"), definition })
             }
             _ => {
                 let help = "originator, category, identifier, version: `\"org.example/heating/Hotplate/v1\"`";

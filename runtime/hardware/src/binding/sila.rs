@@ -60,10 +60,13 @@ impl Reader<'_> {
         let Some((_, (text, at))) = lock else { return };
         match seconds(&text) {
             Some(seconds) if (SHORTEST..=LONGEST).contains(&seconds) => server.lock = Some(seconds),
-            _ => {
-                let help =
-                    "the server lets go when it hears nothing for so long: `lock = \"10 min\"`, from 10 s to 168 h";
-                self.wrong(at, "a lock lasts for a time", "it is none", Some(help.to_owned()));
+            other => {
+                let help = "the server lets go when it hears nothing for so long: `lock = \"10 min\"`".to_owned();
+                let headline = match other {
+                    Some(_) => "a lock lasts from 10 s to 168 h",
+                    None => "a lock lasts for a time, as in `\"10 min\"`",
+                };
+                self.wrong(at, headline, "not this", Some(help));
             }
         }
     }

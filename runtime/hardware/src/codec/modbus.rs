@@ -126,8 +126,9 @@ pub(super) fn answer(asked: &Asked, reply: &Reply) -> Result<Vec<u8>, String> {
         return Ok(pdu);
     }
     let values = Values::parse(&reply.text, request.object)?;
+    // Who asks for other registers than there are is told so, as by a controller.
     if values.count() != usize::from(request.count.unwrap_or(1)) {
-        return Err(format!("`{}` is not as many as were asked for", reply.text));
+        return Ok(vec![asked.function | EXCEPTION, 2]);
     }
     let bytes = packed(&values);
     pdu.push(u8::try_from(bytes.len()).map_err(|_| "too much for one answer")?);

@@ -84,6 +84,19 @@ impl Hardware<'_, '_> {
         found
     }
 
+    /// Devices that would go to others if they heard nothing hear that somebody is there.
+    pub(super) fn hold(&mut self) -> Result<(), Fault> {
+        for index in 0..self.devices.len() {
+            let is_due = self.devices[index].link.as_ref().is_some_and(|link| link.is_to_be_held());
+            if is_due && self.speaks() {
+                let span = self.devices[index].driver.map_or_else(Default::default, |d| d.span);
+                let held = self.over(index, |link, driver, ear| link.hold(driver, ear));
+                held.map_err(|trouble| self.trouble(index, &trouble, span))?;
+            }
+        }
+        Ok(())
+    }
+
     /// Devices were alone: what is to be repeated is said at once.
     pub(super) fn forget_beats(&mut self) {
         self.devices.iter_mut().for_each(|device| device.beats.fill(None));

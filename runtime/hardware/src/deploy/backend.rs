@@ -24,6 +24,11 @@ impl Backend for Hardware<'_, '_> {
         self.twin.now()
     }
 
+    fn moment_after(&mut self, duration: f64) -> f64 {
+        let behind = self.late().map_or(0.0, |to| to - self.twin.now());
+        self.twin.moment_after(behind + duration)
+    }
+
     fn value(&mut self, node: NodeId, out: &mut dyn Listener) -> Result<Option<f64>, Fault> {
         self.eval(node, out).map(Some)
     }
@@ -90,7 +95,7 @@ impl Backend for Hardware<'_, '_> {
             self.settings.control.withdraw(ticket.0);
         }
         let Some(running) = self.running.remove(&ticket) else { return };
-        self.twin.halt(running.twin);
+        self.halt_twin(&running);
         self.break_off(&running);
     }
 
@@ -117,16 +122,16 @@ impl Backend for Hardware<'_, '_> {
         Ok(Some(ticket))
     }
 
-    fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<bool, Fault> {
+    fn answered(&mut self, ticket: Ticket, _: &mut dyn Listener) -> Result<Option<bool>, Fault> {
         self.noted = None;
         let answer = self.answer(ticket);
         match answer.map_err(|fault| self.outward(fault))? {
             Some(Answer { yes: false, who }) => {
                 // Who does not agree wants it to end.
                 self.settings.control.stop(&who);
-                Ok(false)
+                Ok(Some(false))
             }
-            answer => Ok(answer.is_some()),
+            answer => Ok(answer.map(|answer| answer.yes)),
         }
     }
 
@@ -147,6 +152,7 @@ impl Hardware<'_, '_> {
         if self.next_entry().is_none() {
             self.go_live(out)?;
         }
+        self.keep_abreast(out)?;
         let step = self.steps.get(&address(operation)).copied();
         let step =
             step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;
@@ -204,9 +210,11 @@ impl Hardware<'_, '_> {
         let deadline = self.twin.now() + until.map_or(0.0, |u| self.twin.engine().eval(u.timeout));
         let ready = until.is_none() || self.is_dry();
         let changed = exchange.is_some();
+        let actions = if ready { &[][..] } else { &operation.at_end };
         let set: Vec<u32> = operation
             .at_start
             .iter()
+            .chain(actions)
             .filter_map(|a| match a {
                 Action::Assign { state, .. } => Some(*state),
                 Action::Move { .. } => None,
@@ -219,13 +227,16 @@ impl Hardware<'_, '_> {
             return Err(fault);
         }
         if changed {
-            self.commanded.extend(set);
+            self.commanded.extend(&set);
+        }
+        if exchange.is_some() {
+            self.keep_abreast(out)?;
         }
         let words = match self.begun_with.remove(&number) {
             Some(words) => words,
             None => self.words_of(device),
         };
-        let running = Running { device, twin, exchange, deadline, ready, failed, changed, words, by_hand };
+        let running = Running { device, twin, exchange, deadline, ready, failed, changed, set, words, by_hand };
         self.running.insert(ticket, running);
         Ok(ticket)
     }
@@ -303,14 +314,20 @@ impl Hardware<'_, '_> {
             if let Some(running) = self.running.get_mut(&ticket) {
                 running.ready = true;
             }
+            self.keep_abreast(out)?;
+            if !self.is_dry() {
+                self.twin.hasten(twin);
+            }
         }
         match self.twin.poll(twin, out)? {
             Status::Running { until, watch } => Ok(Status::Running { until, watch }),
             ended => {
                 let running = self.running.remove(&ticket);
-                if running.is_some_and(|r| r.changed && r.exchange.is_some_and(|e| e.until.is_some())) && self.is_live()
-                {
-                    self.read_back(device, &[], true)?;
+                if let Some(running) = running {
+                    if running.changed && running.exchange.is_some_and(|e| e.until.is_some()) && self.is_live() {
+                        self.read_back(device, &running.set, true)?;
+                    }
+                    self.set_by_hand(device);
                 }
                 if let Some(fault) = self.replayed_fault() {
                     return Err(fault);

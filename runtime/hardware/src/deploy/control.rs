@@ -15,19 +15,19 @@ pub struct Answer {
     pub who: String,
 }
 
-/// Who answers where nobody can be asked.
-const NOBODY: &str = "nobody";
-
 impl Answer {
+    /// Who answers where nobody can be asked.
+    pub const NOBODY: &'static str = "nobody";
+
     /// The answer of a room without people.
     pub fn of_nobody() -> Self {
-        Answer { yes: false, who: NOBODY.to_owned() }
+        Answer { yes: false, who: Self::NOBODY.to_owned() }
     }
 
     /// A no in words.
     pub(super) fn refusal(who: &str) -> String {
         match who {
-            NOBODY => "nobody is there to confirm it: run it on a terminal, or with `--yes`".to_owned(),
+            Self::NOBODY => "nobody is there to confirm it: run it on a terminal, or with `--yes`".to_owned(),
             who => format!("{who} did not confirm it"),
         }
     }

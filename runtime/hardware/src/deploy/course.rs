@@ -321,7 +321,11 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
         Trouble::Unsaid(_) => codes::UNSENDABLE,
         Trouble::Refused { .. } => codes::DEVICE_REFUSED,
     };
-    let what = if code == codes::DEVICE_LOST { "cannot be reached" } else { "is not what it is bound as" };
+    let what = match trouble {
+        Trouble::Lost(_) | Trouble::Silent(_) => "cannot be reached",
+        Trouble::Unsaid(_) => "cannot be spoken to",
+        Trouble::Garbled(_) | Trouble::Refused { .. } => "is not what it is bound as",
+    };
     let headline = format!("`{device}` {what}: {}", trouble.text());
     let d = Diagnostic::error(code, *at, headline, "bound here");
     d.help(if goes_on {

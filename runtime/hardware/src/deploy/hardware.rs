@@ -71,8 +71,9 @@ pub(super) struct Running<'m> {
     pub(super) deadline: f64,
     pub(super) ready: bool,
     pub(super) failed: Option<(String, String)>,
-    /// What it sets, for reading it back.
+    /// Whether it sets anything, and which states, for reading them back.
     pub(super) changed: bool,
+    pub(super) set: Vec<u32>,
     /// What answers said when it began: others may speak for the same device before its end.
     pub(super) words: Vec<(String, String)>,
     /// A person does it, and has not confirmed yet.
@@ -138,6 +139,10 @@ pub struct Hardware<'m, 't> {
     pub(super) losing: Option<String>,
     /// The last fault that was noted.
     pub(super) noted: Option<String>,
+    /// How often it was looked whether the lab is behind the clock where something begins or ends.
+    pub(super) looks: u64,
+    /// Limits that broke while the lab caught up with the clock, and that nobody has been told of.
+    pub(super) broken_meanwhile: Vec<u32>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
     pub(super) caught_up: Option<f64>,
     /// The step of each operation, by where it stands in memory.
@@ -203,6 +208,8 @@ impl<'m, 't> Hardware<'m, 't> {
             is_unwritten: false,
             losing: None,
             noted: None,
+            looks: 0,
+            broken_meanwhile: Vec::new(),
             caught_up: None,
         }
     }

@@ -1,5 +1,6 @@
 //! A plan on devices: what must be known before, the backend that talks to them, the journal of what it said.
 
+mod abreast;
 mod alive;
 mod backend;
 mod calls;

@@ -15,7 +15,7 @@ use super::journal::{Entry, Gate};
 const STEP: f64 = 0.05;
 
 /// The lab may be so much behind the clock before it goes on at once, s by the clock.
-const LAG: f64 = 1.0;
+const LAG: f64 = 0.25;
 
 /// How often the journal says what the clock shows, s by the clock.
 const DATED: f64 = 60.0;
@@ -28,6 +28,9 @@ const LEAST: Duration = Duration::from_micros(1);
 
 impl Hardware<'_, '_> {
     pub(super) fn pass(&mut self, until: f64, watches: &[Watch], out: &mut dyn Listener) -> Result<Advance, Fault> {
+        if !self.broken_meanwhile.is_empty() {
+            return Ok(Advance::Broken(std::mem::take(&mut self.broken_meanwhile)));
+        }
         loop {
             let is_live = self.join(until, out)?;
             if is_live && let Some(fault) = self.unwritten() {
@@ -43,6 +46,9 @@ impl Hardware<'_, '_> {
                 Some(to) => to,
                 None => until.min(self.next_beat()).min(self.next_step(now)).max(now),
             };
+            if is_live {
+                self.hold()?;
+            }
             if is_live && !self.is_dry() && target > self.clock() {
                 let left = Duration::try_from_secs_f64((target - self.clock()) / self.settings.speed);
                 self.settings.world.sleep(left.unwrap_or(NAP).clamp(LEAST, NAP));

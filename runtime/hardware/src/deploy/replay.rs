@@ -45,6 +45,7 @@ impl Hardware<'_, '_> {
                 | Entry::Clock { .. }
                 | Entry::Kept { .. }
                 | Entry::Out { .. }
+                | Entry::ReadBack { .. }
                 | Entry::Back { .. }
                 | Entry::Again { .. }
                 | Entry::Begin { .. }

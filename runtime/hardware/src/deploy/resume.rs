@@ -189,7 +189,7 @@ impl Hardware<'_, '_> {
                 let holds = told.condition.is_none_or(|c| self.twin.engine().eval(c) != 0.0);
                 let was_set = told.state.is_some_and(|s| self.commanded.contains(&s));
                 if holds && was_set && !is_busy && self.observed.is_settled(&self.program.model, told.value) {
-                    let value = self.tell(device, line)?;
+                    let value = self.read_again(device, line)?;
                     self.settled(device, line, value)?;
                 }
             }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use matterix_ir::Span;
+use matterix_ir::plan::Step;
 use matterix_ir::wire::{Driver, Exchange, Framing, Template, Until};
 
 use matterix_runtime::backend::Backend;
@@ -44,6 +45,28 @@ impl Hardware<'_, '_> {
         self.made_safe.iter().map(|index| format!("`{}`", self.devices[*index].name)).collect()
     }
 
+    /// The twin breaks off what a device is told to break off: it does what the command does that says the same, and sets back what
+    /// the end of the operation would have set back.
+    pub(super) fn halt_twin(&mut self, running: &Running<'_>) {
+        let driver = self.devices.get(running.device).and_then(|d| d.driver).filter(|d| !d.halt.is_empty());
+        let Some(driver) = driver.filter(|_| !running.ready) else { return self.twin.halt(running.twin) };
+        // What cannot be set back stays as it was: nobody waits for it any more.
+        let _ = self.twin.break_off(running.twin);
+        let said = |exchange: &Exchange| exchange.sends.iter().map(|t| t.pieces.clone()).collect::<Vec<_>>();
+        let halt: Vec<_> = driver.halt.iter().flat_map(said).collect();
+        let program = self.program;
+        let same = driver.calls.iter().filter(|(_, e)| e.until.is_none() && said(e) == halt);
+        let mut same = same.filter_map(|(step, _)| match &program.plan.get(*step).step {
+            Step::Operation(operation) if operation.until.is_none() && operation.takes.is_none() => Some(operation),
+            _ => None,
+        });
+        if let Some(operation) = same.next()
+            && let Ok(ticket) = self.twin.start(operation, &mut ())
+        {
+            let _ = self.twin.poll(ticket, &mut ());
+        }
+    }
+
     /// Breaks off what a device does for an operation. Whether it did, is not known where it refuses.
     pub(super) fn break_off(&mut self, running: &Running<'_>) {
         let Some(driver) = self.devices.get(running.device).and_then(|d| d.driver) else { return };
@@ -81,7 +104,39 @@ impl Hardware<'_, '_> {
             }
         }
         self.securing = false;
+        for index in 0..self.devices.len() {
+            if let Some(why) = self.left_on(index) {
+                troubles.push((self.devices[index].binding.at, format!("`{}`: {why}", self.devices[index].name)));
+            }
+        }
         troubles
+    }
+
+    /// What people have set by hand and the plan has not brought back: nothing can be sent there.
+    fn left_on(&mut self, index: usize) -> Option<String> {
+        let device = &self.devices[index];
+        let instance = device.binding.instance;
+        if device.binding.carrier != Carrier::Hand || !device.told || !self.speaks() {
+            return None;
+        }
+        let program = self.program;
+        let ends = program.plan.ends.iter().filter(|end| end.instance == instance);
+        let engine = self.twin.engine();
+        let left = ends.filter(|end| engine.eval(end.condition.node) == 0.0);
+        let left: Vec<String> = left.map(|end| end.condition.failure().replace('_', " ")).collect();
+        (!left.is_empty()).then(|| format!("it was set by hand and is {}", left.join(", ")))
+    }
+
+    /// A person has done something to a device.
+    pub(super) fn set_by_hand(&mut self, index: usize) {
+        if self.devices.get(index).is_none_or(|d| d.binding.carrier != Carrier::Hand) {
+            return;
+        }
+        self.devices[index].told = true;
+        match self.left_on(index) {
+            Some(_) => self.settings.exposed.told(self.devices[index].name),
+            None => self.settings.exposed.safe(self.devices[index].name),
+        }
     }
 
     /// Makes a device safe; why that is not known to have come about.

@@ -192,6 +192,16 @@ impl<'m> Hardware<'m, '_> {
         asked.map_err(|trouble| self.trouble(index, &trouble, told.span))
     }
 
+    /// Asks a device whether it is what it was told to be; what it tells is in the journal.
+    pub(super) fn read_again(&mut self, index: usize, line: usize) -> Result<f64, Fault> {
+        let value = self.tell(index, line)?;
+        if let Some(told) = self.devices[index].driver.and_then(|d| d.told.get(line)) {
+            let (t, name) = (self.twin.now(), told.name.clone());
+            self.journal.note(&Entry::ReadBack { t, name, value });
+        }
+        Ok(value)
+    }
+
     /// Tells an operation to its device.
     pub(super) fn begin(
         &mut self,
@@ -262,7 +272,7 @@ impl<'m> Hardware<'m, '_> {
             {
                 continue;
             }
-            let value = self.tell(device, line)?;
+            let value = self.read_again(device, line)?;
             self.settled(device, line, value)?;
         }
         Ok(())

@@ -85,6 +85,11 @@ impl<'p> Desk<'p> {
         let _ = read.answer.send(value);
     }
 
+    /// Tells who asked why there is no answer.
+    pub(super) fn refuse(&self, read: Read, why: String) {
+        let _ = read.answer.send(Err(Failure::Garbled(why)));
+    }
+
     /// How long commands that have just begun take; asked once for each.
     pub(super) fn unmeasured(&self) -> Vec<(StepId, NodeId)> {
         let going = self.going.borrow();
@@ -230,7 +235,10 @@ impl<'p> Desk<'p> {
             .parameters
             .iter()
             .zip(&call.arguments)
-            .map(|(p, v)| Some((matches!(p.kind, Kind::Things(_)), values::number(self.scene, &p.kind, v)?)))
+            .map(|(p, v)| {
+                let number = values::number(self.scene, &p.kind, v)?;
+                Some((matches!(p.kind, Kind::Things(_)), values::on_bound(p.bounds, number)))
+            })
             .collect::<Option<_>>()?;
         let things: Vec<InstanceId> = numbers.iter().filter(|(t, _)| *t).map(|(_, n)| InstanceId(*n as u32)).collect();
         let arranged = offer.arrangements.iter().find(|a| a.things == things)?;

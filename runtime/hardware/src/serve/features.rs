@@ -14,6 +14,9 @@ const ORIGINATOR: &str = "org.matterixc";
 /// Symbols of the base units, as [`BASES`] has them.
 const SYMBOLS: [&str; 8] = ["", "m", "kg", "s", "A", "K", "mol", "cd"];
 
+/// Longest identifier of the standard, letters.
+const LONGEST: usize = 255;
+
 /// A unit of plain angles, which the standard counts as nothing.
 const ANGLE: &str = "rad";
 
@@ -28,7 +31,14 @@ pub struct Catalogue<'p> {
 }
 
 /// The features of a lab for these of its commands and quantities; `texts` has the comments of their declarations.
-pub fn catalogue<'p>(scene: &'p Scene, texts: &Offers, offers: Vec<&'p Offer>, shown: Vec<&'p Shown>) -> Catalogue<'p> {
+///
+/// Fails where two would have one identifier, or one would be longer than the standard allows: who calls them goes by it.
+pub fn catalogue<'p>(
+    scene: &'p Scene,
+    texts: &Offers,
+    offers: Vec<&'p Offer>,
+    shown: Vec<&'p Shown>,
+) -> Result<Catalogue<'p>, String> {
     let mut out = Catalogue { features: Vec::new(), commands: Vec::new(), properties: Vec::new() };
     let mut places: Vec<(Option<InstanceId>, &str)> = Vec::new();
     let of_offers = offers.iter().map(|o| (o.device, o.capability.as_str()));
@@ -57,10 +67,21 @@ pub fn catalogue<'p>(scene: &'p Scene, texts: &Offers, offers: Vec<&'p Offer>, s
                 format!("The skills of the lab `{}`, each with several of its things.", scene.lab),
             ),
         };
+        let called = identifier(&name);
+        if called.len() > LONGEST {
+            return Err(format!(
+                "`{display}` would be offered under a name of {} letters; {LONGEST} are allowed",
+                called.len()
+            ));
+        }
+        if let Some(other) = out.features.iter().find(|f| f.identifier.eq_ignore_ascii_case(&called)) {
+            return Err(format!(
+                "`{}` and `{display}` would both be offered as `{called}`: give one of the things another name",
+                other.display
+            ));
+        }
         let mut feature = Feature {
-            identifier: unique(identifier(&name), |n| {
-                out.features.iter().any(|f| f.identifier.eq_ignore_ascii_case(n))
-            }),
+            identifier: called,
             display,
             description,
             originator: ORIGINATOR.to_owned(),
@@ -102,7 +123,7 @@ pub fn catalogue<'p>(scene: &'p Scene, texts: &Offers, offers: Vec<&'p Offer>, s
         out.commands.push(commands);
         out.properties.push(properties);
     }
-    out
+    Ok(out)
 }
 
 fn command(scene: &Scene, offer: &Offer, feature: &Feature) -> Command {
@@ -213,10 +234,10 @@ fn data_type(scene: &Scene, kind: &Kind, bounds: Bounds) -> DataType {
     }
 }
 
-/// A number as people write it: without the last digits, which come from the conversion of units. A value between the rounded
-/// bound and the exact one is still refused by the need itself.
+/// A number as people write it, where it is that but for the last digits, which come from the conversion of units.
 fn rounded(number: f64) -> f64 {
-    format!("{number:.11e}").parse().unwrap_or(number)
+    let short: f64 = format!("{number:.11e}").parse().unwrap_or(number);
+    if (short - number).abs() <= 8.0 * f64::EPSILON * number.abs() { short } else { number }
 }
 
 /// A unit as the standard has it; nothing where it has no such thing.

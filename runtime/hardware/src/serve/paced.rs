@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use matterix_ir::NodeId;
 use matterix_ir::plan::{Operation, StepId};
+use matterix_ir::{NodeId, codes};
 use matterix_runtime::backend::{Backend, Follow, Status, Ticket};
 use matterix_runtime::exec::{Alarm, Listener};
 use matterix_runtime::fault::Fault;
@@ -40,9 +40,17 @@ impl<'b, 'd, 'p> Paced<'b, 'd, 'p> {
     /// Answers what is asked of the lab as it is.
     fn answer(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
         while let Some((read, node, kind)) = self.desk.next_read() {
-            let value = self.inner.observe(node, out);
-            self.desk.answer(read, kind, value.as_ref().ok().copied().flatten());
-            value?;
+            match self.inner.observe(node, out) {
+                Ok(value) => self.desk.answer(read, kind, value),
+                // One who asks for what a device does not tell now is told so; others are left alone.
+                Err(fault) if matches!(fault.code, codes::DEVICE_GARBLED | codes::DEVICE_REFUSED) => {
+                    self.desk.refuse(read, fault.message);
+                }
+                Err(fault) => {
+                    self.desk.refuse(read, fault.message.clone());
+                    return Err(fault);
+                }
+            }
         }
         self.measure(out)?;
         self.desk.tell(self.inner.now());

@@ -1,8 +1,8 @@
 //! Values of the standard and numbers of the model.
 
-use matterix_ir::offer::Kind;
+use matterix_ir::offer::{Bounds, Kind};
 use matterix_ir::scene::Scene;
-use matterix_sila_wire::Value;
+use matterix_sila_wire::{ROUNDING, Value};
 
 /// A value that was given, SI; a thing by its number in the scene.
 pub(super) fn number(scene: &Scene, kind: &Kind, value: &Value) -> Option<f64> {
@@ -16,6 +16,18 @@ pub(super) fn number(scene: &Scene, kind: &Kind, value: &Value) -> Option<f64> {
         }
         _ => None,
     }
+}
+
+/// The bound that a number is, where it is beyond it by the rounding of units only.
+pub(super) fn on_bound(bounds: Bounds, number: f64) -> f64 {
+    let ends = [(bounds.least, -1.0), (bounds.greatest, 1.0)];
+    let closed = ends.into_iter().filter_map(|(bound, side)| Some((bound.filter(|b| !b.is_open)?.number, side)));
+    let mut is_it = closed.filter(|(bound, side)| {
+        let beyond = (number - bound) * side;
+        // The conversion of a point, as of a temperature, rounds to its offset.
+        beyond > 0.0 && beyond <= ROUNDING * bound.abs()
+    });
+    is_it.next().map_or(number, |(bound, _)| bound)
 }
 
 /// A number of the model as a value.

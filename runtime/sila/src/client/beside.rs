@@ -42,16 +42,24 @@ pub(super) struct Beside {
     value: BinaryMetadataValue,
     /// Full identifiers of features, commands and properties.
     affected: Vec<String>,
+    /// Whether it is the lock's.
+    is_lock: bool,
 }
 
 impl Beside {
-    /// Adds it where the call of this full identifier needs it.
-    pub fn add(&self, called: &str, to: &mut MetadataMap) {
+    /// Whether a call of this full identifier needs it.
+    fn is_of(&self, called: &str) -> bool {
         let is_in =
             |of: &String| called.strip_prefix(of.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'));
-        if self.affected.iter().any(is_in) {
+        self.affected.iter().any(is_in)
+    }
+
+    /// Adds it where the call of this full identifier needs it; whether it is the lock's and has been added.
+    pub fn add(&self, called: &str, to: &mut MetadataMap) -> bool {
+        if self.is_of(called) {
             to.insert_bin(self.key.clone(), self.value.clone());
         }
+        self.is_lock && self.is_of(called)
     }
 }
 
@@ -66,6 +74,7 @@ impl Client {
         let (user, password) = (Value::Text(login.user.clone()), Value::Text(login.password.clone()));
         let answered = self.carry_out(feature, &command, &[user, password, uuid, Value::List(Vec::new())])?;
         let token = answered.first().map(|(_, value)| shown(value)).unwrap_or_default();
+        self.is_known = true;
         self.beside(ACCESS, "AccessToken", &token)
     }
 
@@ -89,6 +98,7 @@ impl Client {
         };
         locked?;
         self.locked = Some(lock.name.clone());
+        (self.lapse, self.heard) = (Some(lock.lapse), super::now());
         self.beside(LOCK, "LockIdentifier", &lock.name)
     }
 
@@ -97,6 +107,79 @@ impl Client {
         let Some(feature) = self.standard(LOCK) else { return Ok(()) };
         let Some(command) = self.features[feature].command("UnlockServer").cloned() else { return Ok(()) };
         self.carry_out(feature, &command, &[Value::Text(name.to_owned())]).map(|_| ())
+    }
+
+    /// Fails where calls of the feature that is meant need something beside them that nobody gives.
+    pub fn lacks_nothing(&mut self) -> Result<(), Failure> {
+        let main = self.features[0].id();
+        for index in 0..self.features.len() {
+            let feature = &self.features[index];
+            let (id, own) = (feature.id(), feature.originator == STANDARD);
+            let is_given = own && (feature.identifier == LOCK || feature.identifier == ACCESS && self.is_known);
+            if is_given {
+                continue;
+            }
+            let names: Vec<String> = feature.metadata.iter().map(|m| m.element.identifier.clone()).collect();
+            for name in names {
+                let affected = self.affected(index, &name)?;
+                let is_in = |of: &String| {
+                    of.strip_prefix(main.as_str()).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+                };
+                if !affected.iter().any(is_in) {
+                    continue;
+                }
+                let how = match own && id.contains(ACCESS) {
+                    true => "it asks who calls: say `user` and `password_env`".to_owned(),
+                    false => format!(
+                        "its calls need the metadata `{name}` of `{id}` beside them, which cannot be given here"
+                    ),
+                };
+                return Err(Failure::Garbled(how));
+            }
+        }
+        Ok(())
+    }
+
+    /// The full identifiers of what a metadata goes beside.
+    fn affected(&mut self, index: usize, name: &str) -> Result<Vec<String>, Failure> {
+        let answer: Raw = self.unary(index, &format!("Get_FCPAffectedByMetadata_{name}"), Raw::default())?;
+        let calls = decode(&self.features[index], &[affected()], &answer).map_err(Failure::Garbled)?;
+        Ok(match calls.into_iter().next() {
+            Some(Value::List(all)) => all.iter().map(shown).collect(),
+            _ => Vec::new(),
+        })
+    }
+
+    /// Whether the server would soon let go of the lock, as nothing was heard.
+    pub fn lapses_soon(&self) -> bool {
+        self.lapse.is_some_and(|lapse| self.heard.elapsed() > lapse / 3)
+    }
+
+    /// Lets the server hear that the one who has locked it is there.
+    pub fn hold(&mut self) -> Result<(), Failure> {
+        let main = self.features[0].id();
+        let asked = (0..self.features.len()).find_map(|index| {
+            let feature = &self.features[index];
+            let affected = |id: &str| self.beside.iter().any(|b| b.is_lock && b.is_of(&format!("{id}/Property/")));
+            let property = feature.properties.iter().min_by_key(|p| p.observable)?;
+            affected(&feature.id()).then(|| (index, property.identifier.clone()))
+        });
+        let Some((index, property)) = asked else {
+            self.lapse = None;
+            let why = format!(
+                "`{main}` has nothing that can be asked for to keep the lock: give `lock` a longer time than the run takes"
+            );
+            return Err(Failure::Garbled(why));
+        };
+        match self.read(index, &property) {
+            // Who is told no has been heard.
+            Ok(_) | Err(Failure::Garbled(_)) => Ok(()),
+            Err(Failure::Refused { name, message }) if name.contains("Lock") || name == "InvalidMetadata" => {
+                Err(Failure::Lost(format!("the lock is gone: it answered `{name}`: {message}")))
+            }
+            Err(Failure::Refused { .. }) => Ok(()),
+            Err(lost) => Err(lost),
+        }
     }
 
     /// The place of a feature of the standard that the server has.
@@ -112,13 +195,9 @@ impl Client {
         of.metadata.iter().find(|m| m.element.identifier == name).ok_or_else(missing)?;
         let key = BinaryMetadataKey::from_bytes(key(&of.id(), name).as_bytes());
         let key = key.map_err(|e| Failure::Garbled(e.to_string()))?;
-        let answer: Raw = self.unary(index, &format!("Get_FCPAffectedByMetadata_{name}"), Raw::default())?;
-        let calls = decode(&self.features[index], &[affected()], &answer).map_err(Failure::Garbled)?;
-        let affected = match calls.into_iter().next() {
-            Some(Value::List(all)) => all.iter().map(shown).collect(),
-            _ => Vec::new(),
-        };
-        self.beside.push(Beside { key, value: BinaryMetadataValue::from_bytes(&message(text)), affected });
+        let (affected, is_lock) = (self.affected(index, name)?, feature == LOCK);
+        let value = BinaryMetadataValue::from_bytes(&message(text));
+        self.beside.push(Beside { key, value, affected, is_lock });
         Ok(())
     }
 }

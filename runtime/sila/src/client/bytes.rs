@@ -51,7 +51,7 @@ impl Client {
         let mut request = Request::new(create);
         // The parameter's command is what the call is for.
         let command = parameter.rsplit_once("/Parameter/").map_or(parameter, |(command, _)| command);
-        self.beside.iter().for_each(|b| b.add(command, request.metadata_mut()));
+        self.beside.iter().for_each(|b| _ = b.add(command, request.metadata_mut()));
         let created: Name = self.asked(PathAndQuery::from_static(CREATE), request, failure)?;
         let uuid = created.uuid;
         let part = |(index, bytes): (u32, &[u8])| Part { uuid: uuid.clone(), index, bytes: bytes.to_vec() };

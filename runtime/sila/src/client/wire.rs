@@ -1,11 +1,13 @@
 //! Single calls of gRPC, none of which lasts longer than the client's patience.
 
 use std::future::Future;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use http::uri::PathAndQuery;
 use prost::Message;
 use tokio::runtime::Runtime;
+use tokio::task::JoinHandle;
 use tonic::client::Grpc;
 use tonic::transport::Channel;
 use tonic::{Request, Response, Status, Streaming};
@@ -13,6 +15,7 @@ use tonic_prost::ProstCodec;
 
 use super::Client;
 use crate::call::Failure;
+use crate::raw::Raw;
 
 impl Client {
     pub(super) fn silent(&self, what: &str) -> Failure {
@@ -20,7 +23,7 @@ impl Client {
     }
 
     /// A call of a method of a feature, and what goes beside it.
-    fn request<A>(&self, index: usize, method: &str, message: A) -> Result<(PathAndQuery, Request<A>), Failure> {
+    fn request<A>(&mut self, index: usize, method: &str, message: A) -> Result<(PathAndQuery, Request<A>), Failure> {
         let feature = &self.features[index];
         let path = format!("/{}/{method}", feature.service());
         let path = PathAndQuery::try_from(path).map_err(|e| Failure::Garbled(e.to_string()))?;
@@ -32,9 +35,25 @@ impl Client {
         let mut request = Request::new(message);
         // What follows the beginning of a command names its execution, and needs nothing else.
         if property.is_some() || feature.command(method).is_some() {
-            self.beside.iter().for_each(|b| b.add(&called, request.metadata_mut()));
+            let mut is_heard = false;
+            self.beside.iter().for_each(|b| is_heard |= b.add(&called, request.metadata_mut()));
+            if is_heard {
+                self.has_lock()?;
+                self.heard = super::now();
+            }
         }
         Ok((path, request))
+    }
+
+    /// Fails where the server may have let go of the lock, so that others may have used it since.
+    fn has_lock(&self) -> Result<(), Failure> {
+        match self.lapse.filter(|lapse| self.heard.elapsed() >= *lapse) {
+            Some(lapse) => Err(Failure::Lost(format!(
+                "its lock has lapsed, as it heard nothing for more than {} s: others may have used it",
+                lapse.as_secs()
+            ))),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn unary<A, B>(&mut self, index: usize, method: &str, message: A) -> Result<B, Failure>
@@ -55,6 +74,27 @@ impl Client {
         self.patiently(path, Failure::of, async |grpc, path| {
             grpc.server_streaming(request, path, ProstCodec::<A, B>::default()).await.map(Response::into_inner)
         })
+    }
+
+    /// What a server tells by and by: when it says the first of it is its own business.
+    pub(super) fn follow<A>(&mut self, index: usize, method: &str, message: A) -> Result<Latest, Failure>
+    where
+        A: Message + Send + Sync + 'static,
+    {
+        let (path, request) = self.request(index, method, message)?;
+        let mut grpc = self.grpc.clone();
+        let newest = Arc::new(Mutex::new(None));
+        let told = Arc::clone(&newest);
+        let listens = self.runtime.spawn(async move {
+            grpc.ready().await.ok()?;
+            let answer = grpc.server_streaming(request, path, ProstCodec::<A, Raw>::default()).await.ok()?;
+            let mut all = answer.into_inner();
+            while let Some(raw) = all.message().await.ok()? {
+                *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(raw);
+            }
+            Some(())
+        });
+        Ok(Latest { newest, listens })
     }
 
     /// A call with one answer.
@@ -104,6 +144,30 @@ impl Client {
             call(grpc, path).await.map_err(|s| failed(&s))
         };
         within(&self.runtime, self.timeout, answer).unwrap_or(Err(silent))
+    }
+}
+
+/// The newest of what a server tells by and by.
+pub(super) struct Latest {
+    newest: Arc<Mutex<Option<Raw>>>,
+    listens: JoinHandle<Option<()>>,
+}
+
+impl Latest {
+    /// What has come since the last time.
+    pub fn take(&self) -> Option<Raw> {
+        self.newest.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// Waits until all has come, or for so long.
+    pub fn ended(&mut self, runtime: &Runtime, time: Duration) {
+        let _ = within(runtime, time, &mut self.listens);
+    }
+}
+
+impl Drop for Latest {
+    fn drop(&mut self) {
+        self.listens.abort();
     }
 }
 

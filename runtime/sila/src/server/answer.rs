@@ -55,6 +55,21 @@ pub(super) enum Meant {
     Affected(usize),
 }
 
+impl Meant {
+    /// The place of its feature.
+    fn feature(&self) -> usize {
+        match self {
+            Meant::Command(f, _)
+            | Meant::Info(f, _)
+            | Meant::Intermediate(f, _)
+            | Meant::Result(f, _)
+            | Meant::Get(f, _)
+            | Meant::Subscribe(f, _)
+            | Meant::Affected(f) => *f,
+        }
+    }
+}
+
 impl Answers {
     /// The features of a lab, beside the standard's own.
     pub fn new(lab: Vec<Feature>, about: About, guard: Guard, sender: mpsc::Sender<Request>) -> Self {
@@ -110,10 +125,11 @@ impl Answers {
     /// Answers one call.
     pub async fn answer(self: Arc<Self>, request: http::Request<Incoming>) -> http::Response<Body> {
         let (this, path) = (self, request.uri().path().to_owned());
-        let known = this.guard.knows(request.headers());
         let Some(meant) = this.meant(&path) else {
             return Status::unimplemented("there is no such call").into_http();
         };
+        // The first feature is that by which a server tells of itself.
+        let known = this.guard.knows(meant.feature() == 0, request.headers());
         macro_rules! unary {
             ($of:ty => $to:ty, |$message:ident, $user:ident| $answer:expr) => {
                 tonic::server::Grpc::new(ProstCodec::<$to, $of>::default())

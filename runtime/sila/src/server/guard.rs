@@ -84,7 +84,8 @@ fn id(identifier: &str) -> String {
     format!("org.silastandard/core/{identifier}/v1")
 }
 
-fn error(identifier: &str, name: &str, message: &str) -> Status {
+/// A defined error of one of the features above.
+pub(super) fn error(identifier: &str, name: &str, message: &str) -> Status {
     Failure::Refused { name: name.to_owned(), message: message.to_owned() }.status(&id(identifier))
 }
 
@@ -99,13 +100,18 @@ impl Guard {
         self.users.is_some()
     }
 
-    /// Whether nothing goes beside a call but what is known here.
-    pub fn knows(&self, headers: &HeaderMap) -> Result<(), Status> {
+    /// Whether nothing goes beside a call but what is known here, and nothing at all where it asks the server about itself.
+    pub fn knows(&self, of_service: bool, headers: &HeaderMap) -> Result<(), Status> {
         let (lock, token) = (key(&id(LOCK), "LockIdentifier"), key(&id(ACCESS), "AccessToken"));
         let is_known = |k: &str| k == lock || k == token && self.has_users();
-        match headers.keys().find(|k| k.as_str().starts_with(PREFIX) && !is_known(k.as_str())) {
-            Some(unknown) => Err(refused(Refusal::NoMetadata, format!("`{unknown}` does not go beside calls here"))),
-            None => Ok(()),
+        let mut beside = headers.keys().map(|k| k.as_str()).filter(|k| k.starts_with(PREFIX));
+        match of_service {
+            true => beside.next().map_or(Ok(()), |key| {
+                Err(refused(Refusal::NoMetadata, format!("`{key}` does not go beside calls of SiLAService")))
+            }),
+            false => beside
+                .find(|k| !is_known(k))
+                .map_or(Ok(()), |unknown| Err(refused(Refusal::Metadata, format!("`{unknown}` is not known here")))),
         }
     }
 

@@ -6,7 +6,7 @@ use matterix_sila::Feature;
 use tonic::Status;
 
 use super::answer::{Answers, Meant, told};
-use super::cancel;
+use super::{cancel, guard};
 use crate::call::{Failure, status};
 use crate::framework::{Fully, Kind};
 use crate::metadata::{ACCESS, LOCK, LOGIN, STANDARD, affected};
@@ -140,8 +140,10 @@ impl Answers {
             _ => Vec::new(),
         };
         let own = self.about.lock().unwrap_or_else(PoisonError::into_inner).uuid == shown(server);
-        // With a name that nobody has where another server is meant: it fails, and takes as long.
-        let (user, password) = (if own { shown(user) } else { String::new() }, shown(password));
+        if !own {
+            return Err(guard::error(LOGIN, "AuthenticationFailed", "the server that is meant is another one"));
+        }
+        let (user, password) = (shown(user), shown(password));
         // Passwords are dear to check on purpose; others are answered meanwhile.
         let judged = tokio::task::spawn_blocking(move || self.guard.log_in(&user, &password, features)).await;
         judged.unwrap_or_else(|e| Err(Status::internal(e.to_string())))

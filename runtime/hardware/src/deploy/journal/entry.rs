@@ -51,6 +51,15 @@ pub enum Entry {
         /// s.
         to: f64,
     },
+    /// Something began or ended while the lab was behind the clock: it did so at this time.
+    Late {
+        /// s.
+        t: f64,
+        /// s.
+        to: f64,
+        /// How often it had been looked for this before.
+        call: u64,
+    },
     /// An operation is about to be told to its device.
     Starting {
         /// s.
@@ -86,6 +95,15 @@ pub enum Entry {
     },
     /// A device told a quantity.
     Told {
+        /// s.
+        t: f64,
+        /// Which.
+        name: String,
+        /// SI.
+        value: f64,
+    },
+    /// A device told what it was told to be, when that was read back.
+    ReadBack {
         /// s.
         t: f64,
         /// Which.
@@ -244,10 +262,12 @@ impl Entry {
             Entry::Opened { t, .. }
             | Entry::Clock { t, .. }
             | Entry::Leap { t, .. }
+            | Entry::Late { t, .. }
             | Entry::Starting { t, .. }
             | Entry::Started { t, .. }
             | Entry::Ended { t, .. }
             | Entry::Told { t, .. }
+            | Entry::ReadBack { t, .. }
             | Entry::Out { t, .. }
             | Entry::Back { t, .. }
             | Entry::Again { t, .. }

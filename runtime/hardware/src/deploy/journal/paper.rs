@@ -2,7 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
-use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
 use rustix::fs::{FlockOperation, flock};
@@ -15,7 +15,7 @@ pub trait Paper {
     /// Writes over the first bytes.
     fn head(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Comes back when all of it outlives the machine's power.
+    /// Comes back when all of it outlives the machine's power. Fails where nobody will find it.
     fn sync(&mut self) -> io::Result<()>;
 }
 
@@ -80,6 +80,9 @@ impl Paper for Sheet {
     }
 
     fn sync(&mut self) -> io::Result<()> {
+        if self.end.metadata()?.nlink() == 0 {
+            return Err(io::Error::new(ErrorKind::NotFound, "it was removed"));
+        }
         self.end.sync_data()
     }
 }
