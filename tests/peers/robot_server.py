@@ -107,6 +107,9 @@ class Robot:
         parts = path.strip("/").split("/")
         if parts[0] == "protocols":
             return self.protocol(method, parts[1:], body)
+        if method == "GET" and parts == ["modules"]:
+            there = [m for run in self.runs.values() for m in run.engine.state_view.modules.get_all()]
+            return 200, {"data": [{"id": f"module-{m.serialNumber}", "serialNumber": m.serialNumber} for m in there]}
         if method == "POST" and parts == ["runs"]:
             run = str(uuid.uuid4())
             self.runs[run] = wait_for(begun(self.protocols.get(body["data"].get("protocolId"))))
