@@ -7,20 +7,18 @@ use matterix_runtime::fault::Fault;
 use matterix_runtime::process::Advance;
 
 use super::hardware::Hardware;
-use super::journal::Entry;
+use super::journal::{Entry, Turn};
 
 /// Lab time and clock may differ by so much where something begins, s by the clock.
 const BEHIND: f64 = 0.05;
 
 impl Hardware<'_, '_> {
     /// Where the lab has to be for what begins or ends now, s, if it is behind the clock: as an earlier process has it, or by the
-    /// clock. Who goes through a journal again comes by here as often.
-    pub(super) fn late(&mut self) -> Option<f64> {
-        let call = self.looks;
-        self.looks += 1;
+    /// clock.
+    pub(super) fn late(&mut self, what: Turn) -> Option<f64> {
         if let Some(next) = self.front() {
-            let Entry::Late { call: of, to, .. } = next else { return None };
-            if of != call {
+            let Entry::Late { what: of, to, .. } = next else { return None };
+            if of != what {
                 return None;
             }
             self.replay.pop_front();
@@ -30,13 +28,13 @@ impl Hardware<'_, '_> {
         if self.is_dry() || !self.is_live() || clock - now <= BEHIND * self.settings.speed {
             return None;
         }
-        self.journal.note(&Entry::Late { t: now, to: clock, call });
+        self.journal.note(&Entry::Late { t: now, to: clock, what });
         Some(clock)
     }
 
     /// The lab comes to where the clock is. Limits that break meanwhile are told when time passes next.
-    pub(super) fn keep_abreast(&mut self, out: &mut dyn Listener) -> Result<(), Fault> {
-        let Some(to) = self.late() else { return Ok(()) };
+    pub(super) fn keep_abreast(&mut self, what: Turn, out: &mut dyn Listener) -> Result<(), Fault> {
+        let Some(to) = self.late(what) else { return Ok(()) };
         while self.twin.now() < to {
             if let Advance::Broken(limits) = self.twin.advance(to, &[], out)? {
                 self.broken_meanwhile.extend(limits);

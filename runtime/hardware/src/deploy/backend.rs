@@ -11,7 +11,7 @@ use matterix_runtime::process::{Advance, Watch};
 
 use super::control::Answer;
 use super::hardware::{Hardware, Running, address};
-use super::journal::{Entry, Gate};
+use super::journal::{Entry, Gate, Turn};
 use super::preflight::carrier;
 use super::replay::Begun;
 use crate::link::Trouble;
@@ -25,7 +25,9 @@ impl Backend for Hardware<'_, '_> {
     }
 
     fn moment_after(&mut self, duration: f64) -> f64 {
-        let behind = self.late().map_or(0.0, |to| to - self.twin.now());
+        let what = Turn::Waits(self.waits);
+        self.waits += 1;
+        let behind = self.late(what).map_or(0.0, |to| to - self.twin.now());
         self.twin.moment_after(behind + duration)
     }
 
@@ -152,7 +154,7 @@ impl Hardware<'_, '_> {
         if self.next_entry().is_none() {
             self.go_live(out)?;
         }
-        self.keep_abreast(out)?;
+        self.keep_abreast(Turn::Begins(self.tickets), out)?;
         let step = self.steps.get(&address(operation)).copied();
         let step =
             step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;
@@ -205,6 +207,7 @@ impl Hardware<'_, '_> {
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
             self.beat(true, out)?;
+            self.keep_abreast(Turn::Told(number), out)?;
         }
         let until = exchange.and_then(|e| e.until.as_ref());
         let deadline = self.twin.now() + until.map_or(0.0, |u| self.twin.engine().eval(u.timeout));
@@ -228,9 +231,6 @@ impl Hardware<'_, '_> {
         }
         if changed {
             self.commanded.extend(&set);
-        }
-        if exchange.is_some() {
-            self.keep_abreast(out)?;
         }
         let words = match self.begun_with.remove(&number) {
             Some(words) => words,
@@ -314,7 +314,7 @@ impl Hardware<'_, '_> {
             if let Some(running) = self.running.get_mut(&ticket) {
                 running.ready = true;
             }
-            self.keep_abreast(out)?;
+            self.keep_abreast(Turn::Ready(ticket.0), out)?;
             if !self.is_dry() {
                 self.twin.hasten(twin);
             }

@@ -139,8 +139,8 @@ pub struct Hardware<'m, 't> {
     pub(super) losing: Option<String>,
     /// The last fault that was noted.
     pub(super) noted: Option<String>,
-    /// How often it was looked whether the lab is behind the clock where something begins or ends.
-    pub(super) looks: u64,
+    /// How many times that are waited for have begun.
+    pub(super) waits: u64,
     /// Limits that broke while the lab caught up with the clock, and that nobody has been told of.
     pub(super) broken_meanwhile: Vec<u32>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
@@ -208,7 +208,7 @@ impl<'m, 't> Hardware<'m, 't> {
             is_unwritten: false,
             losing: None,
             noted: None,
-            looks: 0,
+            waits: 0,
             broken_meanwhile: Vec::new(),
             caught_up: None,
         }

@@ -57,8 +57,8 @@ pub enum Entry {
         t: f64,
         /// s.
         to: f64,
-        /// How often it had been looked for this before.
-        call: u64,
+        /// What began or ended.
+        what: Turn,
     },
     /// An operation is about to be told to its device.
     Starting {
@@ -239,6 +239,20 @@ pub enum Entry {
         /// Digest of the states of the twin: who replays the journal comes to the same.
         states: String,
     },
+}
+
+/// Something that begins or ends where the clock is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Turn {
+    /// An operation begins, by its number.
+    Begins(u64),
+    /// Its device has been told it.
+    Told(u64),
+    /// Its device is ready.
+    Ready(u64),
+    /// A time that is waited for begins: so many had begun before.
+    Waits(u64),
 }
 
 /// What may begin.

@@ -13,7 +13,7 @@ use matterix_ir::Program;
 use serde::{Deserialize, Serialize};
 
 pub use chain::{Chain, sha256};
-pub use entry::{Entry, Gate, VERSION};
+pub use entry::{Entry, Gate, Turn, VERSION};
 pub use paper::{Paper, Sheet};
 
 use paper::Taken;
