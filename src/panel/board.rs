@@ -303,6 +303,7 @@ mod tests {
         let board = board();
         let lost = Some("plate".to_owned());
         board.take(&Entry::Fault {
+            fed: 0,
             t: 2.0,
             tickets: 0,
             lost,

@@ -7,8 +7,9 @@ use matterix_soundness::random::Random;
 
 const TRIALS: u64 = 200;
 
-/// Seeds that once were wrong. 20302: a pause and a step at the moment at which another process went on.
-const FOUND: [u64; 1] = [20302];
+/// Seeds that once were wrong. 20302: a pause and a step at the moment at which another process went on. 133794: a line that was
+/// lost as a watchdog was fed.
+const FOUND: [u64; 2] = [20302, 133_794];
 
 #[test]
 fn nothing_is_done_twice_and_nothing_is_left_on_in_silence() {

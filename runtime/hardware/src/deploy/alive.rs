@@ -123,6 +123,7 @@ impl Hardware<'_, '_> {
         let texts = self.texts(&served.exchange.sends)?;
         let ticket = self.twin.start(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
+        self.fed += 1;
         if !self.is_live() && !self.is_dry() {
             return self.replayed_fault().map_or(Ok(()), Err);
         }

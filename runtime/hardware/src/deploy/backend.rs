@@ -200,10 +200,6 @@ impl Hardware<'_, '_> {
                     let fault = self.replayed_fault();
                     return Err(fault.unwrap_or_else(|| self.fault(codes::RUN_FAILED, Span::default(), String::new())));
                 }
-                Some(Begun::Fault(fault, lost)) => {
-                    self.lose(lost, &fault);
-                    return Err(fault);
-                }
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };
             self.beat(true, out)?;

@@ -128,6 +128,8 @@ pub struct Hardware<'m, 't> {
     pub(super) commanded: BTreeSet<u32>,
     pub(super) running: BTreeMap<Ticket, Running<'m>>,
     pub(super) tickets: u64,
+    /// How often watchdogs have been fed, or told that they need not listen.
+    pub(super) fed: u64,
     /// What was told at this instant.
     pub(super) fresh: BTreeMap<NodeId, (f64, f64)>,
     pub(super) cancelled: bool,
@@ -202,6 +204,7 @@ impl<'m, 't> Hardware<'m, 't> {
             questions: BTreeMap::new(),
             running: BTreeMap::new(),
             tickets: 0,
+            fed: 0,
             fresh: BTreeMap::new(),
             cancelled: false,
             who: String::new(),
@@ -318,7 +321,7 @@ impl<'m, 't> Hardware<'m, 't> {
             let (t, code, text) = (self.twin.now(), fault.code.name.to_owned(), fault.message.clone());
             self.noted = Some(fault.message.clone());
             let lost = self.losing.take();
-            self.journal.note(&Entry::Fault { t, tickets: self.tickets, lost, code, text });
+            self.journal.note(&Entry::Fault { t, tickets: self.tickets, fed: self.fed, lost, code, text });
         }
         fault
     }

@@ -14,10 +14,8 @@ use super::journal::Entry;
 pub(super) enum Begun {
     /// Its device was told, or refused: the failure and what it says.
     Told(Option<(String, String)>),
-    /// Something went wrong before it was told.
+    /// Something went wrong before it was told, or as it was.
     Not,
-    /// It could not be told; the device whose line was lost by that.
-    Fault(Fault, Option<String>),
 }
 
 impl Hardware<'_, '_> {
@@ -61,27 +59,17 @@ impl Hardware<'_, '_> {
 
     /// The fault that the earlier process met at this moment.
     pub(super) fn replayed_fault(&mut self) -> Option<Fault> {
-        let (fault, lost) = self.next_fault()?;
-        self.lose(lost, &fault);
-        Some(fault)
-    }
-
-    /// The same, and the device whose line was lost by it.
-    fn next_fault(&mut self) -> Option<(Fault, Option<String>)> {
-        let Some(Entry::Fault { t, tickets, lost, code, text }) = self.front() else { return None };
-        if t > self.twin.now() || tickets != self.tickets {
+        let Some(Entry::Fault { t, tickets, fed, lost, code, text }) = self.front() else { return None };
+        if t > self.twin.now() || (tickets, fed) != (self.tickets, self.fed) {
             return None;
         }
         self.replay.pop_front();
         let code = codes::find(&code).unwrap_or(codes::RUN_FAILED);
-        Some((self.fault(code, Span::default(), text), lost))
-    }
-
-    /// The line of a device was lost.
-    pub(super) fn lose(&mut self, lost: Option<String>, fault: &Fault) {
+        let fault = self.fault(code, Span::default(), text);
         if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
             device.lost = Some(fault.message.clone());
         }
+        Some(fault)
     }
 
     pub(super) fn mismatch(&self, now: &str, before: &Entry) -> Fault {
@@ -113,10 +101,7 @@ impl Hardware<'_, '_> {
                 return if half_said { self.once_more(step, texts).map(|()| None) } else { Ok(None) };
             };
             if matches!(&entry, Entry::Fault { t, tickets, .. } if *t <= self.twin.now() && *tickets == self.tickets) {
-                return Ok(Some(match half_said {
-                    true => self.next_fault().map_or(Begun::Not, |(fault, lost)| Begun::Fault(fault, lost)),
-                    false => Begun::Not,
-                }));
+                return Ok(Some(Begun::Not));
             }
             match entry {
                 Entry::Started { ticket: t, .. } if half_said && t == ticket => {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// Version of the form.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// One line. Times are seconds of lab time, walls seconds since 1970.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -201,6 +201,8 @@ pub enum Entry {
         t: f64,
         /// How many operations and questions had begun: two steps at one moment may each have met it.
         tickets: u64,
+        /// How often a watchdog had been fed: that may have met it, and sets states besides.
+        fed: u64,
         /// The device whose line is lost by it.
         lost: Option<String>,
         /// The code.
