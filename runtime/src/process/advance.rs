@@ -1,27 +1,57 @@
 //! The loop over segments.
 
+use std::collections::BTreeMap;
+
+use matterix_ir::model::Drained;
 use matterix_ir::{NodeId, codes};
 
-use super::clock::Clock;
-use super::dense::Dense;
-use super::integrator::{Integrator, Next, STEP_SHARE, Stuck};
-use super::mode::watched;
-use super::switch::{Crossing, Switches, Unseen};
+use super::integrator::{Integrator, STEP_SHARE, Stuck};
+use super::lookout::Lookout;
+use super::mode::{Piece, watched};
+use super::part::{Ending, Part};
+use super::switch::{Crossing, Unseen};
 use super::tolerance::Tolerance;
 use super::{Advance, Engine, Observer, Watch};
 use crate::fault::Fault;
 
-/// How often comparisons are looked at that follow time by more than a shift while no state moves, s.
-const LOOK: f64 = 1.0;
+/// What moves within a segment, and what may end that.
+#[derive(Default)]
+pub(super) struct Course {
+    parts: Vec<Part>,
+    /// By state, the part that moves it.
+    part_of: Vec<u32>,
+    /// Comparisons of the model that no single part decides.
+    across: Vec<Lookout>,
+}
 
-/// How a stretch of a segment ended.
-enum Stretch {
-    /// At the end of what is known of the solution.
-    On,
-    /// At the time asked for, or where the observer stops.
+impl Course {
+    /// A state was set from outside: what is known of the solution of its part is wrong. What its states were worth is kept in
+    /// `sizes`.
+    pub(super) fn wrote(&mut self, state: u32, sizes: &mut [f64]) {
+        let part = self.part_of.get(state as usize).and_then(|part| self.parts.get_mut(*part as usize));
+        if let Some(part) = part.filter(|part| !part.is_broken) {
+            part.leave(sizes);
+            part.is_broken = true;
+        }
+    }
+}
+
+/// How a segment was left.
+enum Left {
+    /// At the time asked for, or where the observer or somebody else stops.
     Target,
+    /// Where a comparison of the time itself changes.
+    Stop,
     /// Where a comparison changed.
     Crossed(Crossing),
+}
+
+/// Who ends a stretch in which nothing else happens.
+#[derive(Clone, Copy)]
+enum Next {
+    Target,
+    Part(usize),
+    Lookout(usize),
 }
 
 impl Engine<'_> {
@@ -59,62 +89,74 @@ impl Engine<'_> {
         }
     }
 
-    /// Looks at the law anew, if there was a discontinuity. The integration goes on if it is still the same.
+    /// Looks at the law anew, if there was a discontinuity. Parts whose law is still the same go on.
     fn prepare(&mut self) -> Result<(), Fault> {
-        if self.mode.is_some() {
+        if self.is_prepared {
             return Ok(());
         }
-        let mut mode = self.law.mode(self.model, self.env());
-        self.watch_limits(&mut mode);
-        let goes_on = self.integrator.as_ref().is_some_and(|i| i.moving == mode.moving && *i.rates() == mode.rates);
-        if !goes_on {
-            self.leave_integration();
+        let mode = self.law.mode(self.model, self.env());
+        self.watch_limits(&mode.piece_of);
+        let before = std::mem::take(&mut self.course).parts;
+        let mut before: BTreeMap<u32, Part> =
+            before.into_iter().filter_map(|part| Some((*part.moving().first()?, part))).collect();
+        let mut kept: Vec<Option<Part>> = Vec::new();
+        for piece in &mode.pieces {
+            let part = piece.moving.first().and_then(|first| before.remove(first));
+            kept.push(part.and_then(|part| {
+                let goes_on = part.goes_on(piece);
+                if !goes_on {
+                    part.leave(&mut self.sizes);
+                }
+                goes_on.then_some(part)
+            }));
         }
-        if self.integrator.is_none() && !mode.moving.is_empty() {
-            let values = self.values(&mode.moving);
-            let mut registers = mode.rates.registers();
-            mode.rates.run(self.time, &values, &mut registers);
-            let broken = (0..values.len()).find(|&i| !registers[mode.rates.outputs[i] as usize].is_finite());
-            if let Some(i) = broken {
-                return Err(self.no_rate(mode.moving[i]));
-            }
-            let (rates, moving) = (mode.rates.clone(), mode.moving.clone());
-            let scale = |s: &u32| self.model.states[*s as usize].scale.filter(|s| s.is_normal()).map(f64::abs);
-            let scales = moving.iter().map(scale).collect();
-            let sizes: Vec<f64> = moving.iter().map(|s| self.sizes[*s as usize]).collect();
-            let rtol = STEP_SHARE * self.options.rtol;
-            let tolerance = Tolerance::new(rtol, scales, &sizes, &rates, self.time, &values);
-            for (state, size) in moving.iter().zip(tolerance.sizes()) {
-                self.sizes[*state as usize] = *size;
-            }
-            self.integrator = Some(Integrator::new(rates, moving, self.time, &values, tolerance));
+        before.values().for_each(|part| part.leave(&mut self.sizes));
+        let mut parts = Vec::with_capacity(kept.len());
+        for (piece, kept) in mode.pieces.into_iter().zip(kept) {
+            parts.push(match kept {
+                Some(mut part) => {
+                    part.look_out_for(piece.own);
+                    part
+                }
+                None => self.begin(piece)?,
+            });
         }
-        self.mode = Some(mode);
+        let across = mode.across.into_iter().map(|group| Lookout::new(group, &parts, &mode.piece_of, self.time));
+        let across = across.collect();
+        self.course = Course { parts, part_of: mode.piece_of, across };
+        self.is_prepared = true;
         Ok(())
     }
 
-    fn values(&self, moving: &[u32]) -> Vec<f64> {
-        moving.iter().map(|&s| self.states[s as usize]).collect()
+    /// Begins to integrate a piece.
+    fn begin(&mut self, piece: Piece) -> Result<Part, Fault> {
+        let Piece { moving, rates, own } = piece;
+        let values: Vec<f64> = moving.iter().map(|&s| self.states[s as usize]).collect();
+        let mut registers = rates.registers();
+        rates.run(self.time, &values, &mut registers);
+        let broken = (0..values.len()).find(|&i| !registers[rates.outputs[i] as usize].is_finite());
+        if let Some(i) = broken {
+            return Err(self.no_rate(moving[i]));
+        }
+        let scale = |s: &u32| self.model.states[*s as usize].scale.filter(|s| s.is_normal()).map(f64::abs);
+        let scales = moving.iter().map(scale).collect();
+        let sizes: Vec<f64> = moving.iter().map(|s| self.sizes[*s as usize]).collect();
+        let rtol = STEP_SHARE * self.options.rtol;
+        let tolerance = Tolerance::new(rtol, scales, &sizes, &rates, self.time, &values);
+        for (state, size) in moving.iter().zip(tolerance.sizes()) {
+            self.sizes[*state as usize] = *size;
+        }
+        let scarce = self.scarce(&moving);
+        Ok(Part::new(Integrator::new(rates, moving, self.time, &values, tolerance), own, scarce))
     }
 
     /// Follows one segment to its end or to `until`, and does what is due there.
     fn segment(&mut self, until: f64, nodes: &[NodeId], observer: &mut dyn Observer) -> Result<(), Fault> {
-        let Some(mut mode) = self.mode.take() else { return Ok(()) };
-        let mut watching = watched(self.model, nodes, &mode.moving, self.env());
-        let stop = mode.switches.stop.min(watching.stop).min(mode.limits.stop);
-        let switches = [&mut mode.switches, &mut watching, &mut mode.limits];
-        let mut guide = Guide { switches, target: until.min(stop) };
-        let end = match self.integrator.take() {
-            None => self.rest(&mut guide)?,
-            Some(mut integrator) => {
-                let end = self.follow(&mut integrator, &mut guide, observer);
-                self.integrator = Some(integrator);
-                end?
-            }
-        };
-        self.mode = Some(mode);
-        match end {
-            Stretch::Crossed(crossing) => {
+        let mut course = std::mem::take(&mut self.course);
+        let left = self.follow(&mut course, until, nodes, observer);
+        self.course = course;
+        match left? {
+            Left::Crossed(crossing) => {
                 if crossing.touch {
                     self.touches.push(crossing.node);
                     self.forget();
@@ -124,102 +166,105 @@ impl Engine<'_> {
                 self.show(observer);
                 self.settle(None, observer)
             }
-            _ if self.time == stop => {
+            Left::Stop => {
                 self.limits.crossed();
                 self.settle(None, observer)
             }
-            _ => Ok(()),
+            Left::Target => Ok(()),
         }
     }
 
-    /// No state moves: time jumps, unless comparisons must be looked at on the way.
-    fn rest(&mut self, guide: &mut Guide<'_>) -> Result<Stretch, Fault> {
-        let looks = guide.switches.iter().any(|s| s.follows_time);
-        while self.time < guide.target && !self.is_cancelled() {
-            let end = if looks { guide.target.min(self.time + LOOK) } else { guide.target };
-            let crossing = guide.crossing(Clock::LAB, self.time, &[end], &mut [], &mut |_, _| {});
-            if let Some(crossing) = crossing.map_err(|unseen| self.unseen(unseen))? {
-                self.arrive(crossing.time);
-                return Ok(Stretch::Crossed(crossing));
-            }
-            self.arrive(end);
-        }
-        Ok(Stretch::Target)
-    }
-
-    /// Follows the integration, first through what is known already.
+    /// Goes through the steps of all parts in the order of time.
     fn follow(
         &mut self,
-        integrator: &mut Integrator,
-        guide: &mut Guide<'_>,
+        course: &mut Course,
+        until: f64,
+        nodes: &[NodeId],
         observer: &mut dyn Observer,
-    ) -> Result<Stretch, Fault> {
-        let moving = integrator.moving.clone();
-        let mut end = Ok(Stretch::On);
-        if integrator.dense.reached < integrator.dense.end {
-            end = self.stretch(&mut integrator.dense, &moving, guide, observer);
-        }
-        if let Ok(Stretch::On) = end {
-            let driven = integrator.drive(&mut |dense| {
-                end = self.stretch(dense, &moving, guide, observer);
-                match end {
-                    Ok(Stretch::On) if self.is_cancelled() => Next::Pause,
-                    Ok(Stretch::On) => Next::Step,
-                    Ok(Stretch::Target) => Next::Pause,
-                    _ => Next::Stop,
+    ) -> Result<Left, Fault> {
+        let Course { parts, part_of, across } = course;
+        let watching = watched(self.model, nodes, part_of, self.env()).into_iter();
+        let mut watching: Vec<Lookout> =
+            watching.map(|group| Lookout::new(group, parts, part_of, self.time)).collect();
+        let mut lookouts: Vec<&mut Lookout> = across.iter_mut().chain(&mut watching).collect();
+        let stop = lookouts.iter().map(|l| l.stop()).fold(f64::INFINITY, f64::min);
+        let target = until.min(stop);
+        let mut values = Vec::new();
+        let mut is_fresh = true;
+        loop {
+            let mut stepped = vec![is_fresh; parts.len()];
+            for (i, part) in parts.iter_mut().enumerate() {
+                let step = part.step();
+                stepped[i] |= step.map_err(|stuck| self.stuck(stuck, part.moving()))?;
+            }
+            for lookout in &mut lookouts {
+                let is_known = lookout.found.is_some();
+                let is_due = match lookout.parts[..] {
+                    [] => !is_known && lookout.until <= self.time,
+                    ref parts => parts.iter().any(|part| stepped[*part as usize]),
+                };
+                if is_due || is_fresh {
+                    lookout.look(parts, self.time).map_err(|Unseen(node)| self.restless(Some(node)))?;
                 }
-            });
-            match driven {
-                Ok(()) => {}
-                Err(Stuck::Short) => return Err(self.stuck(&moving)),
-                Err(Stuck::Busy) => return Err(self.restless(None)),
+            }
+            is_fresh = false;
+            let mut next = (target, Next::Target);
+            for (i, part) in parts.iter().enumerate() {
+                if part.until() < next.0 {
+                    next = (part.until(), Next::Part(i));
+                }
+            }
+            for (i, lookout) in lookouts.iter().enumerate() {
+                // Lab time may be too coarse to tell two ends of one part apart; its own clock is not.
+                let is_sooner = match (next.1, lookout.found, &lookout.parts[..]) {
+                    (Next::Part(p), Some((crossing, _)), [of]) if *of as usize == p => crossing.time < parts[p].limit(),
+                    (_, Some(_), _) => lookout.until < next.0,
+                    _ => lookout.is_timed() && lookout.until < next.0,
+                };
+                if is_sooner {
+                    next = (lookout.until, Next::Lookout(i));
+                }
+            }
+            let (time, next) = (next.0.max(self.time), next.1);
+            let found = match next {
+                Next::Lookout(i) => lookouts[i].found.map(|(crossing, clock)| (crossing, lookouts[i].parts.clone(), clock)),
+                _ => None,
+            };
+            for (i, part) in parts.iter_mut().enumerate() {
+                match (next, &found) {
+                    (Next::Part(p), _) if p == i => part.reach(part.limit(), &mut self.states, &mut values),
+                    (_, Some((crossing, of, _))) if of[..] == [i as u32] => {
+                        part.reach(crossing.time, &mut self.states, &mut values);
+                    }
+                    _ => part.reach_lab(time, &mut self.states, &mut values),
+                }
+            }
+            self.arrive(time);
+            for part in parts.iter() {
+                self.check_states(Some(part.moving()))?;
+            }
+            match next {
+                Next::Target => return Ok(if time == stop { Left::Stop } else { Left::Target }),
+                Next::Lookout(_) => {
+                    if let Some((crossing, ..)) = found {
+                        return Ok(Left::Crossed(crossing));
+                    }
+                }
+                Next::Part(i) => match parts[i].ending() {
+                    Some(Ending::Crossed(crossing)) => return Ok(Left::Crossed(crossing)),
+                    Some(Ending::Unseen(node)) => return Err(self.restless(Some(node))),
+                    Some(Ending::Drained(_, which)) => {
+                        self.show(observer);
+                        let drained: &Drained = &self.model.temperatures.drained[which];
+                        return Err(self.overdrawn(drained, "is used up"));
+                    }
+                    None => self.show(observer),
+                },
+            }
+            if self.is_cancelled() || observer.stops() {
+                return Ok(Left::Target);
             }
         }
-        end
-    }
-
-    /// Goes through what `dense` knows beyond the present time.
-    fn stretch(
-        &mut self,
-        dense: &mut Dense,
-        moving: &[u32],
-        guide: &mut Guide<'_>,
-        observer: &mut dyn Observer,
-    ) -> Result<Stretch, Fault> {
-        let (clock, from) = (dense.clock, dense.reached);
-        let target = clock.local(guide.target).max(from);
-        let end = dense.end.min(target);
-        let mut times: Vec<f64> = dense.times().filter(|&t| t > from && t < end).collect();
-        times.push(end);
-        let mut values = vec![0.0; moving.len()];
-        let crossing = guide.crossing(clock, from, &times, &mut values, &mut |time, out| dense.at(time, out));
-        let crossing = crossing.map_err(|unseen| self.unseen(unseen))?;
-        let mut reached = crossing.map_or(end, |c| c.time);
-        times.retain(|&t| t < reached);
-        times.push(reached);
-        let drained = self.first_drained(dense, moving, from, &times);
-        let drained = drained.map(|(time, drained)| (time, drained.clone()));
-        reached = drained.as_ref().map_or(reached, |(time, _)| *time);
-        dense.at(reached, &mut values);
-        dense.reached = reached;
-        for (&state, &value) in moving.iter().zip(&values) {
-            self.states[state as usize] = value;
-        }
-        let on_target = crossing.is_none() && reached == target;
-        self.arrive(if on_target { guide.target } else { clock.lab(reached).clamp(self.time, guide.target) });
-        self.check_states(Some(moving))?;
-        if let Some((_, drained)) = &drained {
-            self.show(observer);
-            return Err(self.overdrawn(drained, "is used up"));
-        }
-        if reached == dense.end {
-            self.show(observer);
-        }
-        Ok(match crossing {
-            Some(crossing) => Stretch::Crossed(crossing),
-            None if on_target || observer.stops() => Stretch::Target,
-            None => Stretch::On,
-        })
     }
 
     fn arrive(&mut self, time: f64) {
@@ -257,11 +302,6 @@ impl Engine<'_> {
         }
     }
 
-    /// The fault of a condition that may change more often than can be looked at.
-    fn unseen(&self, Unseen(node): Unseen) -> Fault {
-        self.restless(Some(node))
-    }
-
     /// The fault of a law or condition that follows the clock too fast.
     fn restless(&self, node: Option<NodeId>) -> Fault {
         let place = node.and_then(|node| self.user_of(node));
@@ -282,7 +322,10 @@ impl Engine<'_> {
     }
 
     /// The fault of an integration that finds no step: named after the state that changes fastest.
-    fn stuck(&self, moving: &[u32]) -> Fault {
+    fn stuck(&self, stuck: Stuck, moving: &[u32]) -> Fault {
+        if let Stuck::Busy = stuck {
+            return self.restless(None);
+        }
         if let Some(fault) = self.run_dry() {
             return fault;
         }
@@ -304,34 +347,5 @@ impl Engine<'_> {
             Some(line) => fault.help(line),
             None => fault,
         }
-    }
-}
-
-/// What to look out for in a segment, and how far to go.
-struct Guide<'s> {
-    /// Of the model, of the caller, of the limits.
-    switches: [&'s mut Switches; 3],
-    target: f64,
-}
-
-impl Guide<'_> {
-    /// The earliest change between `from` and the last of `times`, s on `clock`.
-    fn crossing(
-        &mut self,
-        clock: Clock,
-        from: f64,
-        times: &[f64],
-        moving: &mut [f64],
-        path: &mut dyn FnMut(f64, &mut [f64]),
-    ) -> Result<Option<Crossing>, Unseen> {
-        let mut first: Option<Crossing> = None;
-        for switches in &mut self.switches {
-            let found = switches.first_crossing(clock, from, times.iter().copied(), moving, path)?;
-            first = match (first, found) {
-                (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),
-                (a, b) => a.or(b),
-            };
-        }
-        Ok(first)
     }
 }

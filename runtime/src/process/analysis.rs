@@ -3,6 +3,7 @@
 //! Within a segment comparisons keep the truth they had at its start. Whatever follows from them, from parameters and
 //! from states at rest is a constant then; the rest is put on a [`Tape`].
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use matterix_ir::graph::{Env, binary, eval_op, unary};
@@ -52,13 +53,38 @@ pub(super) struct Clock {
 pub(super) struct Analysis<'g> {
     graph: &'g Graph,
     facts: Vec<Fact>,
+    scratch: RefCell<Scratch>,
+}
+
+/// What walks over the graph write down, kept from one to the next so that a walk costs no more than what it comes by.
+#[derive(Debug, Default)]
+struct Scratch {
+    /// By operation, the last walk that came by.
+    seen: Vec<u32>,
+    walk: u32,
+    /// By operation, its register.
+    place: Vec<u32>,
+}
+
+impl Scratch {
+    /// Begins another walk over so many operations.
+    fn begin(&mut self, size: usize) {
+        self.seen.resize(size, 0);
+        self.place.resize(size, 0);
+        self.walk += 1;
+    }
+
+    /// Whether the present walk comes by for the first time.
+    fn is_new(&mut self, at: usize) -> bool {
+        std::mem::replace(&mut self.seen[at], self.walk) != self.walk
+    }
 }
 
 impl<'g> Analysis<'g> {
     /// Looks at `schedule` (operands first) at the instant `env`, when the states marked in `moving` change with time.
     pub(super) fn new(graph: &'g Graph, schedule: &[NodeId], env: Env<'_>, moving: &[bool]) -> Self {
-        let mut analysis =
-            Analysis { graph, facts: vec![Fact::default(); schedule.last().map_or(0, |n| n.0 as usize + 1)] };
+        let facts = vec![Fact::default(); schedule.last().map_or(0, |n| n.0 as usize + 1)];
+        let mut analysis = Analysis { graph, facts, scratch: RefCell::default() };
         for &node in schedule {
             analysis.facts[node.0 as usize] = analysis.look(node, env, moving);
         }
@@ -124,9 +150,20 @@ impl<'g> Analysis<'g> {
         !self.fact(node).varies && self.fact(node).now == 0.0
     }
 
-    /// Whether a moving state stands below it.
-    pub(super) fn feels_state(&self, node: NodeId) -> bool {
-        self.fact(node).feels_state
+    /// The moving states that values rest on, ascending.
+    pub(super) fn states_below(&self, nodes: &[NodeId]) -> Vec<u32> {
+        let state = |i: usize| match self.graph.op(NodeId(i as u32)) {
+            Op::State(s) if self.facts[i].varies => Some(s),
+            _ => None,
+        };
+        let mut states: Vec<u32> = self.needed(nodes).into_iter().filter_map(state).collect();
+        states.sort_unstable();
+        states
+    }
+
+    /// Whether the value changes within the segment.
+    pub(super) fn varies(&self, node: NodeId) -> bool {
+        self.fact(node).varies
     }
 
     /// The comparisons that may change and whose change `roots` would notice, in order.
@@ -264,7 +301,8 @@ impl<'g> Analysis<'g> {
         let same = |n: NodeId| self.fact(n).same as usize;
         let needed = self.needed(outputs);
         let mut tape = Tape { inputs: moving.len(), ..Tape::default() };
-        let mut place = vec![0u32; self.facts.len()];
+        let mut scratch = self.scratch.borrow_mut();
+        let place = &mut scratch.place;
         let mut known = BTreeMap::new();
         for i in needed.iter().copied().filter(|&i| !self.facts[i].varies) {
             place[i] = *known.entry(self.facts[i].now.to_bits()).or_insert_with(|| {
@@ -298,11 +336,12 @@ impl<'g> Analysis<'g> {
     /// The operations that `outputs` are computed from, by index, in order.
     fn needed(&self, outputs: &[NodeId]) -> Vec<usize> {
         let same = |n: NodeId| self.fact(n).same as usize;
-        let mut marked = vec![false; self.facts.len()];
+        let scratch = &mut *self.scratch.borrow_mut();
+        scratch.begin(self.facts.len());
         let mut needed = Vec::new();
         let mut todo: Vec<usize> = outputs.iter().map(|&n| same(n)).collect();
         while let Some(i) = todo.pop() {
-            if std::mem::replace(&mut marked[i], true) {
+            if !scratch.is_new(i) {
                 continue;
             }
             needed.push(i);

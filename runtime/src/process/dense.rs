@@ -16,10 +16,8 @@ const WEIGHTS: [f64; DEGREE + 1] = [0.5, -1.0, 1.0, -1.0, 1.0, -0.5];
 #[derive(Clone, Debug)]
 pub(super) struct Dense {
     pub(super) clock: Clock,
-    start: f64,
+    pub(super) start: f64,
     pub(super) end: f64,
-    /// How far it has been gone through.
-    pub(super) reached: f64,
     values: [Vec<f64>; DEGREE + 1],
 }
 
@@ -27,10 +25,10 @@ impl Dense {
     /// An empty interval at the lab time `time`, s.
     pub(super) fn still(time: f64, states: &[f64]) -> Self {
         let values = std::array::from_fn(|_| states.to_vec());
-        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, reached: 0.0, values }
+        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, values }
     }
 
-    /// Counts time from the end on, where nothing is left to go through.
+    /// Counts time from the end on; what was before is forgotten.
     pub(super) fn restart(&mut self) {
         self.clock.restart(self.end);
         self.values.swap(0, DEGREE);
@@ -38,7 +36,7 @@ impl Dense {
             let (first, rest) = self.values.split_at_mut(k);
             rest[0].copy_from_slice(&first[0]);
         }
-        (self.start, self.end, self.reached) = (0.0, 0.0, 0.0);
+        (self.start, self.end) = (0.0, 0.0);
     }
 
     /// Moves on to the interval from the old end to `end`, filling in the states there by `sample`. The old end stays a
@@ -49,7 +47,7 @@ impl Dense {
         mut sample: impl FnMut(f64, &mut [f64]) -> Result<(), E>,
     ) -> Result<(), E> {
         self.values.swap(0, DEGREE);
-        (self.start, self.reached, self.end) = (self.end, self.end, end);
+        (self.start, self.end) = (self.end, end);
         for k in 1..=DEGREE {
             sample(self.time(k), &mut self.values[k])?;
         }
@@ -72,9 +70,30 @@ impl Dense {
 
     /// The moving states at the local `time`, s, within the interval.
     pub(super) fn at(&self, time: f64, out: &mut [f64]) {
+        match self.shares(time) {
+            Shares::At(k) => out.copy_from_slice(&self.values[k]),
+            Shares::Of(shares) => out.iter_mut().enumerate().for_each(|(i, out)| *out = self.mixed(&shares, i)),
+        }
+    }
+
+    /// Some of the moving states, by their places, at the local `time`, s.
+    pub(super) fn some(&self, time: f64, places: &[u32], out: &mut [f64]) {
+        let shares = self.shares(time);
+        for (out, place) in out.iter_mut().zip(places) {
+            *out = match &shares {
+                Shares::At(k) => self.values[*k][*place as usize],
+                Shares::Of(shares) => self.mixed(shares, *place as usize),
+            };
+        }
+    }
+
+    fn mixed(&self, shares: &[f64; DEGREE + 1], place: usize) -> f64 {
+        (0..=DEGREE).map(|k| shares[k] * self.values[k][place]).sum()
+    }
+
+    fn shares(&self, time: f64) -> Shares {
         if let Some(k) = (0..=DEGREE).rev().find(|&k| self.time(k) == time) {
-            out.copy_from_slice(&self.values[k]);
-            return;
+            return Shares::At(k);
         }
         let place = (time - self.start) / (self.end - self.start);
         let mut shares = [0.0; DEGREE + 1];
@@ -83,8 +102,14 @@ impl Dense {
             shares[k] = WEIGHTS[k] / (place - POINTS[k]);
             sum += shares[k];
         }
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = (0..=DEGREE).map(|k| shares[k] * self.values[k][i]).sum::<f64>() / sum;
-        }
+        Shares::Of(shares.map(|share| share / sum))
     }
+}
+
+/// What the value at some time is made of.
+enum Shares {
+    /// It is one of those sampled.
+    At(usize),
+    /// So much of each.
+    Of([f64; DEGREE + 1]),
 }

@@ -1,5 +1,7 @@
 //! What happens at one instant: actions, events, processes that begin and cease.
 
+use std::collections::BTreeMap;
+
 use matterix_ir::model::Action;
 use matterix_ir::{NodeId, Span, codes};
 
@@ -17,10 +19,11 @@ impl Engine<'_> {
     /// Fires the events that became true, each time the first in source order, until none is left; then reports the
     /// processes that began or ceased. The law is looked at anew afterwards. `cause` is shown where a balance breaks.
     pub(super) fn settle(&mut self, cause: Option<Span>, observer: &mut dyn Observer) -> Result<(), Fault> {
-        let mut fired = 0;
+        let mut fired: BTreeMap<usize, usize> = BTreeMap::new();
         while let Some(event) = self.next_event() {
-            fired += 1;
-            if fired > self.options.max_events_per_instant {
+            let times = fired.entry(event).or_default();
+            *times += 1;
+            if *times > self.options.max_events_per_instant {
                 return Err(self.cascade(event));
             }
             self.show(observer);
@@ -32,7 +35,7 @@ impl Engine<'_> {
             self.judge_instant(&format!("`{}`", model.events[event].name), Some(model.events[event].span))?;
         }
         self.report_processes(observer);
-        self.mode = None;
+        self.is_prepared = false;
         if !self.sampled {
             self.show(observer);
             self.check_temperatures()?;
@@ -62,7 +65,7 @@ impl Engine<'_> {
     fn cascade(&self, event: usize) -> Fault {
         let event = &self.model.events[event];
         let count = self.options.max_events_per_instant;
-        let message = format!("`{}` is one of more than {count} events at one instant", event.name);
+        let message = format!("`{}` happens more than {count} times at one instant", event.name);
         Fault::new(codes::EVENT_CASCADE, self.time, message)
             .at(event.span)
             .help("events that make each other's condition true never come to rest")
@@ -141,9 +144,7 @@ impl Engine<'_> {
         self.sampled = false;
         self.forget();
         self.limits.wrote(state);
-        if self.integrator.as_ref().is_some_and(|i| i.moving.binary_search(&state).is_ok()) {
-            self.leave_integration();
-        }
+        self.course.wrote(state, &mut self.sizes);
         self.sizes[state as usize] = 0.0;
     }
 
@@ -163,11 +164,12 @@ impl Engine<'_> {
 
     /// Counts the crossing of `node`; too many in too short a time are a fault.
     pub(super) fn count_crossing(&mut self, node: NodeId) -> Result<(), Fault> {
-        self.crossings.push_back(self.time);
-        if self.crossings.len() <= CHATTER {
+        let crossings = self.crossings.entry(node).or_default();
+        crossings.push_back(self.time);
+        if crossings.len() <= CHATTER {
             return Ok(());
         }
-        let first = self.crossings.pop_front().unwrap_or(self.time);
+        let first = crossings.pop_front().unwrap_or(self.time);
         if self.time - first > CHATTER_TIME { Ok(()) } else { Err(self.chatters(node)) }
     }
 

@@ -1,16 +1,16 @@
 //! The one place that knows the integrator: backward differentiation formulas of `diffsol`.
 //!
 //! The solver counts time from the last discontinuity on ([`Clock`]): a step of 1e-15 s after a week of lab time is as
-//! good as one at its beginning. Steps run freely past the time asked for; what lies between two steps is read from a [`Dense`] polynomial. That keeps
-//! the number of steps, and every bit of the result, independent of how often the caller looks. Events are located on the
-//! same polynomial by [`super::switch`], because the library reports one root at a time and without its direction.
+//! good as one at its beginning. Steps run freely past the time asked for, several at one go; what lies between two steps is read
+//! from a [`Dense`] polynomial. That keeps the number of steps, and every bit of the result, independent of how often the caller
+//! looks. Events are located on the same polynomial by [`super::switch`], because the library reports one root at a time and
+//! without its direction.
 //!
 //! The matrices are nalgebra's, factorised on one thread. The library's other backend, faer, pivots fully; on a chain of
 //! heat conduction a step took, in microseconds, nalgebra against faer: 4 states 1 : 2, 32 states 3 : 25, 100 states 20 : 470,
 //! 300 states 370 : 11000.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
 
 use diffsol::{
     Bdf, BdfState, DiffsolError, NalgebraMat, NalgebraVec, OdeBuilder, OdeSolverMethod, OdeSolverState, Vector,
@@ -29,7 +29,7 @@ use super::tolerance::Tolerance;
 /// least double.
 const SHORTEST_STEP: f64 = 1e-60;
 
-/// A solver is left after so many steps, so that they are counted.
+/// After so many steps the rounding of the law is weighed anew.
 const MOST_STEPS: usize = 1000;
 
 /// A step this short as a part of the time counted is one after which counting begins anew.
@@ -52,9 +52,13 @@ const REFUSALS: usize = 400;
 /// cases of the tests to 80 times that of one.
 pub(super) const STEP_SHARE: f64 = 0.02;
 
-/// How many steps are taken at least when the solver is set up. It lengthens its steps only after several of one length,
-/// so that a caller who looks often would otherwise keep them short for ever.
+/// Steps that are taken at one go: first so many, then twice as many, up to [`LONGEST_RUN`]. A solver that is set up anew looks at
+/// its Jacobian anew; what lies beyond the end of a law is of no use. The number depends on nothing else, so that a result is the same to
+/// the last bit however often the caller looks.
 const RUN: usize = 12;
+
+/// Steps that are taken at one go at most.
+const LONGEST_RUN: usize = 96;
 
 /// The right-hand side and its directional derivative, with their scratch memory.
 struct Field {
@@ -132,12 +136,10 @@ type State = BdfState<NalgebraVec<f64>>;
 
 /// One integration, from a discontinuity to the next.
 pub(super) struct Integrator {
-    /// The states it moves.
+    /// The states it moves, ascending.
     pub(super) moving: Vec<u32>,
-    /// The step being looked at.
-    pub(super) dense: Dense,
-    /// Steps taken beyond it.
-    ahead: VecDeque<Dense>,
+    /// The last step taken.
+    dense: Dense,
     field: Field,
     /// Where the solver stands; absent before its first step.
     state: Option<State>,
@@ -145,6 +147,10 @@ pub(super) struct Integrator {
     pub(super) tolerance: Tolerance,
     /// The longest first step, s, if something that follows the clock is near.
     first: Option<f64>,
+    /// Steps of the next run.
+    run: usize,
+    /// Steps since rounding was weighed.
+    unheard: usize,
     /// Steps since the lab time `since`, s.
     crawled: usize,
     since: f64,
@@ -154,8 +160,9 @@ impl Integrator {
     /// Prepares to integrate `rates` of the states `moving` from `time`, s, and `values` on.
     pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], tolerance: Tolerance) -> Self {
         let dense = Dense::still(time, values);
-        let (ahead, field) = (VecDeque::new(), Field::new(rates, dense.clock));
-        Integrator { moving, dense, ahead, field, state: None, tolerance, first: None, crawled: 0, since: time }
+        let field = Field::new(rates, dense.clock);
+        let (state, first) = (None, None);
+        Integrator { moving, dense, field, state, tolerance, first, run: RUN, unheard: 0, crawled: 0, since: time }
     }
 
     /// The law it integrates.
@@ -163,40 +170,63 @@ impl Integrator {
         &self.field.rates
     }
 
-    /// Shows step after step to `visit`, until that says to stop. Fails where no step can be found.
-    pub(super) fn drive(&mut self, visit: &mut dyn FnMut(&mut Dense) -> Next) -> Result<(), Stuck> {
-        while let Some(dense) = self.ahead.pop_front() {
-            self.dense = dense;
-            if visit(&mut self.dense) != Next::Step {
-                return Ok(());
-            }
-        }
-        loop {
+    /// Where it begins: an empty interval.
+    pub(super) fn begin(&self) -> Dense {
+        self.dense.clone()
+    }
+
+    /// Takes the next steps and shows each to `visit`, until that sees the law end. One that fails is left to the next run, which
+    /// starts anew from the last good one. Fails where not even one can be found.
+    pub(super) fn run(&mut self, visit: &mut dyn FnMut(&Dense) -> Next) -> Result<(), Stuck> {
+        let steps = self.run;
+        self.run = (2 * steps).min(LONGEST_RUN);
+        let mut taken = 0;
+        while taken < steps {
             if self.state.as_ref().is_none_or(|state| state.as_ref().h < FINE * self.dense.end) {
                 self.restart();
             }
+            let is_fresh = self.state.is_none();
             let setting = Setting { field: &self.field, tolerance: &self.tolerance, first: self.first.take() };
-            let driven = drive(setting, self.state.take(), &mut self.dense, &mut self.ahead, visit)?;
+            let driven = drive(setting, self.state.take(), &mut self.dense, steps - taken, visit)?;
             self.state = driven.state;
+            taken += driven.steps;
+            self.unheard += driven.steps;
+            self.count(driven.steps)?;
             let length = match driven.left {
-                Left::Visited => return Ok(()),
-                Left::Short => {
-                    let (end, values) = (self.dense.end, self.dense.last());
-                    self.tolerance.listen(&self.field.rates, self.dense.clock.lab(end), values);
-                    let length = self.state.as_ref().map(|state| state.as_ref().h);
-                    length.filter(|length| self.tolerance.is_outgrown(values, *length))
-                }
+                Left::Visited => break,
+                Left::Failed(stuck) if taken == 0 && is_fresh => return Err(stuck),
+                Left::Failed(_) if taken > 0 => return Ok(()),
+                Left::Failed(_) => None,
+                Left::Short => self.listen(),
                 Left::Before(limit) => {
                     self.first = Some(limit);
                     None
                 }
                 Left::Outgrown(length) => Some(length),
             };
-            if let Some(length) = length {
-                let (field, end, values) = (&self.field, self.dense.end, self.dense.last());
-                self.tolerance.renew(values, length, &mut |state| field.damping(values, end, state));
-            }
-            self.count(driven.steps)?;
+            self.renew(length);
+        }
+        if self.unheard >= MOST_STEPS {
+            let length = self.listen();
+            self.renew(length);
+        }
+        Ok(())
+    }
+
+    /// Weighs rounding anew; the length of the last step, s, where tolerances do not fit any more.
+    fn listen(&mut self) -> Option<f64> {
+        self.unheard = 0;
+        let (end, values) = (self.dense.end, self.dense.last());
+        self.tolerance.listen(&self.field.rates, self.dense.clock.lab(end), values);
+        let length = self.state.as_ref().map(|state| state.as_ref().h);
+        length.filter(|length| self.tolerance.is_outgrown(values, *length))
+    }
+
+    /// Sets tolerances anew after a step of `length`, s, if there is one.
+    fn renew(&mut self, length: Option<f64>) {
+        if let Some(length) = length {
+            let (field, end, values) = (&self.field, self.dense.end, self.dense.last());
+            self.tolerance.renew(values, length, &mut |state| field.damping(values, end, state));
         }
     }
 
@@ -226,9 +256,7 @@ impl Integrator {
 pub(super) enum Next {
     /// Take another.
     Step,
-    /// Come back to it: the solution goes on the same way.
-    Pause,
-    /// A discontinuity: what lies beyond is of no use.
+    /// The law ends here: what lies beyond is of no use.
     Stop,
 }
 
@@ -272,9 +300,11 @@ struct Driven {
 
 /// Why a solver was left.
 enum Left {
-    /// The visitor said so.
+    /// The visitor said so, or all steps were taken.
     Visited,
-    /// Its steps became too short for the time counted, or many.
+    /// No further step was found.
+    Failed(Stuck),
+    /// Its steps became too short for the time counted.
     Short,
     /// Something that follows the clock happens within its next step, which must be no longer than this, s.
     Before(f64),
@@ -282,14 +312,13 @@ enum Left {
     Outgrown(f64),
 }
 
-/// Steps on from `dense`. After a pause some more steps are taken ahead; one that fails is left to the next call, which
-/// starts anew from the last good one.
+/// Takes up to `most` steps on from `dense`, each of which takes its place.
 fn drive(
     setting: Setting<'_>,
     state: Option<State>,
     dense: &mut Dense,
-    ahead: &mut VecDeque<Dense>,
-    visit: &mut dyn FnMut(&mut Dense) -> Next,
+    most: usize,
+    visit: &mut dyn FnMut(&Dense) -> Next,
 ) -> Result<Driven, Stuck> {
     let Setting { field, tolerance, first } = setting;
     let (rtol, atol) = (tolerance.rtol, &tolerance.atol);
@@ -322,46 +351,37 @@ fn drive(
     let allowed = initial.iter().zip(atol).map(|(value, least)| least + rtol * value.abs());
     let mut solver = Bdf::new(&problem, state, WeighedLu::new(allowed))?;
     let mut sampled = NalgebraVec::zeros(initial.len(), *problem.context());
-    let mut step = |dense: &mut Dense, solver: &mut Bdf<'_, _, WeighedLu>| {
+    let mut step = |dense: &Dense, solver: &mut Bdf<'_, _, WeighedLu>| {
+        let mut next = dense.clone();
         solver.step()?;
-        dense.extend(solver.state().t, |time, out| {
+        next.extend(solver.state().t, |time, out| {
             solver.interpolate_inplace(time, &mut sampled)?;
             let sampled = sampled.get_batch(0);
             for (i, out) in out.iter_mut().enumerate() {
                 *out = sampled.get_index(i);
             }
             Ok::<(), DiffsolError>(())
-        })
+        })?;
+        Ok::<Dense, DiffsolError>(next)
     };
-    let mut steps = 0;
-    loop {
-        if let Some(limit) = field.limit(dense.end, solver.state().h, dense.last())? {
-            return Ok(Driven { state: None, steps, left: Left::Before(limit) });
+    for steps in 0..most {
+        let left = |left| Ok(Driven { state: None, steps, left });
+        match field.limit(dense.end, solver.state().h, dense.last()) {
+            Ok(None) => {}
+            Ok(Some(limit)) => return left(Left::Before(limit)),
+            Err(busy) => return left(Left::Failed(busy.into())),
         }
-        step(dense, &mut solver)?;
-        steps += 1;
-        match visit(dense) {
-            Next::Step if solver.state().h < FINE * dense.end || steps > MOST_STEPS => {
-                return Ok(Driven { state: Some(solver.into_state()), steps, left: Left::Short });
-            }
-            Next::Step if tolerance.is_outgrown(dense.last(), solver.state().h) => {
-                let left = Left::Outgrown(solver.state().h);
-                return Ok(Driven { state: Some(solver.into_state()), steps, left });
-            }
-            Next::Step => {}
-            Next::Stop => break,
-            Next::Pause => {
-                for _ in steps..RUN {
-                    let mut next = ahead.back().unwrap_or(dense).clone();
-                    let seen = matches!(field.limit(next.end, solver.state().h, next.last()), Ok(None));
-                    if !seen || step(&mut next, &mut solver).is_err() {
-                        return Ok(Driven { state: None, steps, left: Left::Visited });
-                    }
-                    ahead.push_back(next);
-                }
-                break;
-            }
+        match step(dense, &mut solver) {
+            Ok(next) => *dense = next,
+            Err(error) => return left(Left::Failed(error.into())),
         }
+        let left = match visit(dense) {
+            Next::Stop => Left::Visited,
+            Next::Step if solver.state().h < FINE * dense.end => Left::Short,
+            Next::Step if tolerance.is_outgrown(dense.last(), solver.state().h) => Left::Outgrown(solver.state().h),
+            Next::Step => continue,
+        };
+        return Ok(Driven { state: Some(solver.into_state()), steps: steps + 1, left });
     }
-    Ok(Driven { state: Some(solver.into_state()), steps, left: Left::Visited })
+    Ok(Driven { state: Some(solver.into_state()), steps: most, left: Left::Visited })
 }

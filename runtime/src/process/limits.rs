@@ -6,7 +6,7 @@ use matterix_ir::model::Model;
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
 use super::Engine;
-use super::mode::{Mode, watched};
+use super::mode::{Law, NOWHERE};
 
 /// A limit that depends on what moves is broken where it is passed by more than this share: ten times the relative error that
 /// a step may have. So one that is only touched holds.
@@ -147,7 +147,8 @@ impl<'m> Engine<'m> {
     pub fn keep(&mut self, all: &'m Keeps) {
         let broken = vec![false; all.kept.len()];
         self.limits = Limits { all: Some(all), broken, ..Limits::default() };
-        self.mode = None;
+        self.law = Law::new(self.model, all.kept.iter().map(|kept| kept.node));
+        self.is_prepared = false;
     }
 
     /// Notes whether a limit holds, as someone has just seen: what is known to be broken is not told again.
@@ -178,17 +179,12 @@ impl<'m> Engine<'m> {
         found
     }
 
-    /// The limits that may break while a law holds are watched with it.
-    pub(super) fn watch_limits(&mut self, mode: &mut Mode) {
+    /// The limits that may break while a law holds are those that rest on the time or on a state that is in a piece.
+    pub(super) fn watch_limits(&mut self, piece_of: &[u32]) {
         let Some(all) = self.limits.all else { return };
-        let moves = |kept: &Kept| kept.timed || kept.states.iter().any(|s| mode.moving.binary_search(s).is_ok());
+        let moves = |kept: &Kept| kept.timed || kept.states.iter().any(|s| piece_of[*s as usize] != NOWHERE);
         let live = (0..all.kept.len()).filter(|&i| moves(&all.kept[i]));
         self.limits.live = live.map(|i| i as u32).collect();
-        if self.limits.live.is_empty() {
-            return;
-        }
         self.limits.crossed();
-        let nodes: Vec<NodeId> = self.limits.live.iter().map(|&i| all.kept[i as usize].node).collect();
-        mode.limits = watched(self.model, &nodes, &mode.moving, self.env());
     }
 }

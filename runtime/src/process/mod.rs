@@ -5,7 +5,8 @@
 //! or the caller cares about; there events fire, the law is looked at anew, and the next segment begins.
 //!
 //! - `tape`, `tangent`: the law of a segment as a short program, and its derivative.
-//! - `analysis`, `mode`: which part of the graph that is.
+//! - `analysis`, `mode`: which part of the graph that is, and how it is taken apart.
+//! - `part`, `lookout`: states that move together; what no single part decides.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `linear`, `dense`, `clock`: steps, their linear systems, the solution between them, and the time that they count.
 //! - `limits`: what things keep at all times.
@@ -21,8 +22,10 @@ mod instant;
 mod integrator;
 mod limits;
 mod linear;
+mod lookout;
 mod memo;
 mod mode;
+mod part;
 mod suspicion;
 mod switch;
 mod tangent;
@@ -33,7 +36,7 @@ mod timed;
 mod tolerance;
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::graph::{Env, eval_op};
@@ -46,10 +49,10 @@ use crate::ledger::Balances;
 
 pub use limits::Keeps;
 
-use integrator::Integrator;
+use advance::Course;
 use limits::Limits;
 use memo::Memo;
-use mode::{Law, Mode};
+use mode::Law;
 use suspicion::Suspicion;
 
 /// How accurately to integrate, and when to give up.
@@ -124,18 +127,18 @@ pub struct Engine<'m> {
     sizes: Vec<f64>,
     /// Set from outside to leave off early, once.
     cancel: Option<&'m AtomicBool>,
-    /// What holds now; absent after a discontinuity until it is needed again.
-    mode: Option<Mode>,
-    /// The integration under way, if any state moves.
-    integrator: Option<Integrator>,
+    /// What moves.
+    course: Course,
+    /// Whether that is so now: after a discontinuity not until it is needed again.
+    is_prepared: bool,
     /// Truth of each event's condition when last looked at.
     armed: Vec<bool>,
     /// Which processes run.
     running: Vec<bool>,
     /// Equalities that are true at this instant only.
     touches: Vec<NodeId>,
-    /// Times of the last crossings.
-    crossings: VecDeque<f64>,
+    /// By comparison, the times of its last changes.
+    crossings: BTreeMap<NodeId, VecDeque<f64>>,
     /// Whether the present state has been shown to the observer.
     sampled: bool,
     balances: Balances,
@@ -158,13 +161,13 @@ impl<'m> Engine<'m> {
             states: vec![0.0; model.states.len()],
             sizes: vec![0.0; model.states.len()],
             cancel: None,
-            law: Law::new(model),
-            mode: None,
-            integrator: None,
+            law: Law::new(model, []),
+            course: Course::default(),
+            is_prepared: false,
             armed: vec![false; model.events.len()],
             running: vec![false; model.processes.len()],
             touches: Vec::new(),
-            crossings: VecDeque::new(),
+            crossings: BTreeMap::new(),
             sampled: false,
             balances: Balances::default(),
             suspicion: Suspicion::new(model),
@@ -230,7 +233,7 @@ impl<'m> Engine<'m> {
     fn heard(&mut self) {
         self.forget();
         if self.law.listens {
-            self.mode = None;
+            self.is_prepared = false;
         }
     }
 
@@ -298,14 +301,6 @@ impl<'m> Engine<'m> {
 
     fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
-    }
-
-    /// Gives up the integration under way; what states were worth is kept.
-    fn leave_integration(&mut self) {
-        let Some(integrator) = self.integrator.take() else { return };
-        for (state, size) in integrator.moving.iter().zip(integrator.tolerance.sizes()) {
-            self.sizes[*state as usize] = *size;
-        }
     }
 
     fn env(&self) -> Env<'_> {

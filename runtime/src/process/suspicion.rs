@@ -67,34 +67,14 @@ impl Suspicion {
 }
 
 impl Engine<'_> {
-    /// The first amount that a law takes more of than there is, and when it is used up, s on the clock of `dense`: between `from`
-    /// and the last of `times` (ascending).
-    pub(super) fn first_drained(
-        &self,
-        dense: &Dense,
-        moving: &[u32],
-        from: f64,
-        times: &[f64],
-    ) -> Option<(f64, &Drained)> {
-        let watched = self.model.temperatures.drained.iter();
-        let watched: Vec<(usize, &Drained)> =
-            watched.filter_map(|d| Some((moving.binary_search(&d.state).ok()?, d))).collect();
-        if watched.is_empty() {
-            return None;
-        }
-        let mut values = vec![0.0; moving.len()];
-        let mut low = from;
-        for &high in times {
-            dense.at(high, &mut values);
-            let below = |(place, d): &&(usize, &Drained)| values[*place] < -self.residue(d);
-            let gone: Vec<(usize, &Drained)> = watched.iter().filter(below).copied().collect();
-            let ends = gone.into_iter().map(|(place, d)| (used_up(dense, place, low, high, &mut values), d));
-            if let Some(first) = ends.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                return Some(first);
-            }
-            low = high;
-        }
-        None
+    /// The amounts among `moving` that laws may take more of than there is.
+    pub(super) fn scarce(&self, moving: &[u32]) -> Vec<Scarce> {
+        let watched = self.model.temperatures.drained.iter().enumerate();
+        let scarce = |(which, drained): (usize, &Drained)| {
+            let place = moving.binary_search(&drained.state).ok()? as u32;
+            Some(Scarce { which, place, residue: self.residue(drained) })
+        };
+        watched.filter_map(scarce).collect()
     }
 
     /// The fault of an amount that a law takes more of than there is.
@@ -207,12 +187,40 @@ impl Engine<'_> {
     }
 }
 
-/// The last time between `low` and `high` at which a moving state is not below nothing.
-fn used_up(dense: &Dense, place: usize, mut low: f64, mut high: f64, values: &mut [f64]) -> f64 {
-    for _ in 0..BISECTIONS {
-        let middle = low + 0.5 * (high - low);
-        dense.at(middle, values);
-        if values[place] < 0.0 { high = middle } else { low = middle }
+/// An amount that must not be used up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scarce {
+    /// Its index in the model.
+    which: usize,
+    /// Its place among the moving states.
+    place: u32,
+    /// What counts as nothing.
+    residue: f64,
+}
+
+/// The first amount that is used up, by its index, and when, s on the clock of `dense`: between `from` and the last of `times`
+/// (ascending).
+pub(super) fn first_drained(dense: &Dense, scarce: &[Scarce], from: f64, times: &[f64]) -> Option<(f64, usize)> {
+    let value = |time: f64, scarce: &Scarce| {
+        let mut value = [0.0];
+        dense.some(time, &[scarce.place], &mut value);
+        value[0]
+    };
+    let mut low = from;
+    for &high in times.iter().filter(|_| !scarce.is_empty()) {
+        let gone = scarce.iter().filter(|s| value(high, s) < -s.residue);
+        let used_up = |s: &Scarce| {
+            let (mut low, mut high) = (low, high);
+            for _ in 0..BISECTIONS {
+                let middle = low + 0.5 * (high - low);
+                if value(middle, s) < 0.0 { high = middle } else { low = middle }
+            }
+            (low, s.which)
+        };
+        if let Some(first) = gone.map(used_up).min_by(|a, b| a.0.total_cmp(&b.0)) {
+            return Some(first);
+        }
+        low = high;
     }
-    low
+    None
 }

@@ -31,12 +31,12 @@ const BULGE: f64 = 0.5;
 pub(super) struct Unseen(pub(super) NodeId);
 
 /// A comparison and the truth it has within the segment.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 struct Switch {
     node: NodeId,
     op: BinaryOp,
     truth: bool,
-    /// Sign of left minus right at the start: an equality is crossed where it changes.
+    /// Of an equality, the sign of left minus right at the start: it is crossed where that changes.
     side: f64,
 }
 
@@ -65,8 +65,6 @@ pub(super) struct Switches {
     pub(super) stop: f64,
     /// The comparisons whose sides may turn round between two points, with what bounds them.
     folded: Folded,
-    /// Whether a watched comparison depends on time in a way that cannot be solved for it.
-    pub(super) follows_time: bool,
 }
 
 /// The comparisons that may change and change back between two points: one side is a wave, a square, a magnitude.
@@ -99,27 +97,20 @@ impl Switches {
         Switches { stop: f64::INFINITY, ..Switches::default() }
     }
 
-    /// The comparisons that `roots` depend on, from the instant `time`, s, of the analysis on.
-    pub(super) fn new(
-        analysis: &Analysis<'_>,
-        ops: &[Op],
-        roots: impl IntoIterator<Item = NodeId>,
-        moving: &[u32],
-        time: f64,
-    ) -> Self {
+    /// These comparisons, from the instant `time`, s, of the analysis on; `moving` are the states that they rest on, ascending.
+    pub(super) fn new(analysis: &Analysis<'_>, ops: &[Op], nodes: &[NodeId], moving: &[u32], time: f64) -> Self {
         let mut switches = Switches::none();
         let mut sides = Vec::new();
-        for node in analysis.switches(roots) {
+        for &node in nodes {
             let Op::Binary(op, a, b) = ops[node.0 as usize] else { continue };
             let (left, right) = (analysis.now(a), analysis.now(b));
-            let side = if left == right { 0.0 } else { (left - right).signum() };
+            let side = if op != BinaryOp::Eq || left == right { 0.0 } else { (left - right).signum() };
             let switch = Switch { node, op, truth: binary(op, left, right) != 0.0, side };
-            if !(analysis.feels_state(a) || analysis.feels_state(b)) {
+            if moving.is_empty() {
                 if let Some(stop) = stop(analysis, (a, b), &switch, time) {
                     switches.stop = switches.stop.min(stop.unwrap_or(f64::INFINITY));
                     continue;
                 }
-                switches.follows_time = true;
             }
             switches.list.push(switch);
             sides.extend([a, b]);
@@ -130,6 +121,16 @@ impl Switches {
             switches.fold(analysis, &sides, moving);
         }
         switches
+    }
+
+    /// Whether the other ones find the same.
+    pub(super) fn find_the_same(&self, other: &Switches) -> bool {
+        self.list == other.list && self.tape == other.tape
+    }
+
+    /// Whether there is no comparison to look at as time passes.
+    pub(super) fn is_empty(&self) -> bool {
+        self.list.is_empty()
     }
 
     /// Finds the comparisons that may turn round.

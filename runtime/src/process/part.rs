@@ -1,0 +1,183 @@
+//! A part of the model: states that move together, how far they have been followed, and what ends their law.
+
+use std::collections::VecDeque;
+
+use matterix_ir::NodeId;
+
+use super::dense::Dense;
+use super::integrator::{Integrator, Next, Stuck};
+use super::mode::{Group, Piece};
+use super::suspicion::{Scarce, first_drained};
+use super::switch::{Crossing, Switches, Unseen};
+
+/// What ends the law of a part within a step; times are s on the clock of the step.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Ending {
+    /// A comparison changes.
+    Crossed(Crossing),
+    /// An amount is used up that a law takes more of, by its index.
+    Drained(f64, usize),
+    /// A comparison may change more often than can be seen.
+    Unseen(NodeId),
+}
+
+/// One step of the integration, looked through.
+#[derive(Clone, Debug)]
+struct Leg {
+    dense: Dense,
+    ending: Option<Ending>,
+}
+
+/// States that move together.
+pub(super) struct Part {
+    integrator: Integrator,
+    sight: Sight,
+    leg: Leg,
+    /// Steps taken beyond it.
+    ahead: VecDeque<Leg>,
+    /// Beyond those no step was found.
+    stuck: Option<Stuck>,
+    /// How far the leg has been gone through, s on its clock.
+    at: f64,
+    /// A state was set from outside: what is known of the solution is wrong.
+    pub(super) is_broken: bool,
+}
+
+/// What is looked for in each step.
+struct Sight {
+    switches: Switches,
+    /// The places of the states that these rest on.
+    places: Vec<u32>,
+    values: Vec<f64>,
+    /// Amounts that must not be used up.
+    scarce: Vec<Scarce>,
+}
+
+impl Sight {
+    fn new(group: Group, moving: &[u32], scarce: Vec<Scarce>) -> Self {
+        let place = |s: &u32| moving.partition_point(|m| m < s) as u32;
+        let places = group.states.iter().map(place).collect();
+        let values = vec![0.0; group.states.len()];
+        Sight { switches: group.switches, places, values, scarce }
+    }
+
+    /// The first thing that ends the law in a step, from `from` on, s on the clock of the step.
+    fn look(&mut self, dense: &Dense, from: f64) -> Option<Ending> {
+        let mut times: Vec<f64> = dense.times().filter(|&t| t > from && t < dense.end).collect();
+        times.push(dense.end);
+        let (switches, places) = (&mut self.switches, &self.places);
+        let mut path = |time, out: &mut [f64]| dense.some(time, places, out);
+        let found = switches.first_crossing(dense.clock, from, times.iter().copied(), &mut self.values, &mut path);
+        let crossing = match found {
+            Ok(crossing) => crossing,
+            Err(Unseen(node)) => return Some(Ending::Unseen(node)),
+        };
+        let end = crossing.map_or(dense.end, |c| c.time);
+        times.retain(|&t| t < end);
+        times.push(end);
+        let drained = first_drained(dense, &self.scarce, from, &times);
+        drained.map(|(time, which)| Ending::Drained(time, which)).or(crossing.map(Ending::Crossed))
+    }
+}
+
+impl Part {
+    /// Begins to follow a piece by `integrator`.
+    pub(super) fn new(integrator: Integrator, own: Group, scarce: Vec<Scarce>) -> Self {
+        let leg = Leg { dense: integrator.begin(), ending: None };
+        let sight = Sight::new(own, &integrator.moving, scarce);
+        Part { integrator, sight, leg, ahead: VecDeque::new(), stuck: None, at: 0.0, is_broken: false }
+    }
+
+    /// Whether its solution goes on under the law of `piece`.
+    pub(super) fn goes_on(&self, piece: &Piece) -> bool {
+        !self.is_broken && self.integrator.moving == piece.moving && *self.integrator.rates() == piece.rates
+    }
+
+    /// Other comparisons end its law from now on, or the same ones that have other truths by now.
+    pub(super) fn look_out_for(&mut self, own: Group) {
+        if self.sight.switches.find_the_same(&own.switches) {
+            return;
+        }
+        let scarce = std::mem::take(&mut self.sight.scarce);
+        self.sight = Sight::new(own, &self.integrator.moving, scarce);
+        self.leg.ending = (self.at < self.leg.dense.end).then(|| self.sight.look(&self.leg.dense, self.at)).flatten();
+        for leg in &mut self.ahead {
+            leg.ending = self.sight.look(&leg.dense, leg.dense.start);
+        }
+    }
+
+    /// The states it moves, ascending.
+    pub(super) fn moving(&self) -> &[u32] {
+        &self.integrator.moving
+    }
+
+    /// Its integration is given up: what states were worth is kept in `sizes`.
+    pub(super) fn leave(&self, sizes: &mut [f64]) {
+        let worth = self.integrator.moving.iter().zip(self.integrator.tolerance.sizes());
+        worth.filter(|_| !self.is_broken).for_each(|(state, size)| sizes[*state as usize] = *size);
+    }
+
+    /// The present step.
+    pub(super) fn dense(&self) -> &Dense {
+        &self.leg.dense
+    }
+
+    /// Where it is, s on the clock of the present step.
+    pub(super) fn at(&self) -> f64 {
+        self.at
+    }
+
+    /// Goes on to the next step, if the present one has been gone through; whether it did.
+    pub(super) fn step(&mut self) -> Result<bool, Stuck> {
+        if self.at < self.leg.dense.end {
+            return Ok(false);
+        }
+        if let (true, None) = (self.ahead.is_empty(), self.stuck) {
+            let Part { integrator, sight, ahead, .. } = self;
+            let run = integrator.run(&mut |dense| {
+                let ending = sight.look(dense, dense.start);
+                ahead.push_back(Leg { dense: dense.clone(), ending });
+                if ending.is_some() { Next::Stop } else { Next::Step }
+            });
+            self.stuck = run.err();
+        }
+        self.leg = self.ahead.pop_front().ok_or(self.stuck.unwrap_or(Stuck::Short))?;
+        self.at = self.leg.dense.start;
+        Ok(true)
+    }
+
+    /// What ends the law in the present step.
+    pub(super) fn ending(&self) -> Option<Ending> {
+        self.leg.ending
+    }
+
+    /// How far the present step is good for, s on its clock: to its end, or to where the law ends.
+    pub(super) fn limit(&self) -> f64 {
+        match self.leg.ending {
+            Some(Ending::Crossed(crossing)) => crossing.time,
+            Some(Ending::Drained(time, _)) => time,
+            Some(Ending::Unseen(_)) => self.at,
+            None => self.leg.dense.end,
+        }
+    }
+
+    /// The same, s of lab time.
+    pub(super) fn until(&self) -> f64 {
+        self.leg.dense.clock.lab(self.limit())
+    }
+
+    /// Goes on to `time`, s on the clock of the present step, and sets the states there.
+    pub(super) fn reach(&mut self, time: f64, states: &mut [f64], values: &mut Vec<f64>) {
+        self.at = time.clamp(self.at, self.leg.dense.end);
+        values.resize(self.integrator.moving.len(), 0.0);
+        self.leg.dense.at(self.at, values);
+        for (&state, &value) in self.integrator.moving.iter().zip(values.iter()) {
+            states[state as usize] = value;
+        }
+    }
+
+    /// The same to the lab time `time`, s.
+    pub(super) fn reach_lab(&mut self, time: f64, states: &mut [f64], values: &mut Vec<f64>) {
+        self.reach(self.leg.dense.clock.local(time), states, values);
+    }
+}
