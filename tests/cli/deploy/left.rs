@@ -60,32 +60,6 @@ fn what_a_person_has_heated_is_named() {
 }
 
 #[test]
-fn what_a_person_does_not_confirm_in_a_finally_is_named_and_the_rest_is_done() {
-    const FINALLY: &str = "mtx 1
-use std::heating::IkaRetControl
-lab bench {
-    ambient: 22 degC
-    plate = IkaRetControl at (0, 0, 0) m
-    bath = IkaRetControl at (1, 0, 0) m
-}
-workflow warm in bench {
-    stir plate at 300 rpm
-    heat bath to 50 degC
-} finally { stop heating bath; stop stirring plate }
-";
-    let device = Device::start(b'\n', |line, _| plate(line));
-    let dir = bench("left_unconfirmed", FINALLY, "plate", &device.address);
-    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n[bath]\nby = \"hand\"\n", device.address));
-    // Nobody is there: both requests are answered with no at once.
-    let ended = deploy(&dir, &["--mode", "real"]);
-    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert_eq!(ended.code, 1, "{one_line}");
-    assert!(one_line.contains("`bath`: it was set by hand, and nobody confirmed `stop heating bath`"), "{one_line}");
-    let own = device.heard().iter().filter(|line| *line == "STOP_4").count();
-    assert!(own >= 2, "the `finally` and what makes it safe: {:?}", device.heard());
-}
-
-#[test]
 fn what_a_finally_did_not_come_to_is_named() {
     const FINALLY: &str = "mtx 1
 use std::heating::IkaRetControl
@@ -107,7 +81,7 @@ workflow warm in bench {
     write(&dir, "lab.toml", bound);
     let ended = deploy(&dir, &["--mode", "real", "--yes"]);
     let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
-    let named = "a `finally` broke off: `stop stirring other`, `is it cool?` not done";
+    let named = "a `finally` broke off: `stop stirring other`, `ask \"is it cool?\"` not done";
     assert!(ended.code == 1 && one_line.contains(named), "{one_line}");
     assert!(heard(&other, "STOP_4") > 0, "safe all the same: {:?}", other.heard());
 }
