@@ -2,13 +2,15 @@
 
 use std::io::{BufRead, BufReader, IsTerminal};
 
-use matterix_hardware::deploy::{Answer, Control, Gate};
+use matterix_hardware::deploy::{Answer, Control, Gate, Notice};
 
 use crate::cancel;
 use crate::terminal::{Stream, print};
 
 const STOPPING: &str = "stopping: devices are halted, what `finally` says is done; Ctrl-C ends at once\n";
 const PAUSING: &str = "pausing: what goes on ends, nothing new begins; r and Enter goes on, s lets one step begin\n";
+/// What is said where a deployment that was paused is gone on with.
+pub const STILL_PAUSED: &str = "it was paused and still is: r and Enter goes on, s lets one step begin\n";
 const GOING_ON: &str = "going on\n";
 const STEPPING: &str = "one step\n";
 const HINT: &str = "q and Enter stops, p pauses, r goes on, s lets one step begin\n";
@@ -31,9 +33,19 @@ enum Word {
 }
 
 /// Shows a question, and how to answer it where somebody has to.
-pub fn show(text: &str, open: bool) {
-    let how = if open { CONFIRM } else { "" };
-    print(Stream::Err, &format!("{text}\n{how}"));
+pub fn show(notice: Notice<'_>) {
+    let text = match notice {
+        Notice::Asked(text, true) => format!("{text}\n{CONFIRM}"),
+        Notice::Asked(text, false) => format!("{text}\n"),
+        Notice::Withdrawn(text) => format!("\nno longer asked: {text}\n"),
+    };
+    print(Stream::Err, &text);
+}
+
+/// Shows the question that is to be answered now, after another one was withdrawn.
+fn show_again(control: &Control) {
+    let now = control.open().first().map(|(_, text)| format!("{text}\n{CONFIRM}")).unwrap_or_default();
+    print(Stream::Err, &format!("that answers nothing: a question was withdrawn meanwhile\n{now}"));
 }
 
 /// Listens from here on; false where standard input is no terminal.
@@ -151,6 +163,8 @@ fn obey(line: &str, control: &Control) {
     match meant(line) {
         Word::Stop => stop(&who, control),
         Word::Gate(to) => gate(to, &who, control),
+        // Whoever types may not have seen that another question is asked by now.
+        Word::Yes | Word::No if control.is_overtaken() => show_again(control),
         Word::Yes if answer(true) => {}
         Word::No if answer(false) => {}
         _ if !control.open().is_empty() => print(Stream::Err, CONFIRM),
@@ -198,7 +212,7 @@ mod tests {
     #[test]
     fn an_answer_goes_to_the_question_that_has_waited_longest() {
         static CANCEL: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
-        static CONTROL: Control = Control::new(&CANCEL, |_, _| {});
+        static CONTROL: Control = Control::new(&CANCEL, |_| {});
         CONTROL.ask(3, "is it in?");
         CONTROL.ask(5, "is it out?");
         obey("yes", &CONTROL);
@@ -208,5 +222,18 @@ mod tests {
         assert_eq!(CONTROL.answered(5).map(|a| a.yes), Some(false));
         obey("y", &CONTROL);
         assert_eq!(CONTROL.answers(), 2, "nothing was open any more");
+    }
+
+    #[test]
+    fn an_answer_to_a_question_that_was_withdrawn_is_not_that_to_the_next() {
+        static CANCEL: std::sync::atomic::AtomicBool = std::sync::atomic::AtomicBool::new(false);
+        static CONTROL: Control = Control::new(&CANCEL, |_| {});
+        CONTROL.ask(3, "is the salt in?");
+        CONTROL.withdraw(3);
+        CONTROL.ask(5, "is the hood closed?");
+        obey("y", &CONTROL);
+        assert_eq!(CONTROL.answered(5), None);
+        obey("y", &CONTROL);
+        assert_eq!(CONTROL.answered(5).map(|a| a.yes), Some(true));
     }
 }

@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use matterix_hardware::binding;
 use matterix_hardware::calibration::{self, Calibrated};
-use matterix_hardware::deploy::{Answer, Binding, Carrier, Chain, Control, Exposed, Journal, JournalError, Kept, Mode};
+use matterix_hardware::deploy::{
+    Answer, Binding, Carrier, Chain, Control, Entry, Exposed, Gate, Journal, JournalError, Kept, Mode,
+};
 use matterix_hardware::world::Machine;
 use matterix_ir::quantity::show_number;
 use matterix_ir::{Diagnostic, FileId, Program};
@@ -151,7 +153,7 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     findings.show(&sources, deployed.diagnostics);
     findings.end();
     let stopped = match CONTROL.stopped_by().as_deref() {
-        Some(Answer::NOBODY) => "was stopped, as nobody was there to confirm: run it on a terminal, or with `--yes`",
+        Some(Answer::NOBODY) => "was stopped, as nobody was there to confirm (run it on a terminal, or with `--yes`),",
         _ => "was stopped by a person",
     };
     if let Some(end) = deployed.end {
@@ -255,7 +257,16 @@ fn journal(path: Option<&Path>, args: &DeployArgs) -> Result<Kept, String> {
         return Journal::create(path).map(Kept::New).map_err(|e| e.text().to_owned());
     }
     match Journal::reopen(path) {
-        Ok((journal, before)) => Ok(Kept::Left(journal, before)),
+        Ok((journal, before)) => {
+            let gates = before.iter().rev().find_map(|entry| match entry {
+                Entry::Gate { to, .. } => Some(*to),
+                _ => None,
+            });
+            if gates.is_some_and(|to| to != Gate::Go) {
+                print(Stream::Err, keys::STILL_PAUSED);
+            }
+            Ok(Kept::Left(journal, before))
+        }
         Err(JournalError::Damaged(why)) => Ok(Kept::Damaged(why)),
         Err(other) => Err(other.text().to_owned()),
     }

@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn what_is_not_understood_changes_nothing() {
         static CANCEL: AtomicBool = AtomicBool::new(false);
-        static CONTROL: Control = Control::new(&CANCEL, |_, _| {});
+        static CONTROL: Control = Control::new(&CANCEL, |_| {});
         for (kind, body, wanted) in [
             ("text/plain", r#"{"who": "A", "do": "stop"}"#, 400),
             ("application/json", "", 422),
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn of_two_who_answer_the_first_counts() {
         static CANCEL: AtomicBool = AtomicBool::new(false);
-        static CONTROL: Control = Control::new(&CANCEL, |_, _| {});
+        static CONTROL: Control = Control::new(&CANCEL, |_| {});
         CONTROL.ask(u64::MAX, "is it in?");
         let no = posted("application/json", &format!(r#"{{"who": "Ann", "do": "no", "question": "{}"}}"#, u64::MAX));
         let yes = posted("application/json", &format!(r#"{{"who": "Bo", "do": "yes", "question": "{}"}}"#, u64::MAX));

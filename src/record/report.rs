@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use matterix_hardware::deploy::{Ending, Entry, Gate};
+use matterix_ir::Diagnostic;
 use matterix_runtime::exec::Verdict;
 use serde::{Deserialize, Serialize};
 
@@ -258,10 +259,23 @@ impl Report {
         for entry in entries {
             report.take(entry, &mut rows);
         }
+        if report.ended.is_empty() {
+            report.break_off(entries, ending);
+        }
         let all = ending.execution.iter().flat_map(|e| &e.expectations);
         report.expectations =
             all.map(|e| Expectation { text: e.text.clone(), lab_time: e.time, verdict: e.verdict }).collect();
         report
+    }
+
+    /// The journal has no end, as it could not be written any more: what is known of it besides.
+    fn break_off(&mut self, entries: &[Entry], ending: &Ending) {
+        self.ended = "unknown".to_owned();
+        self.lab_time = ending.end.unwrap_or_default().max(entries.last().map_or(0.0, Entry::time));
+        let wrong = ending.diagnostics.iter().filter(|d| d.is_error());
+        let fault =
+            |d: &Diagnostic| Fault { lab_time: self.lab_time, code: d.code.name.to_owned(), text: d.headline.clone() };
+        self.faults.extend(wrong.map(fault).collect::<Vec<_>>());
     }
 
     fn empty(about: About, passed: bool) -> Report {

@@ -115,7 +115,7 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
         return Ok(());
     }
     checked.holds.push("the program of the record is the one that was carried out".to_owned());
-    let control: &'static Control = Box::leak(Box::new(Control::new(&CANCEL, |_, _| {})));
+    let control: &'static Control = Box::leak(Box::new(Control::new(&CANCEL, |_| {})));
     let exposed = Exposed::new();
     let course = Course {
         bindings,

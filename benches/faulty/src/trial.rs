@@ -83,7 +83,7 @@ pub fn fated(number: usize, fate: Fate, mut random: Random) -> Verdict {
 
 /// What people say; it lives as long as the process, as that of a command does.
 fn fresh() -> &'static Control {
-    Box::leak(Box::new(Control::new(Box::leak(Box::new(AtomicBool::new(false))), |_, _| {})))
+    Box::leak(Box::new(Control::new(Box::leak(Box::new(AtomicBool::new(false))), |_| {})))
 }
 
 fn calm(number: usize) -> &'static Calm {

@@ -115,6 +115,11 @@ pub trait Line {
         Ok(())
     }
 
+    /// So many answers may still come that nobody waits for any more.
+    fn owed(&self) -> u32 {
+        0
+    }
+
     /// Whether the device has to hear soon that somebody is there, whatever the plan says to it.
     fn is_to_be_held(&self) -> bool {
         false
@@ -172,8 +177,8 @@ pub struct Link {
     codec: Codec,
     timeout: Duration,
     buffer: Vec<u8>,
-    /// A question was not answered in time, and its answer may still come.
-    owed: bool,
+    /// So many frames were not answered in time, and their answers may still come.
+    owed: u32,
     /// What the device said by itself, by the line of its driver: when, and the value.
     heard: BTreeMap<usize, (Duration, f64)>,
     /// What answers said last that is kept, by its name.
@@ -192,7 +197,7 @@ impl Link {
         let timeout =
             Duration::try_from_secs_f64(driver.timeout).map_err(|_| "the timeout is no duration".to_owned())?;
         let (buffer, heard, texts) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        Ok(Link { world, port, codec, timeout, buffer, owed: false, heard, texts })
+        Ok(Link { world, port, codec, timeout, buffer, owed: 0, heard, texts })
     }
 
     fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
@@ -243,7 +248,7 @@ impl Link {
                 let seconds = if hurried { most.as_secs_f64().round() } else { most.as_secs_f64() };
                 return Err(match self.buffer.as_slice() {
                     [] => {
-                        self.owed = true;
+                        self.owed += 1;
                         Trouble::Silent(format!("it did not answer `{}` within {seconds} s", shown(to)))
                     }
                     half => Trouble::Garbled(format!(
@@ -253,7 +258,7 @@ impl Link {
                     )),
                 });
             }
-            self.listen(left.min(LOOK), ear)?;
+            self.listen(left.min(LOOK), ear).inspect_err(|_| self.owed += 1)?;
         }
     }
 
@@ -286,7 +291,7 @@ impl Link {
     /// The answer to a question. Where the one before was not answered in time, what comes last is: the first may be late.
     fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
         let mut reply = self.reply(to, driver, ear)?;
-        if std::mem::take(&mut self.owed) {
+        if std::mem::take(&mut self.owed) > 0 {
             self.hush(ear)?;
             while let Some(later) = self.codec.take_reply(&mut self.buffer) {
                 let later = later.map_err(|g| {
@@ -473,6 +478,10 @@ impl Line for Link {
             }
             self.listen(left.min(LOOK), ear)?;
         }
+    }
+
+    fn owed(&self) -> u32 {
+        self.owed
     }
 
     fn kept(&self) -> Kept {

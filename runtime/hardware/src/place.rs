@@ -177,6 +177,9 @@ pub fn trouble(place: &Place, error: &io::Error) -> String {
         (ErrorKind::ConnectionRefused, _) => format!("nothing listens at `{place}`: the connection was refused"),
         (ErrorKind::TimedOut, _) => format!("nobody answers at `{place}`: it timed out"),
         (ErrorKind::HostUnreachable | ErrorKind::NetworkUnreachable, _) => format!("no way leads to `{place}`"),
+        (ErrorKind::NotFound, Place::Serial(text)) if text.contains(':') && !text.starts_with('/') => {
+            format!("there is no port `{place}`: a host with its port is an `address`")
+        }
         (ErrorKind::NotFound, Place::Serial(_)) => format!("there is no port `{place}`"),
         (ErrorKind::PermissionDenied, Place::Serial(_)) => {
             format!("the port `{place}` may not be opened by this user")

@@ -38,6 +38,11 @@ pub enum Status {
     },
     /// Ended; its effects have been applied.
     Done,
+    /// Not done: a person was asked to do it, and did not.
+    Declined {
+        /// Who, in words.
+        text: String,
+    },
     /// Ended with one of its declared failures.
     Failed {
         /// Its name.

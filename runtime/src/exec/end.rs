@@ -184,6 +184,9 @@ impl<'p> Executor<'p, '_> {
 
     /// A failing `finally` fails a block that ended well and is reported beside one that did not.
     fn after_finally(&mut self, id: FrameId, after: End, end: End) {
+        if matches!(end, End::Failed(_) | End::Stopped) {
+            self.name_undone(id);
+        }
         let end = match (after, self.stray(end)) {
             (End::Done | End::Retry(_), end @ (End::Failed(_) | End::Stopped)) => end,
             (after, End::Failed(trace)) => {
@@ -193,6 +196,35 @@ impl<'p> Executor<'p, '_> {
             (after, _) => after,
         };
         self.conclude(id, end);
+    }
+
+    /// A `finally` broke off: what it would have done is said.
+    fn name_undone(&mut self, id: FrameId) {
+        let plan = self.plan;
+        let Some(Step::Guarded { finally: Some(finally), .. }) =
+            self.frames.get(&id).and_then(|f| f.step).map(|step| &plan.get(step).step)
+        else {
+            return;
+        };
+        let begun = self.steps[finally.0 as usize].started;
+        let (mut undone, mut open) = (Vec::new(), vec![*finally]);
+        while let Some(step) = open.pop() {
+            let record = &self.steps[step.0 as usize];
+            let is_begun = record.started.is_some() && record.started >= begun;
+            let node = &plan.get(step).step;
+            match node {
+                Step::Operation(_) | Step::Ask(_) if !is_begun => undone.push(step),
+                _ if is_begun && record.state == StepState::Done => {}
+                _ => open.extend(node.children()),
+            }
+        }
+        undone.sort_by_key(|step| plan.get(*step).span.start);
+        let labels: Vec<String> = undone.iter().map(|id| format!("`{}`", plan.get(*id).label)).collect();
+        if !labels.is_empty() {
+            let raised = Raised::named("unfinished", format!("a `finally` broke off: {} not done", labels.join(", ")));
+            let trace = self.trace(id, Raised { span: Some(plan.get(*finally).span), ..raised });
+            self.suppressed.push(trace);
+        }
     }
 
     /// Begins the next turn of a loop, or ends it.

@@ -212,7 +212,7 @@ struct Executor<'p, 'b> {
     end: Option<End>,
     suppressed: Vec<FailureTrace>,
     unfinished: Vec<FailureTrace>,
-    /// The first question of a `finally` that was answered with no, which held nothing up.
+    /// The first no to a question or a request in a `finally`, which held nothing up.
     declined: Option<FailureTrace>,
     expectations: Vec<ExpectationResult>,
     assumptions: Vec<Assumption>,

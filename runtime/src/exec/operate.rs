@@ -53,9 +53,7 @@ impl<'p> Executor<'p, '_> {
             // Who says no wants it to end; what leaves things as they should be goes on all the same.
             Some(yes) if yes || finally => {
                 if !yes {
-                    let trace = self.trace(id, Raised::named("refused", "a question was answered with no".to_owned()));
-                    self.out.failure(&trace);
-                    self.declined.get_or_insert(trace);
+                    self.decline(id, "a question was answered with no".to_owned());
                 }
                 self.set_kind(id, Kind::Pass);
                 self.push_end(id, End::Done);
@@ -63,6 +61,16 @@ impl<'p> Executor<'p, '_> {
             Some(_) | None => {}
         }
         Ok(())
+    }
+
+    /// A person said no in a `finally`, which goes on with what comes next.
+    fn decline(&mut self, id: FrameId, text: String) {
+        let trace = self.trace(id, Raised::named("refused", text));
+        self.out.failure(&trace);
+        match self.declined {
+            None => self.declined = Some(trace),
+            Some(_) => self.suppressed.push(trace),
+        }
     }
 
     /// Starts an operation unless something else uses what it writes; inside a `finally` it waits for that instead.
@@ -202,6 +210,18 @@ impl<'p> Executor<'p, '_> {
                 self.changed();
                 if !self.alarmed_by(id) && self.within_limits(id, operation)? && !self.went_beyond(id, operation) {
                     self.push_end(id, End::Done);
+                }
+            }
+            Status::Declined { text } => {
+                self.set_kind(id, Kind::Pass);
+                self.out.operation(self.now, step, operation, OperationState::Failed);
+                self.changed();
+                match self.frames.get(&id).is_some_and(|f| f.finally) {
+                    true => {
+                        self.decline(id, text);
+                        self.push_end(id, End::Done);
+                    }
+                    false => self.fail(id, Raised::named("refused", text)),
                 }
             }
             Status::Failed { name, text } => {

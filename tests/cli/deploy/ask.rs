@@ -69,9 +69,14 @@ struct Left {
 
 impl Room {
     fn begin(name: &str, text: &str) -> Room {
+        Room::with(name, text, "")
+    }
+
+    /// With bindings of more devices than the plate.
+    fn with(name: &str, text: &str, more: &str) -> Room {
         let dir = bench(name, text, "plate", "");
         let emulated = Emulated::at(SPEED, &dir, &["plate", "--file", "lab.mtx"]);
-        write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+        write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n{more}", emulated.address));
         let (keyboard, terminal) = terminal();
         let mut process = command();
         process.current_dir(&dir).args(["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real"]);
@@ -235,4 +240,58 @@ fn nothing_begins_while_it_is_paused_and_one_step_begins_at_a_time() {
     assert_eq!(began(&left.journal, "stir plate at 300 rpm"), *stepped);
     assert!(went - stepped > 10.0, "the wait is over meanwhile");
     assert_eq!(began(&left.journal, "stop stirring plate"), *went);
+}
+
+#[test]
+fn what_a_person_does_not_confirm_in_a_finally_is_named_and_the_rest_is_done() {
+    const FINALLY: &str = "mtx 1
+use std::heating::IkaRetControl
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    bath = IkaRetControl at (1, 0, 0) m
+}
+workflow warm in bench {
+    stir plate at 300 rpm
+    heat bath to 50 degC
+} finally { stop heating bath; stop stirring plate }
+";
+    let mut room = Room::with("ask_by_hand", FINALLY, "[bath]\nby = \"hand\"\n");
+    room.until("\"asked\"", 1);
+    room.types("y\n");
+    room.until("\"asked\"", 2);
+    room.types("n\n");
+    let left = room.end();
+    let said = left.said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(left.code, Some(1), "{said}");
+    assert!(said.contains("`bath`: it was set by hand, and nobody confirmed `stop heating bath`"), "{said}");
+    began(&left.journal, "stop stirring plate");
+}
+
+#[test]
+fn a_question_that_is_asked_no_longer_takes_no_answer_to_the_next() {
+    const TWO: &str = "mtx 1
+use std::heating::IkaRetControl
+lab bench { ambient: 22 degC, plate = IkaRetControl at (0, 0, 0) m }
+workflow guarded in bench {
+    heat plate to 80 degC
+    keep plate.temperature <= 26 degC { ask \"is the salt in?\" } on broken { }
+    ask \"is the hood closed?\"
+    stir plate at 300 rpm
+} finally { stop heating plate; stop stirring plate }
+";
+    let mut room = Room::begin("ask_withdrawn", TWO);
+    room.until("\"asked\"", 2);
+    // Meant for the salt.
+    room.types("y\n");
+    std::thread::sleep(Duration::from_millis(500));
+    let early = journal(&room.dir);
+    assert!(event(&early, "answered").is_none(), "{early:?}");
+    room.types("y\n");
+    let left = room.end();
+    assert_eq!(left.code, Some(0), "{}", left.said);
+    for line in ["no longer asked: is the salt in?", "a question was withdrawn meanwhile"] {
+        assert!(left.said.contains(line), "`{line}`: {}", left.said);
+    }
+    began(&left.journal, "stir plate at 300 rpm");
 }

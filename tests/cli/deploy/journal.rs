@@ -92,8 +92,18 @@ fn a_journal_that_was_edited_is_refused_and_the_devices_are_made_safe() {
         let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(one_line.contains("journal-mismatch") && one_line.contains(why), "{name}: {}", ended.err);
         assert!(one_line.contains("made safe meanwhile: `plate`"), "{name}: {}", ended.err);
-        assert_eq!(journal(&dir), text, "{name}: it is left as it is");
+        // Nothing is mended, but whoever mends it does not go on either.
+        assert_eq!(lines(&journal(&dir)), lines(&text), "{name}: it is left as it is");
+        if text.contains("\"state\":\"open\"") {
+            let shut = format!("{}\n{}", journal(&dir).lines().next().unwrap_or_default(), lines(&text));
+            assert!(shut.contains("\"state\":\"shut\""), "{name}: {shut}");
+        }
     }
+    let shut = before.replacen("\"open\"", "\"shut\"", 1);
+    write(&dir, "journal", &shut);
+    let ended = resumed(&dir, "lab.toml");
+    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(ended.code == 1 && one_line.contains("could not be gone on with"), "{}", ended.err);
 }
 
 #[test]
@@ -103,8 +113,16 @@ fn another_program_another_seed_and_another_end_are_refused() {
     let ended = resumed(&dir, "lab.toml");
     assert!(ended.code == 1 && ended.err.contains("another program"), "{}", ended.err);
     write(&dir, "lab.mtx", text());
-    let seeded = matterixc_in(&dir, &[&DEPLOY[..], &["--resume", "--seed", "7"]].concat());
+    let (seeded_dir, _other) = killed("seeded");
+    let seeded = matterixc_in(&seeded_dir, &[&DEPLOY[..], &["--resume", "--seed", "7"]].concat());
     assert!(seeded.code == 1 && seeded.err.contains("another seed"), "{}", seeded.err);
+    // The plate is off by now: whoever goes on would believe that it heats.
+    for dir in [&dir, &seeded_dir] {
+        let right = resumed(dir, "lab.toml");
+        let one_line = right.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(right.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
+        assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+    }
     let again = matterixc_in(&dir, &DEPLOY);
     assert!(again.code == 2 && again.err.contains("--resume"), "{}", again.err);
 }
@@ -176,7 +194,7 @@ fn two_processes_do_not_write_one_journal() {
     until(&dir, "\"told\"", 2);
     let second = resumed(&dir, "lab.toml");
     assert_eq!(second.code, 2, "{}", second.err);
-    let named = format!("process {} of ", first.id());
+    let named = format!("process {} (begun by ", first.id());
     assert!(second.err.contains(&named) && second.err.contains("is writing the journal"), "{}", second.err);
     assert!(first.wait().expect("it ends").success(), "the first goes on: {}", journal(&dir));
     assert_eq!(journal(&dir).matches("\"event\":\"resumed\"").count(), 0);

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::faulty::plate;
-use super::{Device, bench, deploy};
+use super::{Answer, Device, bench, deploy};
 use crate::harness::{matterixc_in, write};
 
 const IN_FINALLY: &str = "mtx 1
@@ -57,6 +57,94 @@ fn what_a_person_has_heated_is_named() {
     assert_eq!(ended.code, 1, "{}", ended.err);
     assert!(ended.err.contains("`bath`: it was set by hand and is left heating"), "{}", ended.err);
     assert!(!ended.err.contains("`plate`: it was set by hand"), "{}", ended.err);
+}
+
+#[test]
+fn what_a_finally_did_not_come_to_is_named() {
+    const FINALLY: &str = "mtx 1
+use std::heating::IkaRetControl
+lab bench {
+    ambient: 22 degC
+    plate = IkaRetControl at (0, 0, 0) m
+    other = IkaRetControl at (1, 0, 0) m
+}
+workflow warm in bench {
+    stir other at 300 rpm
+    heat plate to 50 degC
+    wait 60 s
+} finally { stop heating plate; stop stirring other; ask \"is it cool?\" }
+";
+    let gone = Device::start(b'\n', |line, _| if line == "IN_SP_1" { Answer::HangsUp } else { plate(line) });
+    let other = Device::start(b'\n', |line, _| plate(line));
+    let dir = bench("left_finally", FINALLY, "plate", &gone.address);
+    let bound = format!("[plate]\naddress = \"{}\"\n[other]\naddress = \"{}\"\n", gone.address, other.address);
+    write(&dir, "lab.toml", bound);
+    let ended = deploy(&dir, &["--mode", "real", "--yes"]);
+    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let named = "a `finally` broke off: `stop stirring other`, `ask \"is it cool?\"` not done";
+    assert!(ended.code == 1 && one_line.contains(named), "{one_line}");
+    assert!(heard(&other, "STOP_4") > 0, "safe all the same: {:?}", other.heard());
+}
+
+#[test]
+fn a_deployment_whose_disk_was_full_is_not_gone_on_with() {
+    const WAITS: &str = "mtx 1
+use std::heating::IkaRetControl
+lab bench { ambient: 22 degC, plate = IkaRetControl at (0, 0, 0) m }
+workflow warm in bench {
+    heat plate to 50 degC
+    wait until plate.temperature >= 40 degC timeout 2 h
+} finally { stop heating plate }
+";
+    let device = Device::start(b'\n', |line, _| plate(line));
+    let dir = bench("left_full", WAITS, "plate", &device.address);
+    let args = ["deploy", "lab.mtx", "--bind", "lab.toml", "--mode", "real", "--record", "record", "--speed", "20"];
+    let mut shell = std::process::Command::new("bash");
+    // A signal would end it where a full disk only fails.
+    let limited = "trap '' XFSZ; ulimit -f 8; exec \"$0\" \"$@\"";
+    shell.current_dir(&dir).args(["-c", limited]).arg(env!("CARGO_BIN_EXE_matterixc")).args(args);
+    let full = shell.stdin(std::process::Stdio::null()).output().expect("bash");
+    let err = String::from_utf8_lossy(&full.stderr);
+    let one_line = err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(one_line.contains("the journal cannot be written") && one_line.contains("begin anew"), "{err}");
+    assert!(heard(&device, "STOP_1") > 0, "{:?}", device.heard());
+    let started = heard(&device, "START_1");
+    let more = crate::harness::matterixc_in(&dir, &[&args[..], &["--resume"]].concat());
+    let one_line = more.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(more.code == 1 && one_line.contains("were made safe when it could not be gone on with"), "{one_line}");
+    assert_eq!(heard(&device, "START_1"), started, "{:?}", device.heard());
+}
+
+#[test]
+fn a_late_answer_to_what_was_said_before_does_not_say_that_a_device_is_safe() {
+    const ROTOR: &str = "mtx 1
+capability Rotor {
+    state turning: Bool = false
+    command turn go
+        effect turning = true
+}
+asset Line: Rotor
+driver LineOne for Line over tcp(framing: lf, timeout: 1 s) {
+    turn go sends \"GO\" expects \"OK\"
+    safe sends \"HALT\" expects \"OK\"
+}
+lab bench { ambient: 22 degC, rotor = Line at (0, 0, 0) m }
+workflow go in bench { turn go rotor }
+";
+    // The answer to `GO` comes as that to the first `HALT`, which the rotor does not take.
+    for (name, answers, is_named) in [("misses_one", 2, false), ("misses_all", 1, true)] {
+        let said = std::sync::atomic::AtomicUsize::new(0);
+        let device = Device::start(b'\n', move |line, _| match line {
+            "HALT" if said.fetch_add(1, std::sync::atomic::Ordering::SeqCst) < answers => Answer::Says("OK\n"),
+            _ => Answer::Nothing,
+        });
+        let dir = bench(&format!("left_late_{name}"), ROTOR, "rotor", &device.address);
+        let ended = deploy(&dir, &["--mode", "real", "--yes"]);
+        let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(ended.code, 1, "{one_line}");
+        assert!(heard(&device, "HALT") >= 2, "{:?}", device.heard());
+        assert_eq!(one_line.contains("could not be made safe"), is_named, "{name}: {one_line}");
+    }
 }
 
 #[test]

@@ -232,7 +232,7 @@ impl Hardware<'_, '_> {
             Some(words) => words,
             None => self.words_of(device),
         };
-        let running = Running { device, twin, exchange, deadline, ready, failed, changed, set, words, by_hand };
+        let running = Running { step, device, twin, exchange, deadline, ready, failed, changed, set, words, by_hand };
         self.running.insert(ticket, running);
         Ok(ticket)
     }
@@ -244,7 +244,7 @@ impl Hardware<'_, '_> {
 
     fn poll_operation(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
         let Some(running) = self.running.get_mut(&ticket) else { return Ok(Status::Done) };
-        let (device, twin, exchange) = (running.device, running.twin, running.exchange);
+        let (step, device, twin, exchange) = (running.step, running.device, running.twin, running.exchange);
         if let Some((name, text)) = running.failed.take() {
             self.running.remove(&ticket);
             self.twin.halt(twin);
@@ -255,9 +255,11 @@ impl Hardware<'_, '_> {
                 None => return Ok(self.polled_again()),
                 Some(Answer { yes: true, .. }) => {}
                 Some(Answer { yes: false, who }) => {
+                    let label = &self.program.plan.get(step).label;
                     self.running.remove(&ticket);
                     self.twin.halt(twin);
-                    return Ok(Status::Failed { name: "refused".to_owned(), text: Answer::refusal(&who) });
+                    self.not_set_by_hand(device, label);
+                    return Ok(Status::Declined { text: Answer::refusal(&who) });
                 }
             }
             if let Some(running) = self.running.get_mut(&ticket) {

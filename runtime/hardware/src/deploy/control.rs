@@ -33,13 +33,22 @@ impl Answer {
     }
 }
 
+/// What is shown to whoever is at the terminal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Notice<'t> {
+    /// A question, and whether somebody has to answer it.
+    Asked(&'t str, bool),
+    /// A question that is asked no longer.
+    Withdrawn(&'t str),
+}
+
 /// What people say while a deployment goes on: from a keyboard, by signals, over a page. It is shared between threads.
 #[derive(Debug)]
 pub struct Control {
     /// Set to end it early.
     cancel: &'static AtomicBool,
-    /// Shows a question, and whether somebody has to answer it.
-    show: fn(&str, bool),
+    /// Shows questions.
+    show: fn(Notice<'_>),
     said: Mutex<Said>,
 }
 
@@ -48,6 +57,8 @@ struct Said {
     /// Questions that are open, by number.
     open: BTreeMap<u64, String>,
     answers: BTreeMap<u64, Answer>,
+    /// A question was withdrawn since somebody last answered: what they type next may be meant for that.
+    withdrawn: bool,
     /// Answers that were ever given.
     given: usize,
     /// Answers every question at once.
@@ -64,12 +75,13 @@ impl Said {
 }
 
 impl Control {
-    /// Nothing has been said yet; `cancel` is set to end the deployment early, `show` is given each question, and whether somebody
-    /// has to answer it.
-    pub const fn new(cancel: &'static AtomicBool, show: fn(&str, bool)) -> Self {
+    /// Nothing has been said yet; `cancel` is set to end the deployment early, `show` is given each question, and
+    /// each that is asked no longer.
+    pub const fn new(cancel: &'static AtomicBool, show: fn(Notice<'_>)) -> Self {
         let said = Said {
             open: BTreeMap::new(),
             answers: BTreeMap::new(),
+            withdrawn: false,
             given: 0,
             standing: None,
             gates: VecDeque::new(),
@@ -86,7 +98,7 @@ impl Control {
     /// A question is put.
     pub fn ask(&self, question: u64, text: &str) {
         let mut said = self.said();
-        (self.show)(text, said.standing.is_none());
+        (self.show)(Notice::Asked(text, said.standing.is_none()));
         match said.standing.clone() {
             Some(answer) => said.give(question, answer),
             None => drop(said.open.insert(question, text.to_owned())),
@@ -121,8 +133,16 @@ impl Control {
     /// A question is open no longer.
     pub fn withdraw(&self, question: u64) {
         let mut said = self.said();
-        said.open.remove(&question);
+        if let Some(text) = said.open.remove(&question) {
+            said.withdrawn = true;
+            (self.show)(Notice::Withdrawn(&text));
+        }
         said.answers.remove(&question);
+    }
+
+    /// Whether a question was withdrawn since this was last asked: an answer without a name may be meant for that one.
+    pub fn is_overtaken(&self) -> bool {
+        std::mem::take(&mut self.said().withdrawn)
     }
 
     /// A person says what may begin.

@@ -124,7 +124,11 @@ pub fn carry_out(
         Kept::Not => (Journal::none(), None, None),
         Kept::New(journal) => (journal, None, None),
         Kept::Left(journal, before) => {
-            let unfit = unfit(&before, &digest, speed, seed).filter(|_| mode != Mode::Replay);
+            let unfit = match journal.is_shut() {
+                true => Some(refused("the devices of this journal were made safe when it could not be gone on with")),
+                false => unfit(&before, &digest, speed, seed),
+            };
+            let unfit = unfit.filter(|_| mode != Mode::Replay);
             (journal, Some(before), unfit)
         }
         Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),
@@ -218,6 +222,9 @@ fn concluded(
     found.extend(screen.into_found().into_iter().map(|f| f.diagnostic));
     found.extend(hardware.unhalted().iter().cloned().map(not_halted));
     if !well || !hardware.unhalted().is_empty() {
+        if hardware.journal().broken.is_some() {
+            hardware.journal().shut();
+        }
         found.extend(secured(&mut hardware, exposed));
         if hardware.is_refused() && !found.is_empty() {
             let why = found.remove(0);
@@ -297,6 +304,7 @@ fn made_safe(mut hardware: Hardware<'_, '_>, unfit: Unfit) -> Vec<Diagnostic> {
         Unfit::Unknown(d) if !hardware.abandon() => return vec![d],
         Unfit::Unknown(d) => d,
     };
+    hardware.journal().shut();
     let left = hardware.secure();
     std::iter::once(meanwhile(unfit, &hardware)).chain(left.into_iter().map(unsafe_left)).collect()
 }

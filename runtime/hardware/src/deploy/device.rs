@@ -78,6 +78,10 @@ pub struct Device<'m> {
     pub told: bool,
     /// Why nothing more is said to it.
     pub lost: Option<String>,
+    /// So many answers may still come over its line that nobody waits for any more.
+    pub owed: u32,
+    /// What a person did not confirm to have done to it.
+    pub undone: Vec<String>,
     /// Its line was opened anew after it was lost.
     pub renewed: bool,
     /// When what is repeated was last said, by line of the driver.
@@ -106,7 +110,8 @@ impl<'m> Device<'m> {
         let name = &program.scene.get(binding.instance).name;
         let beats = vec![None; driver.map_or(0, |d| d.alive.len())];
         let (said, told, lost, renewed) = (false, false, None, false);
-        Ok(Device { name, binding, driver, host, link: None, codec, said, told, lost, renewed, beats })
+        let (link, owed, undone) = (None, 0, Vec::new());
+        Ok(Device { name, binding, driver, host, link, codec, said, told, lost, owed, undone, renewed, beats })
     }
 }
 

@@ -64,6 +64,7 @@ pub struct Unreached {
 
 /// An operation that goes on.
 pub(super) struct Running<'m> {
+    pub(super) step: StepId,
     pub(super) device: usize,
     pub(super) twin: Ticket,
     pub(super) exchange: Option<&'m Exchange>,
@@ -288,6 +289,7 @@ impl<'m, 't> Hardware<'m, 't> {
             self.devices[line].lost = Some(trouble.text().to_owned());
             self.losing = Some(self.devices[line].name.to_owned());
             if let Some(link) = self.devices[line].link.take() {
+                self.devices[line].owed += link.owed();
                 let kept = link.kept().into_iter();
                 self.kept.extend(kept.map(|((device, word), text)| (line, device, word, text)));
             }
@@ -297,7 +299,15 @@ impl<'m, 't> Hardware<'m, 't> {
     }
 
     pub(super) fn keep(&mut self, entry: &Entry) -> Result<(), Fault> {
-        self.journal.keep(entry).map_err(|why| self.fault(codes::JOURNAL_MISMATCH, Span::default(), why))
+        self.journal.keep(entry).map_err(|why| self.unkept(why))
+    }
+
+    /// That the journal cannot be written.
+    pub(super) fn unkept(&self, why: String) -> Fault {
+        let fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), why);
+        fault.help(
+            "what was not written down cannot be gone on with: make room, and begin anew with a journal of its own",
+        )
     }
 
     /// Lab time by the clock, s.

@@ -22,7 +22,7 @@ mod speak;
 mod unbound;
 mod values;
 
-pub use control::{Answer, Control};
+pub use control::{Answer, Control, Notice};
 pub use course::{Course, Ending, Kept, REFUSED, carry_out, not_opened, not_reached, of_fault, unsafe_left};
 pub use device::{Binding, Carrier, Device};
 pub use exposed::Exposed;

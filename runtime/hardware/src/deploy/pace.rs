@@ -109,8 +109,7 @@ impl Hardware<'_, '_> {
     /// That nothing more can be written down, once: what ends then is not held up by it.
     fn unwritten(&mut self) -> Option<Fault> {
         let why = self.journal.broken.clone().filter(|_| !std::mem::replace(&mut self.is_unwritten, true))?;
-        let message = format!("the journal cannot be written: {why}");
-        Some(self.fault(matterix_ir::codes::JOURNAL_MISMATCH, matterix_ir::Span::default(), message))
+        Some(self.unkept(format!("the journal cannot be written: {why}")))
     }
 
     /// Heeds what people say at this moment, or said to the earlier process; whether that lets something go on or end.

@@ -12,9 +12,13 @@ use super::device::Carrier;
 use super::hardware::{Hardware, Mode, Running};
 use super::journal::Entry;
 use crate::link::Trouble;
+use crate::place::Place;
 
 /// Longest time until a device that took what makes it safe says that it is.
 const SECURED: Duration = Duration::from_secs(30);
+
+/// So many answers that may still come are counted: each costs one more attempt.
+const MOST_OWED: u32 = 5;
 
 /// How often it is asked.
 const POLL: Duration = Duration::from_millis(200);
@@ -124,7 +128,19 @@ impl Hardware<'_, '_> {
         let engine = self.twin.engine();
         let left = ends.filter(|end| engine.eval(end.condition.node) == 0.0);
         let left: Vec<String> = left.map(|end| end.condition.failure().replace('_', " ")).collect();
-        (!left.is_empty()).then(|| format!("it was set by hand and is {}", left.join(", ")))
+        let undone = self.devices[index].undone.join("`, `");
+        match (left.is_empty(), undone.is_empty()) {
+            (_, false) => Some(format!("it was set by hand, and nobody confirmed `{undone}`")),
+            (false, true) => Some(format!("it was set by hand and is {}", left.join(", "))),
+            (true, true) => None,
+        }
+    }
+
+    /// A person has not done to a device what they were asked to do.
+    pub(super) fn not_set_by_hand(&mut self, index: usize, label: &str) {
+        if let Some(device) = self.devices.get_mut(index).filter(|d| d.binding.carrier == Carrier::Hand) {
+            device.undone.push(label.to_owned());
+        }
     }
 
     /// A person has done something to a device.
@@ -164,7 +180,8 @@ impl Hardware<'_, '_> {
         {
             // What was said may not have come through, and a line that was lost may be there again.
             if !matches!(done, Err(Trouble::Garbled(_))) {
-                self.devices[line].link = None;
+                let link = self.devices[line].link.take();
+                self.devices[line].owed += link.map_or(0, |link| link.owed());
                 self.relink(line);
             }
             done = self.say_safe(index, driver);
@@ -214,12 +231,28 @@ impl Hardware<'_, '_> {
             }
             said = true;
             heard |= exchange.expects.is_some() || exchange.until.is_some();
-            self.say_one(index, exchange, &texts)?;
+            for _ in 0..self.attempts(index) {
+                self.say_one(index, exchange, &texts)?;
+            }
         }
         if said && !heard && self.speaks() {
-            self.prove(index, driver)?;
+            for _ in 0..self.attempts(index) {
+                self.prove(index, driver)?;
+            }
         }
         Ok(said)
+    }
+
+    /// How often something is said so that one of the answers must be to it: as many as are owed over its line may be to what was said
+    /// before, where nothing in them tells them apart.
+    fn attempts(&self, index: usize) -> u32 {
+        let line = &self.devices[self.line_of(index)];
+        match &line.binding.carrier {
+            Carrier::Line { place: Place::Serial(_) | Place::Tcp(_), .. } if self.speaks() => {
+                1 + line.owed.min(MOST_OWED)
+            }
+            _ => 1,
+        }
     }
 
     /// Messages with the values that they have now.

@@ -22,12 +22,14 @@ pub struct Chain {
     pub lines: u64,
     /// Digest of the last of them.
     pub last: String,
+    /// Devices were made safe without a line that says so: nobody goes on from here.
+    pub is_shut: bool,
 }
 
 impl Default for Chain {
     /// That of a journal without lines.
     fn default() -> Self {
-        Chain { lines: 0, last: digest(b"") }
+        Chain { lines: 0, last: digest(b""), is_shut: false }
     }
 }
 
@@ -40,7 +42,9 @@ impl Chain {
 
     /// The head: always as long, so that it can be written over.
     pub fn head(&self) -> String {
-        format!("{{\"journal\":\"matterixc\",\"lines\":\"{:012}\",\"last\":\"{}\"}}\n", self.lines, self.last)
+        let state = if self.is_shut { "shut" } else { "open" };
+        let Chain { lines, last, .. } = self;
+        format!("{{\"journal\":\"matterixc\",\"lines\":\"{lines:012}\",\"last\":\"{last}\",\"state\":\"{state}\"}}\n")
     }
 
     /// What a head says.
@@ -48,7 +52,8 @@ impl Chain {
         let text = std::str::from_utf8(line).ok()?;
         let rest = text.strip_prefix("{\"journal\":\"matterixc\",\"lines\":\"")?;
         let (lines, rest) = rest.split_once("\",\"last\":\"")?;
-        let chain = Chain { lines: lines.parse().ok()?, last: rest.strip_suffix("\"}\n")?.to_owned() };
+        let (last, state) = rest.strip_suffix("\"}\n")?.split_once("\",\"state\":\"")?;
+        let chain = Chain { lines: lines.parse().ok()?, last: last.to_owned(), is_shut: state == "shut" };
         (chain.head() == text).then_some(chain)
     }
 }
@@ -63,6 +68,8 @@ mod tests {
         chain.grow(b"a");
         chain.grow(b"b");
         assert_eq!(Chain::of_head(chain.head().as_bytes()), Some(chain.clone()));
+        let shut = Chain { is_shut: true, ..chain.clone() };
+        assert_eq!(Chain::of_head(shut.head().as_bytes()), Some(shut));
         assert_eq!(chain.head().len(), Chain::default().head().len());
         assert_eq!(Chain::of_head(&chain.head().as_bytes()[1..]), None);
         assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");

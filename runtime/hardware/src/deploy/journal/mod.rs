@@ -118,8 +118,11 @@ impl Journal {
             Taken::Locked => busy(path),
         })?;
         let file = File::open(path).map_err(|e| JournalError::File(wrong(&e)))?;
-        let past = read(BufReader::new(file))
-            .map_err(|why| JournalError::Damaged(format!("the journal `{}` {why}", path.display())))?;
+        let past = read(BufReader::new(file)).map_err(|why| {
+            // What it was about is made safe now: it stays as it is when somebody mends the file.
+            sheet.shut();
+            JournalError::Damaged(format!("the journal `{}` {why}", path.display()))
+        })?;
         sheet.cut(past.whole).map_err(|e| JournalError::File(wrong(&e)))?;
         Ok((Journal::after(Box::new(sheet), &past), past.entries))
     }
@@ -127,6 +130,21 @@ impl Journal {
     /// Whether one is kept.
     pub fn is_kept(&self) -> bool {
         self.paper.is_some()
+    }
+
+    /// Nobody goes on from here, as devices were made safe without a line that says so. The head has room for that also where the disk
+    /// is full.
+    pub fn shut(&mut self) {
+        self.chain.is_shut = true;
+        if let Some(paper) = &mut self.paper {
+            // What cannot be written over is not there any more, or cannot be read either.
+            let _ = paper.head(self.chain.head().as_bytes()).and_then(|()| paper.sync());
+        }
+    }
+
+    /// Whether nobody goes on from here.
+    pub fn is_shut(&self) -> bool {
+        self.chain.is_shut
     }
 
     /// Nothing more is written: it is left as it is.
@@ -176,7 +194,9 @@ impl Journal {
 fn busy(path: &Path) -> JournalError {
     let past = File::open(path).ok().and_then(|file| read(BufReader::new(file)).ok()).unwrap_or_default();
     let who = past.entries.iter().rev().find_map(|e| match e {
-        Entry::Begin { pid, who, .. } | Entry::Resumed { pid, who, .. } => Some(format!("process {pid} of {who}")),
+        Entry::Begin { pid, who, .. } | Entry::Resumed { pid, who, .. } => {
+            Some(format!("process {pid} (begun by {who})"))
+        }
         _ => None,
     });
     let who = who.unwrap_or_else(|| "another process".to_owned());
@@ -193,6 +213,7 @@ pub fn read(from: impl Read) -> Result<Past, String> {
     }
     let told = Chain::of_head(&head).filter(|_| is_there).ok_or("does not begin as one")?;
     let mut past = Past { whole: head.len() as u64, ..Past::default() };
+    past.chain.is_shut = told.is_shut;
     if told.lines == 0 && told != past.chain {
         return Err("was edited: its head is not as it was written".to_owned());
     }

@@ -7,6 +7,8 @@ use std::path::Path;
 
 use rustix::fs::{FlockOperation, flock};
 
+use super::chain::Chain;
+
 /// Something that is added to at its end, and whose head can be written over.
 pub trait Paper {
     /// Adds bytes at the end.
@@ -46,14 +48,24 @@ impl Sheet {
     pub fn create(path: &Path) -> Result<Sheet, Taken> {
         let end = OpenOptions::new().append(true).create_new(true).mode(0o600).open(path)?;
         lock(&end)?;
-        Ok(Sheet { head: OpenOptions::new().write(true).open(path)?, end })
+        Ok(Sheet { head: OpenOptions::new().read(true).write(true).open(path)?, end })
     }
 
     /// One that is there.
     pub fn open(path: &Path) -> Result<Sheet, Taken> {
         let end = OpenOptions::new().append(true).open(path)?;
         lock(&end)?;
-        Ok(Sheet { head: OpenOptions::new().write(true).open(path)?, end })
+        Ok(Sheet { head: OpenOptions::new().read(true).write(true).open(path)?, end })
+    }
+
+    /// Says in the head of a journal, if it has one, that nobody goes on from there.
+    pub fn shut(&mut self) {
+        let head = &mut vec![0; Chain::default().head().len()];
+        let told = self.head.read_exact_at(head, 0).ok().and_then(|()| Chain::of_head(head));
+        if let Some(chain) = told {
+            // A file that cannot be written over cannot be gone on with either.
+            let _ = self.head(Chain { is_shut: true, ..chain }.head().as_bytes()).and_then(|()| self.sync());
+        }
     }
 
     /// Cuts off all but the first bytes.
