@@ -184,8 +184,7 @@ impl Engine<'_> {
     ) -> Result<Left, Fault> {
         let Course { parts, part_of, across } = course;
         let watching = watched(self.model, nodes, part_of, self.env()).into_iter();
-        let mut watching: Vec<Lookout> =
-            watching.map(|group| Lookout::new(group, parts, part_of, self.time)).collect();
+        let mut watching: Vec<Lookout> = watching.map(|group| Lookout::new(group, parts, part_of, self.time)).collect();
         let mut lookouts: Vec<&mut Lookout> = across.iter_mut().chain(&mut watching).collect();
         let stop = lookouts.iter().map(|l| l.stop()).fold(f64::INFINITY, f64::min);
         let target = until.min(stop);
@@ -227,7 +226,9 @@ impl Engine<'_> {
             }
             let (time, next) = (next.0.max(self.time), next.1);
             let found = match next {
-                Next::Lookout(i) => lookouts[i].found.map(|(crossing, clock)| (crossing, lookouts[i].parts.clone(), clock)),
+                Next::Lookout(i) => {
+                    lookouts[i].found.map(|(crossing, clock)| (crossing, lookouts[i].parts.clone(), clock))
+                }
                 _ => None,
             };
             for (i, part) in parts.iter_mut().enumerate() {

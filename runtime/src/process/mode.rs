@@ -1,9 +1,8 @@
 //! The law of a segment, taken apart: states that depend on each other move together, apart from all others.
 //!
-//! Two ways were compared: one sparse system of all that moves, and parts that are followed apart, each with its own steps
-//! (docs/engine.md). What parts have in common is rest within the segment: the room, a set point, a block that is switched off. So
-//! a beaker on one hotplate has nothing to do with one on another, and a part whose law is the same after a discontinuity elsewhere
-//! goes on as if nothing had happened.
+//! What parts have in common rests within the segment: the room, a set point, a block that is switched off. So a beaker on one
+//! hotplate has nothing to do with one on another, and a part whose law is the same after a discontinuity elsewhere goes on as if
+//! nothing had happened (ARCHITECTURE.md, "Simulation").
 
 use std::collections::BTreeMap;
 

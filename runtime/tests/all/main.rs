@@ -6,6 +6,7 @@ mod engine_events;
 mod engine_fast;
 mod engine_faults;
 mod engine_model;
+mod engine_parts;
 mod engine_segments;
 mod engine_sizes;
 mod engine_unseen;
