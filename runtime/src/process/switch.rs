@@ -106,11 +106,9 @@ impl Switches {
             let (left, right) = (analysis.now(a), analysis.now(b));
             let side = if op != BinaryOp::Eq || left == right { 0.0 } else { (left - right).signum() };
             let switch = Switch { node, op, truth: binary(op, left, right) != 0.0, side };
-            if moving.is_empty() {
-                if let Some(stop) = stop(analysis, (a, b), &switch, time) {
-                    switches.stop = switches.stop.min(stop.unwrap_or(f64::INFINITY));
-                    continue;
-                }
+            if let (true, Some(stop)) = (moving.is_empty(), stop(analysis, (a, b), &switch, time)) {
+                switches.stop = switches.stop.min(stop.unwrap_or(f64::INFINITY));
+                continue;
             }
             switches.list.push(switch);
             sides.extend([a, b]);
