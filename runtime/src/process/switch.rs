@@ -106,7 +106,9 @@ impl Switches {
             let (left, right) = (analysis.now(a), analysis.now(b));
             let side = if op != BinaryOp::Eq || left == right { 0.0 } else { (left - right).signum() };
             let switch = Switch { node, op, truth: binary(op, left, right) != 0.0, side };
-            if let (true, Some(stop)) = (moving.is_empty(), stop(analysis, (a, b), &switch, time)) {
+            if moving.is_empty()
+                && let Some(stop) = stop(analysis, (a, b), &switch, time)
+            {
                 switches.stop = switches.stop.min(stop.unwrap_or(f64::INFINITY));
                 continue;
             }
