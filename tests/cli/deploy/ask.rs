@@ -213,7 +213,8 @@ fn a_question_that_was_open_when_its_process_was_killed_is_put_again() {
     assert_eq!(journal.iter().filter(|l| l["event"] == "asked").count(), 1);
     assert!(event(&journal, "answered").is_some_and(|l| l["who"].to_string().contains("--yes")), "{journal:#?}");
     let stirred = began(&journal, "stop stirring plate") - began(&journal, "stir plate at 300 rpm");
-    assert!((stirred - 10.0).abs() < 1e-6, "{stirred}");
+    // Where the machine has other work, the lab is as late as the clock says.
+    assert!((10.0 - 1e-6..11.0).contains(&stirred), "{stirred}");
 }
 
 #[test]
