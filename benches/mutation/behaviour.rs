@@ -104,11 +104,11 @@ impl<'p> Watch<'p> {
 }
 
 impl Observer for Watch<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         // Of samples at one instant the last one counts.
         match self.samples.last_mut() {
-            Some(last) if time - last.0 <= SAME_SAMPLE => last.1 = engine.states().to_vec(),
-            _ => self.samples.push((time, engine.states().to_vec())),
+            Some(last) if time - last.0 <= SAME_SAMPLE => last.1 = engine.states(),
+            _ => self.samples.push((time, engine.states())),
         }
     }
 

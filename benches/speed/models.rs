@@ -49,10 +49,10 @@ impl Recorded {
 struct Follower(Recording);
 
 impl Observer for Follower {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         let observables = engine.model().observables.iter();
         let values: Vec<Vec<f64>> = observables.map(|o| o.value.iter().map(|n| engine.eval(*n)).collect()).collect();
-        self.0.sample(time, engine.states(), &values);
+        self.0.sample(time, &engine.states(), &values);
     }
 
     fn event(&mut self, time: f64, event: usize) {

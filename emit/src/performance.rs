@@ -145,7 +145,7 @@ fn tell(program: &Program, text: &Text, values: &mut impl Iterator<Item = Option
 }
 
 impl Observer for Performance<'_> {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }

@@ -138,7 +138,7 @@ fn run_watched(
     let engine = sim.engine();
     let finished = engine.finish(out);
     out.ended(engine);
-    let mut outcome = outcome(execution, params, engine.states().iter().copied().map(Some).collect());
+    let mut outcome = outcome(execution, params, engine.states().into_iter().map(Some).collect());
     outcome.balances = engine.balances();
     if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
         let trace = FailureTrace::of_fault(fault);

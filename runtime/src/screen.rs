@@ -204,7 +204,7 @@ impl<'p> Screen<'p> {
         let states = engine.states();
         let pairs = std::mem::take(&mut self.pairs);
         for (mixture, pairs) in &pairs {
-            let Some(pair) = self.meeting(*mixture, pairs, states) else {
+            let Some(pair) = self.meeting(*mixture, pairs, &states) else {
                 self.met.retain(|(met, _)| met != mixture);
                 continue;
             };
@@ -229,7 +229,7 @@ impl<'p> Screen<'p> {
 
     /// The states that an operation leaves if nothing else happens, and those that it changes; none where it cannot be carried out.
     fn after(engine: &Engine<'_>, operation: &Operation) -> Option<(Vec<f64>, BTreeSet<u32>)> {
-        let mut states = engine.states().to_vec();
+        let mut states = engine.states();
         let mut changed = BTreeSet::new();
         for action in operation.at_start.iter().chain(&operation.at_end) {
             match *action {
@@ -317,7 +317,7 @@ impl<'p> Screen<'p> {
 }
 
 impl Observer for Screen<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         self.look(time, engine);
     }
 

@@ -23,7 +23,7 @@ impl<'p> Watcher<'p> {
 }
 
 impl Observer for Watcher<'_> {
-    fn sample(&mut self, time: f64, _: &Engine<'_>) {
+    fn sample(&mut self, time: f64, _: &Engine<'_>, _: &[u32]) {
         self.board.reached(time);
     }
 

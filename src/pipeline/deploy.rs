@@ -67,7 +67,7 @@ pub(super) fn traced(shows: bool) -> impl Fn(f64, &str, bool, &[u8]) {
 struct Told;
 
 impl Observer for Told {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }

@@ -117,10 +117,10 @@ struct Follower<'a, 'p> {
 }
 
 impl Observer for Follower<'_, '_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         let observables = engine.model().observables.iter();
         let values: Vec<Vec<f64>> = observables.map(|o| o.value.iter().map(|n| engine.eval(*n)).collect()).collect();
-        self.recording.sample(time, engine.states(), &values);
+        self.recording.sample(time, &engine.states(), &values);
         self.progress.moved(time);
     }
 

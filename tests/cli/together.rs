@@ -120,7 +120,7 @@ fn program(text: &str) -> Program {
 struct Seen(BTreeMap<InstanceId, Vec<(f64, Vec<f64>)>>);
 
 impl Observer for Seen {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }

@@ -266,7 +266,7 @@ impl Room {
         let mut desks = self.desks.borrow_mut();
         let Some(desk) = desks.iter_mut().find(|d| d.place == line) else { return Vec::new() };
         desk.emulator.pass(now).expect("the model goes on");
-        let states = desk.emulator.sim().engine().states().to_vec();
+        let states = desk.emulator.sim().engine().states();
         let of = |name: &&str| {
             let index = lab.prepared.model.states.iter().position(|s| s.name == **name);
             ((*name).to_owned(), index.map_or(f64::NAN, |i| states[i]))

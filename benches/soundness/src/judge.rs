@@ -503,7 +503,7 @@ impl<'p> Watch<'p> {
 }
 
 impl Observer for Watch<'_> {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }

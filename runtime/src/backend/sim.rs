@@ -118,7 +118,7 @@ impl<'m> Sim<'m> {
 
     /// The value of a node when an operation has ended.
     fn after(&self, operation: &Operation, node: NodeId) -> f64 {
-        let mut states = self.engine.states().to_vec();
+        let mut states = self.engine.states();
         for action in operation.at_start.iter().chain(&operation.at_end) {
             let Action::Assign { state, value, .. } = action else { continue };
             let value = self.engine.eval_with(*value, &states);
@@ -188,7 +188,7 @@ impl<'m> Sim<'m> {
         let Some(stage) = self.stage.as_mut() else { return };
         for action in actions {
             let Action::Assign { state, .. } = action else { continue };
-            let Some(value) = self.engine.states().get(*state as usize).copied() else { continue };
+            let value = self.engine.state(*state);
             stage.follow_load(*state, value);
             let Some(state) = self.prepared.model.states.get(*state as usize) else { continue };
             if let Some(id) = supported(stage.scene, &state.name, &state.domain) {

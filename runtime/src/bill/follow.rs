@@ -78,11 +78,11 @@ impl<'p> Follower<'p> {
 }
 
 impl Observer for Follower<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         self.reach(time);
         let Some(last) = self.last.replace(time) else {
             self.begin(engine);
-            self.states = engine.states().to_vec();
+            self.states = engine.states();
             return;
         };
         let program = self.program;
@@ -97,12 +97,11 @@ impl Observer for Follower<'_> {
             self.tallies[i].1 = engine.eval(tally.value);
         }
         if !program.stock.streams.is_empty() && time > last {
-            let model = engine.model();
-            let now: Vec<f64> = model.mixtures.iter().map(|m| mass_of(model, m, engine.states())).collect();
+            let (model, states) = (engine.model(), engine.states());
+            let now: Vec<f64> = model.mixtures.iter().map(|m| mass_of(model, m, &states)).collect();
             self.origins.stream(&program.stock.streams, &now);
         }
-        self.states.clear();
-        self.states.extend_from_slice(engine.states());
+        self.states = engine.states();
     }
 
     fn event(&mut self, time: f64, _: usize) {

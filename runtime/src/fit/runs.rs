@@ -105,7 +105,7 @@ impl Model for Runs<'_> {
 struct Seen(BTreeMap<usize, Vec<f64>>);
 
 impl Observer for Seen {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }

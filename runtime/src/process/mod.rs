@@ -72,8 +72,9 @@ impl Default for Options {
 
 /// Is told what happens, in the order in which it happens.
 pub trait Observer {
-    /// After each accepted step and before and after each discontinuity: two samples at one time are possible.
-    fn sample(&mut self, time: f64, engine: &Engine<'_>);
+    /// After each step of a part and before and after each discontinuity: two samples at one time are possible. `changed` are the
+    /// states, ascending, that may differ from when they were last shown; all others follow the way they were on.
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]);
     /// An event has fired, by its index in the model.
     fn event(&mut self, time: f64, event: usize);
     /// A process has begun or ceased to run, by its index in the model.
@@ -88,7 +89,7 @@ pub trait Observer {
 
 /// Observes nothing.
 impl Observer for () {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }
@@ -201,9 +202,14 @@ impl<'m> Engine<'m> {
         self.time
     }
 
-    /// By state index, SI.
-    pub fn states(&self) -> &[f64] {
-        &self.states
+    /// What all states are now, by index, SI.
+    pub fn states(&self) -> Vec<f64> {
+        self.states.clone()
+    }
+
+    /// What a state is now, SI; not a number where there is no such.
+    pub fn state(&self, index: u32) -> f64 {
+        self.states.get(index as usize).copied().unwrap_or(f64::NAN)
     }
 
     /// What is advanced.
@@ -326,7 +332,8 @@ impl<'m> Engine<'m> {
     fn show(&mut self, observer: &mut dyn Observer) {
         if !self.sampled {
             self.sampled = true;
-            observer.sample(self.time, self);
+            let all: Vec<u32> = (0..self.states.len() as u32).collect();
+            observer.sample(self.time, self, &all);
         }
     }
 

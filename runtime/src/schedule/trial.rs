@@ -33,7 +33,7 @@ impl Trace {
 }
 
 impl Observer for Trace {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
 
     fn event(&mut self, _: f64, _: usize) {}
 

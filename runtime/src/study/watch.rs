@@ -57,7 +57,7 @@ impl<'s> Watcher<'s> {
 }
 
 impl Observer for Watcher<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         self.follow(time, engine);
     }
 

@@ -146,7 +146,7 @@ pub struct Trace {
 }
 
 impl Observer for Trace {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
         assert_eq!(time, engine.time());
         self.samples.push((time, engine.states().to_vec()));
     }

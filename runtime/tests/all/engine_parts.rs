@@ -158,7 +158,7 @@ fn two_thousand_parts_that_switch_at_one_instant_are_no_cascade() {
 struct Quiet(usize);
 
 impl matterix_runtime::process::Observer for Quiet {
-    fn sample(&mut self, _: f64, _: &matterix_runtime::process::Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &matterix_runtime::process::Engine<'_>, _: &[u32]) {}
 
     fn event(&mut self, _: f64, _: usize) {
         self.0 += 1;

@@ -348,7 +348,7 @@ pub struct Log {
 }
 
 impl Observer for Log {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {
         self.samples += 1;
     }
     fn event(&mut self, _: f64, _: usize) {}

@@ -275,7 +275,7 @@ impl<'d, 'p> Attendant<'d, 'p> {
 }
 
 impl Observer for Attendant<'_, '_> {
-    fn sample(&mut self, _: f64, _: &Engine<'_>) {}
+    fn sample(&mut self, _: f64, _: &Engine<'_>, _: &[u32]) {}
     fn event(&mut self, _: f64, _: usize) {}
     fn process(&mut self, _: f64, _: usize, _: bool) {}
 }
