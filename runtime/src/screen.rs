@@ -242,7 +242,8 @@ impl<'p> Screen<'p> {
                     let fraction = engine.eval_with(fraction, &states);
                     let mixtures = &engine.model().mixtures;
                     let (from, to) = (mixtures.get(from as usize)?, mixtures.get(to as usize)?);
-                    transfer(&mut states, fraction, from, to).ok()?;
+                    let after = transfer(|s| states[s as usize], fraction, from, to).ok()?;
+                    after.into_iter().for_each(|(state, value)| states[state as usize] = value);
                     changed.extend(from.extensive.iter().chain(&to.extensive).map(|(_, state)| *state));
                 }
             }

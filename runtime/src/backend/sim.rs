@@ -220,9 +220,7 @@ impl<'m> Sim<'m> {
             if self.told.insert(index, now) != Some(now) {
                 out.reading(now, index as usize, shown);
             }
-            if let Some(slot) = self.engine.readings_mut().get_mut(index as usize) {
-                *slot = shown;
-            }
+            self.engine.set_reading(index, shown);
         }
         self.engine.eval(node)
     }
@@ -251,10 +249,8 @@ impl<'m> Sim<'m> {
     /// A reading as a device has just reported it: within this instant it stands in place of what the model supposes.
     pub fn give(&mut self, reading: u32, value: f64) {
         let now = self.engine.time();
-        if let Some(slot) = self.engine.readings_mut().get_mut(reading as usize) {
-            *slot = value;
-            self.given.insert(reading, now);
-        }
+        self.engine.set_reading(reading, value);
+        self.given.insert(reading, now);
     }
 
     /// Takes a sample of every reading that actions depend on, then performs them.

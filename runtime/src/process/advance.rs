@@ -1,64 +1,35 @@
-//! The loop over segments.
-
-use std::collections::BTreeMap;
+//! The loop over what happens, in the order of time.
+//!
+//! Every part has come as far as its own last step; who asks for a state in between reads it from the solution. So a step of one part
+//! costs nothing elsewhere.
 
 use matterix_ir::model::Drained;
 use matterix_ir::{NodeId, codes};
 
-use super::integrator::{Integrator, STEP_SHARE, Stuck};
+use super::course::Who;
+use super::integrator::Stuck;
 use super::lookout::Lookout;
-use super::mode::{Piece, watched};
-use super::part::{Ending, Part};
-use super::switch::{Crossing, Unseen};
-use super::tolerance::Tolerance;
+use super::part::Ending;
+use super::switch::Crossing;
 use super::{Advance, Engine, Observer, Watch};
 use crate::fault::Fault;
 
-/// What moves within a segment, and what may end that.
-#[derive(Default)]
-pub(super) struct Course {
-    parts: Vec<Part>,
-    /// By state, the part that moves it.
-    part_of: Vec<u32>,
-    /// Comparisons of the model that no single part decides.
-    across: Vec<Lookout>,
-}
+/// Comparisons that change within this share of the time change together: they are located to a few units of rounding only.
+const TOGETHER: f64 = 16.0 * f64::EPSILON;
 
-impl Course {
-    /// A state was set from outside: what is known of the solution of its part is wrong. What its states were worth is kept in
-    /// `sizes`.
-    pub(super) fn wrote(&mut self, state: u32, sizes: &mut [f64]) {
-        let part = self.part_of.get(state as usize).and_then(|part| self.parts.get_mut(*part as usize));
-        if let Some(part) = part.filter(|part| !part.is_broken) {
-            part.leave(sizes);
-            part.is_broken = true;
-        }
-    }
-}
-
-/// How a segment was left.
+/// How a stretch without a discontinuity was left.
 enum Left {
     /// At the time asked for, or where the observer or somebody else stops.
     Target,
-    /// Where a comparison of the time itself changes.
-    Stop,
-    /// Where a comparison changed.
-    Crossed(Crossing),
-}
-
-/// Who ends a stretch in which nothing else happens.
-#[derive(Clone, Copy)]
-enum Next {
-    Target,
-    Part(usize),
-    Lookout(usize),
+    /// Where these are due, of which each finds a discontinuity.
+    Jump(Vec<Who>),
 }
 
 impl Engine<'_> {
     /// Goes on to `until` (s, finite), or to the first instant at which a limit breaks or one of `watches` holds. Events that
     /// become true on the way fire. Fails where the solution cannot be followed.
     pub fn advance(&mut self, until: f64, watches: &[Watch], observer: &mut dyn Observer) -> Result<Advance, Fault> {
-        let nodes: Vec<NodeId> = watches.iter().map(|w| w.node).collect();
+        self.watch(watches);
         loop {
             let broken = self.newly_broken();
             if !broken.is_empty() {
@@ -80,8 +51,14 @@ impl Engine<'_> {
                 return Ok(Advance::Watch(Vec::new()));
             }
             self.release(observer);
-            self.prepare()?;
-            self.segment(until, &nodes, observer)?;
+            self.prepare(observer)?;
+            if !self.due.events.is_empty() {
+                self.settle(None, observer)?;
+                continue;
+            }
+            if let Left::Jump(due) = self.follow(until, observer)? {
+                self.jump(&due, observer)?;
+            }
             if observer.stops() {
                 self.check_suspects()?;
                 return Ok(Advance::Watch(Vec::new()));
@@ -89,193 +66,174 @@ impl Engine<'_> {
         }
     }
 
-    /// Looks at the law anew, if there was a discontinuity. Parts whose law is still the same go on.
-    fn prepare(&mut self) -> Result<(), Fault> {
-        if self.is_prepared {
-            return Ok(());
+    /// Looks out for these conditions from now on, and for no others that the caller asked for.
+    fn watch(&mut self, watches: &[Watch]) {
+        let graph = &self.model.graph;
+        let watching = watches.iter().map(|watch| self.index.watch(graph, watch.node)).collect();
+        for root in self.watching.symmetric_difference(&watching) {
+            self.due.law.roots.insert(*root);
+            self.due.law.sights.insert(*root);
         }
-        let mode = self.law.mode(self.model, self.env());
-        self.watch_limits(&mode.piece_of);
-        let before = std::mem::take(&mut self.course).parts;
-        let mut before: BTreeMap<u32, Part> =
-            before.into_iter().filter_map(|part| Some((*part.moving().first()?, part))).collect();
-        let mut kept: Vec<Option<Part>> = Vec::new();
-        for piece in &mode.pieces {
-            let part = piece.moving.first().and_then(|first| before.remove(first));
-            kept.push(part.and_then(|part| {
-                let goes_on = part.goes_on(piece);
-                if !goes_on {
-                    part.leave(&mut self.sizes);
+        self.watching = watching;
+    }
+
+    /// Goes through the steps of all parts in the order of time, up to the next discontinuity.
+    fn follow(&mut self, until: f64, observer: &mut dyn Observer) -> Result<Left, Fault> {
+        while let Some((time, who)) = self.course.queue.first() {
+            if time > until || time == until && !self.is_stop(who, time) {
+                break;
+            }
+            if self.jumps(who, time) {
+                let together = time + TOGETHER * time;
+                let mut jumps = self.course.queue.until(together);
+                jumps.retain(|who| self.jumps(*who, together));
+                return Ok(Left::Jump(jumps));
+            }
+            match who {
+                Who::Part(id) => {
+                    self.step(id, observer)?;
+                    if self.is_cancelled() || observer.stops() {
+                        return Ok(Left::Target);
+                    }
                 }
-                goes_on.then_some(part)
-            }));
-        }
-        before.values().for_each(|part| part.leave(&mut self.sizes));
-        let mut parts = Vec::with_capacity(kept.len());
-        for (piece, kept) in mode.pieces.into_iter().zip(kept) {
-            parts.push(match kept {
-                Some(mut part) => {
-                    part.look_out_for(piece.own);
-                    part
+                Who::Lookout(id) | Who::Sooner(id) => {
+                    self.arrive(time);
+                    self.look_out(id)?;
                 }
-                None => self.begin(piece)?,
-            });
+            }
         }
-        let across = mode.across.into_iter().map(|group| Lookout::new(group, &parts, &mode.piece_of, self.time));
-        let across = across.collect();
-        self.course = Course { parts, part_of: mode.piece_of, across };
-        self.is_prepared = true;
+        self.arrive(until);
+        Ok(Left::Target)
+    }
+
+    /// Whether a comparison of the time itself changes.
+    fn is_stop(&self, who: Who, time: f64) -> bool {
+        matches!(who, Who::Lookout(id) if self.course.lookouts.get(id).is_some_and(|lookout| lookout.stops(time)))
+    }
+
+    /// Whether what is due is a discontinuity.
+    fn jumps(&self, who: Who, time: f64) -> bool {
+        match who {
+            Who::Part(id) => {
+                let ending = self.course.parts.get(id).and_then(|part| part.ending());
+                matches!(ending, Some(Ending::Crossed(_)))
+            }
+            Who::Lookout(id) | Who::Sooner(id) => {
+                let lookout = self.course.lookouts.get(id);
+                lookout.is_some_and(|lookout| lookout.found.is_some() || lookout.stops(time))
+            }
+        }
+    }
+
+    /// A part has come to the end of a step, or of what can be followed.
+    fn step(&mut self, id: u32, observer: &mut dyn Observer) -> Result<(), Fault> {
+        let Some(part) = self.course.parts.get_mut(id) else { return Ok(()) };
+        let (until, limit, ending) = (part.until(), part.limit(), part.ending());
+        part.reach(limit, &mut self.states);
+        self.arrive(until);
+        self.arrived(id)?;
+        self.show(observer);
+        match ending {
+            Some(Ending::Unseen(node)) => return Err(self.restless(Some(node))),
+            Some(Ending::Drained(_, which)) => {
+                let drained: &Drained = &self.model.temperatures.drained[which];
+                return Err(self.overdrawn(drained, "is used up"));
+            }
+            Some(Ending::Crossed(_)) | None => {}
+        }
+        let stepped = self.course.enqueue_part(id);
+        stepped.map_err(|stuck| self.stuck(stuck, id))?;
+        for lookout in self.course.lookouts_on(id) {
+            let is_due = |of: &Lookout| of.found.is_none() && (of.parts.len() == 1 || of.due() <= self.time);
+            if self.course.lookouts.get(lookout).is_some_and(is_due) {
+                self.look_out(lookout)?;
+            }
+        }
         Ok(())
     }
 
-    /// Begins to integrate a piece.
-    fn begin(&mut self, piece: Piece) -> Result<Part, Fault> {
-        let Piece { moving, rates, own } = piece;
-        let values: Vec<f64> = moving.iter().map(|&s| self.states[s as usize]).collect();
-        let mut registers = rates.registers();
-        rates.run(self.time, &values, &mut registers);
-        let broken = (0..values.len()).find(|&i| !registers[rates.outputs[i] as usize].is_finite());
-        if let Some(i) = broken {
-            return Err(self.no_rate(moving[i]));
+    /// A part has been followed: its states have to be finite, and to be shown.
+    fn arrived(&mut self, id: u32) -> Result<(), Fault> {
+        let Some(part) = self.course.parts.get(id) else { return Ok(()) };
+        let memo = self.memo.get_mut();
+        for &state in part.moving() {
+            self.index.leaves(state).iter().for_each(|leaf| memo.change(&self.index.users, *leaf));
         }
-        let scale = |s: &u32| self.model.states[*s as usize].scale.filter(|s| s.is_normal()).map(f64::abs);
-        let scales = moving.iter().map(scale).collect();
-        let sizes: Vec<f64> = moving.iter().map(|s| self.sizes[*s as usize]).collect();
-        let rtol = STEP_SHARE * self.options.rtol;
-        let tolerance = Tolerance::new(rtol, scales, &sizes, &rates, self.time, &values);
-        for (state, size) in moving.iter().zip(tolerance.sizes()) {
-            self.sizes[*state as usize] = *size;
-        }
-        let scarce = self.scarce(&moving);
-        Ok(Part::new(Integrator::new(rates, moving, self.time, &values, tolerance), own, scarce))
+        self.unshown.extend(part.moving());
+        self.check_states(Some(part.moving()))
     }
 
-    /// Follows one segment to its end or to `until`, and does what is due there.
-    fn segment(&mut self, until: f64, nodes: &[NodeId], observer: &mut dyn Observer) -> Result<(), Fault> {
-        let mut course = std::mem::take(&mut self.course);
-        let left = self.follow(&mut course, until, nodes, observer);
-        self.course = course;
-        match left? {
-            Left::Crossed(crossing) => {
-                if crossing.touch {
-                    self.touches.push(crossing.node);
-                    self.forget();
+    /// Comparisons change at one instant: what rests on them is due.
+    fn jump(&mut self, due: &[Who], observer: &mut dyn Observer) -> Result<(), Fault> {
+        let (mut found, mut concerned): (Vec<Crossing>, Vec<u32>) = (Vec::new(), Vec::new());
+        let mut time = self.time;
+        for who in due {
+            match *who {
+                Who::Part(id) => {
+                    let Some(part) = self.course.parts.get_mut(id) else { continue };
+                    let Some(Ending::Crossed(crossing)) = part.ending() else { continue };
+                    time = time.max(part.until());
+                    part.reach(crossing.time, &mut self.states);
+                    found.push(crossing);
+                    concerned.push(id);
                 }
-                self.limits.crossed();
-                self.count_crossing(crossing.node)?;
-                self.show(observer);
-                self.settle(None, observer)
+                Who::Lookout(id) | Who::Sooner(id) => {
+                    let Some(lookout) = self.course.lookouts.get(id) else { continue };
+                    self.due.law.sights.insert(lookout.root);
+                    time = time.max(lookout.due());
+                    concerned.extend(&lookout.parts);
+                    self.suspects.extend(&lookout.nodes);
+                    let Some((crossing, _)) = lookout.found else { continue };
+                    found.push(crossing);
+                    if let [part] = lookout.parts[..]
+                        && let Some(part) = self.course.parts.get_mut(part)
+                    {
+                        part.reach(crossing.time, &mut self.states);
+                    }
+                }
             }
-            Left::Stop => {
-                self.limits.crossed();
-                self.settle(None, observer)
-            }
-            Left::Target => Ok(()),
         }
+        self.arrive(time);
+        concerned.sort_unstable();
+        concerned.dedup();
+        for &part in &concerned {
+            self.reach_now(part);
+            self.arrived(part)?;
+            self.suspects.extend(self.course.own_of(part));
+            for id in self.course.lookouts_on(part) {
+                self.suspects.extend(self.course.lookouts.get(id).into_iter().flat_map(|lookout| &lookout.nodes));
+            }
+            self.due.law.parts.insert(part);
+        }
+        self.cross(&found)?;
+        self.show(observer);
+        self.settle(None, observer)
     }
 
-    /// Goes through the steps of all parts in the order of time.
-    fn follow(
-        &mut self,
-        course: &mut Course,
-        until: f64,
-        nodes: &[NodeId],
-        observer: &mut dyn Observer,
-    ) -> Result<Left, Fault> {
-        let Course { parts, part_of, across } = course;
-        let watching = watched(self.model, nodes, part_of, self.env()).into_iter();
-        let mut watching: Vec<Lookout> = watching.map(|group| Lookout::new(group, parts, part_of, self.time)).collect();
-        let mut lookouts: Vec<&mut Lookout> = across.iter_mut().chain(&mut watching).collect();
-        let stop = lookouts.iter().map(|l| l.stop()).fold(f64::INFINITY, f64::min);
-        let target = until.min(stop);
-        let mut values = Vec::new();
-        let mut is_fresh = true;
-        loop {
-            let mut stepped = vec![is_fresh; parts.len()];
-            for (i, part) in parts.iter_mut().enumerate() {
-                let step = part.step();
-                stepped[i] |= step.map_err(|stuck| self.stuck(stuck, part.moving()))?;
-            }
-            for lookout in &mut lookouts {
-                let is_known = lookout.found.is_some();
-                let is_due = match lookout.parts[..] {
-                    [] => !is_known && lookout.until <= self.time,
-                    ref parts => parts.iter().any(|part| stepped[*part as usize]),
-                };
-                if is_due || is_fresh {
-                    lookout.look(parts, self.time).map_err(|Unseen(node)| self.restless(Some(node)))?;
-                }
-            }
-            is_fresh = false;
-            let mut next = (target, Next::Target);
-            for (i, part) in parts.iter().enumerate() {
-                if part.until() < next.0 {
-                    next = (part.until(), Next::Part(i));
-                }
-            }
-            for (i, lookout) in lookouts.iter().enumerate() {
-                // Lab time may be too coarse to tell two ends of one part apart; its own clock is not.
-                let is_sooner = match (next.1, lookout.found, &lookout.parts[..]) {
-                    (Next::Part(p), Some((crossing, _)), [of]) if *of as usize == p => crossing.time < parts[p].limit(),
-                    (_, Some(_), _) => lookout.until < next.0,
-                    _ => lookout.is_timed() && lookout.until < next.0,
-                };
-                if is_sooner {
-                    next = (lookout.until, Next::Lookout(i));
-                }
-            }
-            let (time, next) = (next.0.max(self.time), next.1);
-            let found = match next {
-                Next::Lookout(i) => {
-                    lookouts[i].found.map(|(crossing, clock)| (crossing, lookouts[i].parts.clone(), clock))
-                }
-                _ => None,
-            };
-            for (i, part) in parts.iter_mut().enumerate() {
-                match (next, &found) {
-                    (Next::Part(p), _) if p == i => part.reach(part.limit(), &mut self.states, &mut values),
-                    (_, Some((crossing, of, _))) if of[..] == [i as u32] => {
-                        part.reach(crossing.time, &mut self.states, &mut values);
-                    }
-                    _ => part.reach_lab(time, &mut self.states, &mut values),
-                }
-            }
-            self.arrive(time);
-            for part in parts.iter() {
-                self.check_states(Some(part.moving()))?;
-            }
-            match next {
-                Next::Target => return Ok(if time == stop { Left::Stop } else { Left::Target }),
-                Next::Lookout(_) => {
-                    if let Some((crossing, ..)) = found {
-                        return Ok(Left::Crossed(crossing));
-                    }
-                }
-                Next::Part(i) => match parts[i].ending() {
-                    Some(Ending::Crossed(crossing)) => return Ok(Left::Crossed(crossing)),
-                    Some(Ending::Unseen(node)) => return Err(self.restless(Some(node))),
-                    Some(Ending::Drained(_, which)) => {
-                        self.show(observer);
-                        let drained: &Drained = &self.model.temperatures.drained[which];
-                        return Err(self.overdrawn(drained, "is used up"));
-                    }
-                    None => self.show(observer),
-                },
-            }
-            if self.is_cancelled() || observer.stops() {
-                return Ok(Left::Target);
-            }
+    /// These comparisons have changed, and with them perhaps others that rest on the same.
+    fn cross(&mut self, found: &[Crossing]) -> Result<(), Fault> {
+        for crossing in found.iter().filter(|crossing| crossing.touch) {
+            self.touches.push(crossing.node);
+            self.memo.get_mut().pin(&self.index.users, crossing.node, 1.0);
         }
+        let suspects = std::mem::take(&mut self.suspects);
+        let known = self.facts.of(&self.model.graph);
+        let changed = |node: &NodeId| self.truth(*node) != (known.now(*node) != 0.0);
+        let changed: Vec<NodeId> = suspects.into_iter().filter(changed).collect();
+        self.due.seeds.extend(changed);
+        self.due.seeds.extend(found.iter().map(|crossing| crossing.node));
+        found.iter().try_for_each(|crossing| self.count_crossing(crossing.node))
     }
 
     fn arrive(&mut self, time: f64) {
-        self.time = time;
-        self.sampled = false;
-        self.forget();
+        if time > self.time {
+            self.time = time;
+            self.memo.get_mut().pass(&self.index.users);
+        }
     }
 
     /// The fault of a state whose rate is not finite.
-    fn no_rate(&self, state: u32) -> Fault {
+    pub(super) fn no_rate(&self, state: u32) -> Fault {
         let declared = &self.model.states[state as usize];
         let rate = self.model.derivatives.iter().find(|d| d.state == state).map(|d| d.rate);
         let cause = rate.map_or("", |r| self.cause(r));
@@ -304,7 +262,7 @@ impl Engine<'_> {
     }
 
     /// The fault of a law or condition that follows the clock too fast.
-    fn restless(&self, node: Option<NodeId>) -> Fault {
+    pub(super) fn restless(&self, node: Option<NodeId>) -> Fault {
         let place = node.and_then(|node| self.user_of(node));
         let name = place.map_or("a law".to_owned(), |(name, _)| format!("`{name}`"));
         let message = format!("{name} changes with the time more often than a run can follow");
@@ -323,7 +281,8 @@ impl Engine<'_> {
     }
 
     /// The fault of an integration that finds no step: named after the state that changes fastest.
-    fn stuck(&self, stuck: Stuck, moving: &[u32]) -> Fault {
+    pub(super) fn stuck(&self, stuck: Stuck, part: u32) -> Fault {
+        let moving = self.course.parts.get(part).map_or(&[][..], |part| part.moving());
         if let Stuck::Busy = stuck {
             return self.restless(None);
         }
@@ -332,7 +291,7 @@ impl Engine<'_> {
         }
         let rates = self.model.derivatives.iter().filter(|d| moving.contains(&d.state));
         let pace = |d: &matterix_ir::model::Derivative| {
-            let (state, value) = (&self.model.states[d.state as usize], self.states[d.state as usize]);
+            let (state, value) = (&self.model.states[d.state as usize], self.state(d.state));
             self.eval(d.rate).abs() / (value.abs() + state.scale.unwrap_or(self.sizes[d.state as usize]).abs())
         };
         let Some(fastest) = rates.max_by(|a, b| pace(a).total_cmp(&pace(b))) else {

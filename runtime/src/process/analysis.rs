@@ -1,12 +1,13 @@
-//! What each operation of the graph is for the length of one segment: a constant, or something that varies.
+//! What each operation of the graph is between two discontinuities: a constant, or something that varies.
 //!
-//! Within a segment comparisons keep the truth they had at its start. Whatever follows from them, from parameters and
-//! from states at rest is a constant then; the rest is put on a [`Tape`].
+//! Between them comparisons keep the truth they had at the first. Whatever follows from them, from parameters and
+//! from states at rest is a constant then; the rest is put on a [`Tape`]. A discontinuity concerns some of the law only: there
+//! facts are looked at anew, all others stand.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use matterix_ir::graph::{Env, binary, eval_op, unary};
+use matterix_ir::graph::{binary, unary};
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
 use super::tape::{Step, Tape, Term};
@@ -17,7 +18,7 @@ const LARGEST_FACTOR: f64 = 1e6;
 /// A sum is taken apart no further: one written in terms of itself doubles with every line.
 const MOST_TERMS: usize = 1000;
 
-/// What one operation is for the length of a segment.
+/// What one operation is between two discontinuities.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fact {
     /// Its value at the start of the segment.
@@ -48,12 +49,27 @@ pub(super) struct Clock {
     pub(super) offset: f64,
 }
 
-/// The facts about the operations of one schedule.
-#[derive(Debug)]
+/// The facts about the operations of a graph, as they were last looked at.
+#[derive(Debug, Default)]
+pub(super) struct Facts {
+    facts: Vec<Fact>,
+    /// By operation, the instant at which it was looked at; 0 never, [`OUTDATED`] before what it rests on has changed.
+    looked: Vec<u32>,
+    /// By operation, the instant at which its tape was last found to be another one.
+    altered: Vec<u32>,
+    instant: u32,
+    scratch: RefCell<Scratch>,
+}
+
+/// What has been looked at once, but not since something below it changed.
+const OUTDATED: u32 = 1;
+
+/// A look at the facts.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Analysis<'g> {
     graph: &'g Graph,
-    facts: Vec<Fact>,
-    scratch: RefCell<Scratch>,
+    facts: &'g [Fact],
+    scratch: &'g RefCell<Scratch>,
 }
 
 /// What walks over the graph write down, kept from one to the next so that a walk costs no more than what it comes by.
@@ -80,22 +96,107 @@ impl Scratch {
     }
 }
 
-impl<'g> Analysis<'g> {
-    /// Looks at `schedule` (operands first) at the instant `env`, when the states marked in `moving` change with time.
-    pub(super) fn new(graph: &'g Graph, schedule: &[NodeId], env: Env<'_>, moving: &[bool]) -> Self {
-        let facts = vec![Fact::default(); schedule.last().map_or(0, |n| n.0 as usize + 1)];
-        let mut analysis = Analysis { graph, facts, scratch: RefCell::default() };
-        for &node in schedule {
-            analysis.facts[node.0 as usize] = analysis.look(node, env, moving);
+impl Facts {
+    /// Nothing is known of `graph`.
+    pub(super) fn new(graph: &Graph) -> Self {
+        let size = graph.ops().len();
+        Facts {
+            facts: vec![Fact::default(); size],
+            looked: vec![0; size],
+            altered: vec![0; size],
+            instant: OUTDATED,
+            scratch: RefCell::default(),
         }
-        analysis
+    }
+
+    /// What is known.
+    pub(super) fn of<'g>(&'g self, graph: &'g Graph) -> Analysis<'g> {
+        Analysis { graph, facts: &self.facts, scratch: &self.scratch }
+    }
+
+    /// Another instant: everything may be looked at again.
+    pub(super) fn begin(&mut self) {
+        self.instant += 1;
+    }
+
+    /// What is known of an operation is not so any more.
+    pub(super) fn outdate(&mut self, node: NodeId) {
+        let looked = &mut self.looked[node.0 as usize];
+        *looked = (*looked).min(OUTDATED);
+    }
+
+    /// Whether `node` has been found to be something else at this instant: whoever computes it has to do so in another way.
+    pub(super) fn is_altered(&self, node: NodeId) -> bool {
+        self.altered[node.0 as usize] == self.instant
+    }
+
+    /// Looks at all that `roots` depend on, once an instant, when the states marked in `moving` change with time. Returns the
+    /// comparisons whose truth is another one than it was.
+    pub(super) fn look(
+        &mut self,
+        graph: &Graph,
+        roots: impl Iterator<Item = NodeId>,
+        leaf: impl Fn(Op) -> f64,
+        moving: &[bool],
+    ) -> Vec<NodeId> {
+        let (mut todo, mut seen): (Vec<NodeId>, Vec<(NodeId, u32)>) = (roots.collect(), Vec::new());
+        while let Some(node) = todo.pop() {
+            let looked = &mut self.looked[node.0 as usize];
+            if *looked != self.instant {
+                seen.push((node, *looked));
+                *looked = self.instant;
+                todo.extend(graph.op(node).operands());
+            }
+        }
+        seen.sort_unstable();
+        let mut flipped = Vec::new();
+        for (node, looked) in seen {
+            let at = node.0 as usize;
+            let (was, is) = (self.facts[at], self.of(graph).look(node, &leaf, moving));
+            let is_other = looked == 0 || !was.computes_like(&is);
+            self.facts[at] = is;
+            if is_other || self.rests_on_altered(graph, node) {
+                self.altered[at] = self.instant;
+            }
+            if looked != 0 && is_other && graph.op(node).is_comparison() {
+                flipped.push(node);
+            }
+        }
+        flipped
+    }
+
+    /// Whether something that can change `node` within the segment is altered.
+    fn rests_on_altered(&self, graph: &Graph, node: NodeId) -> bool {
+        let fact = self.facts[node.0 as usize];
+        if !(fact.feels_time || fact.feels_state) {
+            return false;
+        }
+        let mut below = Vec::with_capacity(3);
+        self.of(graph).influences(node, &mut below);
+        below.into_iter().any(|n| self.is_altered(n))
+    }
+}
+
+impl Fact {
+    /// Whether a tape computes both alike.
+    fn computes_like(&self, other: &Fact) -> bool {
+        self.varies == other.varies
+            && self.same == other.same
+            && (self.varies || self.now.to_bits() == other.now.to_bits())
+    }
+}
+
+impl Analysis<'_> {
+    /// The operation.
+    pub(super) fn op(&self, node: NodeId) -> Op {
+        self.graph.op(node)
     }
 
     fn fact(&self, node: NodeId) -> Fact {
         self.facts[node.0 as usize]
     }
 
-    fn look(&self, node: NodeId, env: Env<'_>, moving: &[bool]) -> Fact {
+    fn look(&self, node: NodeId, leaf: impl Fn(Op) -> f64, moving: &[bool]) -> Fact {
         let op = self.graph.op(node);
         let mut fact = Fact { same: node.0, ..Fact::default() };
         match op {
@@ -122,7 +223,7 @@ impl<'g> Analysis<'g> {
             Op::Binary(BinaryOp::Mul, a, b) if settled(a, b) => 0.0,
             Op::Binary(kind, a, b) => binary(kind, self.now(a), self.now(b)),
             Op::Select(c, a, b) => self.now(if self.now(c) != 0.0 { a } else { b }),
-            leaf => eval_op(leaf, env, &[]),
+            other => leaf(other),
         };
         fact
     }
@@ -140,9 +241,15 @@ impl<'g> Analysis<'g> {
         }
     }
 
-    /// The value at the start of the segment.
+    /// The value when it was last looked at: of what does not vary, and of comparisons, that is its value now.
     pub(super) fn now(&self, node: NodeId) -> f64 {
         self.fact(node).now
+    }
+
+    /// Whether it changes with the time or with a state that moves, at least by a comparison.
+    pub(super) fn feels(&self, node: NodeId) -> bool {
+        let fact = self.fact(node);
+        fact.feels_time || fact.feels_state
     }
 
     /// Whether the value is 0 throughout the segment.
@@ -168,12 +275,13 @@ impl<'g> Analysis<'g> {
 
     /// The comparisons that may change and whose change `roots` would notice, in order.
     pub(super) fn switches(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
-        let mut reached = vec![false; self.facts.len()];
+        let scratch = &mut *self.scratch.borrow_mut();
+        scratch.begin(self.facts.len());
         let mut found = Vec::new();
         let mut todo: Vec<NodeId> = roots.into_iter().collect();
         while let Some(node) = todo.pop() {
             let fact = self.fact(node);
-            if !(fact.feels_time || fact.feels_state) || std::mem::replace(&mut reached[node.0 as usize], true) {
+            if !(fact.feels_time || fact.feels_state) || !scratch.is_new(node.0 as usize) {
                 continue;
             }
             found.extend(Some(node).filter(|n| self.graph.op(*n).is_comparison()));

@@ -1,10 +1,11 @@
 //! What happens at one instant: actions, events, processes that begin and cease.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Action;
 use matterix_ir::{NodeId, Span, codes};
 
+use super::index::Root;
 use super::{Engine, Observer};
 use crate::fault::Fault;
 use crate::ledger::{Refusal, transfer};
@@ -17,53 +18,58 @@ const CHATTER_TIME: f64 = 1e-3;
 
 impl Engine<'_> {
     /// Fires the events that became true, each time the first in source order, until none is left; then reports the
-    /// processes that began or ceased. The law is looked at anew afterwards. `cause` is shown where a balance breaks.
+    /// processes that began or ceased. `cause` is shown where a balance breaks.
     pub(super) fn settle(&mut self, cause: Option<Span>, observer: &mut dyn Observer) -> Result<(), Fault> {
-        let mut fired: BTreeMap<usize, usize> = BTreeMap::new();
-        while let Some(event) = self.next_event() {
-            let times = fired.entry(event).or_default();
+        let (mut fired, mut ready) = (BTreeMap::new(), BTreeSet::new());
+        while let Some(event) = self.next_event(&mut ready) {
+            let times: &mut usize = fired.entry(event).or_default();
             *times += 1;
             if *times > self.options.max_events_per_instant {
                 return Err(self.cascade(event));
             }
-            self.show(observer);
-            observer.event(self.time, event);
             let model = self.model;
-            for action in &model.events[event].actions {
+            let Some(of) = model.events.get(event as usize) else { continue };
+            self.show(observer);
+            observer.event(self.time, event as usize);
+            self.expose(&of.actions, observer);
+            for action in &of.actions {
                 self.perform(action, observer)?;
             }
-            self.judge_instant(&format!("`{}`", model.events[event].name), Some(model.events[event].span))?;
+            self.judge_instant(&format!("`{}`", of.name), Some(of.span))?;
         }
         self.report_processes(observer);
-        self.is_prepared = false;
-        if !self.sampled {
+        if !self.unshown.is_empty() {
             self.show(observer);
             self.check_temperatures()?;
-            self.check_balances(cause)?;
+            if self.unbalanced >= self.states.len() {
+                self.unbalanced = 0;
+                self.check_balances(cause)?;
+            }
         }
         Ok(())
     }
 
-    /// The first event whose condition has become true since it was last looked at.
-    fn next_event(&mut self) -> Option<usize> {
-        let model = self.model;
-        let mut next = None;
-        for (i, event) in model.events.iter().enumerate() {
-            let now = self.truth(event.when);
+    /// The first event whose condition has become true since it was last looked at; `ready` are those that wait for their turn.
+    fn next_event(&mut self, ready: &mut BTreeSet<u32>) -> Option<u32> {
+        self.digest();
+        for event in std::mem::take(&mut self.due.events) {
+            let now = self.truth(self.model.events[event as usize].when);
             if !now {
-                self.armed[i] = false;
-            } else if !self.armed[i] && next.is_none() {
-                next = Some(i);
+                self.armed[event as usize] = false;
+            }
+            if now && !self.armed[event as usize] {
+                ready.insert(event);
+            } else {
+                ready.remove(&event);
             }
         }
-        if let Some(i) = next {
-            self.armed[i] = true;
-        }
-        next
+        let next = ready.pop_first()?;
+        self.armed[next as usize] = true;
+        Some(next)
     }
 
-    fn cascade(&self, event: usize) -> Fault {
-        let event = &self.model.events[event];
+    fn cascade(&self, event: u32) -> Fault {
+        let event = &self.model.events[event as usize];
         let count = self.options.max_events_per_instant;
         let message = format!("`{}` happens more than {count} times at one instant", event.name);
         Fault::new(codes::EVENT_CASCADE, self.time, message)
@@ -72,9 +78,10 @@ impl Engine<'_> {
     }
 
     fn report_processes(&mut self, observer: &mut dyn Observer) {
-        let model = self.model;
-        for (i, process) in model.processes.iter().enumerate() {
-            let running = process.guard.is_none_or(|g| self.truth(g));
+        self.digest();
+        for process in std::mem::take(&mut self.due.processes) {
+            let i = process as usize;
+            let running = self.model.processes[i].guard.is_none_or(|g| self.truth(g));
             if running != self.running[i] {
                 self.running[i] = running;
                 observer.process(self.time, i, running);
@@ -90,7 +97,7 @@ impl Engine<'_> {
                 if !value.is_finite() {
                     return Err(self.no_value(state, value).at(span));
                 }
-                self.suspicion.count(self.model, state, value - self.states[state as usize]);
+                self.suspicion.count(self.model, state, value - self.state(state));
                 self.write(state, value);
                 Ok(())
             }
@@ -103,14 +110,26 @@ impl Engine<'_> {
         }
     }
 
+    /// Shows what actions are about to change, as it is before.
+    pub(super) fn expose(&mut self, actions: &[Action], observer: &mut dyn Observer) {
+        for action in actions {
+            match *action {
+                Action::Assign { state, .. } => self.unshown.push(state),
+                Action::Move { from, to, .. } => {
+                    let ends = [from, to].map(|mixture| &self.model.mixtures[mixture as usize].extensive);
+                    self.unshown.extend(ends.into_iter().flatten().map(|(_, state)| *state));
+                }
+            }
+        }
+        self.show(observer);
+    }
+
     fn carry(&mut self, fraction: f64, from: u32, to: u32, span: Span) -> Result<(), Fault> {
         let model = self.model;
         let (from, to) = (&model.mixtures[from as usize], &model.mixtures[to as usize]);
-        let mut after = self.states.clone();
-        transfer(&mut after, fraction, from, to).map_err(|refusal| self.refused(refusal).at(span))?;
-        for (_, state) in from.extensive.iter().chain(&to.extensive) {
-            self.write(*state, after[*state as usize]);
-        }
+        let after = transfer(|state| self.state(state), fraction, from, to);
+        let after = after.map_err(|refusal| self.refused(refusal).at(span))?;
+        after.into_iter().for_each(|(state, value)| self.write(state, value));
         Ok(())
     }
 
@@ -136,28 +155,40 @@ impl Engine<'_> {
 
     /// Sets a state from outside the integration.
     fn write(&mut self, state: u32, value: f64) {
-        let place = &mut self.states[state as usize];
-        if place.to_bits() == value.to_bits() {
+        if self.state(state).to_bits() == value.to_bits() {
             return;
         }
-        *place = value;
-        self.sampled = false;
-        self.forget();
-        self.limits.wrote(state);
-        self.course.wrote(state, &mut self.sizes);
+        let part = self.course.part_of[state as usize];
+        self.reach_now(part);
+        if let Some(of) = self.course.parts.get_mut(part).filter(|part| !part.is_broken) {
+            of.leave(&mut self.sizes);
+            of.is_broken = true;
+            self.due.law.broken.insert(part);
+        }
+        self.states[state as usize] = value;
         self.sizes[state as usize] = 0.0;
+        self.unshown.push(state);
+        for &leaf in self.index.leaves(state) {
+            self.memo.get_mut().change(&self.index.users, leaf);
+            self.due.seeds.push(leaf);
+        }
     }
 
     /// Equalities that were true at one instant only are false again.
     pub(super) fn release(&mut self, observer: &mut dyn Observer) {
-        if self.touches.is_empty() {
+        let touches = std::mem::take(&mut self.touches);
+        if touches.is_empty() {
             return;
         }
-        self.touches.clear();
-        self.forget();
-        let model = self.model;
-        for (i, event) in model.events.iter().enumerate() {
-            self.armed[i] = self.armed[i] && self.truth(event.when);
+        self.memo.get_mut().unpin(&self.index.users);
+        let (due, mut events) = (&mut self.due, Vec::new());
+        self.index.above(&touches, &mut |_| {}, &mut |_, kind| match kind {
+            Root::Event(i) => events.push(i as usize),
+            Root::Guard(i) => due.processes.extend([i]),
+            Root::Rate(_) | Root::Limit(_) | Root::Watch => {}
+        });
+        for i in events {
+            self.armed[i] = self.armed[i] && self.truth(self.model.events[i].when);
         }
         self.report_processes(observer);
     }

@@ -6,7 +6,7 @@ use matterix_ir::model::Model;
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
 use super::Engine;
-use super::mode::{Law, NOWHERE};
+use super::index::Index;
 
 /// A limit that depends on what moves is broken where it is passed by more than this share: ten times the relative error that
 /// a step may have. So one that is only touched holds.
@@ -123,23 +123,7 @@ pub(super) struct Limits<'m> {
     /// Whether each was broken when last looked at.
     broken: Vec<bool>,
     /// Those to look at before time goes on.
-    due: BTreeSet<u32>,
-    /// Those that change with what moves now.
-    live: Vec<u32>,
-}
-
-impl Limits<'_> {
-    /// A state has been set from outside the integration.
-    pub(super) fn wrote(&mut self, state: u32) {
-        if let Some(of) = self.all.and_then(|all| all.of_state.get(state as usize)) {
-            self.due.extend(of);
-        }
-    }
-
-    /// A comparison has changed.
-    pub(super) fn crossed(&mut self) {
-        self.due.extend(&self.live);
-    }
+    pub(super) due: BTreeSet<u32>,
 }
 
 impl<'m> Engine<'m> {
@@ -147,8 +131,8 @@ impl<'m> Engine<'m> {
     pub fn keep(&mut self, all: &'m Keeps) {
         let broken = vec![false; all.kept.len()];
         self.limits = Limits { all: Some(all), broken, ..Limits::default() };
-        self.law = Law::new(self.model, all.kept.iter().map(|kept| kept.node));
-        self.is_prepared = false;
+        self.index = Index::new(self.model, all.kept.iter().map(|kept| kept.node));
+        self.concern_all();
     }
 
     /// Notes whether a limit holds, as someone has just seen: what is known to be broken is not told again.
@@ -177,14 +161,5 @@ impl<'m> Engine<'m> {
             }
         }
         found
-    }
-
-    /// The limits that may break while a law holds are those that rest on the time or on a state that is in a piece.
-    pub(super) fn watch_limits(&mut self, piece_of: &[u32]) {
-        let Some(all) = self.limits.all else { return };
-        let moves = |kept: &Kept| kept.timed || kept.states.iter().any(|s| piece_of[*s as usize] != NOWHERE);
-        let live = (0..all.kept.len()).filter(|&i| moves(&all.kept[i]));
-        self.limits.live = live.map(|i| i as u32).collect();
-        self.limits.crossed();
     }
 }

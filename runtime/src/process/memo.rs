@@ -1,68 +1,66 @@
 //! Values of the graph at one instant, each computed once, and again only where what it depends on has changed: of a
 //! deck with hundreds of wells a step changes two.
 
-use matterix_ir::graph::{Env, eval_op};
+use matterix_ir::graph::apply;
 use matterix_ir::{Graph, NodeId, Op};
 
-/// Remembers values until [`Memo::forget`].
+use super::index::Lists;
+
+/// The value of an operation without operands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leaf {
+    pub(super) value: f64,
+    /// Whether it is another one as soon as time passes.
+    pub(super) flows: bool,
+}
+
+/// Remembers values until their leaves change.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memo {
     values: Vec<f64>,
     /// Whether the value is that of the present leaves. Whoever uses an unknown value is unknown, or pinned.
     known: Vec<bool>,
-    /// Operations without operands whose value can change.
-    leaves: Vec<NodeId>,
-    /// Who uses an operation: `users[first[n] .. first[n + 1]]`.
-    first: Vec<u32>,
-    users: Vec<NodeId>,
+    /// Known leaves that are others as soon as time passes.
+    flowing: Vec<NodeId>,
     /// Values taken instead of computed.
     pinned: Vec<NodeId>,
     is_pinned: Vec<bool>,
-    /// The leaves may have changed.
-    stale: bool,
     todo: Vec<NodeId>,
 }
 
 impl Memo {
     /// Room for every operation of `graph`.
     pub(super) fn new(graph: &Graph) -> Self {
-        let ops = graph.ops();
-        let size = ops.len();
-        let mut first = vec![0; size + 1];
-        for op in ops {
-            op.operands().for_each(|o| first[o.0 as usize + 1] += 1);
-        }
-        for i in 0..size {
-            first[i + 1] += first[i];
-        }
-        let mut next = first.clone();
-        let mut users = vec![NodeId(0); first[size] as usize];
-        for (i, op) in ops.iter().enumerate() {
-            for operand in op.operands() {
-                let slot = &mut next[operand.0 as usize];
-                users[*slot as usize] = NodeId(i as u32);
-                *slot += 1;
-            }
-        }
-        let changes = |n: &NodeId| matches!(graph.op(*n), Op::Time | Op::State(_) | Op::Local(_) | Op::Reading(_));
-        let leaves = (0..size as u32).map(NodeId).filter(changes).collect();
+        let size = graph.ops().len();
         let (values, known, is_pinned) = (vec![0.0; size], vec![false; size], vec![false; size]);
-        let (pinned, todo) = (Vec::new(), Vec::new());
-        Memo { values, known, leaves, first, users, pinned, is_pinned, stale: true, todo }
+        Memo { values, known, is_pinned, ..Memo::default() }
     }
 
-    /// The leaves may have changed; pins are taken out.
-    pub(super) fn forget(&mut self) {
-        self.stale = true;
+    /// Time has passed.
+    pub(super) fn pass(&mut self, users: &Lists<NodeId>) {
+        for leaf in std::mem::take(&mut self.flowing) {
+            self.change(users, leaf);
+        }
+    }
+
+    /// A leaf has changed.
+    pub(super) fn change(&mut self, users: &Lists<NodeId>, leaf: NodeId) {
+        if !self.is_pinned[leaf.0 as usize] {
+            self.lose(users, leaf);
+        }
+    }
+
+    /// Takes values as they are computed again.
+    pub(super) fn unpin(&mut self, users: &Lists<NodeId>) {
         for node in std::mem::take(&mut self.pinned) {
             self.is_pinned[node.0 as usize] = false;
-            self.lose(node);
+            self.lose(users, node);
         }
     }
 
-    /// Takes `value` for `node` until it forgets.
-    pub(super) fn pin(&mut self, node: NodeId, value: f64) {
-        self.lose(node);
+    /// Takes `value` for `node` from now on.
+    pub(super) fn pin(&mut self, users: &Lists<NodeId>, node: NodeId, value: f64) {
+        self.lose(users, node);
         self.pinned.push(node);
         self.is_pinned[node.0 as usize] = true;
         self.keep(node, value);
@@ -74,14 +72,13 @@ impl Memo {
     }
 
     /// The value of `node`, and what follows from it, is not known any more.
-    fn lose(&mut self, node: NodeId) {
+    fn lose(&mut self, users: &Lists<NodeId>, node: NodeId) {
         self.known[node.0 as usize] = false;
         let before = self.todo.len();
         self.todo.push(node);
         while self.todo.len() > before {
             let Some(next) = self.todo.pop() else { return };
-            let (from, to) = (self.first[next.0 as usize] as usize, self.first[next.0 as usize + 1] as usize);
-            for user in &self.users[from..to] {
+            for user in users.at(next.0 as usize) {
                 let at = user.0 as usize;
                 if self.known[at] && !self.is_pinned[at] {
                     self.known[at] = false;
@@ -91,26 +88,8 @@ impl Memo {
         }
     }
 
-    /// Takes the present leaves; what follows from those that changed is lost.
-    fn refresh(&mut self, graph: &Graph, env: Env<'_>) {
-        self.stale = false;
-        for i in 0..self.leaves.len() {
-            let leaf = self.leaves[i];
-            let at = leaf.0 as usize;
-            let value = eval_op(graph.op(leaf), env, &[]);
-            if self.is_pinned[at] || (self.known[at] && self.values[at].to_bits() == value.to_bits()) {
-                continue;
-            }
-            self.lose(leaf);
-            self.keep(leaf, value);
-        }
-    }
-
     /// The value of `node`, the same as [`Graph::eval`] gives.
-    pub(super) fn eval(&mut self, graph: &Graph, node: NodeId, env: Env<'_>) -> f64 {
-        if self.stale {
-            self.refresh(graph, env);
-        }
+    pub(super) fn eval(&mut self, graph: &Graph, node: NodeId, leaf: impl Fn(Op) -> Leaf) -> f64 {
         if !self.known[node.0 as usize] {
             self.todo.push(node);
         }
@@ -124,10 +103,20 @@ impl Memo {
             }
             if self.todo.len() == before {
                 self.todo.pop();
-                let value = eval_op(op, env, &self.values);
+                let value = match op.operands().next() {
+                    Some(_) => apply(op, |_| f64::NAN, |o| self.values[o.0 as usize]),
+                    None => self.take(next, leaf(op)),
+                };
                 self.keep(next, value);
             }
         }
         self.values[node.0 as usize]
+    }
+
+    fn take(&mut self, node: NodeId, leaf: Leaf) -> f64 {
+        if leaf.flows {
+            self.flowing.push(node);
+        }
+        leaf.value
     }
 }

@@ -5,19 +5,24 @@
 //! or the caller cares about; there events fire, the law is looked at anew, and the next segment begins.
 //!
 //! - `tape`, `tangent`: the law of a segment as a short program, and its derivative.
-//! - `analysis`, `mode`: which part of the graph that is, and how it is taken apart.
+//! - `index`: who rests on what.
+//! - `analysis`, `mode`, `prepare`: what the law is between two discontinuities, and how it is taken apart, where one concerns it.
 //! - `part`, `lookout`: states that move together; what no single part decides.
+//! - `course`: both of these in the order of time.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `linear`, `dense`, `clock`: steps, their linear systems, the solution between them, and the time that they count.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
-//! - `advance`, `instant`: the loop over segments, and what happens between two.
+//! - `advance`, `instant`: the loop over what happens, and what happens at one instant.
+//! - `memo`: values at one instant.
 
 mod advance;
 mod analysis;
 mod clock;
+mod course;
 mod dense;
+mod index;
 mod instant;
 mod integrator;
 mod limits;
@@ -26,6 +31,7 @@ mod lookout;
 mod memo;
 mod mode;
 mod part;
+mod prepare;
 mod suspicion;
 mod switch;
 mod tangent;
@@ -36,10 +42,10 @@ mod timed;
 mod tolerance;
 
 use std::cell::RefCell;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use matterix_ir::graph::{Env, eval_op};
+use matterix_ir::graph::Env;
 use matterix_ir::model::{Action, Balance, Doubt, Model};
 use matterix_ir::{NodeId, Op, codes};
 
@@ -49,10 +55,12 @@ use crate::ledger::Balances;
 
 pub use limits::Keeps;
 
-use advance::Course;
+use analysis::Facts;
+use course::Course;
+use index::Index;
 use limits::Limits;
-use memo::Memo;
-use mode::Law;
+use memo::{Leaf, Memo};
+use prepare::Due;
 use suspicion::Suspicion;
 
 /// How accurately to integrate, and when to give up.
@@ -122,16 +130,24 @@ pub struct Engine<'m> {
     locals: Vec<f64>,
     readings: Vec<f64>,
     time: f64,
+    /// Those that move, as of where their part has been followed to.
     states: Vec<f64>,
-    law: Law,
+    index: Index,
+    facts: Facts,
+    /// By state, whether it moves.
+    moving: Vec<bool>,
+    /// What moves.
+    course: Course,
+    /// What has changed since the law was last looked at.
+    due: Due,
+    /// The roots of what the caller looks out for.
+    watching: BTreeSet<u32>,
+    /// Comparisons that may have changed at the present instant.
+    suspects: Vec<NodeId>,
     /// By state, the largest magnitude since it was last set, as far as a law moved it.
     sizes: Vec<f64>,
     /// Set from outside to leave off early, once.
     cancel: Option<&'m AtomicBool>,
-    /// What moves.
-    course: Course,
-    /// Whether that is so now: after a discontinuity not until it is needed again.
-    is_prepared: bool,
     /// Truth of each event's condition when last looked at.
     armed: Vec<bool>,
     /// Which processes run.
@@ -140,9 +156,11 @@ pub struct Engine<'m> {
     touches: Vec<NodeId>,
     /// By comparison, the times of its last changes.
     crossings: BTreeMap<NodeId, VecDeque<f64>>,
-    /// Whether the present state has been shown to the observer.
-    sampled: bool,
+    /// States that the observer has not seen as they are now.
+    unshown: Vec<u32>,
     balances: Balances,
+    /// States that have changed since all sums were last looked at.
+    unbalanced: usize,
     suspicion: Suspicion,
     limits: Limits<'m>,
     memo: RefCell<Memo>,
@@ -160,28 +178,44 @@ impl<'m> Engine<'m> {
             readings: vec![f64::NAN; model.readings.len()],
             time: 0.0,
             states: vec![0.0; model.states.len()],
+            index: Index::new(model, []),
+            facts: Facts::new(&model.graph),
+            moving: vec![false; model.states.len()],
+            course: Course::new(model.states.len()),
+            due: Due::default(),
+            watching: BTreeSet::new(),
+            suspects: Vec::new(),
             sizes: vec![0.0; model.states.len()],
             cancel: None,
-            law: Law::new(model, []),
-            course: Course::default(),
-            is_prepared: false,
             armed: vec![false; model.events.len()],
             running: vec![false; model.processes.len()],
             touches: Vec::new(),
             crossings: BTreeMap::new(),
-            sampled: false,
+            unshown: (0..model.states.len() as u32).collect(),
             balances: Balances::default(),
+            unbalanced: 0,
             suspicion: Suspicion::new(model),
             limits: Limits::default(),
             memo: RefCell::new(Memo::new(&model.graph)),
         };
+        for derivative in &model.derivatives {
+            engine.moving[derivative.state as usize] = true;
+        }
         engine.states = model.states.iter().map(|s| engine.eval(s.initial)).collect();
-        engine.forget();
+        engine.memo = RefCell::new(Memo::new(&model.graph));
         engine.check_states(None)?;
         engine.readings = model.readings.iter().map(|r| engine.eval(r.value)).collect();
-        engine.forget();
+        engine.memo = RefCell::new(Memo::new(&model.graph));
         engine.balances = Balances::open(model, &engine.states, |n| engine.eval(n));
+        engine.due.events.extend(0..model.events.len() as u32);
+        engine.due.processes.extend(0..model.processes.len() as u32);
+        engine.concern_all();
         Ok(engine)
+    }
+
+    /// All of the law has to be looked at.
+    fn concern_all(&mut self) {
+        self.due.law.roots.extend(0..self.index.len());
     }
 
     /// From here on `cancel`, once set, ends the advance under way at an instant of its own, as if a watch without index had
@@ -204,12 +238,13 @@ impl<'m> Engine<'m> {
 
     /// What all states are now, by index, SI.
     pub fn states(&self) -> Vec<f64> {
-        self.states.clone()
+        (0..self.states.len() as u32).map(|state| self.state(state)).collect()
     }
 
     /// What a state is now, SI; not a number where there is no such.
     pub fn state(&self, index: u32) -> f64 {
-        self.states.get(index as usize).copied().unwrap_or(f64::NAN)
+        let flowed = self.course.mover(index).and_then(|part| part.value(index, self.time));
+        flowed.or_else(|| self.states.get(index as usize).copied()).unwrap_or(f64::NAN)
     }
 
     /// What is advanced.
@@ -226,41 +261,66 @@ impl<'m> Engine<'m> {
     pub fn set_local(&mut self, index: u32, value: f64) {
         if let Some(local) = self.locals.get_mut(index as usize) {
             *local = value;
-            self.heard();
+            self.heard(Op::Local(index));
         }
     }
 
     /// What the devices report, by reading index, SI. At the start the exact values.
-    pub fn readings_mut(&mut self) -> &mut [f64] {
-        self.heard();
-        &mut self.readings
+    pub fn readings(&self) -> &[f64] {
+        &self.readings
     }
 
-    fn heard(&mut self) {
-        self.forget();
-        if self.law.listens {
-            self.is_prepared = false;
+    /// A device reports; an index the model does not have is ignored.
+    pub fn set_reading(&mut self, index: u32, value: f64) {
+        if let Some(reading) = self.readings.get_mut(index as usize) {
+            *reading = value;
+            self.heard(Op::Reading(index));
+        }
+    }
+
+    fn heard(&mut self, leaf: Op) {
+        for node in self.index.heard(leaf) {
+            self.memo.get_mut().change(&self.index.users, node);
+            self.due.seeds.push(node);
         }
     }
 
     /// The value of `node` now; each operation is computed once between two changes.
     pub fn eval(&self, node: NodeId) -> f64 {
-        self.memo.borrow_mut().eval(&self.model.graph, node, self.env())
+        let leaf = |op| {
+            let flows = match op {
+                Op::Time => true,
+                Op::State(state) => self.course.mover(state).is_some(),
+                _ => false,
+            };
+            Leaf { value: self.leaf(op), flows }
+        };
+        self.memo.borrow_mut().eval(&self.model.graph, node, leaf)
     }
 
     /// The value of `node` now if the states were these.
     pub fn eval_with(&self, node: NodeId, states: &[f64]) -> f64 {
-        self.model.graph.eval(node, Env { states, ..self.env() })
+        let Engine { time, params, locals, readings, .. } = self;
+        self.model.graph.eval(node, Env { time: *time, states, params, locals, readings })
     }
 
     /// The value of `node` now if the values of the plan were these.
     pub fn eval_kept(&self, node: NodeId, locals: &[f64]) -> f64 {
-        self.model.graph.eval(node, Env { locals, ..self.env() })
+        self.model.graph.eval_on(node, |op| match op {
+            Op::Local(i) => locals.get(i as usize).copied().unwrap_or(f64::NAN),
+            other => self.leaf(other),
+        })
     }
 
     /// The value of an operation without operands now.
     pub(crate) fn leaf(&self, op: Op) -> f64 {
-        eval_op(op, self.env(), &[])
+        match op {
+            Op::State(state) => self.state(state),
+            other => {
+                let Engine { time, params, locals, readings, .. } = self;
+                Env { time: *time, states: &[], params, locals, readings }.leaf(other)
+            }
+        }
     }
 
     /// Whether an equality is true now that is true at this instant only.
@@ -277,7 +337,7 @@ impl<'m> Engine<'m> {
     /// number that is not finite, a cascade without end or a balance that does not close.
     pub fn apply(&mut self, actions: &[Action], observer: &mut dyn Observer) -> Result<(), Fault> {
         self.release(observer);
-        self.show(observer);
+        self.expose(actions, observer);
         for action in actions {
             self.perform(action, observer)?;
         }
@@ -295,6 +355,9 @@ impl<'m> Engine<'m> {
 
     /// Takes the last sample and checks that the balances close.
     pub fn finish(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
+        for part in self.course.parts.ids() {
+            self.reach_now(part);
+        }
         self.show(observer);
         self.check_temperatures()?;
         self.check_balances(None)
@@ -302,49 +365,33 @@ impl<'m> Engine<'m> {
 
     /// How every balance stands.
     pub fn balances(&self) -> Vec<BalanceReport> {
-        self.balances.report(self.model, &self.states, |n| self.eval(n))
+        self.balances.report(self.model, &self.states(), |n| self.eval(n))
     }
 
     fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
-    fn env(&self) -> Env<'_> {
-        Env {
-            time: self.time,
-            states: &self.states,
-            params: &self.params,
-            locals: &self.locals,
-            readings: &self.readings,
-        }
-    }
-
-    /// The leaves have changed.
-    fn forget(&mut self) {
-        let memo = self.memo.get_mut();
-        memo.forget();
-        for &node in &self.touches {
-            memo.pin(node, 1.0);
-        }
-    }
-
-    /// Shows the present state to the observer, once.
+    /// Shows the observer what it has not seen.
     fn show(&mut self, observer: &mut dyn Observer) {
-        if !self.sampled {
-            self.sampled = true;
-            let all: Vec<u32> = (0..self.states.len() as u32).collect();
-            observer.sample(self.time, self, &all);
+        if self.unshown.is_empty() {
+            return;
         }
+        let mut changed = std::mem::take(&mut self.unshown);
+        changed.sort_unstable();
+        changed.dedup();
+        self.unbalanced += changed.len();
+        observer.sample(self.time, self, &changed);
     }
 
     /// Fails where a state is not finite; `only` limits the check to some.
     fn check_states(&self, only: Option<&[u32]>) -> Result<(), Fault> {
-        let all = 0..self.states.len();
+        let is_broken = |state: &u32| !self.states[*state as usize].is_finite();
         let broken = match only {
-            Some(list) => list.iter().map(|&s| s as usize).find(|&s| !self.states[s].is_finite()),
-            None => all.into_iter().find(|&s| !self.states[s].is_finite()),
+            Some(list) => list.iter().copied().find(is_broken),
+            None => (0..self.states.len() as u32).find(is_broken),
         };
-        broken.map_or(Ok(()), |state| Err(self.no_value(state as u32, self.states[state])))
+        broken.map_or(Ok(()), |state| Err(self.no_value(state, self.states[state as usize])))
     }
 
     /// The fault of a state that is, or would be, no finite number.
@@ -366,7 +413,7 @@ impl<'m> Engine<'m> {
 
     fn breach(&self, report: &BalanceReport, balance: &Balance, cause: Option<matterix_ir::Span>) -> Fault {
         let (unit, accounted) = (&balance.unit, report.initial + report.exchanged);
-        let did = |d: &&Doubt| self.states[d.state as usize].abs();
+        let did = |d: &&Doubt| self.state(d.state).abs();
         let culprit = balance.doubts.iter().max_by(|a, b| did(a).total_cmp(&did(b))).filter(|d| did(d) > 0.0);
         let process = culprit.and_then(|d| Some((self.model.processes.get(d.process as usize)?, did(&d))));
         let sums = format!("there is {}, and {} is accounted for", unit.show(report.now), unit.show(accounted));

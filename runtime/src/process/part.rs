@@ -6,7 +6,7 @@ use matterix_ir::NodeId;
 
 use super::dense::Dense;
 use super::integrator::{Integrator, Next, Stuck};
-use super::mode::{Group, Piece};
+use super::mode::Piece;
 use super::suspicion::{Scarce, first_drained};
 use super::switch::{Crossing, Switches, Unseen};
 
@@ -39,6 +39,8 @@ pub(super) struct Part {
     stuck: Option<Stuck>,
     /// How far the leg has been gone through, s on its clock.
     at: f64,
+    /// What its states are there.
+    values: Vec<f64>,
     /// A state was set from outside: what is known of the solution is wrong.
     pub(super) is_broken: bool,
 }
@@ -54,11 +56,9 @@ struct Sight {
 }
 
 impl Sight {
-    fn new(group: Group, moving: &[u32], scarce: Vec<Scarce>) -> Self {
-        let place = |s: &u32| moving.partition_point(|m| m < s) as u32;
-        let places = group.states.iter().map(place).collect();
-        let values = vec![0.0; group.states.len()];
-        Sight { switches: group.switches, places, values, scarce }
+    fn new(switches: Switches, places: Vec<u32>, scarce: Vec<Scarce>) -> Self {
+        let values = vec![0.0; places.len()];
+        Sight { switches, places, values, scarce }
     }
 
     /// The first thing that ends the law in a step, from `from` on, s on the clock of the step.
@@ -82,10 +82,11 @@ impl Sight {
 
 impl Part {
     /// Begins to follow a piece by `integrator`.
-    pub(super) fn new(integrator: Integrator, own: Group, scarce: Vec<Scarce>) -> Self {
+    pub(super) fn new(integrator: Integrator, scarce: Vec<Scarce>) -> Self {
         let leg = Leg { dense: integrator.begin(), ending: None };
-        let sight = Sight::new(own, &integrator.moving, scarce);
-        Part { integrator, sight, leg, ahead: VecDeque::new(), stuck: None, at: 0.0, is_broken: false }
+        let sight = Sight::new(Switches::none(), Vec::new(), scarce);
+        let values = vec![0.0; integrator.moving.len()];
+        Part { integrator, sight, leg, ahead: VecDeque::new(), stuck: None, at: 0.0, values, is_broken: false }
     }
 
     /// Whether its solution goes on under the law of `piece`.
@@ -93,13 +94,15 @@ impl Part {
         !self.is_broken && self.integrator.moving == piece.moving && *self.integrator.rates() == piece.rates
     }
 
-    /// Other comparisons end its law from now on, or the same ones that have other truths by now.
-    pub(super) fn look_out_for(&mut self, own: Group) {
-        if self.sight.switches.find_the_same(&own.switches) {
+    /// Other comparisons end its law from where it has been followed to on, or the same ones that have other truths by now.
+    /// `states` are those that they rest on, ascending.
+    pub(super) fn look_out_for(&mut self, switches: Switches, states: &[u32]) {
+        if self.sight.switches.find_the_same(&switches) {
             return;
         }
         let scarce = std::mem::take(&mut self.sight.scarce);
-        self.sight = Sight::new(own, &self.integrator.moving, scarce);
+        let places = states.iter().map(|s| self.place(*s)).collect();
+        self.sight = Sight::new(switches, places, scarce);
         self.leg.ending = (self.at < self.leg.dense.end).then(|| self.sight.look(&self.leg.dense, self.at)).flatten();
         for leg in &mut self.ahead {
             leg.ending = self.sight.look(&leg.dense, leg.dense.start);
@@ -109,6 +112,23 @@ impl Part {
     /// The states it moves, ascending.
     pub(super) fn moving(&self) -> &[u32] {
         &self.integrator.moving
+    }
+
+    /// The place of one of them.
+    pub(super) fn place(&self, state: u32) -> u32 {
+        self.integrator.moving.partition_point(|m| *m < state) as u32
+    }
+
+    /// What a state is at the lab time `time`, s, beyond where it has been followed to; none where it has been followed so far.
+    pub(super) fn value(&self, state: u32, time: f64) -> Option<f64> {
+        let clock = self.leg.dense.clock;
+        if clock.lab(self.at) >= time {
+            return None;
+        }
+        let local = clock.local(time).clamp(self.at, self.leg.dense.end);
+        let mut value = [0.0];
+        self.leg.dense.some(local, &[self.place(state)], &mut value);
+        Some(value[0])
     }
 
     /// Its integration is given up: what states were worth is kept in `sizes`.
@@ -167,17 +187,19 @@ impl Part {
     }
 
     /// Goes on to `time`, s on the clock of the present step, and sets the states there.
-    pub(super) fn reach(&mut self, time: f64, states: &mut [f64], values: &mut Vec<f64>) {
+    pub(super) fn reach(&mut self, time: f64, states: &mut [f64]) {
         self.at = time.clamp(self.at, self.leg.dense.end);
-        values.resize(self.integrator.moving.len(), 0.0);
-        self.leg.dense.at(self.at, values);
-        for (&state, &value) in self.integrator.moving.iter().zip(values.iter()) {
+        let Part { integrator, values, leg, .. } = self;
+        leg.dense.at(self.at, values);
+        for (&state, &value) in integrator.moving.iter().zip(values.iter()) {
             states[state as usize] = value;
         }
     }
 
     /// The same to the lab time `time`, s.
-    pub(super) fn reach_lab(&mut self, time: f64, states: &mut [f64], values: &mut Vec<f64>) {
-        self.reach(self.leg.dense.clock.local(time), states, values);
+    pub(super) fn reach_lab(&mut self, time: f64, states: &mut [f64]) {
+        if self.leg.dense.clock.lab(self.at) < time {
+            self.reach(self.leg.dense.clock.local(time), states);
+        }
     }
 }

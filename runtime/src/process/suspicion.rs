@@ -116,7 +116,7 @@ impl Engine<'_> {
 
     /// Fails where a law has taken more of an amount than there is.
     pub(super) fn check_drained(&self) -> Result<(), Fault> {
-        let overdrawn = |d: &&Drained| self.states[d.state as usize] < -self.residue(d);
+        let overdrawn = |d: &&Drained| self.state(d.state) < -self.residue(d);
         self.model.temperatures.drained.iter().find(overdrawn).map_or(Ok(()), |d| Err(self.takes_too_much(d)))
     }
 
@@ -126,7 +126,7 @@ impl Engine<'_> {
             let rate = self.model.derivatives.iter().find(|of| of.state == d.state).map(|of| self.eval(of.rate));
             rate.is_some_and(|rate| rate < 0.0 || !rate.is_finite())
         };
-        let dry = |d: &&Drained| self.states[d.state as usize].abs() <= self.residue(d) && taken(d);
+        let dry = |d: &&Drained| self.state(d.state).abs() <= self.residue(d) && taken(d);
         self.model.temperatures.drained.iter().find(dry).map(|d| self.takes_too_much(d))
     }
 

@@ -97,17 +97,23 @@ impl Switches {
         Switches { stop: f64::INFINITY, ..Switches::default() }
     }
 
-    /// These comparisons, from the instant `time`, s, of the analysis on; `moving` are the states that they rest on, ascending.
-    pub(super) fn new(analysis: &Analysis<'_>, ops: &[Op], nodes: &[NodeId], moving: &[u32], time: f64) -> Self {
+    /// These comparisons, from the instant `time`, s, on; `moving` are the states that they rest on, ascending, and `now` tells
+    /// what operations are worth at that instant.
+    pub(super) fn new(
+        analysis: Analysis<'_>,
+        nodes: &[NodeId],
+        moving: &[u32],
+        time: f64,
+        now: &dyn Fn(NodeId) -> f64,
+    ) -> Self {
         let mut switches = Switches::none();
         let mut sides = Vec::new();
         for &node in nodes {
-            let Op::Binary(op, a, b) = ops[node.0 as usize] else { continue };
-            let (left, right) = (analysis.now(a), analysis.now(b));
-            let side = if op != BinaryOp::Eq || left == right { 0.0 } else { (left - right).signum() };
-            let switch = Switch { node, op, truth: binary(op, left, right) != 0.0, side };
+            let Op::Binary(op, a, b) = analysis.op(node) else { continue };
+            let side = if op == BinaryOp::Eq { side(now(a), now(b)) } else { 0.0 };
+            let switch = Switch { node, op, truth: analysis.now(node) != 0.0, side };
             if moving.is_empty()
-                && let Some(stop) = stop(analysis, (a, b), &switch, time)
+                && let Some(stop) = stop(&analysis, (a, b), &switch, time)
             {
                 switches.stop = switches.stop.min(stop.unwrap_or(f64::INFINITY));
                 continue;
@@ -118,7 +124,7 @@ impl Switches {
         switches.tape = analysis.tape(&sides, moving);
         switches.registers = switches.tape.registers();
         if switches.tape.steps.iter().any(folds) {
-            switches.fold(analysis, &sides, moving);
+            switches.fold(&analysis, &sides, moving);
         }
         switches
     }
@@ -314,6 +320,11 @@ impl Switches {
         self.run(later, moving);
         if self.is_changed(i, Switch::changed) { later } else { time }
     }
+}
+
+/// The sign of left minus right.
+fn side(left: f64, right: f64) -> f64 {
+    if left == right { 0.0 } else { (left - right).signum() }
 }
 
 /// The unit of rounding at a time, s.

@@ -4,9 +4,10 @@ use matterix_ir::graph::Env;
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 use proptest::prelude::*;
 
-use super::analysis::Analysis;
+use super::analysis::Facts;
 use super::dense::Dense;
-use super::memo::Memo;
+use super::index::users;
+use super::memo::{Leaf, Memo};
 use super::tangent;
 
 const STATES: usize = 4;
@@ -76,8 +77,10 @@ proptest! {
         time in 0.0..10.0f64,
     ) {
         let env = env(time, &states, &[0.7]);
-        let schedule = graph.schedule(nodes.iter().copied());
-        let analysis = Analysis::new(&graph, &schedule, env, &marked);
+        let mut facts = Facts::new(&graph);
+        facts.begin();
+        facts.look(&graph, nodes.iter().copied(), |op| env.leaf(op), &marked);
+        let analysis = facts.of(&graph);
         let moving: Vec<u32> = (0..STATES as u32).filter(|&s| marked[s as usize]).collect();
         let values: Vec<f64> = moving.iter().map(|&s| states[s as usize]).collect();
         let tape = analysis.tape(&nodes, &moving);
@@ -91,7 +94,7 @@ proptest! {
         for (i, &node) in nodes.iter().enumerate() {
             let expected = graph.eval(node, env);
             prop_assert_eq!(registers[tape.outputs[i] as usize], expected);
-            prop_assert_eq!(memo.eval(&graph, node, env), expected);
+            prop_assert_eq!(memo.eval(&graph, node, |op| Leaf { value: env.leaf(op), flows: false }), expected);
             prop_assert_eq!(analysis.now(node), expected);
         }
     }
@@ -103,9 +106,10 @@ proptest! {
         direction in prop::array::uniform4(-1.0..1.0f64),
     ) {
         let env = env(1.5, &states, &[0.7]);
-        let schedule = graph.schedule(nodes.iter().copied());
-        let analysis = Analysis::new(&graph, &schedule, env, &[true; STATES]);
-        let tape = analysis.tape(&nodes, &[0, 1, 2, 3]);
+        let mut facts = Facts::new(&graph);
+        facts.begin();
+        facts.look(&graph, nodes.iter().copied(), |op| env.leaf(op), &[true; STATES]);
+        let tape = facts.of(&graph).tape(&nodes, &[0, 1, 2, 3]);
         let run = |shift: f64| {
             let at: Vec<f64> = states.iter().zip(direction).map(|(s, d)| s + shift * d).collect();
             let mut registers = tape.registers();
@@ -125,6 +129,67 @@ proptest! {
             // where the two differences disagree the function is too curved to judge by them
             prop_assume!((fine - coarse).abs() < 1e-4 * (1.0 + fine.abs()));
             prop_assert!((slope - fine).abs() < 1e-3 * (1.0 + fine.abs()), "{} is not {}", slope, fine);
+        }
+    }
+
+    /// Whichever leaves change, one after the other.
+    #[test]
+    fn a_memo_forgets_what_rests_on_a_change(
+        (graph, nodes) in graph(false),
+        first in states(),
+        changes in prop::collection::vec((0..STATES, -4.0..4.0f64), 1..6),
+    ) {
+        let mut states = first;
+        let users = users(&graph);
+        let mut memo = Memo::new(&graph);
+        for (state, value) in changes {
+            for &node in &nodes {
+                let found = memo.eval(&graph, node, |op| Leaf { value: env(1.0, &states, &[0.7]).leaf(op), flows: false });
+                prop_assert_eq!(found.to_bits(), graph.eval(node, env(1.0, &states, &[0.7])).to_bits());
+            }
+            states[state] = value;
+            let is_it = |n: &&NodeId| graph.op(**n) == Op::State(state as u32);
+            nodes.iter().filter(is_it).for_each(|leaf| memo.change(&users, *leaf));
+        }
+    }
+
+    /// What is looked at in part, where something has changed, is the same as all of it looked at from the beginning.
+    #[test]
+    fn facts_of_what_changed_are_facts_of_all(
+        (graph, nodes) in graph(false),
+        first in states(),
+        changes in prop::collection::vec((0..STATES, -4.0..4.0f64, any::<bool>()), 1..6),
+    ) {
+        let users = users(&graph);
+        let above = |seed: NodeId| {
+            let (mut todo, mut found) = (vec![seed], std::collections::BTreeSet::new());
+            while let Some(node) = todo.pop() {
+                if found.insert(node) {
+                    todo.extend(users.at(node.0 as usize));
+                }
+            }
+            found
+        };
+        let (mut states, mut moving, mut facts) = (first, [true, false, true, false], Facts::new(&graph));
+        facts.begin();
+        facts.look(&graph, nodes.iter().copied(), |op| env(1.0, &states, &[0.7]).leaf(op), &moving);
+        for (state, value, moves) in changes {
+            states[state] = value;
+            moving[state] = moves;
+            facts.begin();
+            let leaf = graph.schedule(nodes.iter().copied()).into_iter().find(|n| graph.op(*n) == Op::State(state as u32));
+            let concerned: Vec<NodeId> = leaf.map(above).into_iter().flatten().filter(|n| nodes.contains(n)).collect();
+            facts.look(&graph, concerned.into_iter(), |op| env(1.0, &states, &[0.7]).leaf(op), &moving);
+            let mut anew = Facts::new(&graph);
+            anew.begin();
+            anew.look(&graph, nodes.iter().copied(), |op| env(1.0, &states, &[0.7]).leaf(op), &moving);
+            let (part, all) = (facts.of(&graph), anew.of(&graph));
+            for &node in &nodes {
+                prop_assert_eq!(part.varies(node), all.varies(node));
+                if !all.varies(node) {
+                    prop_assert_eq!(part.now(node).to_bits(), all.now(node).to_bits());
+                }
+            }
         }
     }
 
@@ -153,8 +218,10 @@ fn slope_of(op: impl Fn(&mut Graph, NodeId, NodeId) -> NodeId, x: f64, y: f64) -
     let (a, b) = (graph.add(Op::State(0)), graph.add(Op::State(1)));
     let node = op(&mut graph, a, b);
     let states = [x, y];
-    let analysis = Analysis::new(&graph, &graph.schedule([node]), env(0.0, &states, &[0.0]), &[true, true]);
-    let tape = analysis.tape(&[node], &[0, 1]);
+    let mut facts = Facts::new(&graph);
+    facts.begin();
+    facts.look(&graph, std::iter::once(node), |op| env(0.0, &states, &[0.0]).leaf(op), &[true, true]);
+    let tape = facts.of(&graph).tape(&[node], &[0, 1]);
     let mut registers = tape.registers();
     tape.run(0.0, &states, &mut registers);
     let mut tangents = registers.clone();
