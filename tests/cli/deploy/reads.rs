@@ -1,10 +1,12 @@
 //! Readings that get lost, come late or make no sense are asked for again; commands never are.
 
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::faulty::plate;
 use super::{Answer, Device, Emulated, HEAT, bench, deploy};
-use crate::harness::write;
+use crate::harness::{folder, write};
 
 /// A plate that gets warm with its sixth temperature, and answers its third like this.
 fn third(name: &str, answer: fn() -> Answer) -> (crate::harness::Ended, Vec<String>, String) {
@@ -153,6 +155,35 @@ workflow weigh_it in bench {
             let shown = number.split_once('.').map_or(0, |(_, digits)| digits.len());
             assert!(of == symbol && shown == digits, "{unit}: {answer}");
         }
+    }
+}
+
+#[test]
+fn an_emulated_balance_answers_what_drivers_of_others_ask() {
+    let dir = folder("deploy_reads_asked");
+    let emulated = Emulated::start(&dir, &["PrecisionBalance"]);
+    let line = TcpStream::connect(&emulated.address).expect("it answers");
+    let mut answers = BufReader::new(line.try_clone().expect("a stream"));
+    let asked = [
+        ("@", "I4 A "),
+        ("I0", "I0 A 1 \"S\""),
+        ("I1", "I1 A \"01\""),
+        ("I2", "I2 A "),
+        ("I3", "I3 A "),
+        ("I4", "I4 A "),
+        ("S", "S S "),
+        ("SI", "S D "),
+        ("Z", "Z A"),
+        ("ZI", "ZI S"),
+        ("T", "T S 0.00 g"),
+        ("TI", "TI S 0.00 g"),
+        ("BLAH", "E"),
+    ];
+    for (question, begin) in asked {
+        (&line).write_all(format!("{question}\r\n").as_bytes()).expect("said");
+        let mut answer = String::new();
+        answers.read_line(&mut answer).expect("answered");
+        assert!(answer.starts_with(begin) && answer.ends_with("\r\n"), "{question}: {answer:?}");
     }
 }
 
