@@ -423,7 +423,7 @@ pub struct EmulateArgs {
     /// The lab the device stands in, with what is around it.
     #[arg(long, value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// The workflow of the file, where it has several.
+    /// A workflow of the lab, where the file has several labs.
     #[arg(long, value_name = "NAME", requires = "file")]
     pub workflow: Option<String>,
     /// The driver, where the device has several.
@@ -466,10 +466,10 @@ fn waiting(text: &str) -> Result<f64, String> {
 #[cfg(feature = "sila")]
 #[derive(Debug, Args)]
 pub struct ServeArgs {
-    /// The lab, in a file with a workflow in it.
+    /// The file of the lab.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// The workflow whose lab it is, where the file has several.
+    /// A workflow of the lab, where the file has several labs.
     #[arg(long, value_name = "NAME")]
     pub workflow: Option<String>,
     /// The port; 0 takes any that is free.

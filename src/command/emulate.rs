@@ -27,12 +27,13 @@ fn attempt(args: &EmulateArgs, color: Color) -> Result<Exit, String> {
         .iter()
         .map(|d| d.split_once('@').map_or((d.as_str(), None), |(name, address)| (name, Some(address))))
         .collect();
-    let (input, devices) = match (&args.file, named.as_slice()) {
+    let (mut input, devices) = match (&args.file, named.as_slice()) {
         (Some(file), _) => (Input::file(file, files::read(file)?), named),
         (None, [(asset, address)]) => (Input::stdin(alone(asset)?.into_bytes()), vec![(ALONE, *address)]),
         (None, _) => return Err("several devices are of a lab: give its file with `--file`".to_owned()),
     };
-    let options = Options { workflow: args.workflow.clone(), wires: Wires::Served, ..Options::default() };
+    let workflow = args.workflow.clone().or_else(|| input.idle());
+    let options = Options { workflow, wires: Wires::Served, ..Options::default() };
     let (sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     let Some(program) = program.filter(|_| !is_wrong) else {

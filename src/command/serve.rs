@@ -20,7 +20,8 @@ pub fn serve(args: &ServeArgs, color: Color) -> Exit {
 }
 
 fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
-    let input = Input::file(&args.file, files::read(&args.file)?);
+    let mut input = Input::file(&args.file, files::read(&args.file)?);
+    let workflow = args.workflow.clone().or_else(|| input.idle());
     let bindings = match &args.bind {
         Some(path) => {
             let text = String::from_utf8(files::read(path)?);
@@ -32,7 +33,7 @@ fn attempt(args: &ServeArgs, color: Color) -> Result<Exit, String> {
         return Err("what is sent to devices is kept in a journal: say where with `--journal FILE`".to_string());
     }
     let mut findings = Findings::new(RunFormat::Human, color);
-    let options = Options { workflow: args.workflow.clone(), wires: Wires::Offered, ..Options::default() };
+    let options = Options { workflow, wires: Wires::Offered, ..Options::default() };
     let (mut sources, program, diagnostics) = pipeline::compile(&input, &options);
     let is_wrong = diagnostics.iter().any(Diagnostic::is_error);
     findings.show(&sources, diagnostics);

@@ -12,6 +12,8 @@ use matterix_ir::wire::{Driver, Transport};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::process::{Engine, Options};
 
+use crate::terminal::{Stream, print};
+
 /// Where an emulator answers.
 pub enum Line<'p> {
     /// At a pseudo-terminal, with a link to it.
@@ -49,6 +51,7 @@ pub fn emulate(
     let (first, address) = units.next().ok_or("no device is named")?;
     let mut emulator = Emulator::new(Sim::new(engine, &prepared, seed), first, address)?;
     units.try_for_each(|(drivers, address)| emulator.join(drivers, address))?;
+    emulator.heeded(|why| print(Stream::Err, &format!("{why}\n")));
     let stop = Stop { cancel, speed };
     if let Transport::Http { header } = &chosen.transport {
         let Line::Tcp(port) = line else {

@@ -22,6 +22,7 @@ use std::sync::atomic::AtomicBool;
 use matterix_ir::points::Points;
 use matterix_ir::script::Wiring;
 use matterix_ir::{Diagnostic, FileId, Program, Severity, Sources, Span, codes};
+use matterix_lang::ast::ItemKind;
 use matterix_lang::{Loader, Session, Stop};
 
 use crate::args::Fidelity;
@@ -40,6 +41,9 @@ pub use run::{Choices, run};
 #[cfg(feature = "sila")]
 pub use serve::{Service, serve};
 pub use view::still;
+
+/// The workflow of a lab that is asked for by itself.
+const IDLE: &str = "nothing_of_its_own";
 
 /// A text to compile, and where its neighbours are.
 pub struct Input {
@@ -80,6 +84,22 @@ impl Input {
     /// The same, worked on until a flag is set: a check or a compilation that was stopped says so.
     pub fn until(self, flag: &Arc<AtomicBool>) -> Self {
         Input { stop: Stop::when(flag), ..self }
+    }
+
+    /// Where a text has one lab, and no workflow or several: puts one that does nothing behind it, and names it. What offers a lab, or
+    /// stands in for what is in it, asks for no workflow.
+    pub fn idle(&mut self) -> Option<String> {
+        let text = std::str::from_utf8(&self.bytes).ok()?;
+        let (file, _) = matterix_lang::syntax::parse(Sources::default().add(&self.name, text), text);
+        let workflows = file.items.iter().filter(|item| matches!(item.kind, ItemKind::Workflow { .. })).count();
+        let mut labs = file.items.iter().filter_map(|item| match &item.kind {
+            ItemKind::Lab { name, .. } => Some(name.text.as_str()),
+            _ => None,
+        });
+        let (Some(lab), None) = (labs.next().filter(|_| workflows != 1), labs.next()) else { return None };
+        let added = format!("\nworkflow {IDLE} in {lab} {{ wait 0 s }}\n");
+        self.bytes.extend_from_slice(added.as_bytes());
+        Some(IDLE.to_owned())
     }
 
     /// The text as the first file of a compilation; an error where it is not text.

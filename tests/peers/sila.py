@@ -80,7 +80,6 @@ skill count(n: Int) -> Int
 {
     return 2 * n
 }
-workflow idle in bench { wait 1 s }
 """
 
 # A device of the library behind the same server.
@@ -144,7 +143,7 @@ def schema():
 
 def served():
     text = LAB.replace("    beaker =", "    turner = Turning at (1, 0, 0) m\n    beaker =").replace(
-        "workflow idle", "asset Turning: Turner { limit: 5 Hz }\nworkflow idle"
+        "skill count", "asset Turning: Turner { limit: 5 Hz }\nskill count"
     )
     process, host, port = start(os.path.join(FOLDER, "served"), text)
     try:

@@ -242,6 +242,8 @@ pub struct Alternative {
     pub expects: Pattern,
     /// The least and the most that its instrument can show, SI, where its line says so.
     pub shows: Option<[f64; 2]>,
+    /// An emulator answers so while this is not 0.
+    pub condition: Option<NodeId>,
 }
 
 /// A reply that means a failure.

@@ -159,6 +159,44 @@ fn a_plate_that_was_set_twice_goes_on_from_the_second() {
     }
 }
 
+#[test]
+fn a_loop_that_was_killed_makes_the_rest_of_its_turns() {
+    let text = "mtx 1
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+lab bench { ambient: 22 degC; plate = IkaRetControl at (0,0,0) m; cup = Beaker250mL on plate holding 100 g of water }
+workflow w(target: Temperature = 40 degC) in bench {
+ heat plate to target
+ repeat 20 times { wait 1 s
+ note \"turn\" }
+} finally { stop heating plate
+ note \"finally was done\" }
+study s of w { vary target in 30 degC .. 60 degC
+ runs 400
+ report a = plate.temperature }
+";
+    let dir = bench("turns", text, "plate", "");
+    let emulated = Emulated::at(SLOW, &dir, &["plate", "--file", "lab.mtx"]);
+    write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+    let mut process = deployed(&dir);
+    until(&dir, "START_1", 1);
+    std::thread::sleep(Duration::from_millis(1500));
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    assert_eq!(ended.err.matches("finally was done").count(), 1, "{}", ended.err);
+    let journal = journal(&dir);
+    assert_eq!(journal.matches("\"bytes\":\"START_1").count(), 1, "{journal}");
+    let began = |label: &str| {
+        let line = lines(&journal).lines().filter_map(|l| serde_json::from_str::<serde_json::Value>(l).ok());
+        let mut line = line.filter(|l| l["event"] == "starting" && l["label"] == label);
+        line.next().and_then(|l| l["t"].as_f64()).unwrap_or_else(|| panic!("no `{label}`: {journal}"))
+    };
+    let lasted = began("stop heating plate") - began("heat plate to target");
+    assert!((20.0 - 1e-6..25.0).contains(&lasted), "{lasted}");
+}
+
 /// The plate of a lab, whose watchdog waits so long.
 fn patient(patience: &str) -> String {
     let text = text().replace("IkaRetControl at", &format!("IkaRetControl {{ patience: {patience} }} at"));

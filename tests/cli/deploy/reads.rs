@@ -1,9 +1,12 @@
 //! Readings that get lost, come late or make no sense are asked for again; commands never are.
 
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpStream;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::faulty::plate;
-use super::{Answer, Device, HEAT, bench, deploy};
+use super::{Answer, Device, Emulated, HEAT, bench, deploy};
+use crate::harness::{folder, write};
 
 /// A plate that gets warm with its sixth temperature, and answers its third like this.
 fn third(name: &str, answer: fn() -> Answer) -> (crate::harness::Ended, Vec<String>, String) {
@@ -115,6 +118,72 @@ fn a_balance_tells_its_weight_in_the_unit_that_it_is_set_to() {
         let dir = bench(&format!("reads_unit_{name}"), WEIGH, "scale", &device.address);
         let ended = deploy(&dir, &["--mode", "real"]);
         assert!(ended.code == 0 && ended.err.contains("1.250"), "{name}: {}", ended.err);
+    }
+}
+
+#[test]
+fn an_emulated_balance_tells_its_weight_in_the_unit_that_it_is_set_to() {
+    let text = "mtx 1
+use std::balances::PrecisionBalance
+use std::glassware::Beaker50mL
+lab bench {
+    ambient: 22 degC
+    scale = PrecisionBalance { shows_in: UNIT } at (0, 0, 0) m
+    beaker = Beaker50mL on scale holding 20 mL of water
+}
+workflow weigh_it in bench {
+    let m = scale.net
+    expect m in 40 g .. 60 g
+    tare scale
+    wait 2 s
+    expect scale.net in -0.1 g .. 0.1 g
+}
+";
+    for (unit, symbol, digits) in [("grams", "g", 2), ("milligrams", "mg", 0), ("kilograms", "kg", 5)] {
+        let dir = bench(&format!("reads_shown_{unit}"), &text.replace("UNIT", unit), "scale", "");
+        let emulated = Emulated::start(&dir, &["scale", "--file", "lab.mtx"]);
+        write(&dir, "lab.toml", format!("[scale]\naddress = \"{}\"\n", emulated.address));
+        // A balance may be set to another unit than the one that the text supposes.
+        write(&dir, "lab.mtx", text.replace("UNIT", "grams"));
+        let ended = deploy(&dir, &["--mode", "real", "--trace"]);
+        assert_eq!(ended.code, 0, "{unit}: {}", ended.err);
+        let answers = ended.out.lines().filter_map(|l| l.split("scale -> S S ").nth(1));
+        let answers: Vec<&str> = answers.map(|l| l.trim_end_matches("\\r\\n").trim()).collect();
+        assert!(!answers.is_empty(), "{unit}: {}", ended.out);
+        for answer in answers {
+            let (number, of) = answer.split_once(' ').expect("a unit");
+            let shown = number.split_once('.').map_or(0, |(_, digits)| digits.len());
+            assert!(of == symbol && shown == digits, "{unit}: {answer}");
+        }
+    }
+}
+
+#[test]
+fn an_emulated_balance_answers_what_drivers_of_others_ask() {
+    let dir = folder("deploy_reads_asked");
+    let emulated = Emulated::start(&dir, &["PrecisionBalance"]);
+    let line = TcpStream::connect(&emulated.address).expect("it answers");
+    let mut answers = BufReader::new(line.try_clone().expect("a stream"));
+    let asked = [
+        ("@", "I4 A "),
+        ("I0", "I0 A 1 \"S\""),
+        ("I1", "I1 A \"01\""),
+        ("I2", "I2 A "),
+        ("I3", "I3 A "),
+        ("I4", "I4 A "),
+        ("S", "S S "),
+        ("SI", "S D "),
+        ("Z", "Z A"),
+        ("ZI", "ZI S"),
+        ("T", "T S 0.00 g"),
+        ("TI", "TI S 0.00 g"),
+        ("BLAH", "E"),
+    ];
+    for (question, begin) in asked {
+        (&line).write_all(format!("{question}\r\n").as_bytes()).expect("said");
+        let mut answer = String::new();
+        answers.read_line(&mut answer).expect("answered");
+        assert!(answer.starts_with(begin) && answer.ends_with("\r\n"), "{question}: {answer:?}");
     }
 }
 

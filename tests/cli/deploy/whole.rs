@@ -1,5 +1,7 @@
 //! Whole workflows on emulators.
 
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
 use std::process::Stdio;
 use std::time::Duration;
 
@@ -64,6 +66,59 @@ fn a_plunger_goes_where_the_volume_says_in_both_protocols() {
             assert!(ended.out.contains(step), "{driver} {step}: {}", ended.out);
         }
     }
+}
+
+#[test]
+fn an_emulator_says_why_it_refuses_what_it_understands() {
+    let dir = folder("deploy_refused");
+    // There is less in the flask than is drawn.
+    let lab = &DOSE[..DOSE.find("workflow").expect("one")];
+    write(&dir, "lab.mtx", lab.replace("20 mL of water", "0.5 mL of water"));
+    let mut emulated = command();
+    emulated.current_dir(&dir).args(["emulate", "pump", "--file", "lab.mtx", "--driver", "CavroDt", "--tcp", "0"]);
+    let mut emulated =
+        emulated.args(["--speed", "40"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("starts");
+    let mut address = String::new();
+    BufReader::new(emulated.stdout.take().expect("piped")).read_line(&mut address).expect("an address");
+    let mut line = TcpStream::connect(address.trim()).expect("it answers");
+    for (said, wanted) in
+        [("/1ZR", "/0`"), ("/1QR", "/0`"), ("/1I1A1274R", "/0b"), ("/1I1A1274R", "/0b"), ("/1I1A60R", "/0@")]
+    {
+        line.write_all(format!("{said}\r").as_bytes()).expect("said");
+        let mut answer = vec![0; wanted.len() + 3];
+        line.read_exact(&mut answer).expect("answered");
+        assert!(answer.starts_with(wanted.as_bytes()), "{said}: {}", String::from_utf8_lossy(&answer));
+    }
+    emulated.kill().expect("it can be killed");
+    let mut why = String::new();
+    emulated.stderr.take().expect("piped").read_to_string(&mut why).expect("text");
+    emulated.wait().expect("it ends");
+    assert_eq!(why.lines().count(), 1, "{why}");
+    assert!(why.contains("`A1274`, `draw`, is refused, volume underflow: there is less in it than that"), "{why}");
+}
+
+#[test]
+fn what_stands_in_for_a_device_needs_no_workflow() {
+    let dir = folder("deploy_no_workflow");
+    let at = HEAT.find("workflow").expect("one");
+    write(&dir, "lab.mtx", HEAT);
+    write(&dir, "none.mtx", &HEAT[..at]);
+    write(&dir, "two.mtx", format!("{HEAT}{}", HEAT[at..].replace("warm", "again")));
+    for file in ["none.mtx", "two.mtx"] {
+        let emulated = Emulated::start(&dir, &["plate", "--file", file]);
+        write(&dir, "lab.toml", format!("[plate]\naddress = \"{}\"\n", emulated.address));
+        let _ = std::fs::remove_file(dir.join("journal"));
+        let ended = deploy(&dir, &["--mode", "real"]);
+        assert_eq!(ended.code, 0, "{file}: {}", ended.err);
+    }
+    // Which lab is meant is not said.
+    write(
+        &dir,
+        "labs.mtx",
+        format!("{}{}", &HEAT[..at], HEAT[HEAT.find("lab bench").expect("a lab")..at].replace("bench", "other")),
+    );
+    let ended = matterixc_in(&dir, &["emulate", "plate", "--file", "labs.mtx", "--tcp", "0"]);
+    assert!(ended.code == 1 && ended.err.contains("no workflow"), "{}", ended.err);
 }
 
 #[test]

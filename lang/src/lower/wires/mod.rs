@@ -357,7 +357,10 @@ fn add_told(driver: &mut Driver, told: wire::Told) {
     let same =
         driver.told.iter_mut().find(|t| t.heard.is_none() && t.name == told.name && t.asks.pieces == told.asks.pieces);
     match same {
-        Some(first) => first.also.push(wire::Alternative { expects: told.expects, shows: told.shows }),
+        Some(first) => {
+            let wire::Told { expects, shows, condition, .. } = told;
+            first.also.push(wire::Alternative { expects, shows, condition });
+        }
         None => driver.told.push(told),
     }
 }

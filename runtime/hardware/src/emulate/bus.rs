@@ -13,12 +13,21 @@ pub struct Emulator<'m> {
     units: Vec<Unit<'m>>,
     /// What devices have said by themselves.
     spoken: Vec<u8>,
+    /// Is told why commands are refused, and what it was told last.
+    heeds: Box<dyn FnMut(&str) + 'm>,
+    last: String,
 }
 
 impl<'m> Emulator<'m> {
     /// The device of the first of these drivers in a lab that has been started; the others speak over its line.
     pub fn new(sim: Sim<'m>, drivers: Vec<&'m Driver>, address: Option<&str>) -> Result<Self, String> {
-        Ok(Emulator { sim, units: vec![Unit::new(drivers, address)?], spoken: Vec::new() })
+        let (units, heeds) = (vec![Unit::new(drivers, address)?], Box::new(|_: &str| {}));
+        Ok(Emulator { sim, units, spoken: Vec::new(), heeds, last: String::new() })
+    }
+
+    /// Tells why a command is refused that a device understands, once for one that is said again and again.
+    pub fn heeded(&mut self, heeds: impl FnMut(&str) + 'm) {
+        self.heeds = Box::new(heeds);
     }
 
     /// Puts another device at the line.
@@ -74,6 +83,12 @@ impl<'m> Emulator<'m> {
         let mut out = Vec::new();
         for unit in &mut self.units {
             out.extend(unit.with(&mut self.sim).receive(bytes)?);
+            for why in unit.refused() {
+                if why != self.last {
+                    (self.heeds)(&why);
+                    self.last = why;
+                }
+            }
         }
         Ok(out)
     }

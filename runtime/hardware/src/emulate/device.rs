@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::plan::Operation;
+use matterix_ir::plan::{Condition, Operation};
 use matterix_ir::wire::{Driver, Exchange, Pattern, Served, Slot, Template, Told};
 use matterix_ir::{Span, codes};
 use matterix_runtime::backend::{Backend, Sim, Status, Ticket};
@@ -36,6 +36,8 @@ pub(super) struct Unit<'m> {
     input: Vec<u8>,
     /// When it says next what it says by itself, in the order of its lines, s.
     due: Vec<(&'m Told, f64)>,
+    /// Why commands were refused that the device understands, for people.
+    refused: Vec<String>,
 }
 
 impl<'m> Unit<'m> {
@@ -45,18 +47,24 @@ impl<'m> Unit<'m> {
         let codec = Codec::new(&first.framing, address.or(first.address.as_deref()))?;
         let told = drivers.iter().flat_map(|d| &d.told).filter_map(|t| t.heard.map(|every| (t, every)));
         let (due, running, heard) = (told.collect(), Vec::new(), BTreeMap::new());
-        Ok(Unit { drivers, codec, running, heard, said: None, last: Vec::new(), input: Vec::new(), due })
+        let (last, input, refused) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Unit { drivers, codec, running, heard, said: None, last, input, due, refused })
     }
 
     /// The device with what stands behind it.
     pub(super) fn with<'e>(&'e mut self, sim: &'e mut Sim<'m>) -> Device<'e, 'm> {
-        let Unit { drivers, codec, running, heard, said, last, input, due } = self;
-        Device { sim, drivers, codec, running, heard, said, last, input, due }
+        let Unit { drivers, codec, running, heard, said, last, input, due, refused } = self;
+        Device { sim, drivers, codec, running, heard, said, last, input, due, refused }
     }
 
     /// Changes to the line of another master, and takes what has come in over that of a request that is not whole.
     pub(super) fn change_line(&mut self, input: &mut Vec<u8>) {
         std::mem::swap(&mut self.input, input);
+    }
+
+    /// Why commands were refused since that was last asked for.
+    pub(super) fn refused(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.refused)
     }
 
     /// What it does.
@@ -81,6 +89,7 @@ pub(super) struct Device<'e, 'm> {
     last: &'e mut Vec<u8>,
     input: &'e mut Vec<u8>,
     due: &'e mut Vec<(&'m Told, f64)>,
+    refused: &'e mut Vec<String>,
 }
 
 impl<'m> Device<'_, 'm> {
@@ -225,15 +234,23 @@ impl<'m> Device<'_, 'm> {
 
     fn tells(&mut self, told: &'m Told) -> Result<String, Fault> {
         let value = self.sim.value(told.value, &mut ())?.unwrap_or(0.0);
-        let digits = self.digits(told);
-        let text = self.codec.rendered(&told.expects, |_| Shown { value, digits });
+        let form = self.form(told);
+        let digits = self.digits(told, form);
+        let text = self.codec.rendered(form, |_| Shown { value, digits });
         text.map_err(|why| untold(told.span, self.sim.now(), why))
     }
 
+    /// The form that it answers in: the last one whose condition holds, or else the first.
+    fn form(&mut self, told: &'m Told) -> &'m Pattern {
+        let engine = self.sim.engine();
+        let holds = told.also.iter().rfind(|form| form.condition.is_some_and(|c| engine.eval(c) != 0.0));
+        holds.map_or(&told.expects, |form| &form.expects)
+    }
+
     /// Digits after the point of what a reading shows, in the unit it is told in.
-    fn digits(&mut self, told: &Told) -> Option<u8> {
+    fn digits(&mut self, told: &Told, form: &Pattern) -> Option<u8> {
         let reading = self.sim.engine().model().readings.get(told.reading? as usize)?;
-        let unit = told.expects.slots.iter().find_map(|s| match s {
+        let unit = form.slots.iter().find_map(|s| match s {
             Slot::Number(unit, _) => Some(unit),
             _ => None,
         })?;
@@ -276,15 +293,17 @@ impl<'m> Device<'_, 'm> {
             let Some(expects) = &part.exchange.expects else { return Ok(Some(None)) };
             return Ok(Some(Some(Reply::of(self.echo(expects.of(place), &found)?))));
         }
-        let mut why = (NOT_UNDERSTOOD, format!("nothing here is meant by `{}`", cut(word)));
+        let mut unmet: Option<(&Served, usize)> = None;
         for (served, all) in complete {
             if !solve(served, &all, self.sim.engine()) {
                 continue;
             }
-            let needs = served.operation.needs.iter().find(|n| self.sim.engine().eval(n.node) == 0.0);
-            if let Some(need) = needs {
-                let failure = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
-                why = (failure, format!("`{}` does not hold", need.text));
+            let needs = &served.operation.needs;
+            if let Some(at) = needs.iter().position(|n| self.sim.engine().eval(n.node) == 0.0) {
+                // Of commands that are said alike, that is meant which is farthest from being nonsense.
+                if unmet.is_none_or(|(_, before)| at >= before) {
+                    unmet = Some((served, at));
+                }
                 continue;
             }
             if served.exchange.until.is_some() && !self.running.is_empty() {
@@ -292,7 +311,12 @@ impl<'m> Device<'_, 'm> {
             }
             return self.begin(served, &all, word).map(Some);
         }
-        Ok(Some(self.refuse(why.0, &why.1)))
+        let Some((served, need)) = unmet.and_then(|(s, at)| Some((s, s.operation.needs.get(at)?))) else {
+            return Ok(Some(self.refuse(NOT_UNDERSTOOD, &format!("nothing here is meant by `{}`", cut(word)))));
+        };
+        self.refused.push(refusal(word, &served.operation.verb, need));
+        let failure = need.refusal.as_ref().map_or(NOT_UNDERSTOOD, |r| r.failure.as_str());
+        Ok(Some(self.refuse(failure, &format!("`{}` does not hold", need.text))))
     }
 
     fn begin(&mut self, served: &'m Served, found: &[Found], word: &str) -> Result<Option<Reply>, Fault> {
@@ -320,9 +344,10 @@ impl<'m> Device<'_, 'm> {
             let told = self.drivers.iter().flat_map(|d| &d.told).find(|t| t.expects.slots.contains(slot));
             let shown = match (found.first(), told) {
                 (Some(sent), _) if matches!(slot, Slot::Number(..)) => Shown { value: sent.value, digits: None },
-                (_, Some(told)) => {
-                    Shown { value: self.sim.value(told.value, &mut ())?.unwrap_or(0.0), digits: self.digits(told) }
-                }
+                (_, Some(told)) => Shown {
+                    value: self.sim.value(told.value, &mut ())?.unwrap_or(0.0),
+                    digits: self.digits(told, &told.expects),
+                },
                 (_, None) => Shown::default(),
             };
             values.push((slot, shown));
@@ -346,6 +371,13 @@ impl<'m> Device<'_, 'm> {
 /// The beginning of a message, for people.
 fn cut(word: &str) -> &str {
     word.char_indices().nth(SHOWN).map_or(word, |(at, _)| &word[..at])
+}
+
+/// Why a command is refused whose need does not hold, for people: many a device says no more than a number.
+fn refusal(word: &str, verb: &str, need: &Condition) -> String {
+    let help = need.refusal.as_ref().and_then(|r| r.help.as_ref()).map_or(String::new(), |help| format!(": {help}"));
+    let failure = need.failure().replace('_', " ");
+    format!("`{}`, `{verb}`, is refused, {failure}{help} (`{}` does not hold)", cut(word), need.text)
 }
 
 /// What is said apart from commands, and whether it breaks off what the device does.
