@@ -8,7 +8,8 @@
 //! - `analysis`, `mode`: which part of the graph that is, and how it is taken apart.
 //! - `part`, `lookout`: states that move together; what no single part decides.
 //! - `switch`: the comparisons, and where they change.
-//! - `integrator`, `linear`, `dense`, `clock`: steps, their linear systems, the solution between them, and the time that they count.
+//! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
+//! - `equations`, `slopes`, `shifted`, `linear`, `sparse`: the linear systems of steps.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
@@ -18,6 +19,7 @@ mod advance;
 mod analysis;
 mod clock;
 mod dense;
+mod equations;
 mod instant;
 mod integrator;
 mod limits;
@@ -26,6 +28,9 @@ mod lookout;
 mod memo;
 mod mode;
 mod part;
+mod shifted;
+mod slopes;
+mod sparse;
 mod suspicion;
 mod switch;
 mod tangent;
