@@ -7,6 +7,9 @@ use std::time::Instant;
 use matterix_ir::model::Model;
 use matterix_runtime::process::{Engine, Observer, Options};
 
+/// Runs are repeated for so long, s.
+const SPAN: f64 = 1.0;
+
 /// Counts samples: the steps of all parts.
 #[derive(Default)]
 struct Steps(usize);
@@ -31,6 +34,21 @@ fn follow(model: &Model, until: f64) -> (usize, f64) {
     (steps.0, engine.states().iter().sum())
 }
 
+/// The least time of several runs, s, and what they come to.
+#[expect(clippy::disallowed_methods, reason = "to measure is what a benchmark is for")]
+fn least(model: &Model, until: f64) -> (f64, usize, f64) {
+    let begin = Instant::now();
+    let mut least = f64::INFINITY;
+    loop {
+        let start = Instant::now();
+        let (steps, sum) = follow(model, until);
+        least = least.min(start.elapsed().as_secs_f64());
+        if begin.elapsed().as_secs_f64() > SPAN {
+            return (least, steps, sum);
+        }
+    }
+}
+
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with("--")).collect();
     let sizes: Vec<usize> = words.iter().filter_map(|w| w.parse().ok()).collect();
@@ -39,9 +57,8 @@ fn main() {
     for (name, build, until) in patterns::ALL.into_iter().filter(|p| wanted(p.0)) {
         for &size in &sizes {
             let model = build(size);
-            let start = Instant::now();
-            let (steps, sum) = follow(&model, until);
-            println!("{name} {size}: {:.4} s, {steps} samples, sum {sum:.9e}", start.elapsed().as_secs_f64());
+            let (time, steps, sum) = least(&model, until);
+            println!("{name} {size}: {time:.4} s, {steps} samples, sum {sum:.9e}");
         }
     }
 }

@@ -3,8 +3,11 @@
 use matterix_ir::model::{Action, Derivative, Domain, Event, Model, State};
 use matterix_ir::{BinaryOp, NodeId, Op, Span, Unit};
 
-/// What is followed: a name, a model of so many states, and until when, s.
-pub const ALL: [(&str, fn(usize) -> Model, f64); 7] = [
+/// What is followed: its name, the model of so many states, and until when, s.
+pub type Case = (&'static str, fn(usize) -> Model, f64);
+
+/// All of them.
+pub const ALL: [Case; 7] = [
     ("chain", |n| conduction(n, &line(n), BEND), 1000.0),
     ("star", |n| conduction(n, &star(n), BEND), 1000.0),
     ("random", |n| conduction(n, &scattered(n), BEND), 1000.0),

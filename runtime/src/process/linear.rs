@@ -15,8 +15,10 @@ use super::shifted::Shifted;
 use super::slopes::Pattern;
 use super::sparse::SparseLu;
 
-/// Up to so many states the matrix is filled up.
-pub(super) const DENSE: usize = 24;
+/// Up to so many states the matrix is filled up. The whole integration with full and with sparse factors took, in ms, on a chain of
+/// heat conduction 0.7 : 1.1 with 10 states, 1.1 : 1.0 with 14, 3.3 : 2.3 with 50, 120 : 19 with 200; on a star 0.7 : 0.6, 1.1 : 0.8,
+/// 3.3 : 2.1, 130 : 14; on a reaction network 1.4 : 1.5, 2.1 : 1.7, 25 : 11, 490 : 180.
+pub(super) const DENSE: usize = 12;
 
 /// The matrix of a law and its factors. What depends on its pattern alone is kept from one solver to the next.
 pub(super) struct Factors {
@@ -34,14 +36,14 @@ pub(super) struct Factors {
 }
 
 enum Lu {
-    Sparse(SparseLu),
+    Sparse(Box<SparseLu>),
     Dense(Option<LU<f64, Dyn, Dyn>>),
 }
 
 impl Factors {
     pub(super) fn new(pattern: &Pattern) -> Self {
         let size = pattern.size();
-        let lu = if pattern.states > DENSE { Lu::Sparse(SparseLu::new(pattern)) } else { Lu::Dense(None) };
+        let lu = if pattern.states > DENSE { Lu::Sparse(Box::new(SparseLu::new(pattern))) } else { Lu::Dense(None) };
         let entries = vec![0.0; pattern.columns.len()];
         let work = std::array::from_fn(|_| vec![0.0; size]);
         let (weights, allowed) = (vec![1.0; size], vec![0.0; size]);
@@ -49,9 +51,9 @@ impl Factors {
     }
 
     /// For states that may be off by `allowed`.
-    pub(super) fn allow(&mut self, allowed: impl Iterator<Item = f64>) {
-        for (place, allowed) in allowed.enumerate() {
-            (self.allowed[place], self.weights[place]) = (allowed, weight(allowed));
+    pub(super) fn allow(&mut self, allowed: &[f64]) {
+        for (place, allowed) in allowed.iter().enumerate() {
+            (self.allowed[place], self.weights[place]) = (*allowed, weight(*allowed));
         }
     }
 

@@ -9,6 +9,7 @@
 //! - `part`, `lookout`: states that move together; what no single part decides.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
+//! - `exact`: steps of parts that need no integration.
 //! - `equations`, `slopes`, `shifted`, `linear`, `sparse`: the linear systems of steps.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
@@ -20,6 +21,7 @@ mod analysis;
 mod clock;
 mod dense;
 mod equations;
+mod exact;
 mod instant;
 mod integrator;
 mod limits;
