@@ -17,6 +17,9 @@ const DIAGONAL: f64 = 0.1;
 /// Old pivots are kept for as long as none is smaller than this part of the largest of its column.
 const KEPT: f64 = 0.01;
 
+/// So many nested columns are subtracted at a time.
+const PANEL: usize = 4;
+
 /// A row that is no pivot yet.
 const OPEN: u32 = u32::MAX;
 
@@ -48,6 +51,64 @@ impl Triangle {
     fn close(&mut self) {
         self.starts.push(self.rows.len() as u32);
     }
+
+    /// Numbers rows anew and sorts them.
+    fn renumber(&mut self, number: impl Fn(u32) -> u32) {
+        for k in 0..self.starts.len() - 1 {
+            let range = self.column(k);
+            let entries = self.rows[range.clone()].iter().zip(&self.values[range.clone()]);
+            let mut entries: Vec<(u32, f64)> = entries.map(|(row, value)| (number(*row), *value)).collect();
+            entries.sort_unstable_by_key(|e| e.0);
+            for (place, (row, value)) in range.zip(entries) {
+                (self.rows[place], self.values[place]) = (row, value);
+            }
+        }
+    }
+
+    /// By column, the last of those that are nested in each other from it on: each has the next as its first row, and its rows.
+    fn nests(&self) -> Vec<u32> {
+        let size = self.starts.len() - 1;
+        let mut ends: Vec<u32> = (0..size as u32).collect();
+        for k in (0..size.saturating_sub(1)).rev() {
+            let (own, next) = (&self.rows[self.column(k)], &self.rows[self.column(k + 1)]);
+            if own.first() == Some(&(k as u32 + 1)) && own[1..] == *next {
+                ends[k] = ends[k + 1];
+            }
+        }
+        ends
+    }
+
+    /// Subtracts multiples of nested columns from `first` on, by what stands in `work` in their rows, which goes to `factors`.
+    fn subtract(&self, first: usize, work: &mut [f64], factors: &mut [f64]) {
+        for (panel, factors) in factors.chunks_mut(PANEL).enumerate() {
+            let begin = first + panel * PANEL;
+            let rows = &self.rows[self.column(begin + factors.len() - 1)];
+            let mut columns: [&[f64]; PANEL] = [&[]; PANEL];
+            for (k, factor) in factors.iter_mut().enumerate() {
+                *factor = std::mem::take(&mut work[begin + k]);
+                let column = &self.values[self.column(begin + k)];
+                let (above, below) = column.split_at(column.len() - rows.len());
+                work[begin + k + 1..].iter_mut().zip(above).for_each(|(value, part)| *value -= part * *factor);
+                columns[k] = below;
+            }
+            if factors.iter().all(|factor| *factor == 0.0) {
+                continue;
+            }
+            match (factors, rows) {
+                (&mut [a, b, c, d], &[low, .., high]) if (high - low) as usize + 1 == rows.len() => {
+                    let [x, y, z, w] = columns;
+                    let sums =
+                        x.iter().zip(y).zip(z.iter().zip(w)).map(|((x, y), (z, w))| (a * x + b * y) + (c * z + d * w));
+                    work[low as usize..].iter_mut().zip(sums).for_each(|(value, sum)| *value -= sum);
+                }
+                (factors, rows) => {
+                    for (factor, column) in factors.iter().zip(columns) {
+                        rows.iter().zip(column).for_each(|(row, part)| work[*row as usize] -= part * factor);
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// A matrix is singular.
@@ -61,6 +122,8 @@ pub(super) struct SparseLu {
     starts: Vec<u32>,
     rows: Vec<u32>,
     entries: Vec<u32>,
+    /// By place of `rows`, the step whose pivot that row has.
+    targets: Vec<u32>,
     /// The columns in the order in which they are taken.
     order: Vec<u32>,
     /// By step, the row of its pivot; empty before the first factorisation.
@@ -68,10 +131,12 @@ pub(super) struct SparseLu {
     /// By row, the step whose pivot it has.
     steps: Vec<u32>,
     diagonal: Vec<f64>,
-    /// Below the diagonal, rows of the matrix.
+    /// Below the diagonal, by steps.
     lower: Triangle,
-    /// Above it, steps, each after those that it needs.
+    /// Above it.
     upper: Triangle,
+    /// Which columns of the lower one are nested.
+    nests: Vec<u32>,
     work: Vec<f64>,
 }
 
@@ -94,7 +159,8 @@ impl SparseLu {
         let (pivots, steps) = (Vec::new(), vec![OPEN; size]);
         let (diagonal, work) = (vec![0.0; size], vec![0.0; size]);
         let (lower, upper) = (Triangle::default(), Triangle::default());
-        SparseLu { starts, rows, entries, order, pivots, steps, diagonal, lower, upper, work }
+        let (targets, nests) = (Vec::new(), Vec::new());
+        SparseLu { starts, rows, entries, targets, order, pivots, steps, diagonal, lower, upper, nests, work }
     }
 
     /// Entries of both factors.
@@ -108,11 +174,23 @@ impl SparseLu {
         if self.pivots.len() == self.order.len() && self.repeat(values) {
             return Ok(());
         }
-        let done = self.begin(values);
-        if done.is_err() {
-            self.pivots.clear();
+        match self.begin(values) {
+            Ok(()) => self.settle(),
+            Err(singular) => {
+                self.pivots.clear();
+                return Err(singular);
+            }
         }
-        done
+        Ok(())
+    }
+
+    /// Numbers rows by their steps, once all have one.
+    fn settle(&mut self) {
+        let steps = &self.steps;
+        self.lower.renumber(|row| steps[row as usize]);
+        self.upper.renumber(|step| step);
+        self.targets = self.rows.iter().map(|row| steps[*row as usize]).collect();
+        self.nests = self.lower.nests();
     }
 
     fn scatter(&mut self, column: usize, values: &[f64]) {
@@ -130,22 +208,25 @@ impl SparseLu {
 
     /// The same operations as before; whether the pivots are still good.
     fn repeat(&mut self, values: &[f64]) -> bool {
+        let SparseLu { lower, upper, work, .. } = self;
         for k in 0..self.order.len() {
-            self.scatter(self.order[k] as usize, values);
-            for e in self.upper.column(k) {
-                let step = self.upper.rows[e] as usize;
-                let factor = std::mem::take(&mut self.work[self.pivots[step] as usize]);
-                self.upper.values[e] = factor;
-                if factor != 0.0 {
-                    self.reduce(step, factor);
-                }
+            let column = self.order[k] as usize;
+            for place in self.starts[column] as usize..self.starts[column + 1] as usize {
+                work[self.targets[place] as usize] = values[self.entries[place] as usize];
             }
-            let pivot = std::mem::take(&mut self.work[self.pivots[k] as usize]);
+            let mut range = upper.column(k);
+            while let Some(&first) = upper.rows[range.clone()].first() {
+                let nested = upper.rows[range.clone()].iter().zip(first..=self.nests[first as usize]);
+                let count = nested.take_while(|(step, nested)| *step == nested).count();
+                lower.subtract(first as usize, work, &mut upper.values[range.start..range.start + count]);
+                range.start += count;
+            }
+            let pivot = std::mem::take(&mut work[k]);
             let mut most = 0.0_f64;
-            for e in self.lower.column(k) {
-                let value = std::mem::take(&mut self.work[self.lower.rows[e] as usize]);
+            for e in lower.column(k) {
+                let value = std::mem::take(&mut work[lower.rows[e] as usize]);
                 most = most.max(value.abs());
-                self.lower.values[e] = value / pivot;
+                lower.values[e] = value / pivot;
             }
             self.diagonal[k] = pivot;
             if !(pivot.is_normal() && pivot.abs() >= KEPT * most) {
@@ -213,12 +294,12 @@ impl SparseLu {
 
     /// Solves for `values`, which become the solution; `work` is as long.
     pub(super) fn solve(&self, values: &mut [f64], work: &mut [f64]) {
+        work.iter_mut().zip(&self.pivots).for_each(|(value, row)| *value = values[*row as usize]);
         for k in 0..self.pivots.len() {
-            let factor = values[self.pivots[k] as usize];
-            work[k] = factor;
+            let factor = work[k];
             if factor != 0.0 {
                 for e in self.lower.column(k) {
-                    values[self.lower.rows[e] as usize] -= self.lower.values[e] * factor;
+                    work[self.lower.rows[e] as usize] -= self.lower.values[e] * factor;
                 }
             }
         }
