@@ -6,7 +6,7 @@ use super::clock::Clock;
 const DEGREE: usize = 5;
 
 /// Where the polynomial is sampled, as fractions of the interval: Chebyshev points with both ends, `(1 - cos(k pi / 5)) / 2`.
-const POINTS: [f64; DEGREE + 1] =
+pub(super) const POINTS: [f64; DEGREE + 1] =
     [0.0, 0.095_491_502_812_526_27, 0.345_491_502_812_526_3, 0.654_508_497_187_473_7, 0.904_508_497_187_473_7, 1.0];
 
 /// Barycentric weights of [`POINTS`].
@@ -52,6 +52,13 @@ impl Dense {
             sample(self.time(k), &mut self.values[k])?;
         }
         Ok(())
+    }
+
+    /// Moves on by `length`, s, through the states that are given at the inner points and at the end.
+    pub(super) fn follow(&mut self, length: f64, states: &[Vec<f64>]) {
+        self.values.swap(0, DEGREE);
+        (self.start, self.end) = (self.end, self.end + length);
+        self.values[1..].iter_mut().zip(states).for_each(|(value, state)| value.copy_from_slice(state));
     }
 
     /// The moving states at the end.

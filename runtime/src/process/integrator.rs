@@ -6,20 +6,22 @@
 //! looks. Events are located on the same polynomial by [`super::switch`], because the library reports one root at a time and
 //! without its direction.
 //!
-//! The matrices are nalgebra's, factorised on one thread. The library's other backend, faer, pivots fully; on a chain of
-//! heat conduction a step took, in microseconds, nalgebra against faer: 4 states 1 : 2, 32 states 3 : 25, 100 states 20 : 470,
-//! 300 states 370 : 11000.
+//! What is linear with constant coefficients is not integrated at all ([`Exact`]), until its rates are too far apart.
 
 use std::cell::RefCell;
 
 use diffsol::{
-    Bdf, BdfState, DiffsolError, NalgebraMat, NalgebraVec, OdeBuilder, OdeSolverMethod, OdeSolverState, Vector,
+    Bdf, BdfState, DiffsolError, NalgebraContext, NalgebraVec, OdeBuilder, OdeSolverMethod, OdeSolverState, Vector,
     VectorView,
 };
 
 use super::clock::Clock;
 use super::dense::Dense;
-use super::linear::WeighedLu;
+use super::equations::Equations;
+use super::exact::Exact;
+use super::linear::{DENSE, Factors, WeighedLu};
+use super::shifted::Shifted;
+use super::slopes::Slopes;
 use super::tangent;
 use super::tape::Tape;
 use super::timed::{Busy, Timed};
@@ -60,11 +62,13 @@ const RUN: usize = 12;
 /// Steps that are taken at one go at most.
 const LONGEST_RUN: usize = 96;
 
-/// The right-hand side and its directional derivative, with their scratch memory.
-struct Field {
+/// The right-hand side and its derivative, with their scratch memory.
+pub(super) struct Field {
     rates: Tape,
     /// What of them follows the clock alone.
     timed: Option<Timed>,
+    slopes: Slopes,
+    factors: RefCell<Factors>,
     clock: Clock,
     work: RefCell<Work>,
 }
@@ -72,6 +76,7 @@ struct Field {
 struct Work {
     registers: Vec<f64>,
     tangents: Vec<f64>,
+    slopes: Vec<f64>,
     /// Where the registers were last computed.
     time: f64,
     moving: Vec<f64>,
@@ -81,9 +86,12 @@ impl Field {
     fn new(rates: Tape, clock: Clock) -> Self {
         let registers = rates.registers();
         let moving = vec![0.0; rates.inputs];
-        let work = RefCell::new(Work { tangents: registers.clone(), registers, time: f64::NAN, moving });
+        let slopes = Slopes::new(&rates, rates.inputs > DENSE);
+        let (tangents, memory) = (registers.clone(), slopes.memory());
+        let work = RefCell::new(Work { tangents, registers, slopes: memory, time: f64::NAN, moving });
         let timed = Timed::of(&rates);
-        Field { work, rates, timed, clock }
+        let factors = RefCell::new(Factors::new(&slopes.pattern));
+        Field { work, rates, timed, slopes, factors, clock }
     }
 
     /// Counts time by `clock`.
@@ -92,14 +100,14 @@ impl Field {
         self.work.get_mut().time = f64::NAN;
     }
 
-    fn rate(&self, moving: &[f64], time: f64, out: &mut [f64]) {
+    pub(super) fn rate(&self, moving: &[f64], time: f64, out: &mut [f64]) {
         let work = &mut *self.work.borrow_mut();
         self.compute(work, moving, time);
         self.rates.results(&work.registers, out);
     }
 
     /// Jacobian times `direction`. An infinite slope (a root at zero) is left out: it would only spoil the factorisation.
-    fn slope(&self, moving: &[f64], time: f64, direction: &[f64], out: &mut [f64]) {
+    pub(super) fn slope(&self, moving: &[f64], time: f64, direction: &[f64], out: &mut [f64]) {
         let work = &mut *self.work.borrow_mut();
         self.compute(work, moving, time);
         tangent::push(&self.rates, &work.registers, direction, &mut work.tangents);
@@ -107,6 +115,15 @@ impl Field {
         for slope in out.iter_mut().filter(|s| !s.is_finite()) {
             *slope = 0.0;
         }
+    }
+
+    /// The whole Jacobian.
+    pub(super) fn slopes(&self, moving: &[f64], time: f64, matrix: &mut Shifted) {
+        let work = &mut *self.work.borrow_mut();
+        self.compute(work, moving, time);
+        let (slopes, rates) = (&self.slopes, &self.rates);
+        let entries = slopes.pattern.columns.len();
+        matrix.set(entries, |out| slopes.evaluate(rates, &work.registers, &mut work.slopes, out));
     }
 
     /// How fast an error of a state dies out by itself, per s.
@@ -141,6 +158,8 @@ pub(super) struct Integrator {
     /// The last step taken.
     dense: Dense,
     field: Field,
+    /// Its law, if that needs no integration.
+    pub(super) exact: Option<Exact>,
     /// Where the solver stands; absent before its first step.
     state: Option<State>,
     /// How accurately.
@@ -161,8 +180,10 @@ impl Integrator {
     pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], tolerance: Tolerance) -> Self {
         let dense = Dense::still(time, values);
         let field = Field::new(rates, dense.clock);
+        let exact = Exact::of(&field.rates, &field.slopes);
         let (state, first) = (None, None);
-        Integrator { moving, dense, field, state, tolerance, first, run: RUN, unheard: 0, crawled: 0, since: time }
+        let (run, unheard, crawled, since) = (RUN, 0, 0, time);
+        Integrator { moving, dense, field, exact, state, tolerance, first, run, unheard, crawled, since }
     }
 
     /// The law it integrates.
@@ -180,8 +201,9 @@ impl Integrator {
     pub(super) fn run(&mut self, visit: &mut dyn FnMut(&Dense) -> Next) -> Result<(), Stuck> {
         let steps = self.run;
         self.run = (2 * steps).min(LONGEST_RUN);
-        let mut taken = 0;
-        while taken < steps {
+        let mut taken = self.propagate(steps, visit);
+        self.count(taken)?;
+        while taken < steps && self.exact.is_none() {
             if self.state.as_ref().is_none_or(|state| state.as_ref().h < FINE * self.dense.end) {
                 self.restart();
             }
@@ -211,6 +233,31 @@ impl Integrator {
             self.renew(length);
         }
         Ok(())
+    }
+
+    /// Takes up to so many steps of a law that needs no integration; how many. It is integrated from where there are no more.
+    fn propagate(&mut self, steps: usize, visit: &mut dyn FnMut(&Dense) -> Next) -> usize {
+        let mut slopes = vec![0.0; self.moving.len()];
+        for taken in 0..steps {
+            let Some(exact) = &mut self.exact else { return taken };
+            let (end, values) = (self.dense.end, self.dense.last());
+            self.field.rate(values, end, &mut slopes);
+            let Some(stride) = exact.stride(values, &slopes, &self.tolerance.allowed(values)) else {
+                self.exact = None;
+                return taken;
+            };
+            if stride.length < FINE * end {
+                self.restart();
+            }
+            self.dense.follow(stride.length, &stride.states);
+            if self.tolerance.is_outgrown(self.dense.last(), stride.length) {
+                self.renew(Some(stride.length));
+            }
+            if visit(&self.dense) == Next::Stop {
+                return taken + 1;
+            }
+        }
+        steps
     }
 
     /// Weighs rounding anew; the length of the last step, s, where tolerances do not fit any more.
@@ -325,16 +372,10 @@ fn drive(
     let start = dense.end;
     let mut initial = vec![0.0; atol.len()];
     dense.at(start, &mut initial);
-    let mut problem = OdeBuilder::<NalgebraMat<f64>>::new()
-        .t0(start)
-        .rtol(rtol)
-        .atol(atol.iter().copied())
-        .rhs_implicit(
-            |x: &[f64], _: &[f64], t: f64, out: &mut [f64]| field.rate(x, t, out),
-            |x: &[f64], _: &[f64], t: f64, v: &[f64], out: &mut [f64]| field.slope(x, t, v, out),
-        )
-        .init(|_: &[f64], _: f64, out: &mut [f64]| out.copy_from_slice(&initial), initial.len())
-        .build()?;
+    let context = NalgebraContext::default();
+    let equations = Equations { field, initial: &initial, context };
+    let mut problem =
+        OdeBuilder::<Shifted>::new().t0(start).rtol(rtol).atol(atol.iter().copied()).build_from_eqn(equations)?;
     problem.ode_options.min_timestep = SHORTEST_STEP;
     // The library counts these over the life of the solver, not per step: the shortest step is the limit that matters.
     problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
@@ -348,10 +389,10 @@ fn drive(
             state
         }
     };
-    let allowed = initial.iter().zip(atol).map(|(value, least)| least + rtol * value.abs());
-    let mut solver = Bdf::new(&problem, state, WeighedLu::new(allowed))?;
+    field.factors.borrow_mut().allow(&tolerance.allowed(&initial));
+    let mut solver = Bdf::new(&problem, state, WeighedLu::new(&field.factors))?;
     let mut sampled = NalgebraVec::zeros(initial.len(), *problem.context());
-    let mut step = |dense: &Dense, solver: &mut Bdf<'_, _, WeighedLu>| {
+    let mut step = |dense: &Dense, solver: &mut Bdf<'_, _, WeighedLu<'_>>| {
         let mut next = dense.clone();
         solver.step()?;
         next.extend(solver.state().t, |time, out| {

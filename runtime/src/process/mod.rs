@@ -10,7 +10,9 @@
 //! - `part`, `lookout`: states that move together; what no single part decides.
 //! - `course`: both of these in the order of time.
 //! - `switch`: the comparisons, and where they change.
-//! - `integrator`, `linear`, `dense`, `clock`: steps, their linear systems, the solution between them, and the time that they count.
+//! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
+//! - `exact`: steps of parts that need no integration.
+//! - `equations`, `slopes`, `shifted`, `linear`, `sparse`: the linear systems of steps.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
@@ -22,6 +24,8 @@ mod analysis;
 mod clock;
 mod course;
 mod dense;
+mod equations;
+mod exact;
 mod index;
 mod instant;
 mod integrator;
@@ -32,6 +36,9 @@ mod memo;
 mod mode;
 mod part;
 mod prepare;
+mod shifted;
+mod slopes;
+mod sparse;
 mod suspicion;
 mod switch;
 mod tangent;

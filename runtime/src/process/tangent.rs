@@ -74,7 +74,7 @@ fn is_tie(registers: &[f64], noise: &[f64], a: usize, b: usize) -> bool {
 }
 
 /// `d value / d a`.
-fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
+pub(super) fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
     match op {
         UnaryOp::Neg => -1.0,
         UnaryOp::Exp => value,
@@ -87,7 +87,8 @@ fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
     }
 }
 
-fn binary(op: BinaryOp, (a, b): (f64, f64), value: f64, (da, db): (f64, f64)) -> f64 {
+/// `d value`, for `da` and `db`.
+pub(super) fn binary(op: BinaryOp, (a, b): (f64, f64), value: f64, (da, db): (f64, f64)) -> f64 {
     match op {
         BinaryOp::Add => da + db,
         BinaryOp::Sub => da - db,

@@ -81,6 +81,16 @@ impl Tape {
         }
     }
 
+    /// Shows the registers that a step reads.
+    pub(super) fn operands(&self, step: &Step, visit: &mut dyn FnMut(u32)) {
+        match *step {
+            Step::Unary(_, a) => visit(a),
+            Step::Binary(_, a, b) => [a, b].into_iter().for_each(visit),
+            Step::Select(c, a, b) => [c, a, b].into_iter().for_each(visit),
+            Step::Sum(first, count) => self.summed(first, count).for_each(|t| visit(t.register)),
+        }
+    }
+
     /// By output: whether a step that it rests on passes a test.
     pub(super) fn rests_on(&self, test: fn(&Step) -> bool) -> Vec<bool> {
         let mut rests = vec![false; self.first_result()];

@@ -119,6 +119,11 @@ impl Tolerance {
         }
     }
 
+    /// How far off the states may be at `values`.
+    pub(super) fn allowed(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(&self.atol).map(|(value, least)| least + self.rtol * value.abs()).collect()
+    }
+
     /// What states are worth, in the order of the moving states.
     pub(super) fn sizes(&self) -> &[f64] {
         &self.sizes
