@@ -88,7 +88,7 @@ impl Build {
     }
 
     pub fn rate(&mut self, state: u32, rate: NodeId) {
-        self.model.derivatives.push(Derivative { state, rate });
+        self.model.derivatives.push(Derivative::new(state, rate));
     }
 
     /// The rates of the first states, in their order.
