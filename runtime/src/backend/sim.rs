@@ -7,7 +7,6 @@ use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{Leaves, NodeId};
 
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
@@ -372,14 +371,7 @@ impl Backend for Sim<'_> {
     }
 
     fn defined(&mut self, node: NodeId) -> Result<(), Fault> {
-        let graph = &self.model().graph;
-        match undefined(graph, node, &mut |n| Some(self.engine.eval(n))) {
-            Some(at) => {
-                let message = format!("this has no value: {}", why(graph.op(at)));
-                Err(Fault::new(codes::NOT_A_NUMBER, self.engine.time(), message))
-            }
-            None => Ok(()),
-        }
+        self.engine.defined(node)
     }
 
     fn limit(&mut self, limit: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
