@@ -100,7 +100,7 @@ pub fn robertson() -> Model {
     let gain = graph.binary(BinaryOp::Sub, slow, back);
     let second = graph.binary(BinaryOp::Sub, gain, fast);
     for (state, rate) in [(0, first), (1, second), (2, fast)] {
-        model.derivatives.push(Derivative { state, rate });
+        model.derivatives.push(Derivative::new(state, rate));
     }
     model
 }

@@ -757,7 +757,10 @@ fn build<'a>(
         }
         false => (Vec::new(), Vec::new()),
     };
+    let (flows, places) = (elaborator.told_flows(), elaborator.told_places());
     let model = Model {
+        flows,
+        places,
         params: elaborator.params,
         states: elaborator.states,
         derivatives,

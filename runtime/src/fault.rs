@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use matterix_ir::{Code, Span};
+use matterix_ir::{Code, Label, Span};
 
 /// Something the simulation cannot continue from; rendered on the source line.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,17 +17,25 @@ pub struct Fault {
     pub message: String,
     /// How to mend it, a line each.
     pub help: Vec<String>,
+    /// What else in the text it rests on.
+    pub because: Vec<Label>,
 }
 
 impl Fault {
     /// A fault without a place and without help.
     pub fn new(code: Code, time: f64, message: impl Into<String>) -> Self {
-        Fault { code, span: None, time, message: message.into(), help: Vec::new() }
+        Fault { code, span: None, time, message: message.into(), help: Vec::new(), because: Vec::new() }
     }
 
     /// The same fault, shown at `span`.
     pub fn at(mut self, span: Span) -> Self {
         self.span = Some(span);
+        self
+    }
+
+    /// The same fault, with one more place that it rests on.
+    pub fn because(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.because.push(Label { span, text: text.into(), primary: false });
         self
     }
 

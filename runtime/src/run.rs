@@ -141,7 +141,7 @@ fn run_watched(
     let mut outcome = outcome(execution, params, engine.states().into_iter().map(Some).collect());
     outcome.balances = engine.balances();
     if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
-        let trace = FailureTrace::of_fault(fault);
+        let trace = FailureTrace::of_fault(&program.plan, fault);
         out.failure(&trace);
         outcome.status = RunStatus::Fault;
         outcome.suppressed.extend(outcome.failure.replace(trace));
@@ -174,7 +174,7 @@ fn params(program: &Program, changed: &[(String, f64)]) -> Result<Vec<f64>, Faul
 fn refused(program: &Program, fault: Fault) -> Outcome {
     let execution = Execution {
         status: RunStatus::Fault,
-        failure: Some(FailureTrace::of_fault(fault)),
+        failure: Some(FailureTrace::of_fault(&program.plan, fault)),
         suppressed: Vec::new(),
         unfinished: Vec::new(),
         expectations: Vec::new(),

@@ -307,7 +307,7 @@ impl<'p> Screen<'p> {
         let instance = model.mixtures[mixture].instance;
         let own = scene.instances.get(instance.0 as usize);
         let vessel = own.and_then(|i| i.owner).and_then(|o| scene.instances.get(o.0 as usize)).or(own);
-        let (name, span) = vessel.map_or(("?", Span::default()), |v| (v.name.as_str(), v.span));
+        let (name, span) = vessel.map_or(("?", self.program.plan.span()), |v| (v.name.as_str(), v.span));
         let headline = format!("`{a}` and `{b}` come together in `{name}`: {}", pair.words);
         let place = self.place(step).unwrap_or(span);
         let mut d = Diagnostic::error(codes::INCOMPATIBLE_MIX, place, headline, "while this went on");

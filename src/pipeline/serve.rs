@@ -119,10 +119,10 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
         return Ok(unreached.iter().map(|u| not_reached(u, false)).collect());
     }
     if let Err(fault) = hardware.begin_journal(&digest, service.seed, &service.who) {
-        return Ok(vec![of_fault(fault)]);
+        return Ok(vec![of_fault(&program.plan, fault)]);
     }
     if let Err(failed) = hardware.open() {
-        let mut found = vec![super::run::led_by_the_user(not_opened(failed), sources)];
+        let mut found = vec![super::run::led_by_the_user(not_opened(&program.plan, failed), sources)];
         found.extend(hardware.secure().into_iter().map(unsafe_left));
         return Ok(found);
     }
@@ -130,9 +130,9 @@ pub fn serve(program: &Program, sources: &Sources, mut service: Service<'_>) -> 
     if !well {
         found.extend(hardware.secure().into_iter().map(unsafe_left));
     }
-    found.extend(hardware.close().err().map(of_fault));
+    found.extend(hardware.close().err().map(|fault| of_fault(&program.plan, fault)));
     let status = if found.iter().any(Diagnostic::is_error) { "failed" } else { "ended" };
-    found.extend(hardware.end_journal(status).err().map(of_fault));
+    found.extend(hardware.end_journal(status).err().map(|fault| of_fault(&program.plan, fault)));
     Ok(found)
 }
 

@@ -4,6 +4,7 @@ mod along;
 mod beforehand;
 mod beginnings;
 mod bill;
+mod blame;
 mod book;
 mod budget;
 mod contents;

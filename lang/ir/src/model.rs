@@ -55,6 +55,47 @@ pub struct Derivative {
     pub state: u32,
     /// SI per second.
     pub rate: NodeId,
+    /// What it is the sum of; empty where that is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub terms: Vec<Contribution>,
+}
+
+impl Derivative {
+    /// A rate of which nobody knows what it is the sum of.
+    pub fn new(state: u32, rate: NodeId) -> Self {
+        Derivative { state, rate, terms: Vec::new() }
+    }
+}
+
+/// What one line of a process adds to a rate or a flow while the process runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Contribution {
+    /// Index into [`Model::processes`].
+    pub process: u32,
+    /// SI; without the condition of the process.
+    pub node: NodeId,
+    /// Its line: `heat_flow -= q`.
+    pub span: Span,
+}
+
+/// A sum that processes add up and that others use: heat that flows into a body.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Flow {
+    /// `beaker.heat_flow`.
+    pub name: String,
+    /// The sum.
+    pub node: NodeId,
+    /// What it is the sum of.
+    pub terms: Vec<Contribution>,
+}
+
+/// Where an operation stands that may leave a number without a value: a quotient, a root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Place {
+    /// The operation.
+    pub node: NodeId,
+    /// Its text, where it is written first.
+    pub span: Span,
 }
 
 /// One process on its instances, for time lines: the derivative already contains it.
@@ -310,6 +351,12 @@ pub struct Model {
     pub states: Vec<State>,
     /// At most one per state; a state without one changes only by actions.
     pub derivatives: Vec<Derivative>,
+    /// Sums that processes add up and that derivatives use.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flows: Vec<Flow>,
+    /// Operations that may have no value, by their node, ascending.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<Place>,
     /// For time lines.
     pub processes: Vec<Process>,
     /// In the order in which they fire within an instant.

@@ -639,6 +639,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Where its workflow stands.
+    pub fn span(&self) -> Span {
+        self.steps.get(self.root.0 as usize).map(|step| step.span).unwrap_or_default()
+    }
+
     /// One node.
     pub fn get(&self, id: StepId) -> &PlanStep {
         &self.steps[id.0 as usize]

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::model::{Balance, Derivative, Domain, Doubt, State};
 use matterix_ir::{NodeId, Op, UnaryOp, Unit};
 
-use super::{Contribution, Elaborator, SpeciesId};
+use super::{Contribution, Elaborator, SpeciesId, origin};
 
 /// What matters of what a process may make or lose, mol or kg.
 const DOUBT_SCALE: f64 = 1e-6;
@@ -18,7 +18,7 @@ impl Elaborator<'_> {
         for (state, parts) in &rates {
             let rate = self.gated_sum(parts);
             if self.graph.constant(rate) != Some(0.0) {
-                derivatives.push(Derivative { state: *state, rate });
+                derivatives.push(Derivative { state: *state, rate, terms: origin::terms(parts) });
             }
         }
         let mut balances = Vec::new();
@@ -77,7 +77,8 @@ impl Elaborator<'_> {
             if self.graph.constant(sum) == Some(0.0) {
                 continue;
             }
-            let rate = self.gated(&Contribution { process, node: sum });
+            let all = Contribution { process, node: sum, span: self.processes[process].span };
+            let rate = self.gated(&all);
             let index = self.states.len() as u32;
             let info = &self.processes[process];
             self.states.push(State {
@@ -88,7 +89,7 @@ impl Elaborator<'_> {
                 span: info.span,
             });
             self.state_owner.push(matterix_ir::scene::InstanceId(0));
-            derivatives.push(Derivative { state: index, rate });
+            derivatives.push(Derivative { state: index, rate, terms: origin::terms(&[all]) });
             exchanges.push(index);
         }
         let total = self.sum_states(states.iter().map(|s| (*s, 1.0)), false);
@@ -140,7 +141,8 @@ impl Elaborator<'_> {
         if self.graph.constant(sum) == Some(0.0) {
             return None;
         }
-        let rate = self.gated(&Contribution { process, node: sum });
+        let all = Contribution { process, node: sum, span: self.processes[process].span };
+        let rate = self.gated(&all);
         let state = self.states.len() as u32;
         let info = &self.processes[process];
         self.states.push(State {
@@ -151,7 +153,7 @@ impl Elaborator<'_> {
             span: info.span,
         });
         self.state_owner.push(matterix_ir::scene::InstanceId(0));
-        derivatives.push(Derivative { state, rate });
+        derivatives.push(Derivative { state, rate, terms: origin::terms(&[all]) });
         Some(Doubt { process: process as u32, state })
     }
 

@@ -42,7 +42,7 @@ pub(super) trait Lines<'a> {
 
 /// The lines of a process: all see the state of one instant.
 struct Rates<'o> {
-    out: &'o mut Vec<(Target, NodeId)>,
+    out: &'o mut Vec<(Target, NodeId, Span)>,
 }
 
 impl<'a> Lines<'a> for Rates<'_> {
@@ -55,7 +55,7 @@ impl<'a> Lines<'a> for Rates<'_> {
         }
         let Some(g) = guard else { return };
         let zero = lab.graph.number(0.0);
-        self.out[first..].iter_mut().for_each(|(_, node)| *node = lab.graph.select(g, *node, zero));
+        self.out[first..].iter_mut().for_each(|(_, node, _)| *node = lab.graph.select(g, *node, zero));
     }
 }
 
@@ -225,8 +225,8 @@ impl<'a> Elaborator<'a> {
             self.touched_flow = false;
             return false;
         }
-        for (target, node) in found {
-            let contribution = Contribution { process: index, node };
+        for (target, node, span) in found {
+            let contribution = Contribution { process: index, node, span };
             match target {
                 Target::Flow(id, owner, name) => self.flows.entry((id, owner, name)).or_default().push(contribution),
                 Target::Derivative(state) => self.rates.entry(state).or_default().push(contribution),
@@ -278,7 +278,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// What the lines of a process contribute.
-    fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+    fn law_body(&mut self, laws: &'a [Law], scope: &mut Scope, out: &mut Vec<(Target, NodeId, Span)>) {
         self.each_law(laws, None, scope, &mut Rates { out });
     }
 
@@ -289,7 +289,7 @@ impl<'a> Elaborator<'a> {
         value: &'a Expr,
         span: Span,
         scope: &mut Scope,
-        out: &mut Vec<(Target, NodeId)>,
+        out: &mut Vec<(Target, NodeId, Span)>,
     ) {
         let v = self.expr(value, scope);
         let (place, prime) = match &*target.kind {
@@ -320,7 +320,7 @@ impl<'a> Elaborator<'a> {
             let ty = self.resolve_type(ty, m.module);
             let v = if op == AssignOp::Sub { self.signed(v) } else { v };
             if let Value::Num(n) = self.coerce(v, &ty, value.span, &name.text) {
-                out.push((Target::Flow(id, m.owner, name.text.clone()), n.node));
+                out.push((Target::Flow(id, m.owner, name.text.clone()), n.node, span));
             }
             return;
         }
@@ -334,7 +334,7 @@ impl<'a> Elaborator<'a> {
         let v = if op == AssignOp::Sub { self.signed(v) } else { v };
         let Value::Num(n) = self.coerce(v, &ty, value.span, "rate of change") else { return };
         match self.graph.op(state.node) {
-            Op::State(index) => out.push((Target::Derivative(index), n.node)),
+            Op::State(index) => out.push((Target::Derivative(index), n.node, span)),
             _ if self.prototype => {}
             _ if self.writes(place, n.node, scope) => {}
             _ => self.report(Diagnostic::error(
@@ -373,9 +373,11 @@ impl<'a> Elaborator<'a> {
         self.touched_flow = true;
         let ty = self.resolve_type(ty, m.module);
         let Type::Quantity { dimension, .. } = ty else { return Value::Error };
-        let parts = self.flows.get(&(id, m.owner, name.text.clone())).cloned().unwrap_or_default();
+        let key = (id, m.owner, name.text.clone());
+        let parts = self.flows.get(&key).cloned().unwrap_or_default();
         let node = self.gated_sum(&parts);
         if self.flows_sealed {
+            self.flows_read.insert(key, node);
             self.flow_sums.insert(node, parts);
         }
         self.num(node, dimension)
@@ -403,7 +405,13 @@ impl<'a> Elaborator<'a> {
     }
 
     /// `move(q, from: a, to: b)` as a flow of everything: the fraction per second of each extensive quantity.
-    fn law_move(&mut self, call: &'a Expr, guard: Option<NodeId>, scope: &mut Scope, out: &mut Vec<(Target, NodeId)>) {
+    fn law_move(
+        &mut self,
+        call: &'a Expr,
+        guard: Option<NodeId>,
+        scope: &mut Scope,
+        out: &mut Vec<(Target, NodeId, Span)>,
+    ) {
         let Some((rate, from, to)) = self.move_call(call, true, scope) else { return };
         self.moves.insert((from, to));
         let zero = self.graph.number(0.0);
@@ -419,10 +427,10 @@ impl<'a> Elaborator<'a> {
             let state = self.graph.add(Op::State(index));
             let flow = self.times(state, rate);
             let less = self.graph.unary(UnaryOp::Neg, flow);
-            out.push((Target::Derivative(index), less));
+            out.push((Target::Derivative(index), less, call.span));
             let there = super::ExtensiveKey { instance: to, ..key };
             match self.extensive.get(&there) {
-                Some(target) => out.push((Target::Derivative(*target), flow)),
+                Some(target) => out.push((Target::Derivative(*target), flow, call.span)),
                 None => self.warn_of_loss(from, to, &there.member, call.span),
             }
         }
@@ -595,6 +603,7 @@ impl<'a> Elaborator<'a> {
             if *dimension == amount {
                 let Value::Num(size) = self.member_value(from, m, at) else { return None };
                 let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
+                self.note_place(share, call.span);
                 // A law whose rate follows what is left takes nothing of nothing.
                 let left = |(key, _): &(&super::ExtensiveKey, &u32)| key.instance == from;
                 let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
@@ -758,9 +767,9 @@ impl<'a> Elaborator<'a> {
     }
 
     /// What one body loses the other must gain: a process of two bodies that contributes to one flow of both.
-    fn check_antisymmetry(&mut self, p: &'a ast::Process, found: Vec<(Target, NodeId)>) {
+    fn check_antisymmetry(&mut self, p: &'a ast::Process, found: Vec<(Target, NodeId, Span)>) {
         let mut sums: BTreeMap<(DeclId, String), (Vec<InstanceId>, NodeId)> = BTreeMap::new();
-        for (target, node) in found {
+        for (target, node, _) in found {
             let Target::Flow(id, owner, name) = target else { continue };
             let zero = self.graph.number(0.0);
             let entry = sums.entry((owner, name)).or_insert((Vec::new(), zero));

@@ -23,6 +23,7 @@ pub mod laws;
 mod lineage;
 mod mended;
 pub mod mixtures;
+mod origin;
 pub mod properties;
 pub mod prune;
 pub mod reach;
@@ -103,6 +104,8 @@ pub struct Contribution {
     pub process: usize,
     /// SI.
     pub node: NodeId,
+    /// Its line.
+    pub span: Span,
 }
 
 /// A process on its instances.
@@ -247,6 +250,10 @@ pub struct Elaborator<'a> {
     pub state_owner: Vec<InstanceId>,
     /// What each complete flow is made of, by the node of its sum.
     pub flow_sums: BTreeMap<NodeId, Vec<Contribution>>,
+    /// The sum of each complete flow that was read.
+    pub flows_read: BTreeMap<(InstanceId, DeclId, String), NodeId>,
+    /// Where operations stand that may have no value, as they are written first.
+    pub written_at: BTreeMap<NodeId, Span>,
     /// Contributions to flows.
     pub flows: BTreeMap<(InstanceId, DeclId, String), Vec<Contribution>>,
     /// Contributions to derivatives, by state.
@@ -361,6 +368,8 @@ impl<'a> Elaborator<'a> {
             held_at: BTreeMap::new(),
             state_owner: Vec::new(),
             flow_sums: BTreeMap::new(),
+            flows_read: BTreeMap::new(),
+            written_at: BTreeMap::new(),
             flows: BTreeMap::new(),
             rates: BTreeMap::new(),
             processes: Vec::new(),

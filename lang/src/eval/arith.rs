@@ -100,6 +100,7 @@ impl<'a> Elaborator<'a> {
         } else {
             (self.graph.binary(BinaryOp::Div, a.node, b.node), a.dimension.over(&b.dimension))
         };
+        self.note_place(node, at_a.to(at_b));
         let unit = if b.dimension.is_one() { a.unit } else { None };
         Value::Num(Num { node, dimension, point: false, unit, literal: false })
     }
@@ -215,6 +216,7 @@ impl<'a> Elaborator<'a> {
             }
         };
         let node = self.graph.binary(BinaryOp::Pow, base.node, power.node);
+        self.note_place(node, a.span.to(b.span));
         self.num(node, dimension)
     }
 

@@ -132,6 +132,7 @@ impl Elaborator<'_> {
         let computed = match (bound, values.as_slice()) {
             (Bound::Unary(op), [Value::Num(n)]) => {
                 let node = self.graph.unary(*op, n.node);
+                self.note_place(node, at);
                 self.num(node, Dimension::any())
             }
             (Bound::Extreme(op), [a, b]) => self.extreme(*op, a.clone(), b.clone(), at),
@@ -141,6 +142,7 @@ impl Elaborator<'_> {
             }
             (Bound::Sqrt, [Value::Num(n)]) => {
                 let node = self.graph.unary(UnaryOp::Sqrt, n.node);
+                self.note_place(node, at);
                 self.num(node, n.dimension.power(crate::units::Rational::new(1, 2)))
             }
             (Bound::Abs, [Value::Num(n)]) if !n.point => {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use matterix_ir::codes;
 use matterix_ir::graph::Env;
 use matterix_ir::model::{Action, Model, State};
-use matterix_ir::plan::{Operation, Plan};
+use matterix_ir::plan::{Operation, Plan, StepId};
 use matterix_ir::{NodeId, Op};
 
 use super::unknown::{self, Known};
@@ -88,13 +88,8 @@ impl<'m> Dry<'m> {
                 return Ok(());
             }
         }
-        Err(Fault {
-            code: codes::RUN_FAILED,
-            span: None,
-            time: self.time,
-            message: format!("more than {CASCADE} events follow from one another within an instant"),
-            help: Vec::new(),
-        })
+        let message = format!("more than {CASCADE} events follow from one another within an instant");
+        Err(Fault::new(codes::RUN_FAILED, self.time, message))
     }
 
     fn assign(&mut self, actions: &[Action]) {
@@ -190,7 +185,7 @@ impl Backend for Dry<'_> {
         }
     }
 
-    fn start(&mut self, operation: &Operation, _: &mut dyn Listener) -> Result<Ticket, Fault> {
+    fn start(&mut self, _: StepId, operation: &Operation, _: &mut dyn Listener) -> Result<Ticket, Fault> {
         let nominal = operation.takes.and_then(|t| self.at(t.nominal, self.time));
         self.apply(&operation.at_start)?;
         let duration = nominal.filter(|d| d.is_finite() && *d >= 0.0).unwrap_or(0.0);

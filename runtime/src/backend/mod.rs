@@ -134,8 +134,8 @@ pub trait Backend {
         None
     }
 
-    /// Starts an operation.
-    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault>;
+    /// Starts the operation of a step.
+    fn start(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault>;
 
     /// Asks where an operation stands; one that has ended is forgotten.
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault>;

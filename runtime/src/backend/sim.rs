@@ -7,7 +7,6 @@ use matterix_ir::model::{Action, Model};
 use matterix_ir::plan::{Motion, Operation, StepId};
 use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{Leaves, NodeId};
 
 use super::{Backend, Follow, Moments, Prepared, Status, Ticket, next_report, noise, watch};
@@ -278,13 +277,8 @@ impl<'m> Sim<'m> {
         if nominal.is_finite() && nominal >= 0.0 {
             return Ok(Ends::At(self.moment_after(nominal)));
         }
-        Err(Fault {
-            code: codes::UNUSABLE_NUMBER,
-            span: None,
-            time: now,
-            message: format!("`{}` takes {} s, which is not a duration", operation.verb, show_number(nominal)),
-            help: Vec::new(),
-        })
+        let message = format!("`{}` takes {} s, which is not a duration", operation.verb, show_number(nominal));
+        Err(Fault::new(codes::UNUSABLE_NUMBER, now, message))
     }
 
     /// Operations that last until `node` holds are over, whatever others then do at this instant.
@@ -310,6 +304,29 @@ impl<'m> Sim<'m> {
             running.ends = ends;
         }
         Ok(())
+    }
+
+    /// Starts an operation that need not be of the plan.
+    pub fn begin(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        let ends = self.attempt(operation, self.engine.time(), out)?;
+        self.act(&operation.at_start, out)?;
+        let lasts = match &ends {
+            Ends::At(end) => end - self.engine.time(),
+            _ => 0.0,
+        };
+        let ends = match self.follow_joints(lasts, out) {
+            Some(text) => Ends::Failed("collision".to_string(), text),
+            None => ends,
+        };
+        let ticket = Ticket(self.started);
+        self.started += 1;
+        let assigned = operation.at_start.iter().filter_map(|action| match action {
+            Action::Assign { state, .. } => Some(*state),
+            Action::Move { .. } => None,
+        });
+        let (set, at_end, motion) = (assigned.collect(), operation.at_end.clone(), operation.motion.clone());
+        self.running.insert(ticket, Running { ends, set, at_end, motion });
+        Ok(ticket)
     }
 
     /// What is worth waiting for, or `None` if the operation is over.
@@ -350,14 +367,7 @@ impl Backend for Sim<'_> {
     }
 
     fn defined(&mut self, node: NodeId) -> Result<(), Fault> {
-        let graph = &self.model().graph;
-        match undefined(graph, node, &mut |n| Some(self.engine.eval(n))) {
-            Some(at) => {
-                let message = format!("this has no value: {}", why(graph.op(at)));
-                Err(Fault::new(codes::NOT_A_NUMBER, self.engine.time(), message))
-            }
-            None => Ok(()),
-        }
+        self.engine.defined(node)
     }
 
     fn limit(&mut self, limit: u32, condition: NodeId, out: &mut dyn Listener) -> Result<Option<bool>, Fault> {
@@ -394,26 +404,8 @@ impl Backend for Sim<'_> {
         out.foreseen(&self.engine, step, operation)
     }
 
-    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
-        let ends = self.attempt(operation, self.engine.time(), out)?;
-        self.act(&operation.at_start, out)?;
-        let lasts = match &ends {
-            Ends::At(end) => end - self.engine.time(),
-            _ => 0.0,
-        };
-        let ends = match self.follow_joints(lasts, out) {
-            Some(text) => Ends::Failed("collision".to_string(), text),
-            None => ends,
-        };
-        let ticket = Ticket(self.started);
-        self.started += 1;
-        let assigned = operation.at_start.iter().filter_map(|action| match action {
-            Action::Assign { state, .. } => Some(*state),
-            Action::Move { .. } => None,
-        });
-        let (set, at_end, motion) = (assigned.collect(), operation.at_end.clone(), operation.motion.clone());
-        self.running.insert(ticket, Running { ends, set, at_end, motion });
-        Ok(ticket)
+    fn start(&mut self, _: StepId, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+        self.begin(operation, out)
     }
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
@@ -453,9 +445,8 @@ impl Backend for Sim<'_> {
         let advance = self.engine.advance(until, watches, out)?;
         if let Some(text) = self.follow_joints(0.0, out) {
             if self.running.is_empty() {
-                let help = vec!["move it out of the way, or end the motion before it gets there".to_string()];
-                let time = self.engine.time();
-                return Err(Fault { code: codes::COLLISION, span: None, time, message: text, help });
+                let fault = Fault::new(codes::COLLISION, self.engine.time(), text);
+                return Err(fault.help("move it out of the way, or end the motion before it gets there"));
             }
             self.swung.get_or_insert(text);
         }

@@ -39,6 +39,7 @@ impl<'p> Executor<'p, '_> {
                 time: self.now,
                 measured: self.measured(&end.condition.compared),
                 help: end.condition.advice().into_iter().collect(),
+                because: Vec::new(),
                 steps: steps
                     .into_iter()
                     .map(|s| FailureTrace::entry(self.plan, s, self.steps[s.0 as usize].started.unwrap_or(self.now)))

@@ -3,7 +3,7 @@
 use matterix_ir::codes::{self, Code};
 use matterix_ir::plan::{Plan, StepId};
 use matterix_ir::quantity::show_number;
-use matterix_ir::{Diagnostic, Span, Unit};
+use matterix_ir::{Diagnostic, Label, Span, Unit};
 use serde::Serialize;
 
 use super::listener::ExpectationResult;
@@ -84,21 +84,25 @@ pub struct FailureTrace {
     pub measured: Vec<Measured>,
     /// How to mend it.
     pub help: Vec<String>,
+    /// What else in the text it rests on.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub because: Vec<Label>,
 }
 
 impl FailureTrace {
-    /// A fault outside of any step.
-    pub fn of_fault(fault: crate::fault::Fault) -> Self {
+    /// A fault outside of any step: where it has no place of its own it is the workflow's.
+    pub fn of_fault(plan: &Plan, fault: crate::fault::Fault) -> Self {
         FailureTrace {
             name: fault.code.name.to_owned(),
             text: fault.message,
             code: fault.code,
             fault: true,
-            span: fault.span.unwrap_or_default(),
+            span: fault.span.unwrap_or_else(|| plan.span()),
             time: fault.time,
             steps: Vec::new(),
             measured: Vec::new(),
             help: fault.help,
+            because: fault.because,
         }
     }
 
@@ -120,6 +124,7 @@ pub fn diagnostic(trace: &FailureTrace) -> Diagnostic {
         format!("the run failed with `{}`: {}", trace.name, trace.text)
     };
     let mut diagnostic = Diagnostic::error(trace.code, trace.span, headline, label);
+    diagnostic.labels.extend(trace.because.iter().cloned());
     let mut last = trace.span;
     for step in &trace.steps {
         // A block has no name of its own: the step it belongs to says where.

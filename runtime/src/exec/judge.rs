@@ -156,7 +156,18 @@ impl Executor<'_, '_> {
         let span = raised.span.or(steps.first().map(|s| s.span)).unwrap_or_default();
         let Raised { name, text, code, measured, help, .. } = raised;
         let help = help.into_iter().collect();
-        FailureTrace { name, text, code, fault: false, span, time: self.now, steps, measured, help }
+        FailureTrace {
+            name,
+            text,
+            code,
+            fault: false,
+            span,
+            time: self.now,
+            steps,
+            measured,
+            help,
+            because: Vec::new(),
+        }
     }
 
     /// Raises a failure in a frame, which ends with it.

@@ -147,8 +147,8 @@ pub fn execute(
     match tree::check(plan) {
         Ok(()) => run.drive(),
         Err(message) => {
-            let fault = Fault { code: codes::RUN_FAILED, span: None, time: 0.0, message, help: Vec::new() };
-            run.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(fault))));
+            let fault = Fault::new(codes::RUN_FAILED, 0.0, message);
+            run.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(plan, fault))));
         }
     }
     run.into_execution()
@@ -274,7 +274,7 @@ impl<'p, 'b> Executor<'p, 'b> {
             self.pass_time();
         }
         if let Err(fault) = self.judge_ends(&begun) {
-            self.abort(FailureTrace::of_fault(fault));
+            self.abort(FailureTrace::of_fault(self.plan, fault));
         }
     }
 
@@ -307,7 +307,7 @@ impl<'p, 'b> Executor<'p, 'b> {
     }
 
     fn run_fault(&self, code: Code, message: String) -> Fault {
-        Fault { code, span: None, time: self.now, message, help: Vec::new() }
+        Fault::new(code, self.now, message)
     }
 
     /// A new frame under `parent`.

@@ -177,7 +177,7 @@ impl<'p> Executor<'p, '_> {
             let new = Use { frame: id, step, within: within.clone(), running: true, time: self.now };
             self.claims.begin(instance, new);
         }
-        let started = self.backend.start(operation, self.out);
+        let started = self.backend.start(step, operation, self.out);
         // Who was told may have taken time to say so.
         self.now = self.backend.now().max(self.now);
         let ticket = started?;

@@ -65,7 +65,7 @@ impl Executor<'_, '_> {
         let leaf = self.frames.iter().find(|(_, f)| f.children.is_empty() && f.step.is_some()).map(|(&id, _)| id);
         let trace = match leaf {
             Some(id) => self.fault_trace(id, fault),
-            None => FailureTrace::of_fault(fault),
+            None => FailureTrace::of_fault(self.plan, fault),
         };
         self.abort(trace);
         self.stop_all(Stop::Now, true);
@@ -80,7 +80,13 @@ impl Executor<'_, '_> {
             measured: Vec::new(),
             help: None,
         };
-        FailureTrace { fault: true, time: fault.time, help: fault.help, ..self.trace(id, raised) }
+        FailureTrace {
+            fault: true,
+            time: fault.time,
+            help: fault.help,
+            because: fault.because,
+            ..self.trace(id, raised)
+        }
     }
 
     pub(super) fn abort(&mut self, trace: FailureTrace) {

@@ -166,8 +166,7 @@ impl Executor<'_, '_> {
         }
         let what = what.unwrap_or_else(|| "the run".to_owned());
         let message = format!("{what} is still waited for after {days} days of lab time");
-        let help = vec!["give it a `timeout`".to_owned()];
-        Fault { code: codes::WAITS_FOR_EVER, span, time: self.now, message, help }
+        Fault { span, ..Fault::new(codes::WAITS_FOR_EVER, self.now, message).help("give it a `timeout`") }
     }
 
     /// Looks at every frame in the order in which they began; what follows from one happens before the next.

@@ -3,11 +3,10 @@
 //! Every part has come as far as its own last step; who asks for a state in between reads it from the solution. So a step of one part
 //! costs nothing elsewhere.
 
+use matterix_ir::NodeId;
 use matterix_ir::model::Drained;
-use matterix_ir::{NodeId, codes};
 
 use super::course::Who;
-use super::integrator::Stuck;
 use super::lookout::Lookout;
 use super::part::Ending;
 use super::switch::Crossing;
@@ -229,83 +228,6 @@ impl Engine<'_> {
         if time > self.time {
             self.time = time;
             self.memo.get_mut().pass(&self.index.users);
-        }
-    }
-
-    /// The fault of a state whose rate is not finite.
-    pub(super) fn no_rate(&self, state: u32) -> Fault {
-        let declared = &self.model.states[state as usize];
-        let rate = self.model.derivatives.iter().find(|d| d.state == state).map(|d| d.rate);
-        let cause = rate.map_or("", |r| self.cause(r));
-        let message = format!("the rate of `{}` has no finite value{cause}", declared.name);
-        let fault = Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span);
-        match self.running_now() {
-            Some(line) => fault.help(line),
-            None => fault,
-        }
-    }
-
-    /// The first operation below `root` that turns finite numbers into something else, in words.
-    fn cause(&self, root: NodeId) -> &'static str {
-        use matterix_ir::{BinaryOp, Op, UnaryOp};
-        let graph = &self.model.graph;
-        let first = graph.schedule([root]).into_iter().find(|&n| !self.eval(n).is_finite());
-        match first.map(|n| graph.op(n)) {
-            Some(Op::Binary(BinaryOp::Div, _, b)) if self.eval(b) == 0.0 => ": a division by zero",
-            Some(Op::Unary(UnaryOp::Ln, _)) => ": the logarithm of a number that is not positive",
-            Some(Op::Unary(UnaryOp::Sqrt, _)) => ": the square root of a negative number",
-            Some(Op::Binary(BinaryOp::Pow, a, _)) if self.eval(a) < 0.0 => ": a power of a negative number",
-            Some(Op::Local(_) | Op::Reading(_)) => ": it depends on a value that is not set yet",
-            Some(_) => ": a number too large",
-            None => "",
-        }
-    }
-
-    /// The fault of a law or condition that follows the clock too fast.
-    pub(super) fn restless(&self, node: Option<NodeId>) -> Fault {
-        let place = node.and_then(|node| self.user_of(node));
-        let name = place.map_or("a law".to_owned(), |(name, _)| format!("`{name}`"));
-        let message = format!("{name} changes with the time more often than a run can follow");
-        let fault = Fault::new(codes::INTEGRATION_FAILED, self.time, message)
-            .help("give it a longer period, or write its mean over the time");
-        match place {
-            Some((_, span)) => fault.at(span),
-            None => fault,
-        }
-    }
-
-    fn running_now(&self) -> Option<String> {
-        let processes = self.model.processes.iter().zip(&self.running).filter(|(_, running)| **running);
-        let names: Vec<String> = processes.map(|(p, _)| format!("`{}`", p.name)).take(5).collect();
-        (!names.is_empty()).then(|| format!("running now: {}", names.join(", ")))
-    }
-
-    /// The fault of an integration that finds no step: named after the state that changes fastest.
-    pub(super) fn stuck(&self, stuck: Stuck, part: u32) -> Fault {
-        let moving = self.course.parts.get(part).map_or(&[][..], |part| part.moving());
-        if let Stuck::Busy = stuck {
-            return self.restless(None);
-        }
-        if let Some(fault) = self.run_dry() {
-            return fault;
-        }
-        let rates = self.model.derivatives.iter().filter(|d| moving.contains(&d.state));
-        let pace = |d: &matterix_ir::model::Derivative| {
-            let (state, value) = (&self.model.states[d.state as usize], self.state(d.state));
-            self.eval(d.rate).abs() / (value.abs() + state.scale.unwrap_or(self.sizes[d.state as usize]).abs())
-        };
-        let Some(fastest) = rates.max_by(|a, b| pace(a).total_cmp(&pace(b))) else {
-            return Fault::new(codes::INTEGRATION_FAILED, self.time, "no step is short enough");
-        };
-        if !self.eval(fastest.rate).is_finite() {
-            return self.no_rate(fastest.state);
-        }
-        let state = &self.model.states[fastest.state as usize];
-        let message = format!("`{}` changes faster than any step can follow", state.name);
-        let fault = Fault::new(codes::INTEGRATION_FAILED, self.time, message).at(state.span);
-        match self.running_now() {
-            Some(line) => fault.help(line),
-            None => fault,
         }
     }
 }

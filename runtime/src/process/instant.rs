@@ -33,7 +33,7 @@ impl Engine<'_> {
             observer.event(self.time, event as usize);
             self.expose(&of.actions, observer);
             for action in &of.actions {
-                self.perform(action, observer)?;
+                self.perform(action, Some(&of.name), observer)?;
             }
             self.judge_instant(&format!("`{}`", of.name), Some(of.span))?;
         }
@@ -89,20 +89,28 @@ impl Engine<'_> {
         }
     }
 
-    /// Performs one action.
-    pub(super) fn perform(&mut self, action: &Action, observer: &mut dyn Observer) -> Result<(), Fault> {
+    /// Performs one action; `who` does, where that is not the step under way.
+    pub(super) fn perform(
+        &mut self,
+        action: &Action,
+        who: Option<&str>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Fault> {
         match *action {
-            Action::Assign { state, value, span } => {
-                let value = self.eval(value);
+            Action::Assign { state, value: node, span } => {
+                let value = self.eval(node);
                 if !value.is_finite() {
-                    return Err(self.no_value(state, value).at(span));
+                    return Err(self.no_effect(state, node, who, span));
                 }
                 self.suspicion.count(self.model, state, value - self.state(state));
                 self.write(state, value);
                 Ok(())
             }
-            Action::Move { fraction, from, to, span } => {
-                let fraction = self.eval(fraction);
+            Action::Move { fraction: node, from, to, span } => {
+                let fraction = self.eval(node);
+                if !fraction.is_finite() {
+                    return Err(self.no_share(node, who, span));
+                }
                 self.carry(fraction, from, to, span)?;
                 observer.moved(self.time, from, to, fraction);
                 Ok(())
@@ -202,16 +210,6 @@ impl Engine<'_> {
         }
         let first = crossings.pop_front().unwrap_or(self.time);
         if self.time - first > CHATTER_TIME { Ok(()) } else { Err(self.chatters(node)) }
-    }
-
-    /// The event, process or state whose condition or rate uses a comparison, and where it stands.
-    pub(super) fn user_of(&self, node: NodeId) -> Option<(&str, Span)> {
-        let graph = &self.model.graph;
-        let uses = |root: NodeId| root.0 >= node.0 && graph.schedule([root]).contains(&node);
-        let event = self.model.events.iter().find(|e| uses(e.when)).map(|e| (&e.name, e.span));
-        let process = self.model.processes.iter().find(|p| p.guard.is_some_and(uses)).map(|p| (&p.name, p.span));
-        let rate = self.model.derivatives.iter().find(|d| uses(d.rate)).map(|d| &self.model.states[d.state as usize]);
-        event.or(process).or(rate.map(|s| (&s.name, s.span))).map(|(name, span)| (name.as_str(), span))
     }
 
     /// The fault, named after the event or process whose condition it is.

@@ -16,11 +16,13 @@
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
+//! - `blame`, `words`: which law is at fault where a run cannot go on, in words.
 //! - `advance`, `instant`: the loop over what happens, and what happens at one instant.
 //! - `memo`: values at one instant.
 
 mod advance;
 mod analysis;
+mod blame;
 mod clock;
 mod course;
 mod dense;
@@ -47,14 +49,15 @@ mod tape;
 mod tests;
 mod timed;
 mod tolerance;
+mod words;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::graph::Env;
-use matterix_ir::model::{Action, Balance, Doubt, Model};
-use matterix_ir::{NodeId, Op, codes};
+use matterix_ir::model::{Action, Model};
+use matterix_ir::{NodeId, Op};
 
 use crate::fault::Fault;
 pub use crate::ledger::BalanceReport;
@@ -210,7 +213,9 @@ impl<'m> Engine<'m> {
         }
         engine.states = model.states.iter().map(|s| engine.eval(s.initial)).collect();
         engine.memo = RefCell::new(Memo::new(&model.graph));
-        engine.check_states(None)?;
+        if let Some(state) = engine.states.iter().position(|s| !s.is_finite()) {
+            return Err(engine.no_beginning(state as u32));
+        }
         engine.readings = model.readings.iter().map(|r| engine.eval(r.value)).collect();
         engine.memo = RefCell::new(Memo::new(&model.graph));
         engine.balances = Balances::open(model, &engine.states, |n| engine.eval(n));
@@ -346,7 +351,7 @@ impl<'m> Engine<'m> {
         self.release(observer);
         self.expose(actions, observer);
         for action in actions {
-            self.perform(action, observer)?;
+            self.perform(action, None, observer)?;
         }
         self.judge_instant(
             "this step",
@@ -401,13 +406,6 @@ impl<'m> Engine<'m> {
         broken.map_or(Ok(()), |state| Err(self.no_value(state, self.states[state as usize])))
     }
 
-    /// The fault of a state that is, or would be, no finite number.
-    fn no_value(&self, state: u32, value: f64) -> Fault {
-        let declared = &self.model.states[state as usize];
-        let message = format!("`{}` has no finite value: it is {value}", declared.name);
-        Fault::new(codes::NOT_A_NUMBER, self.time, message).at(declared.span)
-    }
-
     /// Fails where a sum does not close: at the law that breaks it, else at `cause`.
     fn check_balances(&self, cause: Option<matterix_ir::Span>) -> Result<(), Fault> {
         for (report, balance) in self.balances().iter().zip(&self.model.balances) {
@@ -416,27 +414,5 @@ impl<'m> Engine<'m> {
             }
         }
         Ok(())
-    }
-
-    fn breach(&self, report: &BalanceReport, balance: &Balance, cause: Option<matterix_ir::Span>) -> Fault {
-        let (unit, accounted) = (&balance.unit, report.initial + report.exchanged);
-        let did = |d: &&Doubt| self.state(d.state).abs();
-        let culprit = balance.doubts.iter().max_by(|a, b| did(a).total_cmp(&did(b))).filter(|d| did(d) > 0.0);
-        let process = culprit.and_then(|d| Some((self.model.processes.get(d.process as usize)?, did(&d))));
-        let sums = format!("there is {}, and {} is accounted for", unit.show(report.now), unit.show(accounted));
-        let (message, span) = match process {
-            Some((process, by)) => {
-                let verb = if report.error > 0.0 { "made" } else { "lost" };
-                let text = format!("`{}` has {verb} {} of {}: {sums}", process.name, unit.show(by), report.name);
-                (text, Some(process.span))
-            }
-            None => (format!("the balance of {} does not close: {sums}", report.name), cause),
-        };
-        let help = format!("the difference is {}", unit.show(report.error));
-        let fault = Fault::new(codes::BALANCE_BREACH, self.time, message).help(help);
-        match span {
-            Some(span) => fault.at(span),
-            None => fault,
-        }
     }
 }

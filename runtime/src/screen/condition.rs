@@ -87,7 +87,7 @@ mod tests {
             let domain = Domain::Quantity(Unit::one());
             let name = format!("s{state}");
             model.states.push(State { name, domain, initial, scale: Some(1.0), span: Span::default() });
-            model.derivatives.push(Derivative { state, rate });
+            model.derivatives.push(Derivative::new(state, rate));
             model.graph.add(Op::State(state))
         };
         let (x, y) = (moving(0.0, 1.0), moving(10.0, -1.0));

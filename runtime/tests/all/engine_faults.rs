@@ -1,6 +1,7 @@
 //! What the engine refuses to continue from.
 
-use matterix_ir::{UnaryOp, codes};
+use matterix_ir::model::{Contribution, Flow};
+use matterix_ir::{FileId, NodeId, Span, UnaryOp, codes};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Engine, Options};
 
@@ -14,6 +15,7 @@ fn fails(b: &Build, until: f64) -> Fault {
         Ok(()) => engine.advance(until, &[], &mut ()).expect_err("a fault"),
     };
     assert!(engine.states().iter().all(|s| s.is_finite()), "{:?}", engine.states());
+    assert_ne!(fault.span, Some(Span::default()), "{fault}");
     fault
 }
 
@@ -62,6 +64,46 @@ fn chatter_of_events() {
     let rate = b.model.graph.select(on, one, down);
     b.rate(0, rate);
     assert_eq!(fails(&b, 10.0).code, codes::CHATTERING);
+}
+
+/// A line of a process.
+fn line(process: u32, node: NodeId, start: u32) -> Contribution {
+    Contribution { process, node, span: Span { file: FileId(0), start, end: start + 5 } }
+}
+
+#[test]
+fn a_law_that_adds_to_a_flow_is_blamed_not_the_one_that_uses_it() {
+    let mut b = Build::default();
+    let (_, gap) = (b.state("body.enthalpy", 1.0), b.state("lamp.gap", 0.0));
+    let one = b.num(1.0);
+    let (steady, broken) = (b.num(2.0), b.div(one, gap));
+    let flow = b.model.graph.add(matterix_ir::Op::Binary(matterix_ir::BinaryOp::Add, steady, broken));
+    b.rate(0, flow);
+    ["sun(body)", "lamp(body)", "balance(body)"].into_iter().for_each(|name| b.process(name, None));
+    b.model.derivatives[0].terms = vec![line(2, flow, 30)];
+    let terms = vec![line(0, steady, 10), line(1, broken, 20)];
+    b.model.flows.push(Flow { name: "body.heat_flow".into(), node: flow, terms });
+    let fault = fails(&b, 1.0);
+    assert!(fault.message.contains("a division by zero in `lamp(body)`, where `lamp.gap` is 0"), "{fault}");
+    assert_eq!(fault.span.map(|s| s.start), Some(20));
+    assert_eq!(fault.help, ["it is part of `body.heat_flow`"]);
+}
+
+#[test]
+fn a_process_that_rests_is_not_blamed() {
+    let mut b = Build::default();
+    let (x, zero) = (b.state("x", 1.0), b.state("zero", 0.0));
+    let one = b.num(1.0);
+    let (rests, broken) = (b.div(x, zero), b.div(one, zero));
+    let off = b.lt(one, zero);
+    let gated = b.only_if(off, rests);
+    let rate = b.model.graph.add(matterix_ir::Op::Binary(matterix_ir::BinaryOp::Add, gated, broken));
+    b.rate(0, rate);
+    b.process("rests", Some(off));
+    b.process("runs", None);
+    b.model.derivatives[0].terms = vec![line(0, rests, 10), line(1, broken, 20)];
+    let fault = fails(&b, 1.0);
+    assert!(fault.message.contains("in `runs`"), "{fault}");
 }
 
 #[test]

@@ -2,8 +2,13 @@
 
 use matterix_ir::model::{Action, Balance, Content, Derivative, Domain, Event, Mixture, Model, Process, State};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{BinaryOp, NodeId, Op, Span, Unit};
+use matterix_ir::{BinaryOp, FileId, NodeId, Op, Span, Unit};
 use matterix_runtime::process::{Advance, Engine, Observer, Options, Watch};
+
+/// Where each event, process and action stands: a state stands before them.
+pub const EVENT: Span = Span { file: FileId(0), start: 1000, end: 1001 };
+pub const PROCESS: Span = Span { file: FileId(0), start: 2000, end: 2001 };
+pub const ACTION: Span = Span { file: FileId(0), start: 3000, end: 3001 };
 
 /// A model under construction: short names for what tests write often.
 #[derive(Default)]
@@ -88,7 +93,7 @@ impl Build {
     }
 
     pub fn rate(&mut self, state: u32, rate: NodeId) {
-        self.model.derivatives.push(Derivative { state, rate });
+        self.model.derivatives.push(Derivative::new(state, rate));
     }
 
     /// The rates of the first states, in their order.
@@ -97,11 +102,11 @@ impl Build {
     }
 
     pub fn event(&mut self, name: &str, when: NodeId, actions: Vec<Action>) {
-        self.model.events.push(Event { name: name.into(), when, actions, span: Span::default() });
+        self.model.events.push(Event { name: name.into(), when, actions, span: EVENT });
     }
 
     pub fn process(&mut self, name: &str, guard: Option<NodeId>) {
-        self.model.processes.push(Process { name: name.into(), guard, span: Span::default() });
+        self.model.processes.push(Process { name: name.into(), guard, span: PROCESS });
     }
 
     /// A mixture of amounts; `keys` are sorted pairs of key and state.
@@ -134,7 +139,7 @@ impl Build {
 
 /// `state = value`
 pub fn assign(state: u32, value: NodeId) -> Action {
-    Action::Assign { state, value, span: Span::default() }
+    Action::Assign { state, value, span: ACTION }
 }
 
 /// Everything that was observed.

@@ -94,7 +94,7 @@ impl Lab {
         let on = self.get(on);
         let (one, zero) = (self.number(1.0), self.number(0.0));
         let rate = self.program.model.graph.select(on, one, zero);
-        self.program.model.derivatives.push(Derivative { state, rate });
+        self.program.model.derivatives.push(Derivative::new(state, rate));
         state
     }
 

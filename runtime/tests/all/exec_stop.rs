@@ -96,7 +96,7 @@ fn a_fault_of_the_engine_still_turns_the_heater_off() {
     let x = lab.state("x", 1.0);
     let value = lab.get(x);
     let rate = lab.program.model.graph.binary(matterix_ir::BinaryOp::Mul, value, value);
-    lab.program.model.derivatives.push(matterix_ir::model::Derivative { state: x, rate });
+    lab.program.model.derivatives.push(matterix_ir::model::Derivative::new(x, rate));
     let long = lab.wait(10.0);
     let (heater, inner) = heating(&mut lab, long);
     let (caught, cool, last) = (lab.note("caught"), lab.wait(5.0), lab.note("last"));

@@ -121,7 +121,7 @@ impl Hardware<'_, '_> {
     /// A command apart from the plan.
     fn serve(&mut self, device: usize, served: &Served, out: &mut dyn Listener) -> Result<(), Fault> {
         let texts = self.texts(&served.exchange.sends)?;
-        let ticket = self.twin.start(&served.operation, out)?;
+        let ticket = self.twin.begin(&served.operation, out)?;
         self.twin.poll(ticket, out)?;
         self.fed += 1;
         if !self.is_live() && !self.is_dry() {

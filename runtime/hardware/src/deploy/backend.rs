@@ -10,7 +10,7 @@ use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Advance, Watch};
 
 use super::control::Answer;
-use super::hardware::{Hardware, Running, address};
+use super::hardware::{Hardware, Running};
 use super::journal::{Entry, Gate, Turn};
 use super::preflight::carrier;
 use super::replay::Begun;
@@ -80,9 +80,9 @@ impl Backend for Hardware<'_, '_> {
         self.twin.foresee(step, operation, out)
     }
 
-    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+    fn start(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         self.noted = None;
-        let begun = self.start_operation(operation, out);
+        let begun = self.start_operation(step, operation, out);
         begun.map_err(|fault| self.outward(fault))
     }
 
@@ -145,19 +145,21 @@ impl Backend for Hardware<'_, '_> {
 }
 
 impl Hardware<'_, '_> {
-    fn start_operation(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+    fn start_operation(
+        &mut self,
+        step: StepId,
+        operation: &Operation,
+        out: &mut dyn Listener,
+    ) -> Result<Ticket, Fault> {
         if self.refused.get() {
             let message = format!("`{}` is not said: it was refused to go on", operation.verb);
-            return Err(self.fault(codes::JOURNAL_MISMATCH, Span::default(), message));
+            return Err(self.fault(codes::JOURNAL_MISMATCH, None::<Span>, message));
         }
         // What begins now begins where the clock is by now, on the twin too.
         if self.next_entry().is_none() {
             self.go_live(out)?;
         }
         self.keep_abreast(Turn::Begins(self.tickets), out)?;
-        let step = self.steps.get(&address(operation)).copied();
-        let step =
-            step.ok_or_else(|| self.fault(codes::UNDRIVEN, Span::default(), "an unknown operation".to_owned()))?;
         let program = self.program;
         let label = &program.plan.get(step).label;
         let found = carrier(step, operation, &self.devices);
@@ -190,7 +192,7 @@ impl Hardware<'_, '_> {
             // What an earlier process said in part begins now, on the twin too.
             self.go_live(out)?;
         }
-        let twin = self.twin.start(operation, out)?;
+        let twin = self.twin.start(step, operation, out)?;
         let mut failed = None;
         if let Some(exchange) = exchange {
             self.beat(false, out)?;
@@ -198,7 +200,7 @@ impl Hardware<'_, '_> {
                 Some(Begun::Told(outcome)) => outcome,
                 Some(Begun::Not) => {
                     let fault = self.replayed_fault();
-                    return Err(fault.unwrap_or_else(|| self.fault(codes::RUN_FAILED, Span::default(), String::new())));
+                    return Err(fault.unwrap_or_else(|| self.fault(codes::RUN_FAILED, None::<Span>, String::new())));
                 }
                 None => self.begin(device, exchange, texts, operation, step, number)?,
             };

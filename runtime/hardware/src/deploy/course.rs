@@ -4,6 +4,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
+use matterix_ir::plan::Plan;
 use matterix_ir::{Diagnostic, Program, Severity, Sources, Span, codes};
 use matterix_runtime::backend::{Prepared, Sim};
 use matterix_runtime::exec::{self, Execution, FailureTrace, Limits, Listener, RunStatus, Tee, Verdict};
@@ -120,18 +121,21 @@ pub fn carry_out(
     }
     let digest = digest(program, &binding::canonical(program, &bindings))?;
     let devices: Result<Vec<Device<'_>>, String> = bindings.into_iter().map(|b| Device::new(program, b)).collect();
+    let at = program.plan.span();
     let (journal, before, unfit) = match journal {
         Kept::Not => (Journal::none(), None, None),
         Kept::New(journal) => (journal, None, None),
         Kept::Left(journal, before) => {
             let unfit = match journal.is_shut() {
-                true => Some(refused("the devices of this journal were made safe when it could not be gone on with")),
-                false => unfit(&before, &digest, speed, seed),
+                true => {
+                    Some(refused(at, "the devices of this journal were made safe when it could not be gone on with"))
+                }
+                false => unfit(at, &before, &digest, (speed, seed)),
             };
             let unfit = unfit.filter(|_| mode != Mode::Replay);
             (journal, Some(before), unfit)
         }
-        Kept::Damaged(why) => (Journal::none(), None, Some(refused(&why))),
+        Kept::Damaged(why) => (Journal::none(), None, Some(refused(at, &why))),
     };
     let prepared = Prepared::new(program);
     let params = program.model.params.iter().map(|p| p.value).collect();
@@ -139,7 +143,7 @@ pub fn carry_out(
     let mut screen = Screen::new(program);
     let engine = match engine.and_then(|mut engine| engine.start(&mut screen).map(|()| engine)) {
         Ok(engine) => engine,
-        Err(fault) => return Ok(Ending::not_begun(vec![of_fault(fault)])),
+        Err(fault) => return Ok(Ending::not_begun(vec![of_fault(&program.plan, fault)])),
     };
     let twin = Sim::new(engine, &prepared, seed);
     let ended = AtomicBool::new(false);
@@ -156,7 +160,7 @@ pub fn carry_out(
     match unbroken(|| exec::execute(&program.plan, &program.scene, &mut hardware, limits, &mut heard)) {
         Ok(execution) => Ok(concluded(hardware, execution, screen, (control, exposed))),
         Err(why) => {
-            let mut found = vec![broken(&why)];
+            let mut found = vec![broken(at, &why)];
             found.extend(secured(&mut hardware, exposed));
             // The journal says what happened as far as it goes, and what was found says the rest.
             let _ = unbroken(|| hardware.end_journal("failed"));
@@ -194,11 +198,11 @@ fn ready(
         return Some(Ending::not_begun(untellable));
     }
     if !goes_on && let Err(fault) = hardware.begin_journal(digest, seed, who) {
-        return Some(Ending::not_begun(vec![of_fault(fault)]));
+        return Some(Ending::not_begun(vec![of_fault(&program.plan, fault)]));
     }
     // One that was cut off before anything of the plan was begun opens its lines as a new one does.
     if !is_open && let Err(failed) = hardware.open() {
-        let mut found = vec![not_opened(failed)];
+        let mut found = vec![not_opened(&program.plan, failed)];
         found.extend(secured(hardware, exposed));
         return Some(Ending { stopped: hardware.is_stopped(), ..Ending::not_begun(found) });
     }
@@ -216,6 +220,7 @@ fn concluded(
         return Ending::not_begun(vec![not_reached(unreached, true)]);
     }
     let well = matches!(execution.status, RunStatus::Passed | RunStatus::ExpectationFailed);
+    let program = hardware.program;
     hardware.stop_late();
     let stopped = !well && control.is_stopped();
     let mut found = findings(&execution);
@@ -231,14 +236,14 @@ fn concluded(
             found.insert(0, meanwhile(why, &hardware));
         }
     }
-    found.extend(hardware.close().err().map(of_fault));
+    found.extend(hardware.close().err().map(|fault| of_fault(&program.plan, fault)));
     let status = match (well, stopped) {
         _ if hardware.is_refused() => REFUSED,
         (_, true) => "stopped by a person",
         (true, false) => "ended",
         (false, false) => "failed",
     };
-    found.extend(hardware.end_journal(status).err().map(of_fault));
+    found.extend(hardware.end_journal(status).err().map(|fault| of_fault(&program.plan, fault)));
     let count = |wanted: &[Verdict]| execution.expectations.iter().filter(|e| wanted.contains(&e.verdict)).count();
     let counts = [execution.expectations.len(), count(&[Verdict::Passed]), count(&[Verdict::NotObserved])];
     let passed = execution.status == RunStatus::Passed && found.iter().all(|d| !d.is_error());
@@ -268,33 +273,33 @@ fn unmeasured(program: &Program, bindings: &[Binding]) -> Option<Diagnostic> {
 }
 
 /// Why a journal is of another deployment, or of one that has ended.
-fn unfit(before: &[Entry], digest: &str, speed: f64, seed: u64) -> Option<Unfit> {
+fn unfit(at: Span, before: &[Entry], digest: &str, (speed, seed): (f64, u64)) -> Option<Unfit> {
     let this = env!("CARGO_PKG_VERSION");
     match (before.first(), before.last()) {
         (_, Some(Entry::End { .. })) => {
-            let d = mismatch("the deployment of this journal has come to its end");
+            let d = mismatch(at, "the deployment of this journal has come to its end");
             Some(Unfit::Over(d.help("begin anew, with a journal of its own")))
         }
-        (Some(Entry::Begin { version, tool, digest: of, speed: at, seed: from, .. }), _) => match () {
+        (Some(Entry::Begin { version, tool, digest: of, speed: paced, seed: from, .. }), _) => match () {
             () if *version != VERSION || tool != this => {
-                Some(refused(&format!("the journal was written by version {tool} of this program, not by {this}")))
+                Some(refused(at, &format!("the journal was written by version {tool} of this program, not by {this}")))
             }
-            () if of != digest => Some(refused("the journal is of another program, or of other bindings")),
-            () if *at != speed => Some(refused("the journal is of a deployment at another speed")),
-            () if *from != seed => Some(refused("the journal is of a deployment with another seed")),
+            () if of != digest => Some(refused(at, "the journal is of another program, or of other bindings")),
+            () if *paced != speed => Some(refused(at, "the journal is of a deployment at another speed")),
+            () if *from != seed => Some(refused(at, "the journal is of a deployment with another seed")),
             () => None,
         },
-        _ => Some(refused("the journal says nothing of a deployment")),
+        _ => Some(refused(at, "the journal says nothing of a deployment")),
     }
 }
 
-fn mismatch(headline: &str) -> Diagnostic {
-    Diagnostic::error(codes::JOURNAL_MISMATCH, Span::default(), headline, "cannot go on")
+fn mismatch(at: Span, headline: &str) -> Diagnostic {
+    Diagnostic::error(codes::JOURNAL_MISMATCH, at, headline, "cannot go on")
 }
 
 /// That a journal is not gone on with, though what it is about may still be on.
-fn refused(why: &str) -> Unfit {
-    Unfit::Unknown(mismatch(why).help("see what the devices have done, and begin anew with a journal of its own"))
+fn refused(at: Span, why: &str) -> Unfit {
+    Unfit::Unknown(mismatch(at, why).help("see what the devices have done, and begin anew with a journal of its own"))
 }
 
 /// What an earlier process has left on is made safe, as it is not known what that was.
@@ -316,8 +321,8 @@ fn meanwhile(why: Diagnostic, hardware: &Hardware<'_, '_>) -> Diagnostic {
 }
 
 /// A fault as a finding.
-pub fn of_fault(fault: Fault) -> Diagnostic {
-    exec::diagnostic(&FailureTrace::of_fault(fault))
+pub fn of_fault(plan: &Plan, fault: Fault) -> Diagnostic {
+    exec::diagnostic(&FailureTrace::of_fault(plan, fault))
 }
 
 /// A device that was not there before anything was said to any: nothing need be made safe, and a journal stays as it is.
@@ -344,8 +349,12 @@ pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
 }
 
 /// What went wrong when drivers said what they say first, with the place where the device is bound.
-pub fn not_opened((fault, at): (Fault, Span)) -> Diagnostic {
-    of_fault(fault).because(at, "bound here")
+pub fn not_opened(plan: &Plan, (fault, at): (Fault, Option<Span>)) -> Diagnostic {
+    let found = of_fault(plan, fault);
+    match at {
+        Some(at) => found.because(at, "bound here"),
+        None => found,
+    }
 }
 
 /// What comes of something that may break down: an error in this program leaves no device as it is.
@@ -356,18 +365,19 @@ fn unbroken<T>(act: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-fn broken(why: &str) -> Diagnostic {
+fn broken(at: Span, why: &str) -> Diagnostic {
     let headline = format!("this program broke down: {why}");
-    Diagnostic::error(codes::RUN_FAILED, Span::default(), headline, "an error in matterixc, not in the workflow")
+    Diagnostic::error(codes::RUN_FAILED, at, headline, "an error in matterixc, not in the workflow")
 }
 
 /// Makes devices safe; what could not be.
 fn secured(hardware: &mut Hardware<'_, '_>, exposed: &Exposed) -> Vec<Diagnostic> {
+    let at = hardware.program.plan.span();
     match unbroken(|| hardware.secure()) {
         Ok(left) => left.into_iter().map(unsafe_left).collect(),
         Err(why) => {
-            let all = exposed.names().into_iter().map(|name| unsafe_left((Span::default(), format!("`{name}`"))));
-            std::iter::once(broken(&why)).chain(all).collect()
+            let all = exposed.names().into_iter().map(|name| unsafe_left((at, format!("`{name}`"))));
+            std::iter::once(broken(at, &why)).chain(all).collect()
         }
     }
 }

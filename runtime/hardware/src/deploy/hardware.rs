@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-use matterix_ir::plan::{Operation, Step, StepId};
+use matterix_ir::plan::StepId;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::wire::Exchange;
 use matterix_ir::{Code, NodeId, Program, Sources, Span, codes};
@@ -148,8 +148,6 @@ pub struct Hardware<'m, 't> {
     pub(super) broken_meanwhile: Vec<u32>,
     /// The lab time that the clock had come to when a journal was gone on with, s.
     pub(super) caught_up: Option<f64>,
-    /// The step of each operation, by where it stands in memory.
-    pub(super) steps: BTreeMap<usize, StepId>,
 }
 
 impl<'m, 't> Hardware<'m, 't> {
@@ -169,15 +167,10 @@ impl<'m, 't> Hardware<'m, 't> {
                 told.entry(line.value).or_insert((d, t));
             }
         }
-        let steps = program.plan.steps.iter().enumerate().filter_map(|(i, s)| match &s.step {
-            Step::Operation(operation) => Some((address(operation), StepId(i as u32))),
-            _ => None,
-        });
         let settings = Settings { world: Rc::new(Shared::new(settings.world)), ..settings };
         let origin = (0.0, settings.world.elapsed());
         Hardware {
             observed: Observed::new(&program.model, told),
-            steps: steps.collect(),
             program,
             sources,
             twin,
@@ -272,8 +265,9 @@ impl<'m, 't> Hardware<'m, 't> {
         !matches!(self.settings.mode, Mode::Dry | Mode::Replay)
     }
 
-    pub(super) fn fault(&self, code: Code, span: Span, message: String) -> Fault {
-        Fault { code, span: Some(span), time: self.twin.now(), message, help: Vec::new() }
+    /// A fault now, at a place in the text if it has one: else at the step under way.
+    pub(super) fn fault(&self, code: Code, span: impl Into<Option<Span>>, message: String) -> Fault {
+        Fault { span: span.into(), ..Fault::new(code, self.twin.now(), message) }
     }
 
     /// A trouble as the fault of a device.
@@ -304,7 +298,7 @@ impl<'m, 't> Hardware<'m, 't> {
 
     /// That the journal cannot be written.
     pub(super) fn unkept(&self, why: String) -> Fault {
-        let fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), why);
+        let fault = self.fault(codes::JOURNAL_MISMATCH, None::<Span>, why);
         fault.help(
             "what was not written down cannot be gone on with: make room, and begin anew with a journal of its own",
         )
@@ -341,9 +335,4 @@ impl<'m, 't> Hardware<'m, 't> {
         let states = self.twin.engine().states();
         sha256(&states.iter().flat_map(|state| state.to_bits().to_le_bytes()).collect::<Vec<u8>>())
     }
-}
-
-/// Where an operation stands in memory.
-pub(super) fn address(operation: &Operation) -> usize {
-    std::ptr::from_ref(operation) as usize
 }

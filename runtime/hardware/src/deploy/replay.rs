@@ -65,7 +65,7 @@ impl Hardware<'_, '_> {
         }
         self.replay.pop_front();
         let code = codes::find(&code).unwrap_or(codes::RUN_FAILED);
-        let fault = self.fault(code, Span::default(), text);
+        let fault = self.fault(code, None::<Span>, text);
         if let Some(device) = self.devices.iter_mut().find(|d| Some(d.name) == lost.as_deref()) {
             device.lost = Some(fault.message.clone());
         }
@@ -76,7 +76,7 @@ impl Hardware<'_, '_> {
         self.refused.set(true);
         let before = serde_json::to_string(before).unwrap_or_default();
         let message = format!("the journal does not fit the plan: {now}, but it says `{before}`");
-        let mut fault = self.fault(codes::JOURNAL_MISMATCH, Span::default(), message);
+        let mut fault = self.fault(codes::JOURNAL_MISMATCH, None::<Span>, message);
         fault.help.push("begin anew, with a journal of its own".to_owned());
         fault
     }

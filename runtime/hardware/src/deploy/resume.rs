@@ -81,7 +81,7 @@ impl Hardware<'_, '_> {
         if self.settings.mode == Mode::Replay {
             self.refused.set(true);
             let message = "the journal ends before the plan does".to_owned();
-            return Err(self.fault(codes::JOURNAL_MISMATCH, matterix_ir::Span::default(), message));
+            return Err(self.fault(codes::JOURNAL_MISMATCH, None::<matterix_ir::Span>, message));
         }
         if !std::mem::take(&mut self.resuming) {
             return Ok(());
@@ -103,7 +103,7 @@ impl Hardware<'_, '_> {
                 "the clock of this machine is {} s before the last line of the journal: nobody knows how long devices were alone",
                 show_number(back)
             );
-            let mut fault = self.fault(codes::JOURNAL_MISMATCH, matterix_ir::Span::default(), message);
+            let mut fault = self.fault(codes::JOURNAL_MISMATCH, None::<matterix_ir::Span>, message);
             fault.help.push("set the clock, or begin anew".to_owned());
             return Err(fault);
         }

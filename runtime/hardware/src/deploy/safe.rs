@@ -65,7 +65,7 @@ impl Hardware<'_, '_> {
             _ => None,
         });
         if let Some(operation) = same.next()
-            && let Ok(ticket) = self.twin.start(operation, &mut ())
+            && let Ok(ticket) = self.twin.begin(operation, &mut ())
         {
             let _ = self.twin.poll(ticket, &mut ());
         }

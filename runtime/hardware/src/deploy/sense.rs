@@ -35,17 +35,17 @@ impl Hardware<'_, '_> {
     }
 
     /// Says over open lines what drivers say first; what went wrong, and where the device is bound.
-    pub fn open(&mut self) -> Result<(), (Fault, Span)> {
+    pub fn open(&mut self) -> Result<(), (Fault, Option<Span>)> {
         for index in 0..self.devices.len() {
             let (driver, at) = (self.devices[index].driver, self.devices[index].binding.at);
             for exchange in driver.iter().flat_map(|driver| &driver.open) {
-                self.first(index, exchange).map_err(|fault| (fault, at))?;
+                self.first(index, exchange).map_err(|fault| (fault, Some(at)))?;
             }
         }
         self.set_clock();
         let (t, wall) = (self.twin.now(), self.wall());
         self.dated = wall;
-        self.keep(&Entry::Opened { t, wall }).map_err(|fault| (fault, Span::default()))
+        self.keep(&Entry::Opened { t, wall }).map_err(|fault| (fault, None))
     }
 
     fn first(&mut self, index: usize, exchange: &Exchange) -> Result<(), Fault> {

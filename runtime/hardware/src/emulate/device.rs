@@ -118,7 +118,7 @@ impl<'m> Device<'_, 'm> {
                 continue;
             }
             let reply = Reply::of(self.tells(told)?);
-            out.extend(self.codec.answer(&reply).map_err(|why| untold(told.span, self.sim.now(), why))?);
+            out.extend(self.codec.answer(&reply).map_err(|why| untold(Some(told.span), self.sim.now(), why))?);
         }
         Ok(out)
     }
@@ -139,7 +139,7 @@ impl<'m> Device<'_, 'm> {
             };
             if let Some(reply) = reply {
                 let reply = Reply { busy: !self.running.is_empty(), ..reply };
-                *self.last = self.codec.answer(&reply).map_err(|why| untold(Span::default(), self.sim.now(), why))?;
+                *self.last = self.codec.answer(&reply).map_err(|why| untold(None, self.sim.now(), why))?;
                 out.extend_from_slice(self.last);
             }
         }
@@ -220,7 +220,7 @@ impl<'m> Device<'_, 'm> {
         let (_, with) = answers.into_iter().find(|(asked, _)| self.codec.asked(asked, word))?;
         let engine = self.sim.engine();
         let text = template::filled(with, |n| Some(engine.eval(n)));
-        Some(text.map_err(|why| untold(with.span, self.sim.now(), why)))
+        Some(text.map_err(|why| untold(Some(with.span), self.sim.now(), why)))
     }
 
     /// The quantity a message asks for.
@@ -237,7 +237,7 @@ impl<'m> Device<'_, 'm> {
         let form = self.form(told);
         let digits = self.digits(told, form);
         let text = self.codec.rendered(form, |_| Shown { value, digits });
-        text.map_err(|why| untold(told.span, self.sim.now(), why))
+        text.map_err(|why| untold(Some(told.span), self.sim.now(), why))
     }
 
     /// The form that it answers in: the last one whose condition holds, or else the first.
@@ -328,7 +328,7 @@ impl<'m> Device<'_, 'm> {
             None => None,
         };
         *self.said = Some(&served.exchange);
-        let ticket = self.sim.start(&served.operation, &mut ())?;
+        let ticket = self.sim.begin(&served.operation, &mut ())?;
         if matches!(self.sim.poll(ticket, &mut ())?, Status::Running { .. }) {
             self.running.push((ticket, &served.operation));
         }
@@ -354,7 +354,7 @@ impl<'m> Device<'_, 'm> {
         }
         let shown =
             |slot: &Slot| values.iter().find(|(of, _)| *of == slot).map(|(_, shown)| *shown).unwrap_or_default();
-        self.codec.rendered(pattern, shown).map_err(|why| untold(pattern.span, self.sim.now(), why))
+        self.codec.rendered(pattern, shown).map_err(|why| untold(Some(pattern.span), self.sim.now(), why))
     }
 
     /// The answer that means a failure; none where the driver knows none, as devices do that ignore what they do not understand.
@@ -387,6 +387,6 @@ fn fixed(driver: &Driver) -> impl Iterator<Item = (&Exchange, bool)> {
 }
 
 /// What the device would say has no room in the form that its driver declares.
-fn untold(span: Span, time: f64, message: String) -> Fault {
-    Fault { code: codes::UNSENDABLE, span: Some(span), time, message, help: Vec::new() }
+fn untold(span: Option<Span>, time: f64, message: String) -> Fault {
+    Fault { span, ..Fault::new(codes::UNSENDABLE, time, message) }
 }

@@ -15,17 +15,11 @@ pub use paced::Paced;
 /// Makes the plan of a lab wait for what is asked of it, without end.
 pub fn wait_for_ever(program: &mut Program) {
     let node = program.model.graph.number(0.0);
+    let span = program.scene.instances.first().map(|first| first.span).unwrap_or_default();
     let text = "the end".to_owned();
-    let condition = Condition {
-        node,
-        text,
-        span: Span::default(),
-        compared: Vec::new(),
-        terms: Vec::new(),
-        refusal: None,
-        each: Vec::new(),
-    };
+    let condition =
+        Condition { node, text, span, compared: Vec::new(), terms: Vec::new(), refusal: None, each: Vec::new() };
     let step = Step::WaitUntil { condition, timeout: None };
     program.plan.root = StepId(program.plan.steps.len() as u32);
-    program.plan.steps.push(PlanStep { label: "wait for what is asked".to_owned(), span: Span::default(), step });
+    program.plan.steps.push(PlanStep { label: "wait for what is asked".to_owned(), span, step });
 }

@@ -117,10 +117,10 @@ impl Backend for Paced<'_, '_, '_> {
         self.inner.foresee(step, operation, out)
     }
 
-    fn start(&mut self, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
+    fn start(&mut self, step: StepId, operation: &Operation, out: &mut dyn Listener) -> Result<Ticket, Fault> {
         // How long a command takes follows from what it finds, as in a run, not from what it does.
         self.measure(out)?;
-        self.inner.start(operation, out)
+        self.inner.start(step, operation, out)
     }
 
     fn poll(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Status, Fault> {
@@ -185,7 +185,7 @@ mod tests {
 
         fn set_local(&mut self, _: u32, _: Option<f64>) {}
 
-        fn start(&mut self, _: &Operation, _: &mut dyn Listener) -> Result<Ticket, Fault> {
+        fn start(&mut self, _: StepId, _: &Operation, _: &mut dyn Listener) -> Result<Ticket, Fault> {
             self.asked.push("start");
             Ok(Ticket(0))
         }
@@ -250,7 +250,7 @@ mod tests {
         let mut backend = Noting::default();
         {
             let mut paced = Paced::new(&mut backend, &desk, &cancel, 1.0);
-            paced.start(&heats(), &mut listener).expect("it starts");
+            paced.start(StepId(0), &heats(), &mut listener).expect("it starts");
             paced.answer(&mut listener).expect("it answers");
         }
         assert_eq!(backend.asked, ["value", "start"]);

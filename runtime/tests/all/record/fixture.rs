@@ -122,7 +122,7 @@ fn model() -> Model {
         state("beaker.contents.amount[EtI]", mole(), zero),
         state("energy through convection(beaker)", joule(), zero),
     ];
-    model.derivatives = [0, 4, 5, 6, 7].map(|state| Derivative { state, rate: zero }).to_vec();
+    model.derivatives = [0, 4, 5, 6, 7].map(|state| Derivative::new(state, zero)).to_vec();
     model.params = vec![Param { name: "hotplate.gain".into(), value: 70.09, unit: Unit::one(), span: line(2) }];
     let process = |name: &str, guard| Process { name: name.into(), guard, span: line(2) };
     model.processes = vec![
