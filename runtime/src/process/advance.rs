@@ -3,6 +3,8 @@
 //! Every part has come as far as its own last step; who asks for a state in between reads it from the solution. So a step of one part
 //! costs nothing elsewhere.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::NodeId;
 use matterix_ir::model::Drained;
 
@@ -68,11 +70,10 @@ impl Engine<'_> {
     /// Looks out for these conditions from now on, and for no others that the caller asked for.
     fn watch(&mut self, watches: &[Watch]) {
         let graph = &self.model.graph;
-        let watching = watches.iter().map(|watch| self.index.watch(graph, watch.node)).collect();
-        for root in self.watching.symmetric_difference(&watching) {
-            self.due.law.roots.insert(*root);
-            self.due.law.sights.insert(*root);
-        }
+        let watching: BTreeSet<u32> = watches.iter().map(|watch| self.index.watch(graph, watch.node)).collect();
+        let law = &mut self.due.law;
+        law.roots.extend(watching.difference(&self.watching));
+        law.sights.extend(self.watching.symmetric_difference(&watching));
         self.watching = watching;
     }
 

@@ -31,6 +31,8 @@ struct Fact {
     feels_state: bool,
     /// The operation whose value it passes on, itself if none.
     same: u32,
+    /// The operands that can change it while the others stay, a bit each.
+    live: u8,
 }
 
 impl Fact {
@@ -155,7 +157,7 @@ impl Facts {
             let (was, is) = (self.facts[at], self.of(graph).look(node, &leaf, moving));
             let is_other = looked == 0 || !was.computes_like(&is);
             self.facts[at] = is;
-            if is_other || self.rests_on_altered(graph, node) {
+            if is_other || was.live != is.live || self.rests_on_altered(graph, node) {
                 self.altered[at] = self.instant;
             }
             if looked != 0 && is_other && graph.op(node).is_comparison() {
@@ -168,12 +170,7 @@ impl Facts {
     /// Whether something that can change `node` within the segment is altered.
     fn rests_on_altered(&self, graph: &Graph, node: NodeId) -> bool {
         let fact = self.facts[node.0 as usize];
-        if !(fact.feels_time || fact.feels_state) {
-            return false;
-        }
-        let mut below = Vec::with_capacity(3);
-        self.of(graph).influences(node, &mut below);
-        below.into_iter().any(|n| self.is_altered(n))
+        (fact.feels_time || fact.feels_state) && self.of(graph).influences(node).any(|n| self.is_altered(n))
     }
 }
 
@@ -198,7 +195,7 @@ impl Analysis<'_> {
 
     fn look(&self, node: NodeId, leaf: impl Fn(Op) -> f64, moving: &[bool]) -> Fact {
         let op = self.graph.op(node);
-        let mut fact = Fact { same: node.0, ..Fact::default() };
+        let mut fact = Fact { same: node.0, live: self.live(op), ..Fact::default() };
         match op {
             Op::Time => (fact.varies, fact.feels_time) = (true, true),
             Op::State(s) if moving[s as usize] => (fact.varies, fact.feels_state) = (true, true),
@@ -285,19 +282,31 @@ impl Analysis<'_> {
                 continue;
             }
             found.extend(Some(node).filter(|n| self.graph.op(*n).is_comparison()));
-            self.influences(node, &mut todo);
+            todo.extend(self.influences(node));
         }
         found.sort_unstable();
         found
     }
 
-    /// The operands that can change `node` while the others stay: what a false condition hides is left out.
-    fn influences(&self, node: NodeId, out: &mut Vec<NodeId>) {
-        match self.graph.op(node) {
-            Op::Select(c, a, b) if !self.fact(c).varies => out.extend([c, if self.now(c) != 0.0 { a } else { b }]),
-            Op::Binary(kind, a, _) if decided(kind, self.fact(a)) => out.push(a),
-            Op::Binary(kind, _, b) if decided(kind, self.fact(b)) => out.push(b),
-            op => out.extend(op.operands()),
+    /// The operands that can change `node` while the others stay.
+    fn influences(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let live = self.fact(node).live;
+        self.graph.op(node).operands().enumerate().filter(move |(i, _)| live & (1 << i) != 0).map(|(_, n)| n)
+    }
+
+    /// The same, a bit each: what a false condition hides is left out.
+    fn live(&self, op: Op) -> u8 {
+        match op {
+            Op::Select(c, ..) if !self.fact(c).varies => {
+                if self.now(c) != 0.0 {
+                    0b011
+                } else {
+                    0b101
+                }
+            }
+            Op::Binary(kind, a, _) if decided(kind, self.fact(a)) => 0b01,
+            Op::Binary(kind, _, b) if decided(kind, self.fact(b)) => 0b10,
+            _ => 0b111,
         }
     }
 

@@ -85,10 +85,10 @@ pub(super) struct Index {
     rate_of: Vec<Option<u32>>,
     /// By state, its operations.
     states: Lists<NodeId>,
-    /// By value of the plan, its operations.
-    locals: Lists<NodeId>,
-    /// By reading, its operations.
-    readings: Lists<NodeId>,
+    /// Values of the plan, which need not be there at all, with their operations, in order.
+    locals: Vec<(u32, NodeId)>,
+    /// Readings with their operations, in order.
+    readings: Vec<(u32, NodeId)>,
     walk: Walk,
 }
 
@@ -108,13 +108,14 @@ impl Index {
                 rate_of[*state as usize] = Some(i as u32);
             }
         }
-        let leaves = |list: fn(Op) -> Option<u32>| {
-            let of = graph.ops().iter().enumerate();
-            let of = of.filter_map(move |(i, op)| Some((list(*op)?, NodeId(i as u32))));
-            let count = of.clone().map(|(list, _)| list as usize + 1).max().unwrap_or(0);
-            Lists::new(count, of)
+        let leaves = |of: fn(Op) -> Option<u32>| {
+            let ops = graph.ops().iter().enumerate();
+            let mut found: Vec<(u32, NodeId)> = ops.filter_map(|(i, op)| Some((of(*op)?, NodeId(i as u32)))).collect();
+            found.sort_unstable();
+            found
         };
         let states = leaves(|op| if let Op::State(i) = op { Some(i) } else { None });
+        let states = Lists::new(model.states.len(), states.into_iter());
         let locals = leaves(|op| if let Op::Local(i) = op { Some(i) } else { None });
         let readings = leaves(|op| if let Op::Reading(i) = op { Some(i) } else { None });
         let mut is_law = vec![false; size];
@@ -157,11 +158,13 @@ impl Index {
 
     /// The operations that are this value of the plan, or this reading.
     pub(super) fn heard(&self, leaf: Op) -> Vec<NodeId> {
-        match leaf {
-            Op::Local(i) => self.locals.at(i as usize).to_vec(),
-            Op::Reading(i) => self.readings.at(i as usize).to_vec(),
-            _ => Vec::new(),
-        }
+        let (all, index) = match leaf {
+            Op::Local(i) => (&self.locals, i),
+            Op::Reading(i) => (&self.readings, i),
+            _ => return Vec::new(),
+        };
+        let first = all.partition_point(|(i, _)| *i < index);
+        all[first..].iter().take_while(|(i, _)| *i == index).map(|(_, node)| *node).collect()
     }
 
     /// The root of a condition that the caller asks for.

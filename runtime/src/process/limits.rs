@@ -19,16 +19,12 @@ struct Kept {
     node: NodeId,
     /// The states below it, ascending.
     states: Vec<u32>,
-    /// Whether time stands below it.
-    timed: bool,
 }
 
 /// The limits of a plan, made ready for watching.
 #[derive(Clone, Debug, Default)]
 pub struct Keeps {
     kept: Vec<Kept>,
-    /// By state, the limits that rest on it.
-    of_state: Vec<Vec<u32>>,
 }
 
 impl Keeps {
@@ -38,16 +34,15 @@ impl Keeps {
         for derivative in model.derivatives.iter().filter(|d| model.graph.constant(d.rate) != Some(0.0)) {
             moving[derivative.state as usize] = true;
         }
-        let mut keeps = Keeps { kept: Vec::new(), of_state: vec![Vec::new(); model.states.len()] };
-        for (i, condition) in conditions.into_iter().enumerate() {
-            let mut kept = Kept { node: condition, states: Vec::new(), timed: false };
-            model.graph.visit(condition, |op| match op {
-                Op::State(s) => kept.states.push(s),
-                Op::Time => kept.timed = true,
-                _ => {}
+        let mut keeps = Keeps::default();
+        for condition in conditions {
+            let mut kept = Kept { node: condition, states: Vec::new() };
+            model.graph.visit(condition, |op| {
+                if let Op::State(s) = op {
+                    kept.states.push(s);
+                }
             });
             kept.states.sort_unstable();
-            kept.states.iter().for_each(|&s| keeps.of_state[s as usize].push(i as u32));
             if kept.states.iter().any(|&s| moving[s as usize]) {
                 kept.node = with_slack(&mut model.graph, condition);
             }

@@ -182,3 +182,113 @@ fn what_is_written_from_outside_begins_its_part_anew() {
     close(engine.states()[0], 2.0 * (-1.0f64).exp(), 1e-7);
     close(engine.states()[1], (-0.2f64).exp(), 1e-7);
 }
+
+/// Keeps which states each sample may have changed.
+#[derive(Default)]
+struct Changes(Vec<(f64, Vec<u32>)>);
+
+impl matterix_runtime::process::Observer for Changes {
+    fn sample(&mut self, time: f64, _: &matterix_runtime::process::Engine<'_>, changed: &[u32]) {
+        self.0.push((time, changed.to_vec()));
+    }
+
+    fn event(&mut self, _: f64, _: usize) {}
+
+    fn process(&mut self, _: f64, _: usize, _: bool) {}
+}
+
+#[test]
+fn a_step_of_one_part_shows_nothing_else() {
+    let b = many(20);
+    let (mut engine, mut changes) = (engine(&b.model), Changes::default());
+    engine.start(&mut changes).expect("start");
+    engine.advance(300.0, &[], &mut changes).expect("advance");
+    let (all, _): (Vec<_>, Vec<_>) = changes.0.iter().partition(|(_, changed)| changed.len() > 2);
+    assert!(all.iter().all(|(time, _)| *time == 0.0), "only the beginning concerns several");
+    assert!(changes.0.len() > 100, "{} samples", changes.0.len());
+}
+
+#[test]
+fn how_often_anybody_looks_changes_no_bit() {
+    let b = many(5);
+    let once = |pieces: usize| {
+        let (mut engine, mut trace) = (engine(&b.model), Trace::default());
+        engine.start(&mut trace).expect("start");
+        for piece in 1..=pieces {
+            engine.advance(400.0 * piece as f64 / pieces as f64, &[], &mut trace).expect("advance");
+            let seen: f64 = engine.states().iter().sum();
+            assert!(seen.is_finite());
+        }
+        let states: Vec<u64> = engine.states().iter().map(|s| s.to_bits()).collect();
+        (states, trace.events)
+    };
+    let whole = once(1);
+    for pieces in [2, 7, 1000] {
+        assert_eq!(whole, once(pieces), "{pieces} pieces");
+    }
+}
+
+#[test]
+fn a_state_is_read_between_the_steps_of_its_part() {
+    // One part has all the steps, the other one few long ones.
+    let mut b = Build::default();
+    thermostat(&mut b, "busy", 41.0, (40.0, 40.2));
+    let calm = b.state("calm", 1.0);
+    let decay = b.scale(-1e-3, calm);
+    b.rate(2, decay);
+    struct Reads(f64);
+    impl matterix_runtime::process::Observer for Reads {
+        fn sample(&mut self, time: f64, engine: &matterix_runtime::process::Engine<'_>, _: &[u32]) {
+            self.0 = self.0.max((engine.state(2) - (-1e-3 * time).exp()).abs());
+        }
+
+        fn event(&mut self, _: f64, _: usize) {}
+
+        fn process(&mut self, _: f64, _: usize, _: bool) {}
+    }
+    let (mut engine, mut reads) = (engine(&b.model), Reads(0.0));
+    engine.start(&mut reads).expect("start");
+    engine.advance(1000.0, &[], &mut reads).expect("advance");
+    assert!(reads.0 < 1e-8, "{}", reads.0);
+}
+
+#[test]
+fn what_a_closed_gate_hid_is_seen_when_it_opens() {
+    // A level is passed while nobody looks; who looks later sees that it has been, and what comes after.
+    let mut b = Build::default();
+    let (x, armed, time) = (b.state("x", 0.0), b.state("armed", 0.0), b.time());
+    let one = b.num(1.0);
+    b.rate(0, one);
+    let (late, high, higher) = (b.at_least(time, 5.0), b.at_least(x, 3.0), b.at_least(x, 7.0));
+    let both = |b: &mut Build, level: NodeId| b.op(matterix_ir::BinaryOp::And, armed, level);
+    let (seen, next) = (both(&mut b, high), both(&mut b, higher));
+    b.event("arms", late, vec![assign(1, one)]);
+    b.event("has passed", seen, Vec::new());
+    b.event("passes", next, Vec::new());
+    let (_, trace) = run(&b.model, 10.0);
+    close(trace.times_of(1)[0], 5.0, 1e-9);
+    close(trace.times_of(2)[0], 7.0, 1e-9);
+    assert_eq!(trace.events.len(), 3);
+}
+
+#[test]
+fn what_comes_to_rest_moves_again() {
+    // A valve opens and shuts by time; between, nothing moves and nothing is integrated.
+    let mut b = Build::default();
+    let (level, time) = (b.state("level", 0.0), b.time());
+    let open = |b: &mut Build, from: f64, to: f64| {
+        let (begun, over) = (b.at_least(time, from), b.at_least(time, to));
+        let zero = b.num(0.0);
+        let one = b.num(1.0);
+        let flow = b.model.graph.select(over, zero, one);
+        b.only_if(begun, flow)
+    };
+    let (first, second) = (open(&mut b, 10.0, 20.0), open(&mut b, 1000.0, 1005.0));
+    let rate = b.add(first, second);
+    b.rate(0, rate);
+    let full = b.at_least(level, 12.0);
+    b.event("full", full, Vec::new());
+    let (engine, trace) = run(&b.model, 2000.0);
+    close(engine.states()[0], 15.0, 1e-9);
+    close(trace.times_of(0)[0], 1002.0, 1e-9);
+}
