@@ -158,8 +158,8 @@ fn many_reactions_in_one_volume() {
         volume = b.add(volume, part);
     }
     let speed = |i: usize| 1e-3 * 1.6f64.powi(i as i32);
-    for i in 0..pairs {
-        let concentration = b.div(amounts[i], volume);
+    for (i, amount) in amounts.into_iter().take(pairs).enumerate() {
+        let concentration = b.div(amount, volume);
         let slow = b.scale(speed(i), concentration);
         let rate = b.mul(slow, volume);
         let loss = b.scale(-1.0, rate);
