@@ -42,8 +42,12 @@ enum Lu {
 
 impl Factors {
     pub(super) fn new(pattern: &Pattern) -> Self {
+        let is_sparse = pattern.states > DENSE;
+        Self::with(pattern, if is_sparse { Lu::Sparse(Box::new(SparseLu::new(pattern))) } else { Lu::Dense(None) })
+    }
+
+    fn with(pattern: &Pattern, lu: Lu) -> Self {
         let size = pattern.size();
-        let lu = if pattern.states > DENSE { Lu::Sparse(Box::new(SparseLu::new(pattern))) } else { Lu::Dense(None) };
         let entries = vec![0.0; pattern.columns.len()];
         let work = std::array::from_fn(|_| vec![0.0; size]);
         let (weights, allowed) = (vec![1.0; size], vec![0.0; size]);
@@ -184,6 +188,39 @@ impl LinearSolver<Shifted> for WeighedLu<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A block on which vessels stand, the last of which is a hub of all: as full and as sparse systems they have one solution.
+    #[test]
+    fn full_and_sparse_factors_agree() {
+        let size = 30_u32;
+        let states = size as usize - 1;
+        let mut pattern = Pattern { states, starts: vec![0], columns: Vec::new() };
+        for row in 0..size {
+            let is_full = row == 0 || row == size - 1;
+            pattern.columns.extend((0..size).filter(|column| is_full || [0, row, size - 1].contains(column)));
+            pattern.starts.push(pattern.columns.len() as u32);
+        }
+        let slopes: Vec<f64> = (0..pattern.columns.len()).map(|k| f64::sin(1.0 + k as f64)).collect();
+        let right: Vec<f64> = (0..states).map(|i| f64::cos(i as f64)).collect();
+        let solve = |lu: Lu, factor: f64| {
+            let mut factors = Factors::with(&pattern, lu);
+            let allowed: Vec<f64> = (0..states).map(|i| 10f64.powi(-(i as i32 % 13))).collect();
+            factors.allow(&allowed);
+            factors.factor(|matrix| {
+                matrix.set(slopes.len(), |out| out.copy_from_slice(&slopes));
+                (matrix.ones, matrix.factor) = (1.0, factor);
+            });
+            let mut values = right.clone();
+            factors.solve(&mut values).expect("it is regular");
+            values
+        };
+        for factor in [-1e-3, -0.1, -10.0] {
+            let full = solve(Lu::Dense(None), factor);
+            let sparse = solve(Lu::Sparse(Box::new(SparseLu::new(&pattern))), factor);
+            let most = full.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            assert!(full.iter().zip(&sparse).all(|(a, b)| (a - b).abs() < 1e-10 * most), "{full:?} {sparse:?}");
+        }
+    }
 
     #[test]
     fn a_weight_is_a_power_of_two() {

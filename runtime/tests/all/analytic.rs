@@ -113,6 +113,71 @@ fn two_bodies_come_to_one_temperature() {
     }
 }
 
+/// Vessels that are all alike warm as one.
+#[test]
+fn many_vessels_on_one_block() {
+    let (c1, c2, g, vessels) = (1058.3, 4.303, 1.277, 40);
+    let mut b = Build::default();
+    let block = b.state("block.heat", c1 * 350.0);
+    let t1 = b.scale(1.0 / c1, block);
+    let (mut total, mut loss) = (block, b.num(0.0));
+    let mut flows = Vec::new();
+    for i in 0..vessels {
+        let heat = b.state(&format!("vessel{i}.heat"), c2 * 298.15);
+        let t2 = b.scale(1.0 / c2, heat);
+        let difference = b.sub(t1, t2);
+        let flow = b.scale(g, difference);
+        flows.push(flow);
+        loss = b.sub(loss, flow);
+        total = b.add(total, heat);
+    }
+    b.rate(0, loss);
+    (1..).zip(flows).for_each(|(state, flow)| b.rate(state, flow));
+    b.balance("energy", total, vec![]);
+    let all = c2 * f64::from(vessels);
+    let mean = (c1 * 350.0 + all * 298.15) / (c1 + all);
+    for t in [1.0, 10.0, 1e5] {
+        let (engine, _) = run(&b.model, t);
+        let decay = (-g * (f64::from(vessels) / c1 + 1.0 / c2) * t).exp();
+        close(engine.states()[0] / c1, mean + (350.0 - mean) * decay, 1e-8);
+        close(engine.states()[7] / c2, mean + (298.15 - mean) * decay, 1e-8);
+        assert!(engine.balances()[0].relative < 1e-12);
+    }
+}
+
+/// A_i -> B_i with rate k_i [A_i] V, where all share the volume, which the reactions change: each amount falls off by itself.
+#[test]
+fn many_reactions_in_one_volume() {
+    let pairs = 20;
+    let mut b = Build::default();
+    let amounts: Vec<_> =
+        (0..2 * pairs).map(|i| b.state(&format!("n{i}"), if i < pairs { 1e-3 } else { 0.0 })).collect();
+    let mut volume = b.num(1e-6);
+    for (i, amount) in amounts.iter().enumerate() {
+        let part = b.scale(if i < pairs { 1e-4 } else { 3e-5 }, *amount);
+        volume = b.add(volume, part);
+    }
+    let speed = |i: usize| 1e-3 * 1.6f64.powi(i as i32);
+    for (i, amount) in amounts.into_iter().take(pairs).enumerate() {
+        let concentration = b.div(amount, volume);
+        let slow = b.scale(speed(i), concentration);
+        let rate = b.mul(slow, volume);
+        let loss = b.scale(-1.0, rate);
+        b.rate(i as u32, loss);
+        b.rate((pairs + i) as u32, rate);
+        b.model.states[i].scale = Some(1e-3);
+        b.model.states[pairs + i].scale = Some(1e-3);
+    }
+    for t in [0.5, 20.0, 500.0] {
+        let (engine, _) = run(&b.model, t);
+        for i in 0..pairs {
+            let left = 1e-3 * (-speed(i) * t).exp();
+            assert!((engine.states()[i] - left).abs() < 1e-11, "{i} at {t} s: {} is not {left}", engine.states()[i]);
+            assert!((engine.states()[i] + engine.states()[pairs + i] - 1e-3).abs() < 1e-15);
+        }
+    }
+}
+
 #[test]
 fn lumped_cooling() {
     let (tau, ambient) = (250.0, 298.15);
