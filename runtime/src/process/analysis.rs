@@ -52,7 +52,7 @@ pub(super) struct Clock {
 }
 
 /// The facts about the operations of a graph, as they were last looked at.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Facts {
     facts: Vec<Fact>,
     /// By operation, the instant at which it was looked at; 0 never, [`OUTDATED`] before what it rests on has changed.
@@ -75,7 +75,7 @@ pub(super) struct Analysis<'g> {
 }
 
 /// What walks over the graph write down, kept from one to the next so that a walk costs no more than what it comes by.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Scratch {
     /// By operation, the last walk that came by.
     seen: Vec<u32>,

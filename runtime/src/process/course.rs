@@ -9,6 +9,7 @@ use super::mode::NOWHERE;
 use super::part::Part;
 
 /// Things that keep their number as long as they are there.
+#[derive(Clone)]
 pub(super) struct Slab<T> {
     items: Vec<Option<T>>,
     free: BTreeSet<u32>,
@@ -68,7 +69,7 @@ pub(super) enum Who {
 }
 
 /// Things in the order of time.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Queue {
     /// By the bits of the lab time, s, which stand in the order of times from 0 on.
     order: BTreeSet<(u64, Who)>,
@@ -105,7 +106,7 @@ impl Queue {
 }
 
 /// What a root of the law looks out for.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Sights {
     /// Comparisons that a single part decides, with the part.
     pub(super) own: Vec<(u32, NodeId)>,
@@ -116,7 +117,7 @@ pub(super) struct Sights {
 }
 
 /// What moves.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Course {
     pub(super) parts: Slab<Part>,
     /// By state, the part that moves it, or [`NOWHERE`].

@@ -78,6 +78,7 @@ impl Square {
 }
 
 /// A part's law as a matrix, in units in which its rows and columns are alike.
+#[derive(Clone)]
 pub(super) struct Exact {
     /// The first powers of the matrix, the unit matrix before them.
     powers: Vec<Square>,

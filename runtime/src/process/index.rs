@@ -62,7 +62,7 @@ pub(super) fn users(graph: &Graph) -> Lists<NodeId> {
 }
 
 /// Walks over the graph write down where they have been.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Walk {
     seen: Vec<u32>,
     walk: u32,
@@ -70,7 +70,7 @@ struct Walk {
 }
 
 /// The law's roots, and how they hang on the leaves of the graph.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Index {
     /// Who uses each operation.
     pub(super) users: Lists<NodeId>,

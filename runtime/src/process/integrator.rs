@@ -63,6 +63,7 @@ const RUN: usize = 12;
 const LONGEST_RUN: usize = 96;
 
 /// The right-hand side and its derivative, with their scratch memory.
+#[derive(Clone)]
 pub(super) struct Field {
     rates: Tape,
     /// What of them follows the clock alone.
@@ -73,6 +74,7 @@ pub(super) struct Field {
     work: RefCell<Work>,
 }
 
+#[derive(Clone)]
 struct Work {
     registers: Vec<f64>,
     tangents: Vec<f64>,
@@ -152,6 +154,7 @@ impl Field {
 type State = BdfState<NalgebraVec<f64>>;
 
 /// One integration, from a discontinuity to the next.
+#[derive(Clone)]
 pub(super) struct Integrator {
     /// The states it moves, ascending.
     pub(super) moving: Vec<u32>,

@@ -112,7 +112,7 @@ fn magnitude(graph: &mut Graph, a: NodeId, b: NodeId) -> NodeId {
 }
 
 /// Where the limits of a run stand.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Limits<'m> {
     all: Option<&'m Keeps>,
     /// Whether each was broken when last looked at.

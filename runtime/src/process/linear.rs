@@ -21,6 +21,7 @@ use super::sparse::SparseLu;
 pub(super) const DENSE: usize = 12;
 
 /// The matrix of a law and its factors. What depends on its pattern alone is kept from one solver to the next.
+#[derive(Clone)]
 pub(super) struct Factors {
     pattern: Pattern,
     /// What each row is multiplied by: powers of 2, which round nothing.
@@ -35,6 +36,7 @@ pub(super) struct Factors {
     work: [Vec<f64>; 3],
 }
 
+#[derive(Clone)]
 enum Lu {
     Sparse(Box<SparseLu>),
     Dense(Option<LU<f64, Dyn, Dyn>>),

@@ -12,6 +12,7 @@ use super::switch::{Crossing, Switches, Unseen};
 const LOOK: f64 = 1.0;
 
 /// Comparisons that rest on some parts, looked for as far as these have been followed.
+#[derive(Clone)]
 pub(super) struct Lookout {
     switches: Switches,
     /// The root of the law that asks for them.

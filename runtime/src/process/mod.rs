@@ -132,7 +132,8 @@ pub enum Advance {
     Broken(Vec<u32>),
 }
 
-/// A model on its way through time.
+/// A model on its way through time. A clone is a snapshot: it goes on from where it was taken as the original would have, to the last bit.
+#[derive(Clone)]
 pub struct Engine<'m> {
     model: &'m Model,
     options: Options,

@@ -29,6 +29,7 @@ struct Leg {
 }
 
 /// States that move together.
+#[derive(Clone)]
 pub(super) struct Part {
     integrator: Integrator,
     sight: Sight,
@@ -46,6 +47,7 @@ pub(super) struct Part {
 }
 
 /// What is looked for in each step.
+#[derive(Clone)]
 struct Sight {
     switches: Switches,
     /// The places of the states that these rest on.

@@ -17,7 +17,7 @@ use super::{Engine, Observer};
 use crate::fault::Fault;
 
 /// What has changed since the law was last looked at.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Due {
     /// Leaves and comparisons that have changed.
     pub(super) seeds: Vec<NodeId>,
@@ -29,7 +29,7 @@ pub(super) struct Due {
 }
 
 /// What of the law has to be looked at anew.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Concerned {
     /// Roots that rest on what has changed.
     pub(super) roots: BTreeSet<u32>,

@@ -23,7 +23,7 @@ const BISECTIONS: usize = 60;
 const LEFT_OVER: f64 = 1e-6;
 
 /// What is counted between two looks.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Suspicion {
     /// The sums that each state is in, by balance, with its factor there; found when first needed.
     factors: Vec<Vec<(u32, f64)>>,

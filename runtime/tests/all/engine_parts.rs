@@ -292,3 +292,24 @@ fn what_comes_to_rest_moves_again() {
     close(engine.states()[0], 15.0, 1e-9);
     close(trace.times_of(0)[0], 1002.0, 1e-9);
 }
+
+#[test]
+fn a_snapshot_goes_on_to_the_last_bit() {
+    let b = many(6);
+    let bits = |engine: &matterix_runtime::process::Engine<'_>| -> Vec<u64> {
+        engine.states().iter().map(|s| s.to_bits()).collect()
+    };
+    let (mut engine, mut trace) = (engine(&b.model), Trace::default());
+    engine.start(&mut trace).expect("start");
+    engine.advance(77.7, &[], &mut trace).expect("advance");
+    let (mut saved, before) = (engine.clone(), trace.clone());
+    engine.advance(400.0, &[], &mut trace).expect("advance");
+    // What becomes of the one does not touch the other.
+    let (hot, mut other) = (b.model.states[0].initial, saved.clone());
+    other.apply(&[assign(0, hot)], &mut ()).expect("apply");
+    other.advance(300.0, &[], &mut ()).expect("advance");
+    let mut after = before;
+    saved.advance(400.0, &[], &mut after).expect("advance");
+    assert_eq!(bits(&engine), bits(&saved));
+    assert_eq!(trace, after);
+}
