@@ -170,9 +170,12 @@ pub struct RunArgs {
     /// Where all randomness of the run starts.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Where to write recording, table, plots and report; nothing is written without it.
+    /// Where to write recording, tables, plots and report; nothing is written without it.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write the tables as CSV too, one column a quantity.
+    #[arg(long, requires = "out")]
+    pub csv: bool,
     /// How closely motions are simulated; with `motion` they are looked at before the run begins.
     #[arg(long, value_enum, default_value_t = Fidelity::Process)]
     pub fidelity: Fidelity,

@@ -8,7 +8,7 @@ use matterix_ir::plan::StepId;
 use matterix_ir::{BinaryOp, NodeId, Op, Program, Sources, Span, Unit};
 use matterix_runtime::exec::{Listener, StepState};
 use matterix_runtime::process::{Engine, Observer};
-use matterix_runtime::record::{self, Outputs, Recording, Report, Run, RunInfo};
+use matterix_runtime::record::{self, Outputs, Recording, Report, Run, RunInfo, Sampler};
 use matterix_runtime::run::RunOptions;
 
 /// A run with all its samples.
@@ -21,7 +21,7 @@ pub struct Recorded {
 impl Recorded {
     /// Runs a program.
     pub fn new(program: &Program) -> Self {
-        let mut follower = Follower(Recording::new(program));
+        let mut follower = Follower(Recording::new(program), Sampler::new(&program.model));
         let outcome = matterix_runtime::run::run(program, &RunOptions::default(), &mut follower);
         follower.0.reach(outcome.end_time);
         Recorded { recording: follower.0, info: RunInfo::default(), sources: Sources::default() }
@@ -29,12 +29,12 @@ impl Recorded {
 
     /// Writes the plot.
     pub fn plot(&self, program: &Program) {
-        self.write(program, Outputs { recording: false, tables: false, plot: true });
+        self.write(program, Outputs { recording: false, tables: false, csv: false, plot: true });
     }
 
     /// Writes all but the plot.
     pub fn tables(&self, program: &Program) {
-        self.write(program, Outputs { recording: true, tables: true, plot: false });
+        self.write(program, Outputs { recording: true, tables: true, csv: false, plot: false });
     }
 
     fn write(&self, program: &Program, outputs: Outputs) {
@@ -46,13 +46,11 @@ impl Recorded {
 }
 
 /// Keeps what the command keeps of a run without failures.
-struct Follower(Recording);
+struct Follower(Recording, Sampler);
 
 impl Observer for Follower {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
-        let observables = engine.model().observables.iter();
-        let values: Vec<Vec<f64>> = observables.map(|o| o.value.iter().map(|n| engine.eval(*n)).collect()).collect();
-        self.0.sample(time, &engine.states(), &values);
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        self.1.sample(&mut self.0, time, engine, changed);
     }
 
     fn event(&mut self, time: f64, event: usize) {
@@ -66,13 +64,6 @@ impl Observer for Follower {
 
 impl Listener for Follower {
     fn step(&mut self, time: f64, step: StepId, state: StepState) {
-        let state = match state {
-            StepState::Pending => record::StepState::Pending,
-            StepState::Running => record::StepState::Running,
-            StepState::Done => record::StepState::Done,
-            StepState::Failed => record::StepState::Failed,
-            StepState::Skipped => record::StepState::Skipped,
-        };
         self.0.step(time, step, state);
     }
 }

@@ -16,3 +16,4 @@ pub mod run;
 pub mod schedule;
 mod screen;
 pub mod study;
+mod touched;

@@ -27,6 +27,17 @@ pub enum Fidelity {
     Dry,
 }
 
+impl Fidelity {
+    /// As files have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Fidelity::Process => "process",
+            Fidelity::Motion => "motion",
+            Fidelity::Dry => "dry",
+        }
+    }
+}
+
 /// How to run a program.
 #[derive(Clone, Debug, Default)]
 pub struct RunOptions<'c> {

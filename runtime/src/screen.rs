@@ -10,12 +10,13 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::values::Formulas;
-use matterix_ir::{Diagnostic, Op, Program, Severity, Span, codes};
+use matterix_ir::{Diagnostic, Program, Severity, Span, codes};
 use serde::Serialize;
 
 use crate::exec::{Alarm, Listener, OperationState, StepState};
 use crate::ledger::transfer;
 use crate::process::{Engine, Observer};
+use crate::touched::{Below, Touched};
 use condition::Condition;
 
 /// Less of a species, mol per kg of mixture, is what equilibria and rounding leave, and counts as none.
@@ -51,9 +52,9 @@ impl Side {
     }
 
     /// How much there is of it, dissolved or not, mol.
-    fn amount(&self, states: &[f64]) -> f64 {
-        let ions = self.ions.iter().map(|(state, n)| states[*state] / n).reduce(f64::min);
-        self.amount.map_or(0.0, |state| states[state]) + ions.unwrap_or(0.0)
+    fn amount(&self, now: impl Fn(usize) -> f64) -> f64 {
+        let ions = self.ions.iter().map(|(state, n)| now(*state) / n).reduce(f64::min);
+        self.amount.map_or(0.0, &now) + ions.unwrap_or(0.0)
     }
 }
 
@@ -74,6 +75,12 @@ pub struct Screen<'p> {
     conditions: Vec<Condition>,
     /// Which of them held when last looked at.
     there: Vec<bool>,
+    /// The pairs of each mixture, and the dangers, by what they rest on.
+    watched: (Touched, Touched),
+    /// Whether anything has been looked at yet.
+    has_looked: bool,
+    /// Whether an equality was true at the last instant only.
+    is_touching: bool,
     /// Whether anything it watches for is an error.
     is_grave: bool,
     /// The states that each danger depends on.
@@ -113,6 +120,11 @@ impl<'p> Screen<'p> {
         let mut severities = pairs.iter().flat_map(|(_, p)| p).map(|p| p.incompatible.severity);
         let is_grave = severities.any(|s| s == Severity::Error)
             || model.dangers.iter().any(|danger| danger.severity == Severity::Error);
+        let mixtures =
+            pairs.iter().map(|(mixture, _)| Below::states(model.mixtures[*mixture].contents.iter().map(|c| c.state)));
+        let dangers = model.dangers.iter().map(|d| Below::new(model, &[d.when]));
+        let states = model.states.len();
+        let watched = (Touched::new(states, mixtures), Touched::new(states, dangers));
         let mut formulas = Formulas::default();
         let condition = |danger: &Danger| Condition::new(&model.graph, &mut formulas, danger.when);
         let conditions = model.dangers.iter().map(condition).collect();
@@ -126,6 +138,9 @@ impl<'p> Screen<'p> {
             met: BTreeSet::new(),
             conditions,
             there: vec![false; model.dangers.len()],
+            watched,
+            has_looked: false,
+            is_touching: false,
             is_grave,
             read: OnceCell::new(),
             room: Vec::new(),
@@ -183,28 +198,43 @@ impl<'p> Screen<'p> {
     }
 
     /// The gravest of the pairs of a mixture that meet: the others are mended with it.
-    fn meeting<'s>(&self, mixture: usize, pairs: &'s [Pair<'p>], states: &[f64]) -> Option<&'s Pair<'p>> {
-        let some = |p: &Pair<'_>| p.sides.0.amount(states) > 0.0 && p.sides.1.amount(states) > 0.0;
+    fn meeting<'s>(
+        &self,
+        mixture: usize,
+        pairs: &'s [Pair<'p>],
+        now: impl Fn(usize) -> f64 + Copy,
+    ) -> Option<&'s Pair<'p>> {
+        let some = |p: &Pair<'_>| p.sides.0.amount(now) > 0.0 && p.sides.1.amount(now) > 0.0;
         if !pairs.iter().any(some) {
             return None;
         }
         let masses = self.program.model.mixtures[mixture].contents.iter().map(|c| {
             let molar_mass = self.program.model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
-            states[c.state as usize] * molar_mass
+            now(c.state as usize) * molar_mass
         });
         let mass: f64 = masses.sum();
         pairs.iter().find(|p| {
             let (least_a, least_b) = p.incompatible.least;
-            let enough = |side: &Side, least: f64| side.amount(states) >= least.max(TRACE) * mass * ROUNDED;
+            let enough = |side: &Side, least: f64| side.amount(now) >= least.max(TRACE) * mass * ROUNDED;
             some(p) && enough(&p.sides.0, least_a) && enough(&p.sides.1, least_b)
         })
     }
 
-    fn look(&mut self, time: f64, engine: &Engine<'_>) {
-        let states = engine.states();
+    /// What a sample may have changed: positions in its list of pairs, and dangers.
+    fn touched(&mut self, engine: &Engine<'_>, changed: &[u32]) -> (Vec<u32>, Vec<u32>) {
+        // An equality that is true at this instant only is so again in none of those after it.
+        let was_touching = std::mem::replace(&mut self.is_touching, engine.is_touching());
+        let is_first = !std::mem::replace(&mut self.has_looked, true);
+        let pairs = if is_first { self.watched.0.all() } else { self.watched.0.by(changed) };
+        let is_all = is_first || was_touching || self.is_touching;
+        (pairs, if is_all { self.watched.1.all() } else { self.watched.1.by(changed) })
+    }
+
+    fn look(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        let (met, dangers) = self.touched(engine, changed);
         let pairs = std::mem::take(&mut self.pairs);
-        for (mixture, pairs) in &pairs {
-            let Some(pair) = self.meeting(*mixture, pairs, &states) else {
+        for (mixture, pairs) in met.iter().filter_map(|i| pairs.get(*i as usize)) {
+            let Some(pair) = self.meeting(*mixture, pairs, |state| engine.state(state as u32)) else {
                 self.met.retain(|(met, _)| met != mixture);
                 continue;
             };
@@ -217,7 +247,8 @@ impl<'p> Screen<'p> {
         }
         self.pairs = pairs;
         let program = self.program;
-        for (index, danger) in program.model.dangers.iter().enumerate() {
+        for index in dangers.into_iter().map(|i| i as usize) {
+            let danger = &program.model.dangers[index];
             let now = self.conditions[index].holds(engine, &mut self.room);
             if !std::mem::replace(&mut self.there[index], now) && now {
                 let step = self.operation_at(None);
@@ -267,29 +298,20 @@ impl<'p> Screen<'p> {
             if !model.mixtures[*mixture].contents.iter().any(|c| changed.contains(&c.state)) {
                 continue;
             }
-            let Some(pair) = self.meeting(*mixture, pairs, &states) else { continue };
+            let Some(pair) = self.meeting(*mixture, pairs, |state| states[state]) else { continue };
             let Incompatible { severity, words, .. } = pair.incompatible;
             if *severity == Severity::Error && !self.met.contains(&(*mixture, words.as_str())) {
                 return Some(alarm(MIX, self.incompatible(*mixture, pair.incompatible, Some(step))));
             }
         }
-        let read = self.read.get_or_init(|| model.dangers.iter().map(|d| self.states_of(d)).collect());
+        let read =
+            self.read.get_or_init(|| model.dangers.iter().map(|d| Below::new(model, &[d.when]).states).collect());
         let mut dangers = model.dangers.iter().zip(&self.there).zip(read);
         let (danger, _) = dangers.find(|((danger, there), read)| {
             let new = danger.severity == Severity::Error && !**there && !read.is_disjoint(&changed);
             new && matches!(engine.eval_with(danger.when, &states), v if v != 0.0 && !v.is_nan())
         })?;
         Some(alarm(&danger.0.name, self.danger(danger.0, Some(step))))
-    }
-
-    fn states_of(&self, danger: &Danger) -> BTreeSet<u32> {
-        let mut states = BTreeSet::new();
-        self.program.model.graph.visit(danger.when, |op| {
-            if let Op::State(state) = op {
-                states.insert(state);
-            }
-        });
-        states
     }
 
     fn danger(&self, danger: &Danger, step: Option<StepId>) -> Diagnostic {
@@ -318,8 +340,8 @@ impl<'p> Screen<'p> {
 }
 
 impl Observer for Screen<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
-        self.look(time, engine);
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        self.look(time, engine, changed);
     }
 
     fn event(&mut self, _: f64, _: usize) {}

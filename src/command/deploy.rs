@@ -17,7 +17,7 @@ use matterix_ir::{Diagnostic, FileId, Program};
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
 use crate::panel::{Board, Panel, Watcher};
-use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Measured, Options, Wires};
+use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Keep, Measured, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
 use crate::record::{About, Bound, Folder, Gauge, Taken};
@@ -70,7 +70,8 @@ fn attempt(args: &DeployArgs, color: Color) -> Result<Exit, String> {
     if args.mode == DeployMode::SimFirst && !args.resume {
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let (fidelity, dry) = (Fidelity::Process, false);
-        let choices = Choices { seed: args.seed, fidelity, dry, turns: Vec::new(), moved: Vec::new() };
+        let choices =
+            Choices { seed: args.seed, fidelity, dry, turns: Vec::new(), moved: Vec::new(), keep: Keep::Ends };
         let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
         let (passed, end) = (ran.passed, ran.end_time());
         findings.show(&sources, ran.diagnostics.clone());

@@ -10,7 +10,7 @@ use matterix_runtime::record::Folder;
 
 use crate::args::{Color, Fidelity, RunArgs, RunFormat};
 use crate::cache;
-use crate::pipeline::{self, Choices, Input, Search};
+use crate::pipeline::{self, Choices, Input, Keep, Search};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Reporter};
 use crate::terminal::{self, Stream, paint, print};
@@ -60,7 +60,8 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         }
     };
     let mut progress = Progress::new(&program.plan, kind(args.format));
-    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved };
+    let keep = if args.out.is_some() { Keep::Curves } else { Keep::Ends };
+    let choices = Choices { seed: args.seed, fidelity: args.fidelity, dry: args.dry, turns, moved, keep };
     let ran = pipeline::run(&program, &sources, &choices, cancel, &mut progress);
     progress.finish();
 
@@ -71,7 +72,7 @@ fn attempt(args: &RunArgs, color: Color) -> Result<Exit, String> {
         RunFormat::Json => print(Stream::Out, &ran.json()?),
     }
     if let Some(dir) = &args.out {
-        ran.write(dir)?;
+        ran.write(dir, args.csv)?;
     }
     Ok(if ran.passed { Exit::Fine } else { Exit::Findings })
 }

@@ -37,7 +37,7 @@ pub use matterix_lang::{Gauged, Measured, Options, Test, Wires};
 pub use mend::{Fixes, Mended, Mending, correct, mend};
 pub use neighbours::Neighbours;
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};
-pub use run::{Choices, run};
+pub use run::{Choices, Keep, run};
 #[cfg(feature = "sila")]
 pub use serve::{Service, serve};
 pub use view::still;

@@ -10,7 +10,7 @@ use matterix_runtime::exec::{
 };
 use matterix_runtime::motion::{Moment, Moved};
 use matterix_runtime::process::{Engine, Observer};
-use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo};
+use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo, Sampler};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
 
 use crate::args;
@@ -18,6 +18,24 @@ use crate::progress::Progress;
 
 /// Version of the language that programs are written in, as in `mtx 1`.
 const LANGUAGE: u32 = 1;
+
+/// What is kept of the curves of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// Both ends of each, for the report.
+    Ends,
+    /// What files have.
+    Curves,
+}
+
+impl Keep {
+    fn error(self) -> f64 {
+        match self {
+            Keep::Ends => f64::INFINITY,
+            Keep::Curves => record::ERROR,
+        }
+    }
+}
 
 /// What a run may choose.
 pub struct Choices {
@@ -31,6 +49,8 @@ pub struct Choices {
     pub turns: Vec<Turn>,
     /// What stands away from the place it was given.
     pub moved: Vec<Moved>,
+    /// What is kept of curves: files can be written of [`Keep::Curves`] only.
+    pub keep: Keep,
 }
 
 impl Choices {
@@ -54,7 +74,8 @@ pub fn run<'a>(
     let fidelity = choices.fidelity();
     let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
     let options = RunOptions { seed: choices.seed, fidelity, limits, ..RunOptions::default() };
-    let mut follower = Follower { recording: Recording::new(program), progress };
+    let recording = Recording::within(program, choices.keep.error());
+    let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
     for moved in &choices.moved {
         let instance = program.scene.get(moved.thing);
         let [x, y] = moved.shift.map(|m| m * 1e3);
@@ -103,24 +124,25 @@ impl Ran<'_> {
         self.report.json().map_err(|e| format!("cannot write the report: {e}"))
     }
 
-    /// Writes recording, tables, plots and report into a folder.
-    pub fn write(&self, dir: &Path) -> Result<(), String> {
+    /// Writes recording, tables, plots and report into a folder; tables in CSV too where they are wanted.
+    pub fn write(&self, dir: &Path, csv: bool) -> Result<(), String> {
         let run = Run { program: self.program, recording: &self.recording, sources: self.sources, info: &self.info };
-        record::write_all(dir, &run, &self.report, Outputs::ALL).map(|_| ()).map_err(|e| e.to_string())
+        record::write_all(dir, &run, &self.report, Outputs { csv, ..Outputs::ALL })
+            .map(|_| ())
+            .map_err(|e| e.to_string())
     }
 }
 
 /// Hands on what happens to the recording and to whoever watches.
 struct Follower<'a, 'p> {
     recording: Recording,
+    sampler: Sampler,
     progress: &'a mut Progress<'p>,
 }
 
 impl Observer for Follower<'_, '_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
-        let observables = engine.model().observables.iter();
-        let values: Vec<Vec<f64>> = observables.map(|o| o.value.iter().map(|n| engine.eval(*n)).collect()).collect();
-        self.recording.sample(time, &engine.states(), &values);
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        self.sampler.sample(&mut self.recording, time, engine, changed);
         self.progress.moved(time);
     }
 
@@ -135,7 +157,7 @@ impl Observer for Follower<'_, '_> {
 
 impl Listener for Follower<'_, '_> {
     fn step(&mut self, time: f64, step: StepId, state: StepState) {
-        self.recording.step(time, step, recorded(state));
+        self.recording.step(time, step, state);
         match state {
             StepState::Running => self.progress.started(step, time),
             _ => self.progress.ended(step, time),
@@ -152,16 +174,12 @@ impl Listener for Follower<'_, '_> {
             self.recording.log(result.time, Level::Warning, text, Some(result.span));
             return;
         }
-        let measured = result.compared.iter().filter_map(|m| {
-            let value = m.value?;
-            Some(record::Measured { text: m.text.clone(), value, low: m.low, high: m.high, unit: m.unit.clone() })
-        });
         self.recording.expectation(record::Expectation {
             time: result.time,
             text: result.text.clone(),
             span: result.span,
             passed: result.verdict == Verdict::Passed,
-            measured: measured.collect(),
+            measured: result.compared.clone(),
         });
     }
 
@@ -188,16 +206,6 @@ impl Listener for Follower<'_, '_> {
     }
 }
 
-fn recorded(state: StepState) -> record::StepState {
-    match state {
-        StepState::Pending => record::StepState::Pending,
-        StepState::Running => record::StepState::Running,
-        StepState::Done => record::StepState::Done,
-        StepState::Failed => record::StepState::Failed,
-        StepState::Skipped => record::StepState::Skipped,
-    }
-}
-
 fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
     let failure = outcome.failure.as_ref().map(|f| record::Failure {
         name: f.name.clone(),
@@ -212,15 +220,10 @@ fn info(outcome: &Outcome, choices: &Choices) -> RunInfo {
         RunStatus::Failed | RunStatus::Fault => record::Status::Failed,
         RunStatus::Cancelled => record::Status::Cancelled,
     };
-    let fidelity = match choices.fidelity() {
-        Fidelity::Process => "process",
-        Fidelity::Motion => "motion",
-        Fidelity::Dry => "dry",
-    };
     RunInfo {
         language: LANGUAGE,
         seed: choices.seed,
-        fidelity: fidelity.to_string(),
+        fidelity: choices.fidelity(),
         status,
         failure,
         findings: outcome.findings.clone(),

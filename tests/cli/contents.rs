@@ -121,7 +121,7 @@ fn runs_with_jobs_stay_within_what_is_known() {
 /// Runs a file and compares what is recorded after each statement with what `check` knows there; how many values were.
 pub fn stays_within(file: &str, dir: &std::path::Path) -> usize {
     let out = dir.to_str().expect("text");
-    let ended = matterixc(&["run", file, "--out", out, "--format", "json"]);
+    let ended = matterixc(&["run", file, "--out", out, "--csv", "--format", "json"]);
     let report: Value = serde_json::from_str(&ended.out).expect("a report");
     let (columns, rows) = rows(&dir.join("states.csv"));
     let mut compared = 0;

@@ -46,6 +46,7 @@ mod physique;
 mod pipeline_tests;
 mod plan;
 mod reacting;
+mod recorded;
 mod reference;
 mod science;
 mod screening;

@@ -26,7 +26,7 @@ fn what_goes_along_is_shown_and_recorded() {
     assert!(!known.out.contains("enthalpy"), "{}", known.out);
     let dir = folder("tags");
     let out = dir.join("out");
-    let (code, text) = run_case("tags.mtx", "travel", &["--out", out.to_str().expect("text")]);
+    let (code, text) = run_case("tags.mtx", "travel", &["--csv", "--out", out.to_str().expect("text")]);
     assert_eq!(code, 0, "{text}");
     let table = std::fs::read_to_string(out.join("states.csv")).expect("the table");
     let header: Vec<&str> = table.lines().next().unwrap_or_default().split(',').collect();

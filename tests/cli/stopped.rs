@@ -32,7 +32,7 @@ fn a_request_to_terminate_ends_a_run_in_order() {
     let dir = folder("stopped_run");
     let file = write(&dir, "long.mtx", LONG);
     let mut run = command();
-    run.current_dir(&dir).args(["run", &file, "--out", "out"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    run.current_dir(&dir).args(["run", &file, "--csv", "--out", "out"]).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut run = run.spawn().expect("the command starts");
     let mut said = BufReader::new(run.stderr.take().expect("piped"));
     let mut progress = String::new();
@@ -51,7 +51,10 @@ fn a_request_to_terminate_ends_a_run_in_order() {
     assert!(last.contains("stop heating plate"), "{last}");
 
     let out = dir.join("out");
-    assert_eq!(names(&out), ["plot.svg", "recording.mcap", "records.csv", "report.json", "states.csv"]);
+    assert_eq!(
+        names(&out),
+        ["plot.svg", "recording.mcap", "records.csv", "records.parquet", "report.json", "states.csv", "states.parquet",]
+    );
     let read = |name: &str| std::fs::read_to_string(out.join(name)).expect("it was written");
     let report: serde_json::Value = serde_json::from_str(&read("report.json")).expect("a whole document");
     assert_eq!(report["status"], "cancelled");
@@ -141,7 +144,7 @@ workflow warm in bench {
 } finally { stop heating plate }
 ";
 
-const FILES: [&str; 5] = ["plot.svg", "recording.mcap", "records.csv", "report.json", "states.csv"];
+const FILES: [&str; 5] = ["plot.svg", "recording.mcap", "records.parquet", "report.json", "states.parquet"];
 
 #[test]
 fn a_folder_has_all_files_of_a_run_or_none_where_it_is_killed() {

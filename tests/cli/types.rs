@@ -69,7 +69,7 @@ fn words_of_different_types_are_not_compared() {
 fn recordings_show_the_word() {
     let dir = folder("types_recorded");
     write(&dir, "bench.mtx", format!("mtx 1\n{BOX}"));
-    let ended = matterixc_in(&dir, &["run", "bench.mtx", "--set", "end=closed", "--out", "out"]);
+    let ended = matterixc_in(&dir, &["run", "bench.mtx", "--set", "end=closed", "--csv", "--out", "out"]);
     assert_eq!(ended.code, 0, "{}", ended.err);
     assert!(ended.out.contains("end = closed"), "{}", ended.out);
     let table = std::fs::read_to_string(dir.join("out/states.csv"));

@@ -195,3 +195,21 @@ fn odd_content_is_passed_over() {
     .expect("a recording");
     assert_eq!(document.bodies[0].name, "a");
 }
+
+#[test]
+fn each_field_has_the_times_of_its_own_points() {
+    let water = |time, value: f64| ("/contents/a.contents", time, json!({ "amount": { "water": value } }));
+    let document = from_recording(&recording(&[
+        ("/scene", 0.0, json!({ "entities": [entity("a", [0.1, 0.1, 0.1], true, 0.0)] })),
+        ("/contents/a.contents", 0.0, json!({ "amount": { "water": 1.0 }, "property": { "warm": 20.0 } })),
+        water(3.0, 1.0),
+        water(4.0, 9.0),
+        ("/contents/a.contents", 8.0, json!({ "amount": { "water": 9.0 }, "property": { "warm": 30.0 } })),
+    ]))
+    .expect("a recording");
+    let times = |label: &str| {
+        let series = document.series.iter().find(|s| s.label == label).expect("a series");
+        document.axes[series.axis as usize].clone()
+    };
+    assert_eq!((times("water"), times("warm")), (vec![0.0, 3.0, 4.0, 8.0], vec![0.0, 8.0]));
+}

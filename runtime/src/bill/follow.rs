@@ -8,6 +8,7 @@ use matterix_ir::stock::Count;
 use super::origins::{Origins, mass_of};
 use crate::exec::{Listener, OperationState};
 use crate::process::{Engine, Observer};
+use crate::touched::{Below, Touched};
 
 /// What was noted of a run.
 pub struct Follower<'p> {
@@ -27,8 +28,12 @@ pub struct Follower<'p> {
     pub(super) steps: Vec<usize>,
     /// Questions to a person.
     pub(super) asked: Vec<(f64, String)>,
-    /// States at the last sample.
+    /// States as they were last shown.
     pub(super) states: Vec<f64>,
+    /// Tallies by what they rest on, and mixtures that streams run between.
+    watched: (Touched, Touched),
+    /// By tally, since when it has been true, s.
+    since: Vec<Option<f64>>,
     /// The latest time heard of, s.
     pub(super) end: f64,
     last: Option<f64>,
@@ -49,6 +54,8 @@ impl<'p> Follower<'p> {
             steps: vec![0; program.scene.instances.len()],
             asked: Vec::new(),
             states: Vec::new(),
+            watched: Default::default(),
+            since: vec![None; tallies],
             end: 0.0,
             last: None,
         }
@@ -63,10 +70,55 @@ impl<'p> Follower<'p> {
         self.held = stock.holdings.iter().map(|h| (engine.eval(h.mass), engine.eval(h.amount))).collect();
         let masses: Vec<f64> = self.held.iter().map(|h| h.0).collect();
         self.origins = Origins::new(stock, engine.model().mixtures.len(), &masses);
-        for (slot, tally) in self.tallies.iter_mut().zip(&stock.tallies) {
-            let value = engine.eval(tally.value);
-            *slot = (value, value);
+        let model = engine.model();
+        let tallies = stock.tallies.iter().map(|t| Below::new(model, &[t.value]));
+        let streamed = |i: &usize| stock.streams.iter().any(|(a, b)| *a as usize == *i || *b as usize == *i);
+        let mixtures = (0..model.mixtures.len()).map(|i| match streamed(&i) {
+            true => Below::states(model.mixtures[i].contents.iter().map(|c| c.state)),
+            false => Below::default(),
+        });
+        let count = model.states.len();
+        self.watched = (Touched::new(count, tallies), Touched::new(count, mixtures));
+        self.states = engine.states();
+        for (index, tally) in stock.tallies.iter().enumerate() {
+            self.tallies[index].0 = engine.eval(tally.value);
+            self.counted(index, self.tallies[index].0, engine.time());
         }
+    }
+
+    /// A tally has this value from now on.
+    fn counted(&mut self, index: usize, value: f64, time: f64) {
+        self.tallies[index].1 = value;
+        let is_on = self.program.stock.tallies[index].count == Count::Running && value != 0.0;
+        match (self.since[index], is_on) {
+            (None, true) => self.since[index] = Some(time),
+            (Some(since), false) => {
+                self.ran(index, since, time);
+                self.since[index] = None;
+            }
+            _ => {}
+        }
+    }
+
+    /// A tally was true for a while.
+    fn ran(&mut self, index: usize, since: f64, until: f64) {
+        match self.running[index].last_mut() {
+            Some(before) if before.1 == since => before.1 = until,
+            _ if until > since => self.running[index].push((since, until)),
+            _ => {}
+        }
+    }
+
+    /// Follows the streams: all ends of theirs as they are now, also of those that are not shown.
+    fn stream(&mut self, engine: &Engine<'_>) {
+        let (model, streams) = (engine.model(), &self.program.stock.streams);
+        let mut now = vec![0.0; model.mixtures.len()];
+        for mixture in streams.iter().flat_map(|(a, b)| [*a as usize, *b as usize]) {
+            if let Some(m) = model.mixtures.get(mixture) {
+                now[mixture] = mass_of(model, m, |state| engine.state(state));
+            }
+        }
+        self.origins.stream(streams, &now);
     }
 
     fn end_use(&mut self, time: f64, step: StepId) {
@@ -78,30 +130,22 @@ impl<'p> Follower<'p> {
 }
 
 impl Observer for Follower<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         self.reach(time);
-        let Some(last) = self.last.replace(time) else {
-            self.begin(engine);
-            self.states = engine.states();
-            return;
-        };
+        let Some(last) = self.last.replace(time) else { return self.begin(engine) };
         let program = self.program;
-        for (i, tally) in program.stock.tallies.iter().enumerate() {
-            // Between two samples the value is that of the earlier one.
-            if tally.count == Count::Running && self.tallies[i].1 != 0.0 && time > last {
-                match self.running[i].last_mut() {
-                    Some(open) if open.1 == last => open.1 = time,
-                    _ => self.running[i].push((last, time)),
-                }
+        for index in self.watched.0.by(changed) {
+            let value = engine.eval(program.stock.tallies[index as usize].value);
+            self.counted(index as usize, value, time);
+        }
+        if time > last && !self.watched.1.by(changed).is_empty() {
+            self.stream(engine);
+        }
+        for &state in changed {
+            if let Some(slot) = self.states.get_mut(state as usize) {
+                *slot = engine.state(state);
             }
-            self.tallies[i].1 = engine.eval(tally.value);
         }
-        if !program.stock.streams.is_empty() && time > last {
-            let (model, states) = (engine.model(), engine.states());
-            let now: Vec<f64> = model.mixtures.iter().map(|m| mass_of(model, m, &states)).collect();
-            self.origins.stream(&program.stock.streams, &now);
-        }
-        self.states = engine.states();
     }
 
     fn event(&mut self, time: f64, _: usize) {
@@ -119,6 +163,15 @@ impl Observer for Follower<'_> {
 }
 
 impl Listener for Follower<'_> {
+    fn ended(&mut self, engine: &Engine<'_>) {
+        let time = engine.time();
+        for index in 0..self.since.len() {
+            if let Some(since) = self.since[index].take() {
+                self.ran(index, since, time);
+            }
+        }
+    }
+
     fn operation(&mut self, time: f64, step: StepId, operation: &Operation, state: OperationState) {
         self.reach(time);
         if state != OperationState::Started {

@@ -104,10 +104,10 @@ fn carried_depth(mixture: usize, streams: &[(u32, u32)]) -> usize {
 }
 
 /// Mass of a mixture by its states, kg.
-pub(super) fn mass_of(model: &Model, mixture: &Mixture, states: &[f64]) -> f64 {
+pub(super) fn mass_of(model: &Model, mixture: &Mixture, state: impl Fn(u32) -> f64) -> f64 {
     let one = |c: &matterix_ir::model::Content| {
         let molar_mass = model.species.get(c.species as usize).map_or(0.0, |s| s.molar_mass);
-        molar_mass * states.get(c.state as usize).copied().unwrap_or(0.0)
+        molar_mass * state(c.state)
     };
     mixture.contents.iter().map(one).sum()
 }

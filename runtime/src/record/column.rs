@@ -4,6 +4,7 @@ use matterix_ir::Unit;
 use matterix_ir::model::Domain;
 
 use super::run::Run;
+use super::series::Series;
 
 /// How the numbers of a column are shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,15 +30,15 @@ pub(super) enum Cell<'a> {
     Name(&'a str),
 }
 
-/// A state or an observable over all samples.
+/// A state or an observable over time.
 #[derive(Clone, Debug)]
 pub(super) struct Column<'a> {
     /// Full name.
     pub(super) name: &'a str,
     /// How it is shown.
     pub(super) shown: Shown<'a>,
-    /// By component, then by sample; SI.
-    pub(super) parts: Vec<&'a [f64]>,
+    /// By component; SI.
+    pub(super) parts: Vec<&'a Series>,
 }
 
 impl<'a> Column<'a> {
@@ -50,13 +51,13 @@ impl<'a> Column<'a> {
             Domain::Instance => Shown::Instance,
             Domain::Enum(words) => Shown::Enum(words),
         };
-        Some(Column { name: &state.name, shown, parts: vec![run.recording.states.get(index)?.as_slice()] })
+        Some(Column { name: &state.name, shown, parts: vec![run.recording.states.get(index)?] })
     }
 
     /// The observable with this index.
     pub(super) fn observable(run: &Run<'a>, index: usize) -> Option<Column<'a>> {
         let observable = run.program.model.observables.get(index)?;
-        let parts = run.recording.observables.get(index)?.iter().map(Vec::as_slice).collect();
+        let parts = run.recording.observables.get(index)?.iter().collect();
         Some(Column { name: &observable.name, shown: Shown::Quantity(&observable.unit), parts })
     }
 
@@ -79,9 +80,19 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// One component of one sample; not a number where there is none.
-    pub(super) fn cell(&self, run: &Run<'a>, part: usize, sample: usize) -> Cell<'a> {
-        let value = self.parts.get(part).and_then(|p| p.get(sample)).copied().unwrap_or(f64::NAN);
+    /// Whether it goes from value to value, without any in between.
+    pub(super) fn is_stepped(&self) -> bool {
+        !matches!(self.shown, Shown::Quantity(_))
+    }
+
+    /// One component at a time, after what jumps then; SI.
+    pub(super) fn at(&self, part: usize, time: f64) -> f64 {
+        let Some(series) = self.parts.get(part) else { return f64::NAN };
+        if self.is_stepped() { series.held(time) } else { series.at(time) }
+    }
+
+    /// A value, SI, as it is written.
+    pub(super) fn cell(&self, run: &Run<'a>, value: f64) -> Cell<'a> {
         match self.shown {
             Shown::Quantity(unit) => Cell::Number(unit.of_si(value)),
             Shown::Bool => Cell::Bool(value != 0.0),
@@ -90,21 +101,37 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// Whether two samples are equal to the last bit.
-    pub(super) fn same(&self, a: usize, b: usize) -> bool {
-        self.parts.iter().all(|p| p.get(a).map(|v| v.to_bits()) == p.get(b).map(|v| v.to_bits()))
+    /// Its name, that of a component with its number from 1.
+    pub(super) fn part_name(&self, part: usize) -> String {
+        if self.parts.len() > 1 { format!("{}.{}", self.name, part + 1) } else { self.name.to_owned() }
     }
 
     /// Whether this can be a colour: three components between 0 and 1.
     pub(super) fn is_colour(&self) -> bool {
-        let within = |v: &f64| (-1e-6..=1.0 + 1e-6).contains(v);
-        self.parts.len() == 3 && self.symbol().is_empty() && self.parts.iter().all(|p| p.iter().all(within))
+        let within = |v: f64| (-1e-6..=1.0 + 1e-6).contains(&v);
+        self.parts.len() == 3 && self.symbol().is_empty() && self.parts.iter().all(|p| p.values().all(within))
     }
 
-    /// The red, green and blue of one sample of a colour, 0 to 1.
-    pub(super) fn colour(&self, sample: usize) -> Option<[f64; 3]> {
-        let at = |i: usize| self.parts.get(i).and_then(|p| p.get(sample)).map(|v| v.clamp(0.0, 1.0));
-        Some([at(0)?, at(1)?, at(2)?])
+    /// The red, green and blue of a colour at a time, 0 to 1; none where nothing was recorded.
+    pub(super) fn colour(&self, time: f64) -> Option<[f64; 3]> {
+        let rgb = [0, 1, 2].map(|part| self.at(part, time).clamp(0.0, 1.0));
+        rgb.iter().all(|v| !v.is_nan()).then_some(rgb)
+    }
+
+    /// Times at which a colour is looked at so that no shade of so many is passed over, in order.
+    pub(super) fn shades(&self, count: f64) -> Vec<f64> {
+        let mut times: Vec<f64> = self.parts.iter().flat_map(|p| p.points().map(|p| p.0)).collect();
+        times.sort_by(f64::total_cmp);
+        times.dedup();
+        let between = |pair: &[f64]| {
+            let (from, to) = (self.colour(pair[0]).unwrap_or_default(), self.colour(pair[1]).unwrap_or_default());
+            let most = from.iter().zip(to).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+            let (start, pieces) = (pair[0], (most * count).ceil().max(1.0));
+            let step = (pair[1] - pair[0]) / pieces;
+            (0..pieces as usize).map(move |i| start + step * i as f64)
+        };
+        let last = times.last().copied();
+        times.windows(2).flat_map(between).chain(last).collect()
     }
 }
 

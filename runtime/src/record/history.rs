@@ -2,8 +2,10 @@
 
 use matterix_ir::plan::{Plan, Step, StepId};
 
-use super::recording::{Recording, StepState};
+use super::recording::Recording;
 use super::run::Run;
+use super::series::Series;
+use crate::exec::StepState;
 
 /// One execution of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,11 +79,11 @@ pub(super) fn process_intervals(run: &Run<'_>) -> Vec<Vec<(f64, f64)>> {
     intervals
 }
 
-/// When a column of truth values was true, s. It changes at its samples.
-pub(super) fn true_intervals(recording: &Recording, values: &[f64]) -> Vec<(f64, f64)> {
+/// When a truth value was true, s. It changes at its points.
+pub(super) fn true_intervals(recording: &Recording, truth: &Series) -> Vec<(f64, f64)> {
     let mut intervals = Vec::new();
     let mut since = None;
-    for (&time, &value) in recording.times.iter().zip(values) {
+    for (time, value) in truth.points() {
         match (value != 0.0, since) {
             (true, None) => since = Some(time),
             (false, Some(start)) => {

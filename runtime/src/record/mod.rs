@@ -6,15 +6,20 @@
 pub(crate) mod column;
 mod files;
 mod folder;
+mod frames;
 mod history;
 mod recording;
 pub(crate) mod run;
+mod sampler;
+mod series;
 
 pub mod mcap;
+pub mod parquet;
 pub mod plot;
 pub mod report;
 pub mod table;
 
+use std::fmt::Display;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -22,30 +27,34 @@ use std::thread;
 pub use files::RecordError;
 pub use folder::{Folder, give_up};
 pub use recording::{
-    EventMark, Expectation, Level, LogLine, Measured, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
-    StepState,
+    EventMark, Expectation, Level, LogLine, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
 };
 pub use report::{REPORT_SCHEMA, Report, human};
 pub use run::{Failure, Place, Run, RunInfo, Status};
+pub use sampler::Sampler;
+pub use series::{ERROR, Series};
 
 /// Which files [`write_all`] writes besides `report.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outputs {
     /// `recording.mcap`.
     pub recording: bool,
-    /// `states.csv`, and `records.csv` if anything was recorded.
+    /// `states.parquet`, and `records.parquet` if anything was recorded.
     pub tables: bool,
+    /// The same as CSV.
+    pub csv: bool,
     /// `plot.svg`.
     pub plot: bool,
 }
 
 impl Outputs {
     /// All of them.
-    pub const ALL: Outputs = Outputs { recording: true, tables: true, plot: true };
+    pub const ALL: Outputs = Outputs { recording: true, tables: true, csv: true, plot: true };
 }
 
 /// Names of all files that a run may leave behind.
-const NAMES: &[&str] = &["recording.mcap", "states.csv", "records.csv", "plot.svg", "report.json"];
+const NAMES: &[&str] =
+    &["recording.mcap", "states.parquet", "records.parquet", "states.csv", "records.csv", "plot.svg", "report.json"];
 
 /// Writes the files of a run into `dir`, which is made if need be, all or none; gives their paths.
 pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -> Result<Vec<PathBuf>, RecordError> {
@@ -56,7 +65,7 @@ pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -
     };
     // The recording and the tables are the large ones: they are made side by side.
     let recording = || outputs.recording.then(|| mcap_bytes(run));
-    let tables = || outputs.tables.then(|| bytes_of(|out| table::states(run, out)));
+    let tables = || outputs.tables.then(|| bytes_of(|out| parquet::states(run, out)));
     let (recording, tables) = thread::scope(|scope| {
         let beside = thread::Builder::new().spawn_scoped(scope, recording);
         let tables = tables();
@@ -67,9 +76,16 @@ pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -
     if let Some(bytes) = recording {
         put("recording.mcap", bytes)?;
     }
+    let is_recorded = !run.recording.values.is_empty();
     if let Some(bytes) = tables {
-        put("states.csv", bytes)?;
-        if !run.recording.values.is_empty() {
+        put("states.parquet", bytes)?;
+        if is_recorded {
+            put("records.parquet", bytes_of(|out| parquet::records(run, out)))?;
+        }
+    }
+    if outputs.csv {
+        put("states.csv", bytes_of(|out| table::states(run, out)))?;
+        if is_recorded {
             put("records.csv", bytes_of(|out| table::records(run, out)))?;
         }
     }
@@ -86,7 +102,7 @@ fn mcap_bytes(run: &Run<'_>) -> Result<Vec<u8>, String> {
     Ok(out.into_inner())
 }
 
-fn bytes_of(write: impl FnOnce(&mut Vec<u8>) -> std::io::Result<()>) -> Result<Vec<u8>, String> {
+fn bytes_of<E: Display>(write: impl FnOnce(&mut Vec<u8>) -> Result<(), E>) -> Result<Vec<u8>, String> {
     let mut out = Vec::new();
     write(&mut out).map_err(|e| e.to_string())?;
     Ok(out)

@@ -1,26 +1,13 @@
 //! What happened, in memory and by column, as the engine and the executor report it.
 
+use matterix_ir::model::Domain;
 use matterix_ir::plan::StepId;
-use matterix_ir::{Program, Span, Unit};
+use matterix_ir::{Program, Span};
 use serde::Serialize;
 
+use super::series::{ERROR, Series};
+use crate::exec::{Measured, StepState};
 use crate::motion::Moment;
-
-/// Where a node of the plan stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum StepState {
-    /// Not begun.
-    Pending,
-    /// Begun, not ended.
-    Running,
-    /// Ended as intended.
-    Done,
-    /// Ended by a failure.
-    Failed,
-    /// Passed over, or stopped because a sibling failed.
-    Skipped,
-}
 
 /// How much a line of the log matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -102,21 +89,6 @@ pub struct ReadingMark {
     pub value: f64,
 }
 
-/// A quantity an expectation compared, SI.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
-    /// The comparison as written.
-    pub text: String,
-    /// What was found.
-    pub value: f64,
-    /// Lower limit.
-    pub low: Option<f64>,
-    /// Upper limit.
-    pub high: Option<f64>,
-    /// As shown.
-    pub unit: Unit,
-}
-
 /// An `expect`, judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expectation {
@@ -134,15 +106,17 @@ pub struct Expectation {
 
 /// All that happened in one run. Times are seconds of the virtual clock, numbers SI.
 ///
-/// Several samples may share one time: the value before and after a jump.
+/// Each state and each component of an observable is a [`Series`] of its own.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
-    /// Time of each sample.
-    pub times: Vec<f64>,
-    /// By state, then by sample.
-    pub states: Vec<Vec<f64>>,
-    /// By observable, then by component, then by sample.
-    pub observables: Vec<Vec<Vec<f64>>>,
+    /// What is left out of its curves: see [`Series::new`].
+    pub error: f64,
+    /// Times of the first and the last sample, s.
+    pub sampled: Option<(f64, f64)>,
+    /// By state.
+    pub states: Vec<Series>,
+    /// By observable, then by component.
+    pub observables: Vec<Vec<Series>>,
     /// Where robots were while they moved, in order of time.
     pub moments: Vec<Moment>,
     /// In order of occurrence.
@@ -171,27 +145,55 @@ impl Recording {
         self.moments.sort_by(|a, b| a.time.total_cmp(&b.time));
     }
 
-    /// Empty columns for every state and observable of the program.
+    /// Without anything yet, of curves to the error that files have: [`ERROR`].
     pub fn new(program: &Program) -> Self {
+        Recording::within(program, ERROR)
+    }
+
+    /// Without anything yet, of curves to such an error: see [`Series::new`]. What goes from value to value is exact.
+    pub fn within(program: &Program, error: f64) -> Self {
         let model = &program.model;
+        let state = |domain: &Domain| match domain {
+            Domain::Quantity(_) => Series::new(error),
+            _ if error == f64::INFINITY => Series::new(error),
+            Domain::Bool | Domain::Instance | Domain::Enum(_) => Series::new(0.0),
+        };
         Recording {
-            states: vec![Vec::new(); model.states.len()],
-            observables: model.observables.iter().map(|o| vec![Vec::new(); o.value.len()]).collect(),
+            error,
+            states: model.states.iter().map(|s| state(&s.domain)).collect(),
+            observables: model.observables.iter().map(|o| vec![Series::new(error); o.value.len()]).collect(),
             ..Recording::default()
         }
     }
 
-    /// Adds one value of every state and of every component of every observable; a value not given is not a number.
-    pub fn sample(&mut self, time: f64, states: &[f64], observables: &[Vec<f64>]) {
+    /// Something is sampled at a time.
+    pub fn sampled(&mut self, time: f64) {
         self.reach(time);
-        self.times.push(time);
-        for (i, column) in self.states.iter_mut().enumerate() {
-            column.push(states.get(i).copied().unwrap_or(f64::NAN));
+        let first = self.sampled.map_or(time, |(first, _)| first);
+        self.sampled = Some((first, time));
+    }
+
+    /// What a state is at a time.
+    pub fn state(&mut self, time: f64, index: u32, value: f64) {
+        if let Some(series) = self.states.get_mut(index as usize) {
+            series.push(time, value);
         }
-        for (i, components) in self.observables.iter_mut().enumerate() {
-            for (j, column) in components.iter_mut().enumerate() {
-                column.push(observables.get(i).and_then(|o| o.get(j)).copied().unwrap_or(f64::NAN));
-            }
+    }
+
+    /// What an observable is at a time, by component.
+    pub fn observable(&mut self, time: f64, index: u32, values: impl IntoIterator<Item = f64>) {
+        let components = self.observables.get_mut(index as usize).into_iter().flatten();
+        components.zip(values).for_each(|(series, value)| series.push(time, value));
+    }
+
+    /// Adds one value of every state and of every component of every observable.
+    pub fn sample(&mut self, time: f64, states: &[f64], observables: &[Vec<f64>]) {
+        self.sampled(time);
+        for (index, value) in (0..).zip(states) {
+            self.state(time, index, *value);
+        }
+        for (index, values) in (0..).zip(observables) {
+            self.observable(time, index, values.iter().copied());
         }
     }
 

@@ -7,7 +7,7 @@ use matterix_ir::{Program, Sources, Span};
 use serde::Serialize;
 
 use super::recording::Recording;
-use crate::run::Finding;
+use crate::run::{Fidelity, Finding};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -46,8 +46,8 @@ pub struct RunInfo {
     pub language: u32,
     /// Seed of all randomness.
     pub seed: u64,
-    /// `process`, `dry`.
-    pub fidelity: String,
+    /// How closely the world was simulated.
+    pub fidelity: Fidelity,
     /// How it ended.
     pub status: Status,
     /// Why it failed, if it did.

@@ -1,4 +1,4 @@
-//! Tables in CSV: every state and observable at every sample, and what `record` statements took.
+//! Tables in CSV: every state and observable wherever one of them changed its way, and what `record` statements took.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -7,26 +7,24 @@ use matterix_ir::Unit;
 use matterix_ir::plan::Step;
 
 use super::column::{Cell, Column, exact};
+use super::frames::frames;
 use super::run::Run;
 
-/// One row a sample, one column a state or a component of an observable, with the unit in the header.
+/// One row a time at which any column has a point, one column a state or a component of an observable, with the unit in the header.
 pub fn states<W: Write>(run: &Run<'_>, out: W) -> io::Result<()> {
     let columns = Column::all(run);
+    let columns: Vec<&Column<'_>> = columns.iter().collect();
     let mut writer = csv::Writer::from_writer(out);
     let mut header = vec!["time [s]".to_owned()];
     for column in &columns {
-        for part in 0..column.parts.len() {
-            let name =
-                if column.parts.len() > 1 { format!("{}.{}", column.name, part + 1) } else { column.name.into() };
-            header.push(with_unit(&name, column.symbol()));
-        }
+        header.extend((0..column.parts.len()).map(|part| with_unit(&column.part_name(part), column.symbol())));
     }
     writer.write_record(&header)?;
-    for (sample, &time) in run.recording.times.iter().enumerate() {
-        writer.write_field(exact(time))?;
-        for column in &columns {
+    for frame in frames(&columns) {
+        writer.write_field(exact(frame.time))?;
+        for (index, column) in columns.iter().enumerate() {
             for part in 0..column.parts.len() {
-                match column.cell(run, part, sample) {
+                match column.cell(run, frame.value(&columns, index, part)) {
                     Cell::Number(value) => writer.write_field(exact(value))?,
                     Cell::Bool(value) => writer.write_field(if value { "true" } else { "false" })?,
                     Cell::Name(name) => writer.write_field(name)?,

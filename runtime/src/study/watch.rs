@@ -4,6 +4,7 @@ use matterix_ir::study::{Keep, Study};
 
 use crate::exec::Listener;
 use crate::process::{Engine, Observer};
+use crate::touched::{Below, Touched};
 
 /// A quantity over time, so far.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +21,8 @@ pub(super) struct Watcher<'s> {
     /// How many values the plan keeps.
     locals: usize,
     courses: Vec<Course>,
+    /// The quantities by what they rest on, once there is a model.
+    values: Option<Touched>,
     /// In the order of the study, SI.
     pub(super) reports: Vec<Option<f64>>,
 }
@@ -36,16 +39,17 @@ impl<'s> Watcher<'s> {
             last: None,
             since: 0.0,
         });
-        Watcher { study, locals, courses: courses.collect(), reports: vec![None; study.reports.len()] }
+        Watcher { study, locals, courses: courses.collect(), values: None, reports: vec![None; study.reports.len()] }
     }
 
-    fn follow(&mut self, time: f64, engine: &Engine<'_>) {
-        for (over, course) in self.study.over_time.iter().zip(&mut self.courses) {
+    fn follow(&mut self, time: f64, engine: &Engine<'_>, touched: &[u32]) {
+        for &index in touched {
+            let (over, course) = (&self.study.over_time[index as usize], &mut self.courses[index as usize]);
             let value = engine.eval(over.value);
             match over.keep {
                 Keep::Largest => course.kept = course.kept.max(value),
                 Keep::Smallest => course.kept = course.kept.min(value),
-                // The rule of trapezia over the solver's own steps.
+                // The rule of trapezia over the solver's own steps: it goes on as it did while it is not shown.
                 Keep::Mean => match course.last {
                     Some((before, was)) => course.kept += 0.5 * (value + was) * (time - before),
                     None => course.since = time,
@@ -57,8 +61,14 @@ impl<'s> Watcher<'s> {
 }
 
 impl Observer for Watcher<'_> {
-    fn sample(&mut self, time: f64, engine: &Engine<'_>, _: &[u32]) {
-        self.follow(time, engine);
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        let is_first = self.values.is_none();
+        let values = self.values.get_or_insert_with(|| {
+            let (study, model) = (self.study, engine.model());
+            Touched::new(model.states.len(), study.over_time.iter().map(|o| Below::new(model, &[o.value])))
+        });
+        let touched = if is_first { values.all() } else { values.by(changed) };
+        self.follow(time, engine, &touched);
     }
 
     fn event(&mut self, _: f64, _: usize) {}
@@ -69,7 +79,8 @@ impl Observer for Watcher<'_> {
 impl Listener for Watcher<'_> {
     fn ended(&mut self, engine: &Engine<'_>) {
         let time = engine.time();
-        self.follow(time, engine);
+        let all: Vec<u32> = (0..self.courses.len() as u32).collect();
+        self.follow(time, engine, &all);
         let mut locals = engine.locals().to_vec();
         locals.resize(self.locals.max(locals.len()), f64::NAN);
         for (over, course) in self.study.over_time.iter().zip(&self.courses) {

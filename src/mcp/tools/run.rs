@@ -15,7 +15,7 @@ use crate::args;
 use crate::mcp::answer::{Answer, bounded, pruned};
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
-use crate::pipeline::{self, Choices};
+use crate::pipeline::{self, Choices, Keep};
 use crate::progress::{Kind, Progress};
 
 #[derive(Deserialize, JsonSchema)]
@@ -86,7 +86,8 @@ impl Task for Run {
                 return unrun(&sources, found);
             }
         }
-        let choices = Choices { seed: self.seed, fidelity, dry: false, turns: Vec::new(), moved: Vec::new() };
+        let choices =
+            Choices { seed: self.seed, fidelity, dry: false, turns: Vec::new(), moved: Vec::new(), keep: Keep::Ends };
         let mut progress = Progress::new(&program.plan, Kind::Quiet);
         let ran = pipeline::run(&program, &sources, &choices, stop, &mut progress);
         found.extend(ran.diagnostics.iter().cloned());

@@ -25,15 +25,16 @@ pub(super) fn read(topics: &[Topic], owners: &Owners, document: &mut Document) {
     }
 }
 
-/// One column of a topic: its path in the message, the component of a list, and its values.
+/// One column of a topic: its path in the message, the component of a list, and its values over time.
 struct Column {
     group: String,
     field: String,
     component: Option<usize>,
+    times: Vec<f64>,
     values: Vec<f64>,
 }
 
-/// The numbers of all messages of a topic by column, in the order of its first message.
+/// The numbers of a topic by column, in the order of its first message, which has all fields; others have those that they are about.
 fn columns(topic: &Topic) -> Vec<Column> {
     let Some((_, Value::Object(first))) = topic.messages.first() else { return Vec::new() };
     let mut columns = Vec::new();
@@ -44,14 +45,16 @@ fn columns(topic: &Topic) -> Vec<Column> {
         }
     }
     for column in &mut columns {
-        column.values = topic.messages.iter().map(|(_, message)| pick(message, column)).collect();
+        let points = topic.messages.iter().filter_map(|(time, message)| Some((*time, pick(message, column)?)));
+        (column.times, column.values) = points.unzip();
     }
     columns
 }
 
 fn shape(group: &str, field: &str, value: &Value, columns: &mut Vec<Column>) {
     let mut add = |component| {
-        columns.push(Column { group: group.to_owned(), field: field.to_owned(), component, values: Vec::new() })
+        let (group, field) = (group.to_owned(), field.to_owned());
+        columns.push(Column { group, field, component, times: Vec::new(), values: Vec::new() })
     };
     match value {
         Value::Number(_) | Value::Null => add(None),
@@ -60,17 +63,18 @@ fn shape(group: &str, field: &str, value: &Value, columns: &mut Vec<Column>) {
     }
 }
 
-fn pick(message: &Value, column: &Column) -> f64 {
-    let of = if column.group.is_empty() { Some(message) } else { message.get(&column.group) };
-    let value = of.and_then(|m| m.get(&column.field));
+/// What a message says of a column, if it does; not a number where it says that there is none.
+fn pick(message: &Value, column: &Column) -> Option<f64> {
+    let of = if column.group.is_empty() { message } else { message.get(&column.group)? };
+    let value = of.get(&column.field)?;
     let value = match column.component {
-        Some(i) => value.and_then(|v| v.get(i)),
-        None => value,
+        Some(i) => value.get(i),
+        None => Some(value),
     };
-    value.and_then(Value::as_f64).unwrap_or(f64::NAN)
+    Some(value.and_then(Value::as_f64).unwrap_or(f64::NAN))
 }
 
-/// Adds the columns as series over one axis of their own, thinned; gives the index of each.
+/// Adds the columns as thinned series, those of equal times over one axis; gives the index of each.
 fn add(
     topic: &Topic,
     columns: &[Column],
@@ -79,14 +83,19 @@ fn add(
     origin: Origin,
     document: &mut Document,
 ) -> Vec<u32> {
-    let times: Vec<f64> = topic.messages.iter().map(|(time, _)| *time).collect();
-    let values: Vec<&[f64]> = columns.iter().map(|c| c.values.as_slice()).collect();
-    let tolerances: Vec<f64> = values.iter().map(|v| thin::tolerance(v, TOLERANCE)).collect();
-    let kept = thin::keep(&times, &values, &tolerances);
-    document.axes.push(kept.iter().map(|&i| times[i]).collect());
-    let axis = document.axes.len() as u32 - 1;
     let first = document.series.len() as u32;
+    // Columns of one topic share an axis as often as not: the one before is looked at first.
+    let mut made: Vec<u32> = Vec::new();
     for column in columns {
+        let tolerance = thin::tolerance(&column.values, TOLERANCE);
+        let kept = thin::keep(&column.times, &[&column.values], &[tolerance]);
+        let times: Vec<f64> = kept.iter().map(|&i| column.times[i]).collect();
+        let known = made.iter().rev().copied().find(|axis| document.axes[*axis as usize] == times);
+        let axis = known.unwrap_or_else(|| {
+            document.axes.push(times);
+            made.push(document.axes.len() as u32 - 1);
+            document.axes.len() as u32 - 1
+        });
         let (name, label) = named(column);
         let path = [column.group.as_str(), column.field.as_str()].into_iter().filter(|s| !s.is_empty());
         let unit = topic.unit(&path.collect::<Vec<_>>().join(".")).to_owned();

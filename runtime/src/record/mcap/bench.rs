@@ -34,18 +34,16 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
     let mut replay = Replay::new(run);
     bodies::write(&replay.stage, sink)?;
     let mut robots = Robots::begin(&replay.stage, sink, entities, frames)?;
-    let samples = run.recording.times.len().max(1);
-    for sample in 0..samples {
-        let time = run.recording.times.get(sample).copied().unwrap_or(0.0);
+    for (index, time) in instants(run, &replay, tints.values()).into_iter().enumerate() {
         let travelled = robots.until(run, time, sink, frames, &mut replay)?;
-        let moved = replay.sample(run, sample) || sample == 0;
+        let moved = replay.sample(run, time) || index == 0;
         if !moved && !travelled && tints.is_empty() {
             continue;
         }
         let poses: Vec<Pose> = (0..scene.instances.len() as u32).map(|i| replay.stage.pose(InstanceId(i))).collect();
         let mut changed = Vec::new();
         for (i, &at) in poses.iter().enumerate() {
-            let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(sample)).unwrap_or(GREY))));
+            let now = Some((at, tint(tints.get(&i).and_then(|c| c.colour(time)).unwrap_or(GREY))));
             if now != shown[i] {
                 let displaced = shown[i].map(|(before, _)| before) != Some(at);
                 let repainted = shown[i].map(|(_, before)| Some(before) != now.map(|(_, tint)| tint)) != Some(false);
@@ -69,6 +67,21 @@ pub(super) fn write<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapR
         }
     }
     Ok(())
+}
+
+/// Times at which something may have another place or colour than before, in order: where what says so has points, where steps
+/// begin and end, and at both ends of the run.
+fn instants<'c, 'p: 'c>(run: &Run<'p>, replay: &Replay<'_>, tints: impl Iterator<Item = &'c Column<'p>>) -> Vec<f64> {
+    let recording = run.recording;
+    let (first, last) = recording.sampled.unwrap_or_default();
+    let places = replay.states().filter_map(|state| recording.states.get(state));
+    let mut times: Vec<f64> = places.flat_map(|s| s.points().map(|p| p.0)).collect();
+    times.extend(tints.flat_map(|column| column.shades(SHADES)));
+    times.extend(recording.steps.iter().map(|mark| mark.time).filter(|time| (first..=last).contains(time)));
+    times.extend([first, last]);
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    times
 }
 
 /// A vessel has the colour of what is in it: the first property of a mixture that can be a colour.

@@ -84,7 +84,7 @@ impl<W: Write + Seek> Sink<W> {
         set("workflow", plan.workflow.clone());
         set("lab", run.program.scene.lab.clone());
         set("seed", run.info.seed.to_string());
-        set("fidelity", run.info.fidelity.clone());
+        set("fidelity", run.info.fidelity.name().to_owned());
         set("language", run.info.language.to_string());
         set("tool", TOOL.to_owned());
         for (name, value) in &plan.arguments {

@@ -90,9 +90,14 @@ impl<'p> Replay<'p> {
         }
     }
 
-    /// Things stand where the states of a sample say; whether anything changed its place.
-    pub(super) fn sample(&mut self, run: &Run<'_>, sample: usize) -> bool {
-        let value = |state: usize| run.recording.states.get(state)?.get(sample).copied();
+    /// The states that say where things are.
+    pub(super) fn states(&self) -> impl Iterator<Item = usize> {
+        self.supports.iter().map(|s| s.1).chain(self.loads.iter().map(|l| l.1))
+    }
+
+    /// Things stand where the states say at a time; whether anything changed its place.
+    pub(super) fn sample(&mut self, run: &Run<'_>, time: f64) -> bool {
+        let value = |state: usize| run.recording.states.get(state).map(|s| s.held(time)).filter(|v| !v.is_nan());
         let mut moved = false;
         for index in 0..self.supports.len() {
             let (id, state, current) = self.supports[index];
@@ -106,7 +111,6 @@ impl<'p> Replay<'p> {
                 false => self.stage.follow(id, by),
             }
         }
-        let time = run.recording.times.get(sample).copied().unwrap_or_default();
         moved |= self.arrive(time);
         for index in 0..self.loads.len() {
             let (by, state, _) = self.loads[index];

@@ -40,3 +40,9 @@ pub(super) fn object<K: Into<String>>(title: &str, fields: impl IntoIterator<Ite
     let required: Vec<&String> = properties.keys().collect();
     json!({ "title": title, "type": "object", "required": required, "properties": properties })
 }
+
+/// An object that has some of its fields in each message, those that have something to say.
+pub(super) fn open<K: Into<String>>(title: &str, fields: impl IntoIterator<Item = (K, Value)>) -> Value {
+    let properties: Map<String, Value> = fields.into_iter().map(|(k, v)| (k.into(), v)).collect();
+    json!({ "title": title, "type": "object", "properties": properties })
+}

@@ -10,8 +10,10 @@ use serde_json::Value;
 use super::Sink;
 use super::foxglove::{self, Log, Time};
 use super::schema::{count, list, number, object, optional, text, truth};
+use crate::exec::StepState;
 use crate::record::history;
-use crate::record::recording::{Level, StepState};
+use crate::record::recording::Level;
+use crate::record::report::MeasuredReport;
 use crate::record::run::{Place, Run};
 
 /// Writes all topics of what happened.
@@ -102,18 +104,9 @@ fn processes<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<(
 struct Expectation<'a> {
     text: &'a str,
     passed: bool,
-    measured: Vec<Measured<'a>>,
+    measured: Vec<MeasuredReport>,
     #[serde(flatten)]
     place: Place,
-}
-
-#[derive(Serialize)]
-struct Measured<'a> {
-    text: &'a str,
-    value: f64,
-    low: Option<f64>,
-    high: Option<f64>,
-    unit: &'a str,
 }
 
 fn expectations<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
@@ -131,13 +124,7 @@ fn expectations<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResul
     let schema = object("matterix.Expectation", fields.into_iter().chain(place_schema()));
     let channel = sink.channel("/expectations", "matterix.Expectation", &schema, &BTreeMap::new())?;
     for entry in &run.recording.expectations {
-        let measured = entry.measured.iter().map(|m| Measured {
-            text: &m.text,
-            value: m.unit.of_si(m.value),
-            low: m.low.map(|v| m.unit.of_si(v)),
-            high: m.high.map(|v| m.unit.of_si(v)),
-            unit: &m.unit.symbol,
-        });
+        let measured = entry.measured.iter().filter_map(MeasuredReport::of);
         let place = run.place(entry.span);
         let message = Expectation { text: &entry.text, passed: entry.passed, measured: measured.collect(), place };
         sink.push(channel, entry.time, &message)?;

@@ -7,8 +7,9 @@ use mcap::McapResult;
 use serde_json::{Value, json};
 
 use super::Sink;
-use super::schema::{list, number, object, text, truth};
+use super::schema::{list, number, object, open, text, truth};
 use crate::record::column::{Cell, Column, Shown, repeats};
+use crate::record::frames::{Frame, frames};
 use crate::record::run::Run;
 use crate::record::table::record_units;
 
@@ -21,7 +22,7 @@ struct Group<'a> {
     fields: Vec<Field<'a>>,
 }
 
-/// A topic whose messages are samples.
+/// A topic whose messages are points of columns.
 struct Topic<'a> {
     topic: String,
     schema: String,
@@ -94,23 +95,20 @@ fn contents<'a>(run: &Run<'a>) -> Vec<Topic<'a>> {
 }
 
 impl Topic<'_> {
-    /// Writes the samples at which something changed, each preceded by the last that did not, so that a line drawn between
-    /// messages is the line between samples; the first and the last sample always.
+    /// Writes every point of its columns, those of one time together, so that a line drawn between messages of a field is the line
+    /// of its column; the first and the last message have all fields.
     fn write<W: Write + Seek>(&self, run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
-        let times = &run.recording.times;
         let channel = sink.channel(&self.topic, &self.schema, &self.schema(), &self.units())?;
-        let columns = || self.groups.iter().flat_map(|g| &g.fields).map(|(_, c)| c);
-        let mut written: Option<usize> = None;
-        for sample in 0..times.len() {
-            let last = sample + 1 == times.len();
-            if !last && written.is_some_and(|w| columns().all(|c| c.same(w, sample))) {
-                continue;
-            }
-            if written.is_some_and(|w| w + 1 < sample) {
-                sink.push_bytes(channel, times[sample - 1], self.message(run, sample - 1));
-            }
-            sink.push_bytes(channel, times[sample], self.message(run, sample));
-            written = Some(sample);
+        let columns: Vec<&Column<'_>> = self.groups.iter().flat_map(|g| &g.fields).map(|(_, c)| c).collect();
+        let mut frames = frames(&columns);
+        if let Some((_, end)) = run.recording.sampled.filter(|(_, end)| frames.last().is_some_and(|f| f.time < *end)) {
+            frames.push(Frame { time: end, points: Vec::new() });
+        }
+        let last = frames.len().saturating_sub(1);
+        for (i, frame) in frames.iter().enumerate() {
+            let is_whole = i == 0 || i == last;
+            let shown = |column: usize| is_whole || frame.has(column);
+            sink.push_bytes(channel, frame.time, self.message(run, &columns, frame, shown));
         }
         Ok(())
     }
@@ -120,8 +118,8 @@ impl Topic<'_> {
             group.fields.iter().map(|(key, column)| (key.clone(), column_schema(column))).collect()
         };
         match self.groups.as_slice() {
-            [only] if only.name.is_empty() => object(&self.schema, fields(only)),
-            groups => object(&self.schema, groups.iter().map(|g| (g.name, object(g.name, fields(g))))),
+            [only] if only.name.is_empty() => open(&self.schema, fields(only)),
+            groups => open(&self.schema, groups.iter().map(|g| (g.name, open(g.name, fields(g))))),
         }
     }
 
@@ -139,25 +137,27 @@ impl Topic<'_> {
         units
     }
 
-    /// The message as JSON, written by hand because there are very many.
-    fn message(&self, run: &Run<'_>, sample: usize) -> Vec<u8> {
+    /// The message as JSON, written by hand because there are very many; `shown` are the columns that it has.
+    fn message(&self, run: &Run<'_>, columns: &[&Column<'_>], frame: &Frame, shown: impl Fn(usize) -> bool) -> Vec<u8> {
         let mut out = vec![b'{'];
-        for (i, group) in self.groups.iter().enumerate() {
-            let nested = !group.name.is_empty();
-            if nested {
-                out.extend_from_slice(if i > 0 { b",\"" } else { b"\"" });
-                out.extend_from_slice(group.name.as_bytes());
-                out.extend_from_slice(b"\":{");
+        let mut index = 0;
+        for group in &self.groups {
+            let fields: Vec<usize> = (index..index + group.fields.len()).filter(|i| shown(*i)).collect();
+            let first = index;
+            index += group.fields.len();
+            let is_nested = !group.name.is_empty() && !fields.is_empty();
+            if is_nested {
+                comma(&mut out);
+                append(&mut out, group.name);
+                out.extend_from_slice(b":{");
             }
-            for (j, (key, column)) in group.fields.iter().enumerate() {
-                if j > 0 {
-                    out.push(b',');
-                }
-                append(&mut out, key);
+            for field in fields {
+                comma(&mut out);
+                append(&mut out, &group.fields[field - first].0);
                 out.push(b':');
-                append_column(&mut out, run, column, sample);
+                append_column(&mut out, run, columns, frame, field);
             }
-            if nested {
+            if is_nested {
                 out.push(b'}');
             }
         }
@@ -166,7 +166,20 @@ impl Topic<'_> {
     }
 }
 
-fn append_column(out: &mut Vec<u8>, run: &Run<'_>, column: &Column<'_>, sample: usize) {
+/// A number as exact as a curve whose error is not 0: more digits would make most of a file.
+fn ten_digits(value: f64) -> f64 {
+    format!("{value:.9e}").parse().unwrap_or(value)
+}
+
+/// A comma where something stands before.
+fn comma(out: &mut Vec<u8>) {
+    if out.last() != Some(&b'{') {
+        out.push(b',');
+    }
+}
+
+fn append_column(out: &mut Vec<u8>, run: &Run<'_>, columns: &[&Column<'_>], frame: &Frame, index: usize) {
+    let column = columns[index];
     let tuple = column.parts.len() > 1;
     if tuple {
         out.push(b'[');
@@ -175,7 +188,8 @@ fn append_column(out: &mut Vec<u8>, run: &Run<'_>, column: &Column<'_>, sample: 
         if part > 0 {
             out.push(b',');
         }
-        match column.cell(run, part, sample) {
+        match column.cell(run, frame.value(columns, index, part)) {
+            Cell::Number(value) if run.recording.error > 0.0 => append(out, &ten_digits(value)),
             Cell::Number(value) => append(out, &value),
             Cell::Bool(value) => append(out, &value),
             Cell::Name(name) => append(out, name),

@@ -90,10 +90,9 @@ fn is_temperature(unit: &Unit) -> bool {
 }
 
 /// A series of one component of a column in its unit.
-fn series(run: &Run<'_>, name: String, column: &Column<'_>, part: usize, stepped: bool) -> Option<Series> {
+fn series(name: String, column: &Column<'_>, part: usize, stepped: bool) -> Option<Series> {
     let Shown::Quantity(unit) = column.shown else { return None };
-    let values = column.parts.get(part)?;
-    let points = run.recording.times.iter().zip(*values).map(|(&t, &v)| (t, unit.of_si(v))).collect();
+    let points = column.parts.get(part)?.points().map(|(t, v)| (t, unit.of_si(v))).collect();
     Some(Series { name, points, stepped }.thinned())
 }
 
@@ -141,16 +140,14 @@ fn by_unit(run: &Run<'_>) -> Vec<(Unit, Panel)> {
             None => groups.push((unit.clone(), vec![(column, stepped)])),
         }
     }
-    groups.into_iter().filter_map(|(unit, list)| unit_panel(run, &unit, list).map(|p| (unit, p))).collect()
+    groups.into_iter().filter_map(|(unit, list)| unit_panel(&unit, list).map(|p| (unit, p))).collect()
 }
 
-fn unit_panel(run: &Run<'_>, unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
+fn unit_panel(unit: &Unit, columns: Vec<(Column<'_>, bool)>) -> Option<Panel> {
     let mut lines = Vec::new();
     for (column, stepped) in &columns {
         for part in 0..column.parts.len() {
-            let name =
-                if column.parts.len() > 1 { format!("{}.{}", column.name, part + 1) } else { column.name.to_owned() };
-            lines.extend(series(run, name, column, part, *stepped));
+            lines.extend(series(column.part_name(part), column, part, *stepped));
         }
     }
     let mut panel = panel(String::new(), &unit.symbol, lines)?;
@@ -207,7 +204,7 @@ fn contents(run: &Run<'_>, mixture: &Mixture) -> Vec<Panel> {
     let mut groups: Vec<(&str, Vec<Series>)> = Vec::new();
     for (species, column) in species.zip(columns) {
         let Some((species, column)) = species.zip(column) else { continue };
-        let Some(line) = series(run, species.name.clone(), &column, 0, false) else { continue };
+        let Some(line) = series(species.name.clone(), &column, 0, false) else { continue };
         match groups.iter_mut().find(|(symbol, _)| *symbol == column.symbol()) {
             Some((_, list)) => list.push(line),
             None => groups.push((column.symbol(), vec![line])),

@@ -5,10 +5,11 @@ use plotters::style::RGBColor;
 
 use super::canvas::PALETTE;
 use super::draw::{Bar, Block, Row};
+use crate::exec::StepState;
 use crate::record::column::{Column, Shown};
 use crate::record::history::{self, is_structure};
-use crate::record::recording::StepState;
 use crate::record::run::Run;
+use crate::record::series::Series;
 
 /// Rows of a block at most.
 const MOST: usize = 24;
@@ -23,8 +24,8 @@ fn block(title: &str, mut rows: Vec<Row>) -> Option<Block> {
 /// Columns that are colours and change.
 pub(super) fn colours(run: &Run<'_>, columns: &[Column<'_>]) -> Option<Block> {
     let row = |column: &Column<'_>| {
-        let bars = stretches(run, |sample| {
-            let [r, g, b] = column.colour(sample).unwrap_or_default().map(|v| (v * 255.0).round() as u8);
+        let bars = stretches(run, column.shades(255.0).into_iter(), |time| {
+            let [r, g, b] = column.colour(time).unwrap_or_default().map(|v| (v * 255.0).round() as u8);
             Some((RGBColor(r, g, b), String::new()))
         });
         Row { label: column.name.to_owned(), bars }
@@ -35,20 +36,23 @@ pub(super) fn colours(run: &Run<'_>, columns: &[Column<'_>]) -> Option<Block> {
 
 /// Truth values and places that change.
 pub(super) fn discrete(run: &Run<'_>, columns: &[Column<'_>]) -> Option<Block> {
-    let changes = |c: &&Column<'_>| c.parts.first().is_some_and(|p| p.iter().any(|v| Some(v) != p.first()));
-    let row = |column: &Column<'_>| {
-        let values = column.parts.first().copied().unwrap_or_default();
+    let changes = |c: &&Column<'_>| {
+        let first = |s: &Series| s.first().map(|p| p.1);
+        c.parts.first().is_some_and(|s| s.values().any(|v| Some(v) != first(s)))
+    };
+    let row = |column: &Column<'_>, series: &Series| {
+        let times = series.points().map(|p| p.0);
         let bars = match column.shown {
             Shown::Bool => {
                 let bar = |(start, end)| plain(start, end, PALETTE[0]);
-                history::true_intervals(run.recording, values).into_iter().map(bar).collect()
+                history::true_intervals(run.recording, series).into_iter().map(bar).collect()
             }
-            Shown::Instance => stretches(run, |sample| {
-                let value = values.get(sample).copied().filter(|v| *v >= 0.0)?;
+            Shown::Instance => stretches(run, times, |time| {
+                let value = Some(series.held(time)).filter(|v| *v >= 0.0)?;
                 Some((PALETTE[(value as usize + 3) % PALETTE.len()], run.instance_name(value).to_owned()))
             }),
-            Shown::Enum(words) => stretches(run, |sample| {
-                let value = values.get(sample).copied()? as usize;
+            Shown::Enum(words) => stretches(run, times, |time| {
+                let value = series.held(time) as usize;
                 Some((PALETTE[(value + 1) % PALETTE.len()], words.get(value)?.clone()))
             }),
             Shown::Quantity(_) => Vec::new(),
@@ -56,7 +60,7 @@ pub(super) fn discrete(run: &Run<'_>, columns: &[Column<'_>]) -> Option<Block> {
         Row { label: column.name.to_owned(), bars }
     };
     let shown = columns.iter().filter(|c| !matches!(c.shown, Shown::Quantity(_))).filter(changes);
-    block("state", shown.map(row).collect())
+    block("state", shown.filter_map(|c| Some(row(c, c.parts.first()?))).collect())
 }
 
 /// Processes that began or ended within the run.
@@ -118,21 +122,24 @@ fn span(start: f64, end: f64) -> String {
     if a == b { format!("{a} s") } else { format!("{a} – {b} s") }
 }
 
-/// Neighbouring samples that look alike as one bar; samples that look like nothing leave a gap.
-fn stretches(run: &Run<'_>, look: impl Fn(usize) -> Option<(RGBColor, String)>) -> Vec<Bar> {
-    let recording = run.recording;
+/// Neighbouring times at which something looks alike as one bar; what looks like nothing leaves a gap.
+fn stretches(
+    run: &Run<'_>,
+    times: impl Iterator<Item = f64>,
+    look: impl Fn(f64) -> Option<(RGBColor, String)>,
+) -> Vec<Bar> {
     let mut bars: Vec<Bar> = Vec::new();
     let mut current: Option<(RGBColor, String)> = None;
-    for (sample, &time) in recording.times.iter().enumerate() {
-        let next = look(sample);
-        if next == current && sample > 0 {
+    for (index, time) in times.enumerate() {
+        let next = look(time);
+        if next == current && index > 0 {
             continue;
         }
         if let (Some(bar), Some(_)) = (bars.last_mut(), &current) {
             bar.end = time;
         }
         if let Some((color, text)) = next.clone() {
-            bars.push(Bar { start: time, end: recording.end, color, text, beside: false });
+            bars.push(Bar { start: time, end: run.recording.end, color, text, beside: false });
         }
         current = next;
     }

@@ -6,6 +6,7 @@ use matterix_ir::model::{Content, Mixture};
 use super::*;
 use crate::record::history::{self, is_structure};
 use crate::record::run::TOOL;
+use crate::record::series::Series;
 use crate::record::table::record_units;
 
 /// The report of a finished run.
@@ -21,7 +22,7 @@ pub(super) fn report(run: &Run<'_>) -> Report {
         lab: program.scene.lab.clone(),
         arguments: program.plan.arguments.iter().map(argument).collect(),
         seed: info.seed,
-        fidelity: info.fidelity.clone(),
+        fidelity: info.fidelity,
         status: info.status,
         end: run.recording.end,
         failure: failure(run),
@@ -64,19 +65,12 @@ fn findings(run: &Run<'_>) -> Vec<FindingReport> {
 }
 
 fn expectations(run: &Run<'_>) -> Vec<ExpectationReport> {
-    let measured = |m: &crate::record::recording::Measured| MeasuredReport {
-        text: m.text.clone(),
-        value: m.unit.of_si(m.value),
-        low: m.low.map(|v| m.unit.of_si(v)),
-        high: m.high.map(|v| m.unit.of_si(v)),
-        unit: m.unit.symbol.clone(),
-    };
     let entry = |e: &crate::record::recording::Expectation| ExpectationReport {
         text: e.text.clone(),
         passed: e.passed,
         time: e.time,
         place: run.place(e.span),
-        measured: e.measured.iter().map(measured).collect(),
+        measured: e.measured.iter().filter_map(MeasuredReport::of).collect(),
     };
     run.recording.expectations.iter().map(entry).collect()
 }
@@ -88,8 +82,8 @@ fn container(run: &Run<'_>, mixture: &Mixture) -> ContainerReport {
     let property = |&index: &u32| -> Option<PropertyReport> {
         let observable = run.program.model.observables.get(index as usize)?;
         let short = observable.name.strip_prefix(&name).map_or(observable.name.as_str(), |n| n.trim_start_matches('.'));
-        let values = last(run.recording.observables.get(index as usize)?);
-        let values = values.into_iter().map(|v| observable.unit.of_si(v)).collect();
+        let components = run.recording.observables.get(index as usize)?.iter();
+        let values = components.map(|c| observable.unit.of_si(end(c))).collect();
         Some(PropertyReport { name: short.to_owned(), values, unit: observable.unit.symbol.clone() })
     };
     ContainerReport {
@@ -101,11 +95,11 @@ fn container(run: &Run<'_>, mixture: &Mixture) -> ContainerReport {
 
 fn content(run: &Run<'_>, content: &Content, concentration: Option<u32>) -> Option<SpeciesReport> {
     let species = run.program.model.species.get(content.species as usize)?;
-    let amount = run.recording.states.get(content.state as usize)?.last().copied().unwrap_or(f64::NAN);
+    let amount = end(run.recording.states.get(content.state as usize)?);
     let of = |index: u32| {
         let observable = run.program.model.observables.get(index as usize)?;
-        let value = run.recording.observables.get(index as usize)?.first()?.last()?;
-        Some((observable.unit.of_si(*value), observable.unit.symbol.clone()))
+        let (_, value) = run.recording.observables.get(index as usize)?.first()?.last()?;
+        Some((observable.unit.of_si(value), observable.unit.symbol.clone()))
     };
     let (concentration, concentration_unit) = concentration.and_then(of).map(|(v, u)| (Some(v), u)).unwrap_or_default();
     Some(SpeciesReport {
@@ -118,9 +112,9 @@ fn content(run: &Run<'_>, content: &Content, concentration: Option<u32>) -> Opti
     })
 }
 
-/// The last sample of each component.
-fn last(components: &[Vec<f64>]) -> Vec<f64> {
-    components.iter().map(|c| c.last().copied().unwrap_or(f64::NAN)).collect()
+/// What it is at the end.
+fn end(series: &Series) -> f64 {
+    series.last().map_or(f64::NAN, |p| p.1)
 }
 
 fn steps(run: &Run<'_>) -> Vec<StepReport> {

@@ -5,7 +5,8 @@ use matterix_ir::quantity::show_number;
 
 use super::text::{Align, Table, amount, digits, mass, quantity, seconds};
 use super::{BalanceReport, ContainerReport, MeasuredReport, Place, Report};
-use crate::record::recording::{Level, StepState};
+use crate::exec::StepState;
+use crate::record::recording::Level;
 use crate::record::run::Status;
 
 use Align::{Left, Right};

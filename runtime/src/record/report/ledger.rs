@@ -5,18 +5,16 @@ use matterix_ir::{Env, NodeId};
 
 use super::{BalanceReport, ExchangeReport};
 use crate::record::run::Run;
+use crate::record::series::Series;
 
 /// Every balance of the model; none if nothing was sampled.
 pub(super) fn balances(run: &Run<'_>) -> Vec<BalanceReport> {
-    let samples = run.recording.times.len();
-    if samples == 0 {
-        return Vec::new();
-    }
-    let (first, last) = (Instant::new(run, 0), Instant::new(run, samples - 1));
+    let Some((first, last)) = run.recording.sampled else { return Vec::new() };
+    let (first, last) = (Instant::new(run, first, Series::first), Instant::new(run, last, Series::last));
     run.program.model.balances.iter().map(|b| balance(run, b, &first, &last)).collect()
 }
 
-/// All states at one sample.
+/// All states at the first or the last sample.
 struct Instant<'a> {
     run: Run<'a>,
     time: f64,
@@ -27,12 +25,12 @@ struct Instant<'a> {
 }
 
 impl<'a> Instant<'a> {
-    fn new(run: &Run<'a>, sample: usize) -> Self {
+    fn new(run: &Run<'a>, time: f64, point: fn(&Series) -> Option<(f64, f64)>) -> Self {
         let model = &run.program.model;
-        let state = |i: usize| run.recording.states.get(i).and_then(|s| s.get(sample)).copied().unwrap_or(f64::NAN);
+        let state = |i: usize| run.recording.states.get(i).and_then(point).map_or(f64::NAN, |p| p.1);
         Instant {
             run: *run,
-            time: run.recording.times.get(sample).copied().unwrap_or(0.0),
+            time,
             states: (0..model.states.len()).map(state).collect(),
             params: model.params.iter().map(|p| p.value).collect(),
             unset: vec![f64::NAN; run.program.plan.locals.len().max(model.readings.len())],

@@ -10,8 +10,10 @@ use std::collections::BTreeMap;
 use matterix_ir::Severity;
 use serde::Serialize;
 
-use super::recording::{Level, StepState};
+use super::recording::Level;
 use super::run::{Place, Run, Status};
+use crate::exec::{Measured, StepState};
+use crate::run::Fidelity;
 
 pub use human::human;
 
@@ -38,7 +40,7 @@ pub struct Report {
     /// Seed of all randomness.
     pub seed: u64,
     /// Fidelity of the simulation.
-    pub fidelity: String,
+    pub fidelity: Fidelity,
     /// How it ended.
     pub status: Status,
     /// When it ended, s.
@@ -149,6 +151,20 @@ pub struct MeasuredReport {
     pub high: Option<f64>,
     /// Of all three.
     pub unit: String,
+}
+
+impl MeasuredReport {
+    /// In the unit shown; none where nothing was measured.
+    pub(super) fn of(m: &Measured) -> Option<Self> {
+        let shown = |si: f64| m.unit.of_si(si);
+        Some(MeasuredReport {
+            text: m.text.clone(),
+            value: shown(m.value?),
+            low: m.low.map(shown),
+            high: m.high.map(shown),
+            unit: m.unit.symbol.clone(),
+        })
+    }
 }
 
 /// A mixture at the end.

@@ -26,20 +26,24 @@ fn the_table_reads_back_to_the_last_bit() {
         ["time [s]", "hotplate.temperature [degC]", "hotplate.target [degC]", "hotplate.active", "beaker.support"]
     );
     assert!(head.contains(&"beaker.contents.color.3".to_owned()), "{head:?}");
-    assert_eq!(rows.len(), lab.recording.times.len());
-    for (sample, row) in rows.iter().enumerate() {
-        for (state, column) in lab.program.model.states.iter().zip(&lab.recording.states) {
+    let samples = fixture::samples();
+    // Before 2 s all rests.
+    assert_eq!(rows.len(), samples.len() - 2);
+    for row in &rows {
+        let time: f64 = row[0].parse().expect("a time");
+        let sample = samples.iter().find(|sample| sample.time == time).expect("it was sampled");
+        for (state, value) in lab.program.model.states.iter().zip(sample.states) {
             let at = head
                 .iter()
                 .position(|h| *h == state.name || h.starts_with(&format!("{} [", state.name)))
                 .expect("column");
             match &state.domain {
                 Domain::Quantity(unit) => {
-                    assert_eq!(row[at].parse::<f64>(), Ok(unit.of_si(column[sample])), "{}", state.name)
+                    assert_eq!(row[at].parse::<f64>(), Ok(unit.of_si(value)), "{}", state.name)
                 }
-                Domain::Bool => assert_eq!(row[at], if column[sample] == 1.0 { "true" } else { "false" }),
-                Domain::Enum(words) => assert_eq!(row[at], words[column[sample] as usize]),
-                Domain::Instance => assert_eq!(row[at], if column[sample] == 1.0 { "hotplate" } else { "table" }),
+                Domain::Bool => assert_eq!(row[at], if value == 1.0 { "true" } else { "false" }),
+                Domain::Enum(words) => assert_eq!(row[at], words[value as usize]),
+                Domain::Instance => assert_eq!(row[at], if value == 1.0 { "hotplate" } else { "table" }),
             }
         }
     }
@@ -49,7 +53,7 @@ fn the_table_reads_back_to_the_last_bit() {
 fn names_with_commas_are_quoted_and_nothing_is_said_so() {
     let mut lab = fixture::lab();
     lab.program.model.states[3].name = "near(a, \"b\")".into();
-    lab.recording.states[3][0] = -1.0;
+    lab.recording.states[3] = fixture::series(&[(0.0, -1.0), (8.0, 1.0)]);
     let mut out = Vec::new();
     table::states(&lab.run(), &mut out).expect("memory");
     let (head, rows) = read(&out);
@@ -80,7 +84,18 @@ fn all_files_are_written_whole_and_alike() {
         let paths = record::write_all(&dir, &lab.run(), &report, Outputs::ALL).expect("written");
         let names: Vec<_> =
             paths.iter().filter_map(|p| p.file_name()).map(|n| n.to_string_lossy().into_owned()).collect();
-        assert_eq!(names, ["recording.mcap", "states.csv", "records.csv", "plot.svg", "report.json"]);
+        assert_eq!(
+            names,
+            [
+                "recording.mcap",
+                "states.parquet",
+                "records.parquet",
+                "states.csv",
+                "records.csv",
+                "plot.svg",
+                "report.json",
+            ]
+        );
         assert_eq!(fs::read_dir(&dir).expect("folder").count(), names.len(), "nothing else is left");
         paths.iter().map(|p| fs::read(p).expect("file")).collect::<Vec<_>>()
     });
@@ -93,7 +108,7 @@ fn an_error_names_the_file() {
     let report = Report::new(&lab.run());
     let dir = scratch("record-blocked");
     fs::create_dir_all(dir.join("report.json")).expect("folder");
-    let outputs = Outputs { recording: false, tables: false, plot: false };
+    let outputs = Outputs { recording: false, tables: false, csv: false, plot: false };
     let error = record::write_all(&dir, &lab.run(), &report, outputs).expect_err("a folder is in the way");
     assert!(error.path.ends_with("report.json"));
     assert!(error.to_string().starts_with("cannot write `"));

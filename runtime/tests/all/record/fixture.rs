@@ -8,8 +8,9 @@ use matterix_ir::model::{
 use matterix_ir::plan::{Local, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::{Frame, Instance, InstanceId, Pose, Scene, Shape};
 use matterix_ir::{BinaryOp, Diagnostic, FileId, Op, Program, Sources, Span, Unit, codes};
-use matterix_runtime::record::{Expectation, Failure, Level, Measured, Recording, Run, RunInfo, Status, StepState};
-use matterix_runtime::run::Finding;
+use matterix_runtime::exec::{Measured, StepState};
+use matterix_runtime::record::{Expectation, Failure, Level, Recording, Run, RunInfo, Series, Status};
+use matterix_runtime::run::{Fidelity, Finding};
 
 pub(super) const TEXT: &str = "mtx 1\nlab bench {\n}\nworkflow synthesize in bench {\n    wait 2 s\n    heat hotplate to 76.33 degC\n    place beaker on hotplate by panda\n    expect beaker.contents[EtI] in 0.90 mol/kg .. 0.92 mol/kg\n}\n";
 
@@ -209,11 +210,17 @@ fn plan(model: &mut Model) -> Plan {
     }
 }
 
-/// Heating to 1010.6 s, cooling to 2000 s, drawn with exponentials; the beaker meets the plate at 8 s.
-fn recording(program: &Program) -> Recording {
-    let mut r = Recording::new(program);
+/// All that is there at a time.
+pub(super) struct Sample {
+    pub(super) time: f64,
+    pub(super) states: [f64; 8],
+    pub(super) observables: [Vec<f64>; 4],
+}
+
+/// Every 0.5 s to 2000 s: heating to 1010.5 s, cooling then, drawn with exponentials; the beaker meets the plate at 8 s.
+pub(super) fn samples() -> Vec<Sample> {
     let rise = |t: f64, tau: f64| 1.0 - (-t / tau).exp();
-    for i in 0..=4000 {
+    let sample = |i: i32| {
         let t = f64::from(i) * 0.5;
         let on = (2.0..1010.5).contains(&t);
         let heated = if t < 1010.5 { rise((t - 2.0).max(0.0), 150.0) } else { (-(t - 1010.5) / 250.0).exp() };
@@ -235,11 +242,23 @@ fn recording(program: &Program) -> Recording {
         let temperature = enthalpy / 41.75 + 298.15;
         let observables =
             [vec![temperature], vec![0.9, 0.9 - 0.6 * fade, 0.95 - 0.9 * fade], vec![etoh * 83.0], vec![eti * 83.0]];
-        r.sample(t, &states, &observables);
-        if i % 20 == 0 {
-            r.reading(t, 0, temperature);
-            r.value(t, "probe", &[temperature]);
-        }
+        Sample { time: t, states, observables }
+    };
+    (0..=4000).map(sample).collect()
+}
+
+/// The samples, and what happened.
+fn recording(program: &Program) -> Recording {
+    let mut r = Recording::within(program, 0.0);
+    let all = samples();
+    for sample in &all {
+        r.sample(sample.time, &sample.states, &sample.observables);
+    }
+    for i in 0..=200 {
+        let t = all[20 * i].time;
+        let temperature = all[20 * i].observables[0][0];
+        r.reading(t, 0, temperature);
+        r.value(t, "probe", &[temperature]);
     }
     let spans = [
         (1, 0.0, 2.0),
@@ -265,7 +284,7 @@ fn recording(program: &Program) -> Recording {
     r.log(2000.0, Level::Warning, "a \u{1} control character", None);
     let measured = Measured {
         text: "beaker.contents[EtI] in 0.90 mol/kg .. 0.92 mol/kg".into(),
-        value: 0.8985,
+        value: Some(0.8985),
         low: Some(0.90),
         high: Some(0.92),
         unit: Unit::scaled("mol/kg", 1.0),
@@ -294,7 +313,7 @@ pub(super) fn lab() -> Lab {
     let info = RunInfo {
         language: 1,
         seed: 7,
-        fidelity: "process".into(),
+        fidelity: Fidelity::Process,
         status: Status::Missed,
         failure: Some(Failure {
             name: "slip".into(),
@@ -310,4 +329,11 @@ pub(super) fn lab() -> Lab {
         integrator: BTreeMap::from([("steps".into(), 128), ("rejected".into(), 3)]),
     };
     Lab { recording: recording(&program), program, sources, info }
+}
+
+/// Points in a curve to the last bit.
+pub(super) fn series(points: &[(f64, f64)]) -> Series {
+    let mut series = Series::new(0.0);
+    points.iter().for_each(|(time, value)| series.push(*time, *value));
+    series
 }

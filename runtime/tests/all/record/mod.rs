@@ -4,5 +4,6 @@ mod contents;
 mod docs;
 mod fixture;
 mod mcap;
+mod parquet;
 mod plot;
 mod report;

@@ -51,8 +51,7 @@ fn an_empty_run_has_a_page() {
 #[test]
 fn values_that_are_no_numbers_are_left_out() {
     let mut lab = fixture::lab();
-    lab.recording.states[0][7] = f64::NAN;
-    lab.recording.states[0][9] = f64::INFINITY;
+    lab.recording.states[0] = fixture::series(&[(0.0, 300.0), (7.0, f64::NAN), (8.0, 301.0), (9.0, f64::INFINITY)]);
     let svg = matterix_runtime::record::plot::page(&lab.run()).expect("drawn");
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
 }
@@ -64,7 +63,8 @@ fn more_lines_than_colours_are_said_in_words() {
     for i in 0..9 {
         let name = format!("body{i}.temperature");
         lab.program.model.states.push(matterix_ir::model::State { name, ..state.clone() });
-        lab.recording.states.push(column.iter().map(|v| v * (1.0 + 0.01 * f64::from(i))).collect());
+        let points: Vec<_> = column.points().map(|(t, v)| (t, v * (1.0 + 0.01 * f64::from(i)))).collect();
+        lab.recording.states.push(fixture::series(&points));
     }
     let svg = matterix_runtime::record::plot::page(&lab.run()).expect("drawn");
     assert!(texts(&svg).iter().any(|t| t.starts_with("not shown: ")), "the rest is named");

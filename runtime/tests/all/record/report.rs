@@ -1,6 +1,7 @@
 //! The report and its text.
 
-use matterix_runtime::record::{Report, StepState, human};
+use matterix_runtime::exec::StepState;
+use matterix_runtime::record::{Report, human};
 
 use super::fixture;
 
@@ -51,7 +52,8 @@ fn the_ledger_closes_to_rounding() {
 #[test]
 fn a_balance_that_does_not_close_says_by_how_much() {
     let mut lab = fixture::lab();
-    *lab.recording.states[5].last_mut().expect("samples") += 1e-3;
+    let (time, last) = lab.recording.states[5].last().expect("samples");
+    lab.recording.states[5].push(time, last + 1e-3);
     let report = Report::new(&lab.run());
     assert!((report.ledger[1].error - 1.0).abs() < 1e-9, "{:?} mmol", report.ledger[1].error);
 }

@@ -1,0 +1,38 @@
+//! Takes from the engine what a sample may have changed.
+
+use matterix_ir::model::Model;
+
+use super::recording::Recording;
+use crate::process::Engine;
+use crate::touched::{Below, Touched};
+
+/// Knows which observables rest on which states.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    observables: Touched,
+}
+
+impl Sampler {
+    /// Of a model.
+    pub fn new(model: &Model) -> Self {
+        let below = model.observables.iter().map(|o| Below::new(model, &o.value));
+        Sampler { observables: Touched::new(model.states.len(), below) }
+    }
+
+    /// Takes a sample: of the first one all, later only `changed` states and what rests on them.
+    pub fn sample(&self, recording: &mut Recording, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        let model = engine.model();
+        let (states, touched): (Vec<u32>, _) = match recording.sampled {
+            None => ((0..model.states.len() as u32).collect(), self.observables.all()),
+            Some(_) => (changed.to_vec(), self.observables.by(changed)),
+        };
+        recording.sampled(time);
+        for state in states {
+            recording.state(time, state, engine.state(state));
+        }
+        for index in touched {
+            let nodes = model.observables[index as usize].value.iter();
+            recording.observable(time, index, nodes.map(|node| engine.eval(*node)));
+        }
+    }
+}
