@@ -46,6 +46,9 @@ const CRAWL: usize = 20_000;
 /// What happens in a lab takes longer than this, s, or is over after far fewer steps than [`CRAWL`].
 const CRAWL_TIME: f64 = 1e-6;
 
+/// A step that is not found costs as much as so many: all lengths down to [`SHORTEST_STEP`] were tried.
+const NOT_FOUND: usize = 200;
+
 /// How often the error of one step is found too large, each time halving it at least: enough to get from 1 s to
 /// [`SHORTEST_STEP`].
 const REFUSALS: usize = 400;
@@ -216,7 +219,8 @@ impl Integrator {
             self.state = driven.state;
             taken += driven.steps;
             self.unheard += driven.steps;
-            self.count(driven.steps)?;
+            let tried = if let Left::Failed(_) = driven.left { NOT_FOUND } else { 0 };
+            self.count(driven.steps + tried)?;
             let length = match driven.left {
                 Left::Visited => break,
                 Left::Failed(stuck) if taken == 0 && is_fresh => return Err(stuck),
