@@ -55,7 +55,7 @@ fn the_same_run_twice_writes_the_same_bytes() {
     }
     let files = names(&dir.join("one"));
     assert_eq!(files, names(&dir.join("two")));
-    for ending in [".mcap", ".csv", ".svg", "report.json"] {
+    for ending in [".mcap", ".parquet", ".svg", "report.json"] {
         assert!(files.iter().any(|f| f.ends_with(ending)), "no {ending} in {files:?}");
     }
     for file in files {

@@ -52,7 +52,7 @@ fn recorded(workflow: &str) -> BTreeMap<String, Vec<f64>> {
     let dir = folder(&format!("columns_{workflow}"));
     let file = root().join("tests/cases/columns.mtx");
     let out = dir.to_str().expect("text");
-    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow, "--out", out]);
+    let ran = matterixc(&["run", file.to_str().expect("text"), "--workflow", workflow, "--csv", "--out", out]);
     assert_eq!(ran.code, 0, "{}{}", ran.out, ran.err);
     let text = std::fs::read_to_string(dir.join("records.csv")).expect("records");
     let mut columns: BTreeMap<String, Vec<f64>> = BTreeMap::new();
