@@ -36,7 +36,8 @@ pub struct Follower<'p> {
     since: Vec<Option<f64>>,
     /// The latest time heard of, s.
     pub(super) end: f64,
-    last: Option<f64>,
+    /// Whether a sample was taken.
+    is_begun: bool,
 }
 
 impl<'p> Follower<'p> {
@@ -57,7 +58,7 @@ impl<'p> Follower<'p> {
             watched: Default::default(),
             since: vec![None; tallies],
             end: 0.0,
-            last: None,
+            is_begun: false,
         }
     }
 
@@ -132,13 +133,16 @@ impl<'p> Follower<'p> {
 impl Observer for Follower<'_> {
     fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         self.reach(time);
-        let Some(last) = self.last.replace(time) else { return self.begin(engine) };
+        if !std::mem::replace(&mut self.is_begun, true) {
+            return self.begin(engine);
+        }
         let program = self.program;
         for index in self.watched.0.by(changed) {
             let value = engine.eval(program.stock.tallies[index as usize].value);
             self.counted(index as usize, value, time);
         }
-        if time > last && !self.watched.1.by(changed).is_empty() {
+        // Also of one instant: what moves each of two ends may be shown one after the other.
+        if !self.watched.1.by(changed).is_empty() {
             self.stream(engine);
         }
         for &state in changed {

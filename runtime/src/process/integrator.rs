@@ -53,6 +53,9 @@ const NOT_FOUND: usize = 200;
 /// [`SHORTEST_STEP`].
 const REFUSALS: usize = 400;
 
+/// How often the equations of a step are not solved at most, on the mean of those taken at one go.
+const FAILURES: usize = 20;
+
 /// The error allowed in one step as a part of the tolerance asked for. The errors of many steps add up: on the analytic
 /// cases of the tests to 80 times that of one.
 pub(super) const STEP_SHARE: f64 = 0.02;
@@ -384,8 +387,8 @@ fn drive(
     let mut problem =
         OdeBuilder::<Shifted>::new().t0(start).rtol(rtol).atol(atol.iter().copied()).build_from_eqn(equations)?;
     problem.ode_options.min_timestep = SHORTEST_STEP;
-    // The library counts these over the life of the solver, not per step: the shortest step is the limit that matters.
-    problem.ode_options.max_nonlinear_solver_failures = usize::MAX;
+    // The library counts these over the life of the solver, not per step. A step of no length that is a number never ends otherwise.
+    problem.ode_options.max_nonlinear_solver_failures = REFUSALS + FAILURES * most;
     problem.ode_options.max_error_test_failures = REFUSALS;
     let state = match state {
         Some(state) => state,
@@ -420,7 +423,8 @@ fn drive(
             Err(busy) => return left(Left::Failed(busy.into())),
         }
         match step(dense, &mut solver) {
-            Ok(next) => *dense = next,
+            Ok(next) if next.last().iter().all(|value| value.is_finite()) => *dense = next,
+            Ok(_) => return left(Left::Failed(Stuck::Short)),
             Err(error) => return left(Left::Failed(error.into())),
         }
         let left = match visit(dense) {

@@ -366,11 +366,12 @@ impl<'m> Engine<'m> {
         self.settle(last, observer)
     }
 
-    /// Takes the last sample and checks that the balances close.
+    /// Takes the last sample, of all states, and checks that the balances close.
     pub fn finish(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         for part in self.course.parts.ids() {
             self.reach_now(part);
         }
+        self.unshown.extend(0..self.states.len() as u32);
         self.show(observer);
         self.check_temperatures()?;
         self.check_balances(None)

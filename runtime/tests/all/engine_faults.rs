@@ -5,7 +5,7 @@ use matterix_ir::{FileId, NodeId, Span, UnaryOp, codes};
 use matterix_runtime::fault::Fault;
 use matterix_runtime::process::{Engine, Options};
 
-use crate::engine_model::{Build, assign, engine};
+use crate::engine_model::{Build, assign, close, engine};
 
 fn fails(b: &Build, until: f64) -> Fault {
     let mut engine = engine(&b.model);
@@ -165,4 +165,23 @@ fn an_initial_state_that_is_not_finite() {
     let fault = Engine::new(&b.model, vec![], 0, Options::default()).err().expect("a fault");
     assert_eq!(fault.code, codes::NOT_A_NUMBER);
     assert!(fault.message.contains("`x`"));
+}
+
+/// A level that falls with the root of what is above an outlet comes to it in a finite time: whatever becomes of it there, the run ends.
+#[test]
+fn a_root_that_comes_to_nothing_does_not_hold_up_the_run() {
+    let mut b = Build::default();
+    let level = b.state("level", 0.1);
+    let outlet = b.num(0.01);
+    let above = b.sub(level, outlet);
+    let share = b.scale(10.0, above);
+    let root = b.model.graph.unary(matterix_ir::UnaryOp::Sqrt, share);
+    let rate = b.scale(-0.02, root);
+    b.rate(0, rate);
+    let mut engine = engine(&b.model);
+    engine.start(&mut ()).expect("start");
+    match engine.advance(60.0, &[], &mut ()) {
+        Ok(_) => close(engine.states()[0], 0.01, 1e-6),
+        Err(fault) => assert!(!fault.message.is_empty()),
+    }
 }
