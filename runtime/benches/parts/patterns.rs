@@ -95,7 +95,7 @@ fn conduction(n: usize, pairs: &[(usize, usize)], bend: f64) -> Model {
     for (i, flows) in flows.into_iter().enumerate() {
         let rate = sum(&mut model, &flows);
         let rate = times(&mut model, if i == 0 { 0.5 } else { 1.0 }, rate);
-        model.derivatives.push(Derivative { state: i as u32, rate });
+        model.derivatives.push(Derivative::new(i as u32, rate));
     }
     model
 }
@@ -121,7 +121,7 @@ fn network(n: usize) -> Model {
     }
     for (i, rates) in rates.into_iter().enumerate() {
         let rate = sum(&mut model, &rates);
-        model.derivatives.push(Derivative { state: i as u32, rate });
+        model.derivatives.push(Derivative::new(i as u32, rate));
     }
     model
 }
