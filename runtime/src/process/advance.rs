@@ -160,7 +160,7 @@ impl Engine<'_> {
             self.index.leaves(state).iter().for_each(|leaf| memo.change(&self.index.users, *leaf));
         }
         self.unshown.extend(part.moving());
-        self.check_states(Some(part.moving()))
+        self.check_states(part.moving())
     }
 
     /// Comparisons change at one instant: what rests on them is due.

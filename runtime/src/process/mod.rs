@@ -398,14 +398,10 @@ impl<'m> Engine<'m> {
         observer.sample(self.time, self, &changed);
     }
 
-    /// Fails where a state is not finite; `only` limits the check to some.
-    fn check_states(&self, only: Option<&[u32]>) -> Result<(), Fault> {
-        let is_broken = |state: &u32| !self.states[*state as usize].is_finite();
-        let broken = match only {
-            Some(list) => list.iter().copied().find(is_broken),
-            None => (0..self.states.len() as u32).find(is_broken),
-        };
-        broken.map_or(Ok(()), |state| Err(self.no_value(state, self.states[state as usize])))
+    /// Fails where one of these states is not finite.
+    fn check_states(&self, states: &[u32]) -> Result<(), Fault> {
+        let broken = states.iter().find(|state| !self.states[**state as usize].is_finite());
+        broken.map_or(Ok(()), |&state| Err(self.no_value(state, self.states[state as usize])))
     }
 
     /// Fails where a sum does not close: at the law that breaks it, else at `cause`.
