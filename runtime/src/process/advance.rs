@@ -157,7 +157,7 @@ impl Engine<'_> {
         let Some(part) = self.course.parts.get(id) else { return Ok(()) };
         let memo = self.memo.get_mut();
         for &state in part.moving() {
-            self.index.leaves(state).iter().for_each(|leaf| memo.change(&self.index.users, *leaf));
+            memo.change_all(&self.index.users, self.index.leaves(state));
         }
         self.unshown.extend(part.moving());
         self.check_states(part.moving())

@@ -176,10 +176,9 @@ impl Engine<'_> {
         self.states[state as usize] = value;
         self.sizes[state as usize] = 0.0;
         self.unshown.push(state);
-        for &leaf in self.index.leaves(state) {
-            self.memo.get_mut().change(&self.index.users, leaf);
-            self.due.seeds.push(leaf);
-        }
+        let leaves = self.index.leaves(state);
+        self.memo.get_mut().change_all(&self.index.users, leaves);
+        self.due.seeds.extend(leaves);
     }
 
     /// Equalities that were true at one instant only are false again.

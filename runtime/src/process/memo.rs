@@ -38,9 +38,13 @@ impl Memo {
 
     /// Time has passed.
     pub(super) fn pass(&mut self, users: &Lists<NodeId>) {
-        for leaf in std::mem::take(&mut self.flowing) {
-            self.change(users, leaf);
-        }
+        let flowing = std::mem::take(&mut self.flowing);
+        self.change_all(users, &flowing);
+    }
+
+    /// Leaves have changed.
+    pub(super) fn change_all(&mut self, users: &Lists<NodeId>, leaves: &[NodeId]) {
+        leaves.iter().for_each(|leaf| self.change(users, *leaf));
     }
 
     /// A leaf has changed.

@@ -292,10 +292,9 @@ impl<'m> Engine<'m> {
     }
 
     fn heard(&mut self, leaf: Op) {
-        for node in self.index.heard(leaf) {
-            self.memo.get_mut().change(&self.index.users, node);
-            self.due.seeds.push(node);
-        }
+        let leaves = self.index.heard(leaf);
+        self.memo.get_mut().change_all(&self.index.users, &leaves);
+        self.due.seeds.extend(leaves);
     }
 
     /// The value of `node` now; each operation is computed once between two changes.

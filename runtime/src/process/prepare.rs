@@ -274,7 +274,7 @@ impl Engine<'_> {
         let memo = self.memo.get_mut();
         for &state in &moving {
             self.course.part_of[state as usize] = id;
-            self.index.leaves(state).iter().for_each(|leaf| memo.change(&self.index.users, *leaf));
+            memo.change_all(&self.index.users, self.index.leaves(state));
         }
         self.unshown.extend(moving);
         concerned.parts.insert(id);
