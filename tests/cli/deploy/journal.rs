@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
+use matterix_hardware::deploy::Chain;
+
 use super::{Emulated, HEAT, bench, lines};
 use crate::harness::{Ended, command, matterixc_in, write};
 
@@ -324,4 +326,64 @@ fn what_was_half_said_begins_when_it_is_said_once_more() {
     assert_eq!(words, ["ON", "ON", "OFF"]);
     let spins = told[2].1.duration_since(told[1].1).expect("later").as_secs_f64();
     assert!((2.5..6.0).contains(&spins), "12 s at four times the speed of the clock are 3 s: {spins} s");
+}
+
+/// The same journal with another text, chained anew.
+fn rechained(text: &str) -> String {
+    let mut chain = Chain::default();
+    let mut lines = String::new();
+    for line in text.lines().skip(1) {
+        let after = line.find("\"after\":\"").expect("each line has a digest") + "\"after\":\"".len();
+        let end = after + line[after..].find('"').expect("that ends");
+        let line = format!("{}{}{}", &line[..after], chain.last, &line[end..]);
+        chain.grow(line.as_bytes());
+        lines += &(line + "\n");
+    }
+    chain.head() + &lines
+}
+
+#[test]
+fn a_journal_of_another_version_is_refused_and_the_devices_are_made_safe() {
+    let (dir, _emulated) = killed("version");
+    let before = journal(&dir);
+    let (first, rest) = before.split_once('\n').expect("a head");
+    let broken = rest.rfind('\n').map_or(rest, |end| &rest[..=end]);
+    assert_eq!(rechained(&before), format!("{first}\n{broken}"), "only the text is changed below");
+    let tool = format!("\"tool\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    assert!(before.contains(&tool), "{before}");
+    write(&dir, "journal", rechained(&before.replace(&tool, "\"tool\":\"0.0.1\"")));
+    let ended = resumed(&dir, "lab.toml");
+    let one_line = ended.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(ended.code, 1, "{one_line}");
+    assert!(one_line.contains("written by version 0.0.1 of this program"), "{one_line}");
+    assert!(one_line.contains("made safe meanwhile: `plate`"), "{one_line}");
+}
+
+/// What a plate is asked when a deployment of this workflow is gone on with.
+fn asked_on_resuming(name: &str, text: &str) -> Vec<String> {
+    let device = super::Device::start(b'\n', |line, before| match line {
+        "IN_PV_90" => super::Answer::Says("100.0 90 \r\n"),
+        "IN_PV_2" if before > 40 => super::Answer::Says("50.0 2 \r\n"),
+        other => super::faulty::plate(other),
+    });
+    let dir = bench(name, text, "plate", &device.address);
+    let mut process = deployed(&dir);
+    until(&dir, "\"told\"", 3);
+    process.kill().expect("it can be killed");
+    process.wait().expect("it ends");
+    let before = device.heard().len();
+    let ended = resumed(&dir, "lab.toml");
+    assert_eq!(ended.code, 0, "{}", ended.err);
+    let asked = device.heard()[before..].to_vec();
+    asked.into_iter().filter(|line| line.starts_with("IN_PV")).collect()
+}
+
+#[test]
+fn only_readings_that_the_workflow_uses_are_asked_for_when_it_goes_on() {
+    let asked = asked_on_resuming("uses_two", &text());
+    assert!(asked.iter().any(|line| line == "IN_PV_2"), "{asked:?}");
+    assert!(!asked.iter().any(|line| line == "IN_PV_90"), "nothing asks for a weight: {asked:?}");
+    let weighed = text().replace("expect beaker", "expect plate.weight >= 1 g\n    expect beaker");
+    let asked = asked_on_resuming("uses_three", &weighed);
+    assert!(asked.iter().any(|line| line == "IN_PV_90"), "{asked:?}");
 }
