@@ -111,11 +111,12 @@ fn written<'a>(
     if !draft {
         lab.initialise();
     }
-    lab.close_holds();
+    lab.targets.close();
     let mut events = lab.events();
-    lab.close_holds();
+    lab.targets.close();
     lab.processes();
     events.extend(lab.stream_events());
+    lab.targets.close();
     let reach = Reach::compute(&lab);
     Some(Settled { lab, plan, wiring, events, reach })
 }

@@ -42,7 +42,9 @@ pub fn lab(tables: &Tables<'_>, id: DeclId, seeing: &mut Seeing) -> Vec<Diagnost
         lab.open_parameters = true;
         lab.lab(id);
         lab.initialise();
+        lab.targets.close();
         let events = lab.events();
+        lab.targets.close();
         lab.processes();
         drop(events);
         lab.note_things(id);

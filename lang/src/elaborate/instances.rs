@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{NodeId, Span};
@@ -294,15 +295,15 @@ impl<'a> Elaborator<'a> {
     }
 
     /// All instances that have a kind.
-    pub fn instances_of(&self, kind: DeclId) -> Vec<InstanceId> {
+    pub fn instances_of(&self, kind: DeclId) -> Arc<[InstanceId]> {
         let count = self.instances.len();
         let known = self.by_kind.read().ok().and_then(|known| known.get(&kind).cloned());
         if let Some((_, found)) = known.filter(|(then, _)| *then == count) {
             return found;
         }
-        let found: Vec<_> = (0..count as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect();
+        let found: Arc<[_]> = (0..count as u32).map(InstanceId).filter(|i| self.instance_is(*i, kind)).collect();
         if let Ok(mut known) = self.by_kind.write() {
-            known.insert(kind, (count, found.clone()));
+            known.insert(kind, (count, Arc::clone(&found)));
         }
         found
     }

@@ -116,7 +116,7 @@ impl Instant<'_> {
         let initial = lab.graph.number(if domain == Domain::Instance { -1.0 } else { 0.0 });
         lab.states.push(State { name, domain, initial, scale: Some(1.0), span: self.of.1 });
         lab.state_owner.push(self.owner);
-        lab.note_held(state, node);
+        lab.note_target(state, node);
         self.actions.push(Action::Assign { state, value: node, span: self.of.1 });
         lab.graph.add(Op::State(state))
     }

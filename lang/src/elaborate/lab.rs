@@ -48,6 +48,8 @@ impl<'a> Elaborator<'a> {
         for i in 0..self.instances.len() as u32 {
             self.declare_states(InstanceId(i));
         }
+        self.foresee_targets();
+        self.note_first_targets();
         self.judge_coverings();
     }
 

@@ -149,7 +149,7 @@ impl<'a> Elaborator<'a> {
             });
         }
         let unordered = params.len() == 2 && guard.is_some_and(|g| self.asks_symmetric(g, params, module));
-        Tuples::new(params, module, name, sets, unordered)
+        Tuples::new(params, (module, name), guard, sets, unordered)
     }
 
     /// Which of two things a law takes first that exists once for both: the one that the lab names first in what it gives
@@ -723,34 +723,11 @@ impl<'a> Elaborator<'a> {
             }
             return None;
         };
-        self.note_held(state, new);
+        self.note_target(state, new);
         if let Some(g) = guard {
             new = self.graph.select(g, new, node);
         }
         Some(Action::Assign { state, value: new, span: target.span.to(value.span) })
-    }
-
-    /// Notes what a state that holds an instance may come to hold.
-    pub(super) fn note_held(&mut self, state: u32, value: NodeId) {
-        if self.states[state as usize].domain != matterix_ir::model::Domain::Instance {
-            return;
-        }
-        match self.graph.op(value) {
-            Op::Const(v) => {
-                self.holds.entry(state).or_default().insert(v as i64);
-            }
-            Op::State(from) => {
-                self.copies.insert((state, from));
-            }
-            Op::Select(_, a, b) if !self.picks.contains_key(&value) => {
-                self.note_held(state, a);
-                self.note_held(state, b);
-            }
-            _ => {
-                let picked = self.picks.get(&value).into_iter().flatten();
-                self.holds.entry(state).or_default().extend(picked.map(|i| i64::from(i.0)));
-            }
-        }
     }
 }
 

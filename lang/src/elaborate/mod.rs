@@ -2,6 +2,7 @@
 
 pub mod articulation;
 pub mod balances;
+mod candidates;
 mod conserve;
 pub mod contents;
 mod coverings;
@@ -33,6 +34,7 @@ pub mod species;
 mod standing;
 pub mod states;
 pub mod tables;
+pub mod targets;
 mod tuples;
 pub mod units;
 mod whereabouts;
@@ -220,10 +222,8 @@ pub struct Elaborator<'a> {
     pub open: crate::study::Open,
     /// States of the model.
     pub states: Vec<model::State>,
-    /// For states that hold an instance: what they may hold, copied states included.
-    pub holds: BTreeMap<u32, BTreeSet<i64>>,
-    /// Copies between states that hold instances: to, from.
-    pub copies: BTreeSet<(u32, u32)>,
+    /// What states that hold an instance may point at.
+    pub targets: targets::Targets,
     /// Extensive quantities by place.
     pub extensive: BTreeMap<ExtensiveKey, u32>,
     /// Names of all fields that are given in the lab, once they were asked for.
@@ -311,7 +311,7 @@ pub struct Elaborator<'a> {
     /// What parts of things that are alike are shaped like.
     pub known_geometries: FxHashMap<geometry::Alike, geometry::Geometry>,
     /// Instances by kind, and how many there were when they were looked for.
-    pub by_kind: RwLock<BTreeMap<DeclId, (usize, Vec<InstanceId>)>>,
+    pub by_kind: RwLock<BTreeMap<DeclId, (usize, Arc<[InstanceId]>)>>,
     /// Members being evaluated.
     pub open_members: Vec<(InstanceId, MemberKey)>,
     /// Functions being evaluated.
@@ -354,8 +354,7 @@ impl<'a> Elaborator<'a> {
             params: Vec::new(),
             open: crate::study::Open::default(),
             states: Vec::new(),
-            holds: BTreeMap::new(),
-            copies: BTreeSet::new(),
+            targets: targets::Targets::default(),
             extensive: BTreeMap::new(),
             drivers: Vec::new(),
             offers: matterix_ir::offer::Offers::default(),

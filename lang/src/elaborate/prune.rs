@@ -1,7 +1,5 @@
 //! What can never be true: conditions on where things stand, given everything the plan can do.
 
-use std::collections::BTreeSet;
-
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::Elaborator;
@@ -15,23 +13,6 @@ enum Tri {
 }
 
 impl Elaborator<'_> {
-    /// Carries what instance states may hold along copies between them, until nothing changes.
-    pub fn close_holds(&mut self) {
-        loop {
-            let mut changed = false;
-            for (to, from) in self.copies.clone() {
-                let more: BTreeSet<i64> = self.holds.get(&from).cloned().unwrap_or_default();
-                let set = self.holds.entry(to).or_default();
-                let before = set.len();
-                set.extend(more);
-                changed |= set.len() != before;
-            }
-            if !changed {
-                return;
-            }
-        }
-    }
-
     /// Whether a condition can never hold, whatever the plan does.
     pub fn never(&self, node: NodeId) -> bool {
         self.tri(node) == Tri::Never
@@ -68,7 +49,7 @@ impl Elaborator<'_> {
 
     fn holds_eq(&self, state: NodeId, value: NodeId) -> Option<Tri> {
         let (Op::State(s), Some(v)) = (self.graph.op(state), self.graph.constant(value)) else { return None };
-        let set = self.holds.get(&s)?;
+        let set = self.targets.noted(s)?;
         Some(if !set.contains(&(v as i64)) {
             Tri::Never
         } else if set.len() == 1 {

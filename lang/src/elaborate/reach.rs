@@ -1,11 +1,13 @@
 //! Which species can get into which mixture: by what it holds, by transfers, by reactions and dissociation, by laws and effects that
-//! write an amount.
+//! write an amount. And what states that hold an instance can point at.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use matterix_ir::scene::InstanceId;
 use serde::{Deserialize, Serialize};
 
+use super::targets::Numbers;
 use super::{Elaborator, SpeciesId, Tables};
 
 /// Species by mixture name.
@@ -15,6 +17,8 @@ pub struct Reach {
     /// What laws and effects write, as far as earlier rounds found it: it only grows, so that the rounds come to an end.
     written: BTreeMap<String, BTreeSet<SpeciesId>>,
     origins: BTreeMap<String, BTreeSet<String>>,
+    /// What states that hold an instance can point at, by the name of the state; it only grows as well.
+    pub(super) targets: BTreeMap<String, Arc<Numbers>>,
 }
 
 impl Reach {
@@ -83,8 +87,24 @@ impl Reach {
             sets: sets.into_iter().map(|(id, set)| (name(id), set)).collect(),
             written,
             origins: origins.into_iter().map(|(id, set)| (name(id), set)).collect(),
+            targets: targets(lab),
         }
     }
+}
+
+/// What states can point at: what this round began with, and whatever it noted beyond that.
+fn targets(lab: &Elaborator<'_>) -> BTreeMap<String, Arc<Numbers>> {
+    let mut all = lab.reach.targets.clone();
+    let noted = lab.noted_targets();
+    // A state that may point at anything after all.
+    all.retain(|name, _| noted.contains_key(name));
+    for (name, numbers) in noted {
+        let known = all.entry(name).or_default();
+        if !numbers.is_subset(known) {
+            *known = Arc::new(known.union(&numbers).copied().collect());
+        }
+    }
+    all
 }
 
 /// The reagents that transfers can bring into each mixture.

@@ -262,11 +262,6 @@ impl<'a> Elaborator<'a> {
                     _ => continue,
                 };
                 let Some(node) = self.value_node(&value) else { continue };
-                if let Some(held) = self.graph.constant(node)
-                    && self.states[index as usize].domain == Domain::Instance
-                {
-                    self.holds.entry(index).or_default().insert(held as i64);
-                }
                 self.states[index as usize].initial = node;
             }
         }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use matterix_ir::scene::InstanceId;
 
 use super::{Elaborator, SpeciesId};
-use crate::ast::{Name, Param};
+use crate::ast::{Expr, Name, Param};
 use crate::eval::{Scope, Value};
 
 /// The combinations that are still to come, the last parameter varying fastest.
@@ -13,75 +13,110 @@ pub(super) struct Tuples<'a> {
     params: &'a [Param],
     module: usize,
     name: &'a Name,
-    /// What each parameter may stand for.
+    /// What must hold of a combination.
+    guard: Option<&'a Expr>,
+    /// What each parameter may stand for; instances in their order.
     sets: Vec<Vec<Value>>,
-    /// The next combination, by positions in `sets`; none after the last one.
-    at: Option<Vec<usize>>,
+    /// For each parameter up to one, what it may stand for after those before it, and how many of that were taken.
+    open: Vec<(Vec<Value>, usize)>,
     /// Each pair comes once, in the order of its instances.
     unordered: bool,
-    /// Of a pair: its first by position, and the species that can get into it.
-    held: Option<(usize, BTreeSet<SpeciesId>)>,
+    /// Of a pair: its first, and the species that can get into it.
+    held: Option<(InstanceId, BTreeSet<SpeciesId>)>,
+    /// Whether a law without parameters is still to come.
+    first: bool,
 }
 
 impl<'a> Tuples<'a> {
     pub(super) fn new(
         params: &'a [Param],
-        module: usize,
-        name: &'a Name,
+        (module, name): (usize, &'a Name),
+        guard: Option<&'a Expr>,
         sets: Vec<Vec<Value>>,
         unordered: bool,
     ) -> Self {
-        let at = sets.iter().all(|set| !set.is_empty()).then(|| vec![0; sets.len()]);
-        Tuples { params, module, name, sets, at, unordered, held: None }
+        Tuples { params, module, name, guard, sets, open: Vec::new(), unordered, held: None, first: true }
     }
 
     /// The next one as a scope, and the law with it in words; none after the last one, or where the task is given up.
     pub(super) fn next(&mut self, lab: &mut Elaborator<'a>) -> Option<(Scope, String)> {
         loop {
-            let at = self.at.clone()?;
-            self.advance();
+            let combination = self.advance(lab)?;
             if !lab.spend_on(self.name.span) {
-                self.at = None;
+                self.sets.clear();
+                self.open.clear();
                 return None;
             }
-            if !self.fits(&at, lab) {
+            if !self.fits(&combination, lab) {
                 continue;
             }
             let mut scope = Scope::module(self.module);
-            let mut shown = Vec::with_capacity(at.len());
-            for ((param, set), position) in self.params.iter().zip(&self.sets).zip(at) {
-                shown.push(lab.show(&set[position]));
-                scope.bind(param.name.text.clone(), set[position].clone());
+            let mut shown = Vec::with_capacity(combination.len());
+            for (param, value) in self.params.iter().zip(combination) {
+                shown.push(lab.show(&value));
+                scope.bind(param.name.text.clone(), value);
             }
             return Some((scope, format!("{}({})", self.name.text, shown.join(", "))));
         }
     }
 
-    fn advance(&mut self) {
-        let Some(at) = &mut self.at else { return };
-        for (position, set) in at.iter_mut().zip(&self.sets).rev() {
-            *position += 1;
-            if *position < set.len() {
-                return;
+    fn advance(&mut self, lab: &mut Elaborator<'a>) -> Option<Vec<Value>> {
+        if std::mem::take(&mut self.first) {
+            if self.sets.is_empty() {
+                return Some(Vec::new());
             }
-            *position = 0;
+            self.open.push((self.narrowed(0, lab), 0));
         }
-        self.at = None;
+        loop {
+            let (set, taken) = self.open.last_mut()?;
+            if *taken == set.len() {
+                self.open.pop();
+                continue;
+            }
+            *taken += 1;
+            if self.open.len() == self.sets.len() {
+                return Some(self.taken().cloned().collect());
+            }
+            let set = self.narrowed(self.open.len(), lab);
+            self.open.push((set, 0));
+        }
+    }
+
+    /// What the parameters up to the last open one stand for.
+    fn taken(&self) -> impl Iterator<Item = &Value> {
+        self.open.iter().filter_map(|(set, taken)| set.get(taken.checked_sub(1)?))
+    }
+
+    /// What a parameter may stand for after those before it, as far as the form of the guard tells.
+    fn narrowed(&self, parameter: usize, lab: &mut Elaborator<'a>) -> Vec<Value> {
+        let set = &self.sets[parameter];
+        let (Some(guard), Some(Value::Instance(_))) = (self.guard, set.first()) else { return set.clone() };
+        let mut scope = Scope::module(self.module);
+        for (param, value) in self.params.iter().zip(self.taken()) {
+            scope.bind(param.name.text.clone(), value.clone());
+        }
+        // What is not bound yet hides what its name means elsewhere.
+        for param in &self.params[parameter + 1..] {
+            scope.bind(param.name.text.clone(), Value::Error);
+        }
+        match lab.candidates(guard, &self.params[parameter].name.text, &scope) {
+            Some(those) => those.into_iter().filter(|i| self.has(parameter, *i)).map(Value::Instance).collect(),
+            None => set.clone(),
+        }
     }
 
     /// Whether the second of a pair goes with its first: another instance, or what can be in it. There are many more species and reactions
     /// than any one mixture meets.
-    fn fits(&mut self, at: &[usize], lab: &Elaborator<'_>) -> bool {
-        let [first, second] = at else { return true };
-        let Value::Instance(a) = self.sets[0][*first] else { return true };
-        match self.sets[1][*second] {
-            Value::Instance(b) if self.unordered && self.has(1, a) && self.has(0, b) => lab.goes_first(a, b),
+    fn fits(&mut self, combination: &[Value], lab: &Elaborator<'_>) -> bool {
+        let [Value::Instance(a), second] = combination else { return true };
+        match second {
+            Value::Instance(b) if self.unordered && self.has(1, *a) && self.has(0, *b) => lab.goes_first(*a, *b),
             Value::Instance(b) => a != b,
             Value::Reaction(r) => {
-                let held = self.held(*first, lab);
+                let held = self.held(*a, lab);
                 lab.tables.reactions[r.0 as usize].reactants.iter().all(|(s, _)| held.contains(s))
             }
-            Value::Species(s) => self.held(*first, lab).contains(&s),
+            Value::Species(s) => self.held(*a, lab).contains(s),
             _ => true,
         }
     }
@@ -92,12 +127,9 @@ impl<'a> Tuples<'a> {
         self.sets[parameter].binary_search_by_key(&Some(id), instance).is_ok()
     }
 
-    fn held(&mut self, first: usize, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {
+    fn held(&mut self, first: InstanceId, lab: &Elaborator<'_>) -> &BTreeSet<SpeciesId> {
         let known = self.held.take().filter(|(of, _)| *of == first);
-        let species = || match self.sets[0][first] {
-            Value::Instance(a) => lab.reach.set(&lab.instances[a.0 as usize].name).cloned().unwrap_or_default(),
-            _ => BTreeSet::new(),
-        };
+        let species = || lab.reach.set(&lab.instances[first.0 as usize].name).cloned().unwrap_or_default();
         &self.held.insert(known.unwrap_or_else(|| (first, species()))).1
     }
 }

@@ -147,7 +147,10 @@ impl<'a> Elaborator<'a> {
             _ => None,
         };
         let (x, y) = (node(self, a)?, node(self, b)?);
-        Some(self.graph.binary(BinaryOp::Eq, x, y))
+        Some(match self.same_target(x, y) {
+            Some(same) => self.graph.number(f64::from(u8::from(same))),
+            None => self.graph.binary(BinaryOp::Eq, x, y),
+        })
     }
 
     /// Two quantities of one dimension and scale; a concentration takes its kind from the other side.

@@ -1,5 +1,6 @@
 //! Expressions, one construct at a time.
 
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 use rustc_hash::FxHashMap;
 
@@ -523,7 +524,10 @@ impl<'a> Elaborator<'a> {
     }
 
     fn fold(&mut self, fold: &Name, var: &Name, set: &'a Expr, body: &'a Expr, scope: &mut Scope) -> Value {
-        let items = self.set(set, scope);
+        let items = match self.narrowed(fold, var, (set, body), scope) {
+            Some(items) => Some(items),
+            None => self.set(set, scope),
+        };
         let Some(items) = items else { return Value::Error };
         let mut result: Option<Value> = None;
         let single =
@@ -595,6 +599,32 @@ impl<'a> Elaborator<'a> {
         })
     }
 
+    /// Those of all instances of a kind that matter to what is folded over them, and one that stands for the rest, where the form of
+    /// that tells who matters.
+    fn narrowed(
+        &mut self,
+        fold: &Name,
+        var: &Name,
+        (set, body): (&'a Expr, &'a Expr),
+        scope: &mut Scope,
+    ) -> Option<Vec<Value>> {
+        let ExprKind::Name(kind) = &*set.kind else { return None };
+        if kind.text == var.text {
+            return None;
+        }
+        let candidates = self.folded(&fold.text, body, &var.text, scope)?;
+        let Value::Kind(kind) = self.expr(set, scope) else { return None };
+        if scope.lab {
+            self.gone_through.insert(kind);
+        }
+        let all = self.instances_of(kind);
+        let other = all.iter().position(|i| !candidates.contains(i)).map(|at| all[at]);
+        let mut those: Vec<InstanceId> =
+            candidates.into_iter().filter(|i| self.instance_is(*i, kind)).chain(other).collect();
+        those.sort_unstable();
+        Some(those.into_iter().map(Value::Instance).collect())
+    }
+
     fn fold_two(&mut self, fold: &str, a: Value, b: Value, span: Span) -> Option<Value> {
         Some(match fold {
             "sum" => self.arith(Binary::Add, a, b, span, span, span),
@@ -628,7 +658,7 @@ impl<'a> Elaborator<'a> {
                 if scope.lab {
                     self.gone_through.insert(kind);
                 }
-                Some(self.instances_of(kind).into_iter().map(Value::Instance).collect())
+                Some(self.instances_of(kind).iter().copied().map(Value::Instance).collect())
             }
             Value::Error => None,
             other => {

@@ -368,7 +368,7 @@ impl<'a> Planner<'a, '_> {
         let capability = self.lab.tables.kind_name(owner).to_string();
         let able: Vec<String> = lacking
             .iter()
-            .flat_map(|(o, _)| self.lab.instances_of(*o))
+            .flat_map(|(o, _)| self.lab.instances_of(*o).to_vec())
             .map(|i| self.lab.instances[i.0 as usize].name.clone())
             .take(3)
             .collect();

@@ -29,7 +29,7 @@ use matterix_ir::{Sources, Span, Unit};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::clauses::Clauses;
-use crate::ast::{Block, Handlers, ItemKind};
+use crate::ast::{Block, Clause, Handlers, ItemKind};
 use crate::elaborate::Elaborator;
 use crate::eval::{Scope, Type, Value};
 use crate::names::DeclId;
@@ -91,6 +91,8 @@ pub struct Planner<'a, 'e> {
     texts: RefCell<FxHashMap<Span, String>>,
     /// Clauses and limits that a draft has looked at.
     drafted: FxHashSet<Span>,
+    /// Conditions that a draft looks at once it knows all that the plan moves, each as its names stand there.
+    deferred: Vec<(&'a Clause, Scope)>,
 }
 
 /// Where a skill's result goes.
@@ -143,6 +145,7 @@ impl<'a, 'e> Planner<'a, 'e> {
             meanings: FxHashMap::default(),
             texts: RefCell::default(),
             drafted: FxHashSet::default(),
+            deferred: Vec::new(),
         }
     }
 
@@ -193,6 +196,9 @@ impl<'a, 'e> Planner<'a, 'e> {
         };
         let item = item.map_or(decl.item, |workflow| self.lab.tables.names.decl(workflow).item);
         let name = crate::names::item_name(item).map(|n| n.0).unwrap_or_default();
+        if self.draft {
+            self.catch_up();
+        }
         let limits = self.limits(false);
         if !self.draft {
             self.ask_for_barred();

@@ -10,7 +10,7 @@ use matterix_ir::{Diagnostic, Op, Span, codes};
 use super::Planner;
 use super::call::Bound;
 use super::clauses::Outcome;
-use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, MemberKind, Sig};
+use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, Expr, MemberKind, Sig};
 use crate::elaborate::tables::MemberRef;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, verb_text};
@@ -121,7 +121,9 @@ impl<'a> Planner<'a, '_> {
                 ));
                 return None;
             }
-            if !matches!(clause.kind, ClauseKind::Effect(_)) && self.is_drafted(clause.span) {
+            if !matches!(clause.kind, ClauseKind::Effect(_))
+                && (self.is_drafted(clause.span) || self.defers(clause, inner))
+            {
                 continue;
             }
             match (self.outcome(clause, inner, |this, inner| this.clause(clause, inner))?, &clause.kind) {
@@ -150,6 +152,31 @@ impl<'a> Planner<'a, '_> {
             operation.reads = self.reads(&operation);
         }
         Some((operation, invariants))
+    }
+
+    /// Whether an effect sets a state that holds an instance: a thing is moved.
+    fn is_reference(&mut self, target: &'a Expr, inner: &mut Scope) -> bool {
+        matches!(self.lab.expr(target, inner), Value::InstanceNode(_))
+    }
+
+    /// Whether a draft looks at a condition once it knows all that the plan moves.
+    fn defers(&mut self, clause: &'a Clause, inner: &Scope) -> bool {
+        let defers = self.draft && matches!(clause.kind, ClauseKind::Needs { .. } | ClauseKind::Presumes { .. });
+        if defers {
+            self.deferred.push((clause, inner.clone()));
+        }
+        defers
+    }
+
+    /// Looks at what was deferred.
+    pub(super) fn catch_up(&mut self) {
+        self.lab.targets.close();
+        self.lab.targets.settle();
+        self.lab.readings_live = true;
+        for (clause, mut scope) in std::mem::take(&mut self.deferred) {
+            self.need(clause, &mut scope);
+        }
+        self.lab.readings_live = false;
     }
 
     /// What comes of a clause of an operation that says something of it; none where it is wrong.
@@ -184,7 +211,9 @@ impl<'a> Planner<'a, '_> {
     fn effect(&mut self, effect: &'a Effect, span: Span, inner: &mut Scope) -> Vec<Action> {
         match effect {
             // A draft asks for what is moved where, not for values.
-            Effect::Assign(_, value) if self.is_drafted(value.span) => Vec::new(),
+            Effect::Assign(target, value) if self.is_drafted(value.span) && !self.is_reference(target, inner) => {
+                Vec::new()
+            }
             Effect::Assign(target, value) => self.lab.assignment(target, value, None, inner).into_iter().collect(),
             Effect::Call(call) if self.is_drafted(call.span) && self.lab.note_move(call, inner) => Vec::new(),
             Effect::Call(call) => self.lab.call_actions(call, span, inner),
@@ -277,7 +306,7 @@ impl<'a> Planner<'a, '_> {
     ) -> (Vec<Arc<Condition>>, Vec<Condition>, Vec<Condition>, Option<Takes>) {
         let (mut needs, mut invariants, mut promises, mut takes) = (Vec::new(), Vec::new(), Vec::new(), None);
         for clause in clauses {
-            if self.is_drafted(clause.span) {
+            if self.is_drafted(clause.span) || self.defers(clause, inner) {
                 continue;
             }
             match &clause.kind {

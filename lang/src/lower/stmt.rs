@@ -413,6 +413,7 @@ impl<'a> Planner<'a, '_> {
             }
             Value::InstanceNode(n) => {
                 let (node, step) = self.keep_node(name, n, Unit::one(), span);
+                self.lab.targets.keep(node, n);
                 (Value::InstanceNode(node), vec![step])
             }
             Value::Enum(n, words) if self.depends_on_run(n) => {

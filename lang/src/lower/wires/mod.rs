@@ -73,7 +73,7 @@ impl<'a> Planner<'a, '_> {
             }
             let Some(kind) = self.lab.kind_named(device, names.decl(id).module) else { continue };
             let under = self.under(transport, names.decl(id).module);
-            for instance in self.lab.instances_of(kind) {
+            for instance in self.lab.instances_of(kind).iter().copied() {
                 if under.is_some_and(|under| self.host(under, instance).is_none()) {
                     continue;
                 }
