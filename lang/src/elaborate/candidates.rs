@@ -129,9 +129,9 @@ impl<'a> Elaborator<'a> {
             None => Candidates::new(),
         };
         let name = crate::names::item_name(self.tables.names.decl(id).item).map(|(name, _)| name)?;
-        let is_other = |i: InstanceId| scope.vars.iter().any(|(_, v)| *v == Value::Instance(i));
+        let others: Vec<InstanceId> = scope.vars.iter().filter_map(|(_, v)| instance(v)).collect();
         let ends = self.pairs.iter().filter(|p| p.name == name).flat_map(|p| [(p.a, p.b), (p.b, p.a)]);
-        found.extend(ends.filter(|(other, _)| scope.vars.is_empty() || is_other(*other)).map(|(_, end)| end));
+        found.extend(ends.filter(|(other, _)| others.is_empty() || others.contains(other)).map(|(_, end)| end));
         Some(found)
     }
 
@@ -240,4 +240,8 @@ impl<'a> Elaborator<'a> {
         let [m] = *members else { return Side::Open };
         self.points_at(id, m).map_or(Side::Open, Side::Targets)
     }
+}
+
+fn instance(value: &Value) -> Option<InstanceId> {
+    if let Value::Instance(i) = value { Some(*i) } else { None }
 }

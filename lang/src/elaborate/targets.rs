@@ -1,8 +1,8 @@
 //! What states that hold an instance may point at: what they begin with, and what effects and events assign to them.
 //!
 //! A round of elaboration notes what is assigned. The next one begins with what was noted before: there a comparison with an instance
-//! that a state never points at is false, and one with the only instance that it ever points at is true. Rounds go on until what is
-//! noted is what was begun with.
+//! that a state never points at is false. One with the only instance that it ever points at stays a comparison, so that who reads a
+//! condition still finds what it rests on. Rounds go on until what is noted is what was begun with.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -170,25 +170,20 @@ impl<'a> Elaborator<'a> {
         known.map(|(s, numbers)| (name(s), Arc::new(numbers.clone()))).collect()
     }
 
-    /// Whether a node that holds an instance is another one, as far as is known of what states point at.
-    pub(crate) fn same_target(&self, a: NodeId, b: NodeId) -> Option<bool> {
+    /// Whether two nodes that hold instances never hold the same one, as far as is known of what states point at.
+    pub(crate) fn never_the_same(&self, a: NodeId, b: NodeId) -> bool {
         if self.initial_mode {
-            return None;
+            return false;
         }
-        match (self.graph.op(a), self.graph.op(b)) {
-            (Op::State(state), Op::Const(v)) | (Op::Const(v), Op::State(state)) => {
-                let known = self.targets.known(state)?;
-                match (known.contains(&(v as i64)), known.len()) {
-                    (false, _) => Some(false),
-                    (true, 1) => Some(true),
-                    (true, _) => None,
-                }
-            }
-            (Op::State(x), Op::State(y)) => {
-                let apart = self.targets.known(x)?.is_disjoint(self.targets.known(y)?);
-                apart.then_some(false)
-            }
+        let known = |node| match self.graph.op(node) {
+            Op::State(state) => self.targets.known(state),
             _ => None,
+        };
+        match (known(a), known(b)) {
+            (Some(a), Some(b)) => a.is_disjoint(b),
+            (Some(all), None) => self.graph.constant(b).is_some_and(|v| !all.contains(&(v as i64))),
+            (None, Some(all)) => self.graph.constant(a).is_some_and(|v| !all.contains(&(v as i64))),
+            (None, None) => false,
         }
     }
 

@@ -147,9 +147,9 @@ impl<'a> Elaborator<'a> {
             _ => None,
         };
         let (x, y) = (node(self, a)?, node(self, b)?);
-        Some(match self.same_target(x, y) {
-            Some(same) => self.graph.number(f64::from(u8::from(same))),
-            None => self.graph.binary(BinaryOp::Eq, x, y),
+        Some(match self.never_the_same(x, y) {
+            true => self.graph.number(0.0),
+            false => self.graph.binary(BinaryOp::Eq, x, y),
         })
     }
 

@@ -102,15 +102,22 @@ impl Dense {
         if let Some(k) = (0..=DEGREE).rev().find(|&k| self.time(k) == time) {
             return Shares::At(k);
         }
-        let place = (time - self.start) / (self.end - self.start);
-        let mut shares = [0.0; DEGREE + 1];
-        let mut sum = 0.0;
-        for k in 0..=DEGREE {
-            shares[k] = WEIGHTS[k] / (place - POINTS[k]);
-            sum += shares[k];
-        }
-        Shares::Of(shares.map(|share| share / sum))
+        Shares::Of(shares((time - self.start) / (self.end - self.start)))
     }
+}
+
+/// How much of each sampled value there is in the one at a place of the interval, as a share of it.
+pub(super) fn shares(place: f64) -> [f64; DEGREE + 1] {
+    if let Some(k) = POINTS.iter().position(|point| *point == place) {
+        return std::array::from_fn(|i| f64::from(u8::from(i == k)));
+    }
+    let mut shares = [0.0; DEGREE + 1];
+    let mut sum = 0.0;
+    for k in 0..=DEGREE {
+        shares[k] = WEIGHTS[k] / (place - POINTS[k]);
+        sum += shares[k];
+    }
+    shares.map(|share| share / sum)
 }
 
 /// What the value at some time is made of.

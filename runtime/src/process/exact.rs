@@ -15,7 +15,7 @@ use super::slopes::Slopes;
 use super::tape::{Step, Tape};
 
 /// More states than this are integrated: a product of matrices grows with the third power.
-const MOST: usize = 10;
+pub(super) const MOST: usize = 10;
 
 /// Powers of 2, s: no step is longer or shorter.
 const LENGTHS: std::ops::RangeInclusive<i32> = -100..=40;
@@ -39,7 +39,7 @@ const GROWTH: f64 = 96.0;
 const BEND: f64 = 1.0 / 400.0;
 
 /// Where the solution is computed, as parts of a step: where a polynomial is sampled, and where that is worst.
-const PLACES: [f64; 6] = [POINTS[1], POINTS[2], POINTS[3], POINTS[4], 1.0, 0.5];
+pub(super) const PLACES: [f64; 6] = [POINTS[1], POINTS[2], POINTS[3], POINTS[4], 1.0, 0.5];
 
 /// A square matrix, row by row.
 #[derive(Clone, Debug)]
@@ -156,6 +156,17 @@ impl Exact {
         }
     }
 
+    /// The least and the most of each state so far.
+    pub(super) fn seen(&self) -> Vec<(f64, f64)> {
+        self.seen.clone()
+    }
+
+    /// Takes over what states were under another law.
+    pub(super) fn see(&mut self, before: &[(f64, f64)]) {
+        let both = self.seen.iter_mut().zip(before);
+        both.for_each(|(seen, before)| *seen = (seen.0.min(before.0), seen.1.max(before.1)));
+    }
+
     fn states(&mut self, values: &[f64]) -> [Vec<f64>; 6] {
         self.prepare(self.next);
         let matrices = &self.known[&self.next];
@@ -262,7 +273,7 @@ fn balance(matrix: &mut Square) -> Vec<f64> {
 }
 
 /// Whether all results are sums of constant multiples of states, and of constants.
-fn is_linear(tape: &Tape) -> bool {
+pub(super) fn is_linear(tape: &Tape) -> bool {
     // What each register is: 0 constant, 1 linear, 2 anything else.
     let mut kinds = vec![1_u8; tape.first_result()];
     kinds[..tape.time()].fill(0);

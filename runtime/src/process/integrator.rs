@@ -6,7 +6,7 @@
 //! looks. Events are located on the same polynomial by [`super::switch`], because the library reports one root at a time and
 //! without its direction.
 //!
-//! What is linear with constant coefficients is not integrated at all ([`Exact`]), until its rates are too far apart.
+//! What is linear with constant coefficients but for bends is not integrated at all ([`Bent`]), until its rates are too far apart.
 
 use std::cell::RefCell;
 
@@ -15,10 +15,10 @@ use diffsol::{
     VectorView,
 };
 
+use super::bends::Bent;
 use super::clock::Clock;
 use super::dense::Dense;
 use super::equations::Equations;
-use super::exact::Exact;
 use super::linear::{DENSE, Factors, WeighedLu};
 use super::shifted::Shifted;
 use super::slopes::Slopes;
@@ -168,7 +168,7 @@ pub(super) struct Integrator {
     dense: Dense,
     field: Field,
     /// Its law, if that needs no integration.
-    pub(super) exact: Option<Exact>,
+    pub(super) exact: Option<Bent>,
     /// Where the solver stands; absent before its first step.
     state: Option<State>,
     /// How accurately.
@@ -189,7 +189,7 @@ impl Integrator {
     pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], tolerance: Tolerance) -> Self {
         let dense = Dense::still(time, values);
         let field = Field::new(rates, dense.clock);
-        let exact = Exact::of(&field.rates, &field.slopes);
+        let exact = Bent::of(&field.rates, values);
         let (state, first) = (None, None);
         let (run, unheard, crawled, since) = (RUN, 0, 0, time);
         Integrator { moving, dense, field, exact, state, tolerance, first, run, unheard, crawled, since }
@@ -252,7 +252,7 @@ impl Integrator {
             let Some(exact) = &mut self.exact else { return taken };
             let (end, values) = (self.dense.end, self.dense.last());
             self.field.rate(values, end, &mut slopes);
-            let Some(stride) = exact.stride(values, &slopes, &self.tolerance.allowed(values)) else {
+            let Some(stride) = exact.stride(&self.field.rates, values, &slopes, &self.tolerance.allowed(values)) else {
                 self.exact = None;
                 return taken;
             };

@@ -22,6 +22,7 @@
 
 mod advance;
 mod analysis;
+mod bends;
 mod blame;
 mod clock;
 mod course;

@@ -16,10 +16,12 @@ use super::lines::{Edge, Lines, lines};
 use super::world::World;
 use super::{Coming, Pair, Walk};
 use crate::check::time::Times;
+use crate::elaborate::SpeciesId;
 
-/// Points of all lines, and joint states that are visited, at most; a plan that needs more is told so.
+/// Points of all lines, and steps from one joint state to the next, at most; a plan that needs more is told so. Time and memory go with
+/// the steps: a joint state of a hundred lines leads to a hundred others.
 const MOST_POINTS: usize = 100_000;
-const MOST_VISITS: usize = 20_000;
+const MOST_STEPS: usize = 40_000;
 
 /// Where each line stands, by its point, in order.
 type State = Vec<usize>;
@@ -90,6 +92,17 @@ impl<'e, 'l, 'a> Shared<'e, 'l, 'a> {
         Shared { eyes, group, hot: BTreeSet::new(), switches }
     }
 
+    /// Groups that several species can get into.
+    fn of_several(&self) -> BTreeSet<usize> {
+        let lab = self.eyes.lab;
+        let mut species: BTreeMap<usize, BTreeSet<SpeciesId>> = BTreeMap::new();
+        for m in &lab.mixtures {
+            let all = species.entry(self.group[m.0 as usize]).or_default();
+            all.extend(lab.reach.set(&lab.instances[m.0 as usize].name).into_iter().flatten());
+        }
+        species.into_iter().filter(|(_, all)| all.len() > 1).map(|(group, _)| group).collect()
+    }
+
     fn effect(&self, operation: &Operation) -> Effect {
         let mixtures = &self.eyes.lab.mixtures;
         let of = |m: &u32| mixtures.get(*m as usize).map(|m| self.group[m.0 as usize]);
@@ -151,6 +164,12 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnO
         effect.into.iter().for_each(|g| into.entry(*g).or_default().push(*id));
         effect.from.iter().for_each(|g| from.entry(*g).or_default().push(*id));
     }
+    if !into.keys().any(|g| from.contains_key(g)) {
+        return;
+    }
+    // Where there is one species there is nothing that it could meet.
+    let several = shared.of_several();
+    into.retain(|group, _| several.contains(group));
     if !into.keys().any(|g| from.contains_key(g)) {
         return;
     }
@@ -230,17 +249,18 @@ impl<'s, 'w, 'v, 'a> Search<'s, 'w, 'v, 'a> {
         let first = vec![self.lines.begin];
         due.insert((0, first.clone()));
         worlds.insert(first, begin);
-        let mut visits = 0;
+        let mut steps = 0;
         while let Some((_, state)) = due.pop_first() {
-            visits += 1;
-            if visits > MOST_VISITS {
+            if steps > MOST_STEPS {
                 return false;
             }
             let Some(world) = worlds.get(&state).cloned() else { continue };
             if state.contains(&self.lines.end) {
                 continue;
             }
-            for (next, after) in self.successors(&state, &world) {
+            let successors = self.successors(&state, &world);
+            steps += successors.len().max(1);
+            for (next, after) in successors {
                 let grown = match worlds.remove(&next) {
                     None => Some(after),
                     Some(known) => {
