@@ -44,6 +44,10 @@ impl<'a> Elaborator<'a> {
         if self.prototype || self.initial_mode {
             return None;
         }
+        #[cfg(test)]
+        if tests::asks_everybody() {
+            return None;
+        }
         self.can_hold(condition, &Place { variable, scope, depth: 0 })
     }
 
@@ -244,4 +248,139 @@ impl<'a> Elaborator<'a> {
 
 fn instance(value: &Value) -> Option<InstanceId> {
     if let Value::Instance(i) = value { Some(*i) } else { None }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use matterix_ir::Sources;
+
+    use crate::{LibraryOnly, Options, compile};
+
+    /// Nobody is left out: what everything here is compared with. Threads of a compilation see it, so one test alone sets it.
+    static EVERYBODY: AtomicBool = AtomicBool::new(false);
+
+    pub(super) fn asks_everybody() -> bool {
+        EVERYBODY.load(Ordering::SeqCst)
+    }
+
+    /// What comes of a text, as far as who is asked could change it.
+    fn outcome(text: &str, everybody: bool) -> (Vec<String>, Vec<String>) {
+        EVERYBODY.store(everybody, Ordering::SeqCst);
+        let mut sources = Sources::default();
+        let file = sources.add("lab.mtx", text);
+        let (program, found) = compile(&mut sources, file, &LibraryOnly, &Options::default());
+        EVERYBODY.store(false, Ordering::SeqCst);
+        let mut model = Vec::new();
+        if let Some(program) = program {
+            model.extend(program.model.processes.iter().map(|p| p.name.clone()));
+            model.extend(program.model.events.iter().map(|e| e.name.clone()));
+            model.extend(program.model.dangers.iter().map(|d| d.headline.clone()));
+            model.extend(program.model.states.iter().map(|s| s.name.clone()));
+            let limits = program.plan.limits.iter().chain(&program.plan.ends);
+            model.extend(limits.map(|l| format!("{:?} {}", l.instance, l.condition.text)));
+            let started = program.model.states.iter().map(|s| program.model.graph.constant(s.initial));
+            model.extend(started.map(|v| format!("{v:?}")));
+        }
+        (model, found.iter().map(|d| format!("{d:?}")).collect())
+    }
+
+    /// Laws between two, asked for in every way that is looked into, and in some that are not.
+    const KINDS: &str = "
+use std::glassware::Beaker250mL
+use std::heating::IkaRetControl
+capability Tank { state level: Ratio = 1; param feeds: Tank? = nothing; state joined: Tank? = nothing
+    command join to(other: Tank) effect joined = other
+    command leave effect joined = nothing }
+asset T: Tank { }
+capability Rack: Tank { }
+asset Twin: Rack { left = T { }, right = T { } }
+relation piped(a: Tank, b: Tank)
+relation beside(a: Tank, b: Tank) symmetric
+relation linked(a: Tank, b: Tank) = a.joined == b or b.joined == a
+fn feeding(a, b) -> Bool = a.feeds == b
+fn reach(first, second) -> Bool = feeding(second, first) or piped(first, second)
+fn holds(a, b) -> Bool = any(p in parts(b, Tank): p == a or p.joined == a)
+fn under(a, b) -> Bool = any(w in wholes(a, Rack): w.joined == b)
+";
+
+    #[test]
+    fn nobody_who_matters_is_left_out() {
+        let guards = [
+            "piped(a, b)",
+            "piped(b, a)",
+            "piped(b: a, a: b)",
+            "beside(a, b)",
+            "linked(a, b)",
+            "linked(b, a) and a.level > 0",
+            "feeding(a, b)",
+            "reach(a, b)",
+            "reach(b, a)",
+            "holds(a, b)",
+            "holds(b, a)",
+            "under(a, b)",
+            "under(b, a)",
+            "a.joined == b",
+            "b == a.joined",
+            "a.feeds == b or beside(a, b)",
+            "not linked(a, b)",
+            "a.joined == nothing and b.joined == a",
+            "a.joined == b.joined",
+            "a.joined != b",
+            "any(t in Tank: t.joined == a and t.feeds == b)",
+            "any(t in Tank: piped(t, a) and linked(t, b))",
+        ];
+        let lab = "lab bench {
+    ambient: 22 degC
+    one = T { feeds: two }
+    two = T { joined: three }
+    three = T { }
+    pair = Twin { joined: one }
+    other = Twin { }
+    between one and three { piped: true, beside: true }
+    between pair.left and two { piped: true }
+}
+";
+        let sums = "capability Sum: Tank { derived heads: Ratio = sum(t in Tank: choose(t.joined == self, t.level, 0)) + max(t in Tank: choose(linked(t, self), 2, 1))
+    derived low: Ratio = min(t in Tank: choose(t.feeds == self, t.level, 7)) + choose(any(t in Tank: t.joined == self), 1, 0)
+    keeps heads < 100
+    process grow { level' += (heads + low) * 0.001 Hz } }
+asset S: Sum { }
+";
+        let mut texts: Vec<String> = Vec::new();
+        for guard in guards {
+            let law = format!(
+                "process law(a: Tank, b: Tank) while {guard} {{ a.level' -= 0.1 Hz * a.level; b.level' += 0.1 Hz * a.level }}"
+            );
+            let moves = "workflow go in bench { wait 1 s; join two to pair.right; let t = two.joined; join three to one; wait 1 s; leave two; expect one.level > 0 }";
+            texts.push(format!("mtx 1\n{KINDS}{law}\n{lab}{moves}\n"));
+        }
+        let turns =
+            "event turn(a: Tank, b: Tank) when a.level < 0.5 and piped(a, b) { a.joined = b.joined; b.joined = a }";
+        let summed = lab.replace("three = T { }", "three = S { joined: one }").replace("one = T", "one = S");
+        texts.push(format!(
+            "mtx 1\n{KINDS}{turns}\n{sums}{summed}workflow go in bench {{ wait 1 s; join one to two }}\n"
+        ));
+        let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests");
+        for folder in ["../examples", "cases", "faults"] {
+            let files = std::fs::read_dir(tests.join(folder)).expect("a folder");
+            let mut files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();
+            files.sort();
+            let all = files.iter().filter(|f| f.extension().is_some_and(|e| e == "mtx"));
+            let read: Vec<String> = all.map(|f| std::fs::read_to_string(f).expect("text")).collect();
+            let between_two = |text: &&String| text.contains("relation ") || text.contains(".support");
+            texts.extend(read.iter().filter(|text| folder != "faults" || between_two(text)).cloned());
+        }
+        let mut processes = 0;
+        for text in &texts {
+            let (model, found) = outcome(text, false);
+            let (expected, expected_found) = outcome(text, true);
+            processes += model.iter().filter(|line| line.starts_with("law(")).count();
+            assert_eq!(found, expected_found, "{text}");
+            assert_eq!(model, expected, "{text}");
+        }
+        assert!(texts.len() > 50 && processes > 60, "{processes} processes in {} texts", texts.len());
+    }
 }
