@@ -4,10 +4,10 @@ use matterix_ir::plan::{Plan, Step};
 use matterix_ir::{Program, Severity, codes};
 use serde::Serialize;
 
-use crate::backend::{Dry, Moves, Prepared, Sim};
+use crate::backend::{Backend, Dry, Moves, Prepared, Sim};
 use crate::exec::Tee;
 use crate::exec::{
-    self, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
+    self, Around, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
 };
 use crate::fault::Fault;
 use crate::motion::Stage;
@@ -108,56 +108,108 @@ pub fn run_ready(
     options: &RunOptions<'_>,
     out: &mut dyn Listener,
 ) -> Outcome {
-    let mut screen = Screen::new(program);
-    if screen.is_idle() {
-        return run_watched(program, prepared, params, options, out);
+    match Underway::begin(program, prepared, params, options, out) {
+        Ok(mut underway) => {
+            underway.go_on(f64::INFINITY, out);
+            underway.finish(out)
+        }
+        Err(outcome) => *outcome,
     }
-    let mut outcome = run_watched(program, prepared, params, options, &mut Tee(&mut screen, out));
-    outcome.findings = screen.into_found();
-    let is_grave = outcome.findings.iter().any(|f| f.diagnostic.severity == Severity::Error);
-    if is_grave && outcome.status == RunStatus::Passed {
-        outcome.status = RunStatus::ExpectationFailed;
-    }
-    outcome
 }
 
-fn run_watched(
-    program: &Program,
-    prepared: &Prepared,
+/// A run of a program on the twin that can be left at any time. A clone is a snapshot: it goes on as the run does, to the last bit,
+/// wherever either of them pauses. What listens goes along as a clone of itself, such as of a [`Recorder`](crate::record::Recorder).
+#[derive(Clone)]
+pub struct Underway<'p> {
+    program: &'p Program,
     params: Vec<f64>,
-    options: &RunOptions<'_>,
-    out: &mut dyn Listener,
-) -> Outcome {
-    let engine = Engine::new(&prepared.model, params.clone(), program.plan.locals.len(), options.process);
-    let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
-    let engine = match started {
-        Ok(engine) => engine,
-        Err(fault) => return refused(program, fault),
-    };
-    let mut engine = engine;
-    engine.heed(options.limits.cancel);
-    let mut sim = Sim::new(engine, prepared, options.seed);
-    let moves = options.fidelity == Fidelity::Motion;
-    sim = match Stage::new(program) {
-        Ok(stage) if moves || !stage.fixtures.is_empty() => {
-            sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out)
-        }
-        Err(message) if moves => return refused(program, Fault::new(codes::URDF_FILE, 0.0, message)),
-        _ => sim,
-    };
-    let execution = exec::execute(&program.plan, &program.scene, &mut sim, options.limits, out);
-    let engine = sim.engine();
-    let finished = engine.finish(out);
-    out.ended(engine);
-    let mut outcome = outcome(execution, params, engine.states().into_iter().map(Some).collect());
-    outcome.balances = engine.balances();
-    if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
-        let trace = FailureTrace::of_fault(&program.plan, fault);
-        out.failure(&trace);
-        outcome.status = RunStatus::Fault;
-        outcome.suppressed.extend(outcome.failure.replace(trace));
+    sim: Sim<'p>,
+    progress: exec::Progress<'p>,
+    limits: Limits<'p>,
+    /// Who looks for what should not come about, if there is such a thing.
+    screen: Option<Screen<'p>>,
+}
+
+impl<'p> Underway<'p> {
+    /// Starts the engine on a program that was made ready: `params` are all of its parameters by index, SI. Where it cannot begin
+    /// there is an outcome already.
+    pub fn begin(
+        program: &'p Program,
+        prepared: &'p Prepared,
+        params: Vec<f64>,
+        options: &RunOptions<'p>,
+        out: &mut dyn Listener,
+    ) -> Result<Self, Box<Outcome>> {
+        let mut screen = Some(Screen::new(program)).filter(|screen| !screen.is_idle());
+        let mut tee;
+        let out = match &mut screen {
+            Some(screen) => {
+                tee = Tee(screen, out);
+                &mut tee as &mut dyn Listener
+            }
+            None => out,
+        };
+        let engine = Engine::new(&prepared.model, params.clone(), program.plan.locals.len(), options.process);
+        let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
+        let mut engine = started.map_err(|fault| Box::new(refused(program, fault)))?;
+        engine.heed(options.limits.cancel);
+        let mut sim = Sim::new(engine, prepared, options.seed);
+        let moves = options.fidelity == Fidelity::Motion;
+        sim = match Stage::new(program) {
+            Ok(stage) if moves || !stage.fixtures.is_empty() => {
+                sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out)
+            }
+            Err(message) if moves => {
+                return Err(Box::new(refused(program, Fault::new(codes::URDF_FILE, 0.0, message))));
+            }
+            _ => sim,
+        };
+        let progress = exec::Progress::new(&program.plan, sim.now(), options.limits);
+        Ok(Underway { program, params, sim, progress, limits: options.limits, screen })
     }
-    outcome
+
+    /// Goes on to `until`, s of lab time, or to the end of the plan; whether that has come.
+    pub fn go_on(&mut self, until: f64, out: &mut dyn Listener) -> bool {
+        let Underway { sim, limits, screen, .. } = self;
+        let Program { plan, scene, .. } = self.program;
+        let mut tee;
+        let out = match screen {
+            Some(screen) => {
+                tee = Tee(screen, out);
+                &mut tee as &mut dyn Listener
+            }
+            None => out,
+        };
+        self.progress.go_on(Around { plan, scene, backend: sim, limits: *limits, out }, until)
+    }
+
+    /// What has come of it.
+    pub fn finish(mut self, out: &mut dyn Listener) -> Outcome {
+        let Some(mut screen) = self.screen.take() else { return self.end(out) };
+        let mut outcome = self.end(&mut Tee(&mut screen, out));
+        outcome.findings = screen.into_found();
+        let is_grave = outcome.findings.iter().any(|f| f.diagnostic.severity == Severity::Error);
+        if is_grave && outcome.status == RunStatus::Passed {
+            outcome.status = RunStatus::ExpectationFailed;
+        }
+        outcome
+    }
+
+    fn end(mut self, out: &mut dyn Listener) -> Outcome {
+        let execution = self.progress.into_execution(out);
+        let engine = self.sim.engine();
+        let finished = engine.finish(out);
+        out.ended(engine);
+        let mut outcome = outcome(execution, self.params, engine.states().into_iter().map(Some).collect());
+        outcome.balances = engine.balances();
+        if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
+            let trace = FailureTrace::of_fault(&self.program.plan, fault);
+            out.failure(&trace);
+            outcome.status = RunStatus::Fault;
+            outcome.suppressed.extend(outcome.failure.replace(trace));
+        }
+        outcome
+    }
 }
 
 /// Whether some steps of a plan run beside others.

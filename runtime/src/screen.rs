@@ -38,6 +38,7 @@ pub struct Finding {
 }
 
 /// A species in one mixture, by the states of its amount and of its ions.
+#[derive(Clone)]
 struct Side {
     amount: Option<usize>,
     ions: Vec<(usize, f64)>,
@@ -59,12 +60,14 @@ impl Side {
 }
 
 /// A pair of species in one mixture.
+#[derive(Clone)]
 struct Pair<'p> {
     incompatible: &'p Incompatible,
     sides: (Side, Side),
 }
 
 /// Looks at every moment of a run that is shown.
+#[derive(Clone)]
 pub struct Screen<'p> {
     program: &'p Program,
     /// Pairs by mixture, the gravest first.

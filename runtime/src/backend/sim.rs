@@ -24,7 +24,8 @@ pub struct Moves {
     pub beside: bool,
 }
 
-/// Simulates at `process` fidelity, or with robots that move through space.
+/// Simulates at `process` fidelity, or with robots that move through space. A clone goes on as it does.
+#[derive(Clone)]
 pub struct Sim<'m> {
     stage: Option<Stage<'m>>,
     moves: Moves,
@@ -51,6 +52,7 @@ const FRAME: f64 = 0.04;
 const PATIENCE: f64 = 0.25;
 
 /// An operation that goes on.
+#[derive(Clone)]
 struct Running {
     ends: Ends,
     /// The states that its beginning set.
@@ -60,6 +62,7 @@ struct Running {
 }
 
 /// When an operation ends.
+#[derive(Clone)]
 enum Ends {
     At(f64),
     When(NodeId),

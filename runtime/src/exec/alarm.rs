@@ -24,7 +24,7 @@ impl Executor<'_, '_> {
         while let Some(more) = self.out.alarm() {
             let trace = self.trace_of(id, more);
             self.out.failure(&trace);
-            self.suppressed.push(trace);
+            self.state.suppressed.push(trace);
         }
         true
     }
@@ -44,10 +44,11 @@ impl Executor<'_, '_> {
 
     /// What goes on now in the innermost of some steps that has not ended, the latest last.
     fn concerned(&self, around: &[StepId]) -> FrameId {
-        let runs = |step: &StepId| self.frames.iter().rev().find(|(_, f)| f.step == Some(*step)).map(|(&id, _)| id);
+        let runs =
+            |step: &StepId| self.state.frames.iter().rev().find(|(_, f)| f.step == Some(*step)).map(|(&id, _)| id);
         let mut id = around.iter().find_map(runs).unwrap_or_default();
-        while let Some(frame) = self.frames.get(&id) {
-            let is_job = |child: &&FrameId| self.frames.get(child).is_some_and(|f| f.job);
+        while let Some(frame) = self.state.frames.get(&id) {
+            let is_job = |child: &&FrameId| self.state.frames.get(child).is_some_and(|f| f.job);
             let own = frame.children.iter().rev().find(|child| !is_job(child));
             let Some(&next) = own.or(frame.children.last()) else { break };
             id = next;

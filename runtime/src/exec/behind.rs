@@ -11,7 +11,7 @@ use super::claims::Use;
 use super::frame::{FrameId, Kind};
 
 /// By frame, the uses of one instant that what begins in it comes behind.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Behind {
     /// The instant, s.
     time: f64,
@@ -21,7 +21,7 @@ pub(super) struct Behind {
 impl Executor<'_, '_> {
     /// A wait under `parent` is over: its line comes behind what has changed the condition at this instant.
     pub(super) fn comes_behind(&mut self, parent: Option<FrameId>, condition: NodeId) {
-        let now: Vec<Use> = self.claims.all_uses(self.now).filter(|u| !u.running).cloned().collect();
+        let now: Vec<Use> = self.state.claims.all_uses(self.state.now).filter(|u| !u.running).cloned().collect();
         let mut past: BTreeSet<FrameId> = BTreeSet::new();
         for cause in now.iter().filter(|used| self.changes(used, condition)) {
             past.insert(cause.frame);
@@ -33,14 +33,16 @@ impl Executor<'_, '_> {
         if past.is_empty() {
             return;
         }
-        if self.behind.time != self.now {
-            self.behind = Behind { time: self.now, uses: BTreeMap::new() };
+        if self.state.behind.time != self.state.now {
+            self.state.behind = Behind { time: self.state.now, uses: BTreeMap::new() };
         }
         let mut line = parent;
         while let Some(id) = line {
-            let Some(frame) = self.frames.get(&id).filter(|f| !matches!(f.kind, Kind::Parallel { .. })) else { return };
+            let Some(frame) = self.state.frames.get(&id).filter(|f| !matches!(f.kind, Kind::Parallel { .. })) else {
+                return;
+            };
             let (job, outer) = (frame.job, frame.parent);
-            self.behind.uses.entry(id).or_default().extend(&past);
+            self.state.behind.uses.entry(id).or_default().extend(&past);
             line = outer.filter(|_| !job);
         }
     }
@@ -54,7 +56,7 @@ impl Executor<'_, '_> {
     }
 
     fn behind_now(&self) -> Option<&BTreeMap<FrameId, BTreeSet<FrameId>>> {
-        (self.behind.time == self.now).then_some(&self.behind.uses)
+        (self.state.behind.time == self.state.now).then_some(&self.state.behind.uses)
     }
 
     /// Whether what begins within these frames comes behind a use.

@@ -13,13 +13,13 @@ use crate::fault::Fault;
 impl<'p> Executor<'p, '_> {
     /// Ends a frame and tells its parent.
     pub(super) fn finish(&mut self, id: FrameId, end: End) {
-        let Some(frame) = self.frames.remove(&id) else { return };
+        let Some(frame) = self.state.frames.remove(&id) else { return };
         self.leave(id, &frame, &end);
         let Some(parent) = frame.parent else {
-            self.end = Some(self.stray(end));
+            self.state.end = Some(self.stray(end));
             return;
         };
-        if let Some(parent) = self.frames.get_mut(&parent) {
+        if let Some(parent) = self.state.frames.get_mut(&parent) {
             parent.children.retain(|&c| c != id);
         }
         self.grant(false);
@@ -34,19 +34,19 @@ impl<'p> Executor<'p, '_> {
     /// What a frame leaves behind: its state, its end time, what it held.
     fn leave(&mut self, id: FrameId, frame: &Frame, end: &End) {
         let plan = self.plan;
-        self.claims.release(id);
+        self.state.claims.release(id);
         let Some(step) = frame.step else { return };
         match (&frame.kind, &plan.get(step).step) {
             (Kind::Operation { ticket, .. }, Step::Operation(operation)) => {
                 self.backend.halt(*ticket);
-                self.out.operation(self.now, step, operation, OperationState::Halted);
+                self.out.operation(self.state.now, step, operation, OperationState::Halted);
             }
             (Kind::Asked { ticket }, _) => self.backend.halt(*ticket),
             (
                 Kind::WaitUntil { .. } | Kind::Hold { .. },
                 Step::WaitUntil { condition, .. } | Step::Hold { condition, .. },
             ) if matches!(end, End::Done) => self.comes_behind(frame.parent, condition.node),
-            (Kind::Named, Step::Named { end, .. }) => self.backend.set_local(*end, Some(self.now)),
+            (Kind::Named, Step::Named { end, .. }) => self.backend.set_local(*end, Some(self.state.now)),
             _ => {}
         }
         let state = match end {
@@ -66,10 +66,10 @@ impl<'p> Executor<'p, '_> {
 
     /// Ends a frame as its child ended; while it is being stopped a failure is only reported.
     pub(super) fn conclude(&mut self, id: FrameId, end: End) {
-        let stopped = self.frames.get(&id).is_some_and(|f| f.stop.is_some());
+        let stopped = self.state.frames.get(&id).is_some_and(|f| f.stop.is_some());
         let end = match end {
             End::Failed(trace) if stopped => {
-                self.suppressed.push(*trace);
+                self.state.suppressed.push(*trace);
                 End::Stopped
             }
             end => end,
@@ -78,7 +78,7 @@ impl<'p> Executor<'p, '_> {
     }
 
     pub(super) fn child_ended(&mut self, id: FrameId, end: End) -> Result<(), Fault> {
-        let Some(frame) = self.frames.get(&id) else { return Ok(()) };
+        let Some(frame) = self.state.frames.get(&id) else { return Ok(()) };
         let stopped = frame.stop.is_some();
         match (&frame.kind, end) {
             (Kind::Sequence { .. }, End::Done) => self.next_in_sequence(id),
@@ -101,7 +101,7 @@ impl<'p> Executor<'p, '_> {
     /// Begins the next step of a sequence, or ends it.
     pub(super) fn next_in_sequence(&mut self, id: FrameId) {
         let plan = self.plan;
-        let Some(frame) = self.frames.get_mut(&id) else { return };
+        let Some(frame) = self.state.frames.get_mut(&id) else { return };
         let (Kind::Sequence { next }, Some(step)) = (&mut frame.kind, frame.step) else { return };
         let Step::Sequence(list) = &plan.get(step).step else { return };
         let child = list.get(*next).copied();
@@ -118,7 +118,7 @@ impl<'p> Executor<'p, '_> {
     /// Begins an alternative, or ends an empty `try`; whether there was one to begin.
     pub(super) fn next_alternative(&mut self, id: FrameId, index: usize) -> bool {
         let plan = self.plan;
-        let Some(step) = self.frames.get(&id).and_then(|f| f.step) else { return false };
+        let Some(step) = self.state.frames.get(&id).and_then(|f| f.step) else { return false };
         let Step::Try(list) = &plan.get(step).step else { return false };
         if list.is_empty() {
             self.push_end(id, End::Done);
@@ -129,7 +129,7 @@ impl<'p> Executor<'p, '_> {
 
     /// The first failure of a branch stops the others; the frame ends when all have.
     fn branch_ended(&mut self, id: FrameId, end: End) {
-        let Some(frame) = self.frames.get_mut(&id) else { return };
+        let Some(frame) = self.state.frames.get_mut(&id) else { return };
         let Kind::Parallel { end: first } = &mut frame.kind else { return };
         let children = frame.children.clone();
         match (first.as_ref(), end) {
@@ -138,11 +138,11 @@ impl<'p> Executor<'p, '_> {
                 *first = Some(end);
                 children.iter().for_each(|&sibling| self.stop(sibling, Stop::Boundary, false));
             }
-            (Some(_), End::Failed(trace)) => self.suppressed.push(*trace),
+            (Some(_), End::Failed(trace)) => self.state.suppressed.push(*trace),
             (Some(_), _) => {}
         }
         if children.is_empty()
-            && let Some(Kind::Parallel { end }) = self.frames.get(&id).map(|f| &f.kind)
+            && let Some(Kind::Parallel { end }) = self.state.frames.get(&id).map(|f| &f.kind)
         {
             let end = end.clone().unwrap_or(End::Done);
             self.conclude(id, end);
@@ -151,7 +151,7 @@ impl<'p> Executor<'p, '_> {
 
     fn guarded_ended(&mut self, id: FrameId, end: End) {
         let plan = self.plan;
-        let Some(frame) = self.frames.get_mut(&id) else { return };
+        let Some(frame) = self.state.frames.get_mut(&id) else { return };
         let (Kind::Guarded { phase, retries }, Some(step)) = (&mut frame.kind, frame.step) else { return };
         let Step::Guarded { body, handlers, finally } = &plan.get(step).step else { return };
         let stopped = frame.stop.is_some();
@@ -176,7 +176,7 @@ impl<'p> Executor<'p, '_> {
     /// Runs the `finally`, if there is one, and keeps what is to be passed on.
     fn begin_finally(&mut self, id: FrameId, after: End, finally: Option<StepId>) {
         let Some(step) = finally else { return self.conclude(id, after) };
-        if let Some(Kind::Guarded { phase, .. }) = self.frames.get_mut(&id).map(|f| &mut f.kind) {
+        if let Some(Kind::Guarded { phase, .. }) = self.state.frames.get_mut(&id).map(|f| &mut f.kind) {
             *phase = Phase::Finally(after);
         }
         self.spawn(id, step);
@@ -190,7 +190,7 @@ impl<'p> Executor<'p, '_> {
         let end = match (after, self.stray(end)) {
             (End::Done | End::Retry(_), end @ (End::Failed(_) | End::Stopped)) => end,
             (after, End::Failed(trace)) => {
-                self.suppressed.push(*trace);
+                self.state.suppressed.push(*trace);
                 after
             }
             (after, _) => after,
@@ -202,14 +202,14 @@ impl<'p> Executor<'p, '_> {
     fn name_undone(&mut self, id: FrameId) {
         let plan = self.plan;
         let Some(Step::Guarded { finally: Some(finally), .. }) =
-            self.frames.get(&id).and_then(|f| f.step).map(|step| &plan.get(step).step)
+            self.state.frames.get(&id).and_then(|f| f.step).map(|step| &plan.get(step).step)
         else {
             return;
         };
-        let begun = self.steps[finally.0 as usize].started;
+        let begun = self.state.steps[finally.0 as usize].started;
         let (mut undone, mut open) = (Vec::new(), vec![*finally]);
         while let Some(step) = open.pop() {
-            let record = &self.steps[step.0 as usize];
+            let record = &self.state.steps[step.0 as usize];
             let is_begun = record.started.is_some() && record.started >= begun;
             let node = &plan.get(step).step;
             match node {
@@ -223,14 +223,14 @@ impl<'p> Executor<'p, '_> {
         if !labels.is_empty() {
             let raised = Raised::named("unfinished", format!("a `finally` broke off: {} not done", labels.join(", ")));
             let trace = self.trace(id, Raised { span: Some(plan.get(*finally).span), ..raised });
-            self.suppressed.push(trace);
+            self.state.suppressed.push(trace);
         }
     }
 
     /// Begins the next turn of a loop, or ends it.
     pub(super) fn turn(&mut self, id: FrameId) -> Result<(), Fault> {
         let plan = self.plan;
-        let Some(frame) = self.frames.get(&id) else { return Ok(()) };
+        let Some(frame) = self.state.frames.get(&id) else { return Ok(()) };
         let (kind, stopped) = (frame.kind.clone(), frame.stop.is_some());
         let Some(step) = frame.step else { return Ok(()) };
         match (kind, &plan.get(step).step) {
@@ -264,7 +264,7 @@ impl<'p> Executor<'p, '_> {
     /// Begins a step that may have run before: what is below it is pending again.
     fn again(&mut self, parent: FrameId, step: StepId) {
         for below in tree::subtree(self.plan, step) {
-            if self.steps[below.0 as usize].state != StepState::Pending {
+            if self.state.steps[below.0 as usize].state != StepState::Pending {
                 self.mark(below, StepState::Pending);
             }
         }

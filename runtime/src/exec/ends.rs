@@ -20,7 +20,7 @@ impl<'p> Executor<'p, '_> {
     /// Judges at the end what was in order at the start; a run that failed or was stopped leaves things as they are. Fails where
     /// it cannot be asked for: what nobody knows to be off may be on.
     pub(super) fn judge_ends(&mut self, begun: &[&Limit]) -> Result<(), Fault> {
-        if self.abort.is_some() || !matches!(self.end, Some(End::Done)) {
+        if self.state.abort.is_some() || !matches!(self.state.end, Some(End::Done)) {
             return Ok(());
         }
         for end in begun {
@@ -36,16 +36,22 @@ impl<'p> Executor<'p, '_> {
                 code: codes::UNFINISHED,
                 fault: false,
                 span: steps.first().map_or(end.condition.span, |s| self.plan.get(*s).span),
-                time: self.now,
+                time: self.state.now,
                 measured: self.measured(&end.condition.compared),
                 help: end.condition.advice().into_iter().collect(),
                 because: Vec::new(),
                 steps: steps
                     .into_iter()
-                    .map(|s| FailureTrace::entry(self.plan, s, self.steps[s.0 as usize].started.unwrap_or(self.now)))
+                    .map(|s| {
+                        FailureTrace::entry(
+                            self.plan,
+                            s,
+                            self.state.steps[s.0 as usize].started.unwrap_or(self.state.now),
+                        )
+                    })
                     .collect(),
             };
-            self.unfinished.push(trace);
+            self.state.unfinished.push(trace);
         }
         Ok(())
     }
@@ -60,7 +66,7 @@ impl<'p> Executor<'p, '_> {
             let step = &self.plan.get(id).step;
             step.children().into_iter().for_each(|c| above[c.0 as usize] = Some(id));
             let Step::Operation(operation) = step else { continue };
-            let Some(started) = self.steps[id.0 as usize].started else { continue };
+            let Some(started) = self.state.steps[id.0 as usize].started else { continue };
             let later = last.is_none_or(|(time, other)| (time, other) < (started, id));
             if later && operation.claims.iter().any(|c| wholes.contains(c)) {
                 last = Some((started, id));

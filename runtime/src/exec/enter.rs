@@ -15,8 +15,8 @@ use crate::fault::Fault;
 impl<'p> Executor<'p, '_> {
     /// Begins a frame, unless it has been stopped before.
     pub(super) fn enter(&mut self, id: FrameId) {
-        let now = self.now;
-        let Some(frame) = self.frames.get_mut(&id) else { return };
+        let now = self.state.now;
+        let Some(frame) = self.state.frames.get_mut(&id) else { return };
         let Some(step) = frame.step else { return };
         if frame.stop.is_some() {
             return self.finish(id, End::Stopped);
@@ -35,7 +35,7 @@ impl<'p> Executor<'p, '_> {
         for node in self.out.wanted(step) {
             values.push(self.backend.value(node, self.out)?);
         }
-        self.out.begins(self.now, step, &values);
+        self.out.begins(self.state.now, step, &values);
         Ok(())
     }
 
@@ -63,7 +63,7 @@ impl<'p> Executor<'p, '_> {
             Step::Skill { .. } | Step::Keep { .. } | Step::During { .. } => self.begin_monitored(id, step)?,
             Step::Named { start, body, end, .. } => {
                 self.set_kind(id, Kind::Named);
-                self.backend.set_local(*start, Some(self.now));
+                self.backend.set_local(*start, Some(self.state.now));
                 self.backend.set_local(*end, None);
                 self.spawn(id, *body);
             }
@@ -115,14 +115,16 @@ impl<'p> Executor<'p, '_> {
                     return Err(self.unusable("the interval of `record` is 0 s".to_owned()));
                 }
                 // A turn of a loop that comes to it again finds it sampling.
-                if self.recordings.get(&id).is_none_or(|r| r.every != every) {
-                    self.recordings.insert(id, Recording { name, value, unit, since: self.now, every, turn: 0 });
+                if self.state.recordings.get(&id).is_none_or(|r| r.every != every) {
+                    self.state
+                        .recordings
+                        .insert(id, Recording { name, value, unit, since: self.state.now, every, turn: 0 });
                     self.sample()?;
                 }
             }
             Step::Note(text) => {
                 let text = self.words(text)?;
-                self.out.note(self.now, id, &text);
+                self.out.note(self.state.now, id, &text);
             }
             _ => {}
         }
@@ -145,7 +147,7 @@ impl<'p> Executor<'p, '_> {
         if branches.is_empty() {
             return self.push_end(id, End::Done);
         }
-        self.tasks.extend(branches.into_iter().rev().map(super::Task::Enter));
+        self.state.tasks.extend(branches.into_iter().rev().map(super::Task::Enter));
     }
 
     fn begin_wait(&mut self, id: FrameId, step: StepId) -> Result<(), Fault> {
@@ -155,7 +157,7 @@ impl<'p> Executor<'p, '_> {
                 let duration = self.duration(*duration, "the time to wait")?.unwrap_or(0.0);
                 let at = self.backend.moment_after(duration);
                 self.set_kind(id, Kind::Wait { at });
-                self.end_if(id, at <= self.now);
+                self.end_if(id, at <= self.state.now);
             }
             Step::WaitUntil { condition, timeout } => {
                 let deadline = self.deadline(*timeout)?;
@@ -178,7 +180,7 @@ impl<'p> Executor<'p, '_> {
                 };
                 let end = self.follower_holds(&follower)?.then(|| self.backend.moment_after(duration));
                 self.set_kind(id, Kind::Hold { follower, duration, end, deadline });
-                self.end_if(id, end.is_some_and(|e| e <= self.now));
+                self.end_if(id, end.is_some_and(|e| e <= self.state.now));
             }
             _ => {}
         }
@@ -203,10 +205,10 @@ impl<'p> Executor<'p, '_> {
         if since.is_some_and(|s| !s.is_finite()) {
             return Err(self.unusable("`within` refers to a time that has not come yet".to_owned()));
         }
-        let rounding = 1e-9 * self.now.abs().max(1.0);
+        let rounding = 1e-9 * self.state.now.abs().max(1.0);
         match limit.zip(since) {
-            Some((limit, since)) if self.now - since > limit + rounding => {
-                let [passed, limit] = [self.now - since, limit].map(show_number);
+            Some((limit, since)) if self.state.now - since > limit + rounding => {
+                let [passed, limit] = [self.state.now - since, limit].map(show_number);
                 let text = format!("{passed} s have passed, at most {limit} s may");
                 self.fail(id, Raised::named("late", text));
             }
@@ -241,28 +243,28 @@ impl<'p> Executor<'p, '_> {
 
     /// Samples every `record` that is due.
     pub(super) fn sample(&mut self) -> Result<(), Fault> {
-        let now = self.now;
+        let now = self.state.now;
         let due: BTreeMap<StepId, Recording<'p>> =
-            self.recordings.iter().filter(|(_, r)| r.is_due(now)).map(|(&s, r)| (s, r.clone())).collect();
+            self.state.recordings.iter().filter(|(_, r)| r.is_due(now)).map(|(&s, r)| (s, r.clone())).collect();
         for (step, recording) in due {
             let mut values = Vec::with_capacity(recording.value.len());
             for &node in recording.value {
                 values.push(self.backend.value(node, self.out)?.unwrap_or(f64::NAN));
             }
             self.out.record(now, step, recording.name, &values, recording.unit);
-            if let Some(recording) = self.recordings.get_mut(&step) {
+            if let Some(recording) = self.state.recordings.get_mut(&step) {
                 recording.turn += 1;
             }
         }
-        while let Some(time) = self.limits.looks.times.get(self.looked)
+        while let Some(time) = self.limits.looks.times.get(self.state.looked)
             && *time <= now
         {
             let mut values = Vec::with_capacity(self.limits.looks.nodes.len());
             for &node in self.limits.looks.nodes {
                 values.push(self.backend.value(node, self.out)?.unwrap_or(f64::NAN));
             }
-            self.out.looked(self.looked, &values);
-            self.looked += 1;
+            self.out.looked(self.state.looked, &values);
+            self.state.looked += 1;
         }
         Ok(())
     }

@@ -30,7 +30,7 @@ pub(super) enum Stop {
 }
 
 /// What is to be done next, without recursion.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Task {
     Enter(FrameId),
     Finish(FrameId, End),

@@ -16,30 +16,30 @@ impl<'p> Executor<'p, '_> {
             return self.fail(id, Raised::named("job", format!("the job `{name}` is still running")));
         }
         let frame = self.insert(Some(scope), Some(body));
-        if let Some(new) = self.frames.get_mut(&frame) {
+        if let Some(new) = self.state.frames.get_mut(&frame) {
             new.job = true;
         }
-        if let Some(scope) = self.frames.get_mut(&scope) {
+        if let Some(scope) = self.state.frames.get_mut(&scope) {
             scope.jobs.push(Job { name: name.to_owned(), frame, end: None, awaited: false });
         }
-        self.job_names.insert(name);
+        self.state.job_names.insert(name);
         self.push_end(id, End::Done);
-        self.tasks.push(Task::Enter(frame));
+        self.state.tasks.push(Task::Enter(frame));
     }
 
     /// Begins what is asked for from outside, beside the plan; whatever becomes of it is nobody else's business.
     pub(super) fn begin_asked(&mut self) {
-        if self.abort.is_some() {
+        if self.state.abort.is_some() {
             return;
         }
         for step in self.out.given_up() {
             let is_it = |(_, f): &(&FrameId, &super::Frame)| f.job && f.parent == Some(ROOT) && f.step == Some(step);
-            if let Some(job) = self.frames.iter().find(is_it).map(|(&id, _)| id) {
+            if let Some(job) = self.state.frames.iter().find(is_it).map(|(&id, _)| id) {
                 self.stop(job, Stop::Now, false);
                 self.drain();
             }
         }
-        for asked in self.out.asked(self.now) {
+        for asked in self.out.asked(self.state.now) {
             if self.plan.steps.len() <= asked.step.0 as usize {
                 continue;
             }
@@ -47,14 +47,14 @@ impl<'p> Executor<'p, '_> {
                 self.backend.set_local(local, Some(value));
             }
             let frame = self.insert(Some(ROOT), Some(asked.step));
-            if let Some(new) = self.frames.get_mut(&frame) {
+            if let Some(new) = self.state.frames.get_mut(&frame) {
                 (new.job, new.asked) = (true, true);
             }
-            if let Some(root) = self.frames.get_mut(&ROOT) {
+            if let Some(root) = self.state.frames.get_mut(&ROOT) {
                 root.jobs.retain(|j| j.end.is_none());
                 root.jobs.push(Job { name: String::new(), frame, end: None, awaited: true });
             }
-            self.tasks.push(Task::Enter(frame));
+            self.state.tasks.push(Task::Enter(frame));
             self.drain();
         }
     }
@@ -70,7 +70,7 @@ impl<'p> Executor<'p, '_> {
                 }
             }
             // Its block has waited for it.
-            None if self.job_names.contains(name) => self.push_end(id, End::Done),
+            None if self.state.job_names.contains(name) => self.push_end(id, End::Done),
             None => self.fail(id, Raised::named("job", format!("no job `{name}` has been started"))),
         }
     }
@@ -78,14 +78,14 @@ impl<'p> Executor<'p, '_> {
     /// The innermost, latest job of this name around a frame, with the frame it belongs to.
     fn find_job(&self, id: FrameId, name: &str) -> Option<(FrameId, &Job)> {
         self.ancestors(id).find_map(|f| {
-            let jobs = &self.frames.get(&f)?.jobs;
+            let jobs = &self.state.frames.get(&f)?.jobs;
             jobs.iter().rev().find(|j| j.name == name).map(|j| (f, j))
         })
     }
 
     /// Someone takes the result of a job.
     fn take_job(&mut self, scope: FrameId, job: FrameId) {
-        let jobs = self.frames.get_mut(&scope).map(|f| &mut f.jobs);
+        let jobs = self.state.frames.get_mut(&scope).map(|f| &mut f.jobs);
         for found in jobs.into_iter().flatten().filter(|j| j.frame == job) {
             found.awaited = true;
         }
@@ -93,7 +93,7 @@ impl<'p> Executor<'p, '_> {
 
     /// Whether jobs started in a frame belong to it.
     pub(super) fn is_scope(&self, id: FrameId) -> bool {
-        self.frames.get(&id).is_some_and(|f| {
+        self.state.frames.get(&id).is_some_and(|f| {
             f.step.is_none()
                 || matches!(
                     f.kind,
@@ -104,7 +104,7 @@ impl<'p> Executor<'p, '_> {
 
     /// The body of a frame ended: its jobs end before it goes on.
     pub(super) fn body_ended(&mut self, id: FrameId, end: End) {
-        let Some(frame) = self.frames.get_mut(&id) else { return };
+        let Some(frame) = self.state.frames.get_mut(&id) else { return };
         let running: Vec<FrameId> = frame.jobs.iter().filter(|j| j.end.is_none()).map(|j| j.frame).collect();
         if running.is_empty() {
             return self.joined(id, end);
@@ -118,6 +118,7 @@ impl<'p> Executor<'p, '_> {
 
     pub(super) fn job_ended(&mut self, scope: FrameId, job: FrameId, end: End) {
         let waiting: Vec<FrameId> = self
+            .state
             .frames
             .iter()
             .filter(|(_, f)| matches!(f.kind, Kind::Await { job: awaited } if awaited == job))
@@ -126,7 +127,7 @@ impl<'p> Executor<'p, '_> {
         for id in waiting.into_iter().rev() {
             self.push_end(id, end.clone());
         }
-        let Some(frame) = self.frames.get_mut(&scope) else { return };
+        let Some(frame) = self.state.frames.get_mut(&scope) else { return };
         for ended in frame.jobs.iter_mut().filter(|j| j.frame == job) {
             ended.end = Some(end.clone());
         }
@@ -139,7 +140,7 @@ impl<'p> Executor<'p, '_> {
 
     /// Body and jobs have ended; a failure that nobody has taken counts.
     fn joined(&mut self, id: FrameId, end: End) {
-        let jobs = self.frames.get_mut(&id).map(|f| std::mem::take(&mut f.jobs)).unwrap_or_default();
+        let jobs = self.state.frames.get_mut(&id).map(|f| std::mem::take(&mut f.jobs)).unwrap_or_default();
         let lost = |job: Job| match job.end {
             Some(End::Failed(trace)) if !job.awaited => Some(trace),
             _ => None,
@@ -149,7 +150,7 @@ impl<'p> Executor<'p, '_> {
             End::Done => lost.next().map_or(End::Done, End::Failed),
             end => end,
         };
-        lost.for_each(|trace| self.suppressed.push(*trace));
+        lost.for_each(|trace| self.state.suppressed.push(*trace));
         if let Err(fault) = self.child_ended(id, end) {
             self.fault(id, fault);
         }

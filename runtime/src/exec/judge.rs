@@ -74,8 +74,8 @@ impl Executor<'_, '_> {
     /// Notes that a condition was taken to hold.
     pub(super) fn assume(&mut self, step: StepId, condition: &Condition) {
         let (text, span) = (condition.text.clone(), condition.span);
-        self.assumptions.push(Assumption { step, text, span, time: self.now });
-        self.out.assumed(self.now, step, condition);
+        self.state.assumptions.push(Assumption { step, text, span, time: self.state.now });
+        self.out.assumed(self.state.now, step, condition);
     }
 
     /// A follower of `condition`; `None`, with a note, if it can only be assumed.
@@ -85,7 +85,7 @@ impl Executor<'_, '_> {
             self.assume(step, condition);
             return None;
         }
-        Some(Follower::new(condition.node, follow, self.now))
+        Some(Follower::new(condition.node, follow, self.state.now))
     }
 
     /// A duration or interval, s; `None` if it cannot be known.
@@ -135,9 +135,9 @@ impl Executor<'_, '_> {
             };
             let compared = self.measured(&condition.compared);
             let (text, span) = (condition.text.clone(), condition.span);
-            let result = ExpectationResult { step, text, span, time: self.now, verdict, compared };
+            let result = ExpectationResult { step, text, span, time: self.state.now, verdict, compared };
             self.out.expectation(&result);
-            self.expectations.push(result);
+            self.state.expectations.push(result);
         }
         Ok(())
     }
@@ -150,7 +150,7 @@ impl Executor<'_, '_> {
 
     /// The trace of something raised in a frame.
     pub(super) fn trace(&self, id: FrameId, raised: Raised) -> FailureTrace {
-        let frames = std::iter::once(id).chain(self.ancestors(id)).filter_map(|f| self.frames.get(&f));
+        let frames = std::iter::once(id).chain(self.ancestors(id)).filter_map(|f| self.state.frames.get(&f));
         let steps: Vec<_> =
             frames.filter_map(|f| f.step.map(|s| FailureTrace::entry(self.plan, s, f.started))).collect();
         let span = raised.span.or(steps.first().map(|s| s.span)).unwrap_or_default();
@@ -162,7 +162,7 @@ impl Executor<'_, '_> {
             code,
             fault: false,
             span,
-            time: self.now,
+            time: self.state.now,
             steps,
             measured,
             help,

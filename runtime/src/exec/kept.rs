@@ -53,9 +53,9 @@ impl Executor<'_, '_> {
         let from = cause.map(path).unwrap_or_default();
         let near = |step: StepId| path(step).iter().zip(&from).take_while(|(a, b)| a == b).count();
         let beside = |id: FrameId| {
-            std::iter::once(id).chain(self.ancestors(id)).any(|f| self.frames.get(&f).is_some_and(|f| f.job))
+            std::iter::once(id).chain(self.ancestors(id)).any(|f| self.state.frames.get(&f).is_some_and(|f| f.job))
         };
-        let leaves = self.frames.iter().filter(|(_, f)| f.children.is_empty());
+        let leaves = self.state.frames.iter().filter(|(_, f)| f.children.is_empty());
         let ranked = leaves.filter_map(|(&id, f)| Some(((f.stop.is_none(), near(f.step?), !beside(id), id), id)));
         ranked.max_by_key(|(rank, _)| *rank).map(|(_, id)| id)
     }
@@ -64,11 +64,11 @@ impl Executor<'_, '_> {
     fn cause(&self, limit: u32) -> Option<StepId> {
         self.backend.decide(limit).iter().find_map(|states| {
             let begun = (0..self.plan.steps.len() as u32).map(StepId).filter_map(|id| match &self.plan.get(id).step {
-                Step::Operation(o) if sets(o, states) => Some((id, self.steps[id.0 as usize].started?)),
+                Step::Operation(o) if sets(o, states) => Some((id, self.state.steps[id.0 as usize].started?)),
                 _ => None,
             });
             let runs = |id: StepId| {
-                self.frames.values().any(|f| f.step == Some(id) && matches!(f.kind, Kind::Operation { .. }))
+                self.state.frames.values().any(|f| f.step == Some(id) && matches!(f.kind, Kind::Operation { .. }))
             };
             let ranked = begun.map(|(id, time)| (runs(id), time, self.plan.get(id).span, id));
             ranked.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))).map(|(.., id)| id)

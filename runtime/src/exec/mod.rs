@@ -35,7 +35,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::codes::{self, Code};
-use matterix_ir::plan::{LONGEST_RUN, Plan, StepId};
+use matterix_ir::plan::{LONGEST_RUN, Limit, Plan, StepId};
 use matterix_ir::scene::Scene;
 use matterix_ir::{NodeId, Unit};
 use serde::{Deserialize, Serialize};
@@ -135,6 +135,20 @@ pub struct Execution {
     pub end_time: f64,
 }
 
+/// What a plan is carried out with.
+pub struct Around<'p, 'b> {
+    /// The plan.
+    pub plan: &'p Plan,
+    /// Its things.
+    pub scene: &'p Scene,
+    /// Who carries it out.
+    pub backend: &'b mut dyn Backend,
+    /// Bounds.
+    pub limits: Limits<'b>,
+    /// Who is told.
+    pub out: &'b mut dyn Listener,
+}
+
 /// Runs `plan` on `backend` to its end.
 pub fn execute(
     plan: &Plan,
@@ -143,19 +157,13 @@ pub fn execute(
     limits: Limits<'_>,
     out: &mut dyn Listener,
 ) -> Execution {
-    let mut run = Executor::new(plan, scene, backend, limits, out);
-    match tree::check(plan) {
-        Ok(()) => run.drive(),
-        Err(message) => {
-            let fault = Fault::new(codes::RUN_FAILED, 0.0, message);
-            run.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(plan, fault))));
-        }
-    }
-    run.into_execution()
+    let mut progress = Progress::new(plan, backend.now(), limits);
+    progress.go_on(Around { plan, scene, backend, limits, out }, f64::INFINITY);
+    progress.into_execution(out)
 }
 
 /// Why the whole run ends early.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Abort {
     Cancelled,
     Fault(Box<FailureTrace>),
@@ -185,13 +193,9 @@ impl Recording<'_> {
     }
 }
 
-/// One run.
-struct Executor<'p, 'b> {
-    plan: &'p Plan,
-    scene: &'p Scene,
-    backend: &'b mut dyn Backend,
-    out: &'b mut dyn Listener,
-    limits: Limits<'b>,
+/// Where a run stands. A clone goes on as it does, on a clone of its backend.
+#[derive(Clone, Debug)]
+pub struct Progress<'p> {
     frames: BTreeMap<FrameId, Frame>,
     created: FrameId,
     tasks: Vec<Task>,
@@ -208,6 +212,8 @@ struct Executor<'p, 'b> {
     /// Steps taken at this instant.
     taken: usize,
     abort: Option<Abort>,
+    /// What should hold at the end and held at the start, once it has begun.
+    begun: Option<Vec<&'p Limit>>,
     /// How the whole plan ended.
     end: Option<End>,
     suppressed: Vec<FailureTrace>,
@@ -216,23 +222,26 @@ struct Executor<'p, 'b> {
     declined: Option<FailureTrace>,
     expectations: Vec<ExpectationResult>,
     assumptions: Vec<Assumption>,
+    /// Nothing is left to do.
+    is_over: bool,
 }
 
-impl<'p, 'b> Executor<'p, 'b> {
-    fn new(
-        plan: &'p Plan,
-        scene: &'p Scene,
-        backend: &'b mut dyn Backend,
-        limits: Limits<'b>,
-        out: &'b mut dyn Listener,
-    ) -> Self {
-        let now = backend.now();
-        Executor {
-            plan,
-            scene,
-            backend,
-            out,
-            limits,
+/// A run while it goes on.
+struct Executor<'p, 'b> {
+    plan: &'p Plan,
+    scene: &'p Scene,
+    backend: &'b mut dyn Backend,
+    out: &'b mut dyn Listener,
+    limits: Limits<'b>,
+    /// It pauses here, s.
+    until: f64,
+    state: &'b mut Progress<'p>,
+}
+
+impl<'p> Progress<'p> {
+    /// Of a plan that has not begun, `now` s after the start of lab time.
+    pub fn new(plan: &'p Plan, now: f64, limits: Limits<'_>) -> Self {
+        Progress {
             frames: BTreeMap::new(),
             created: 0,
             tasks: Vec::new(),
@@ -246,49 +255,88 @@ impl<'p, 'b> Executor<'p, 'b> {
             horizon: now + limits.horizon.clamp(0.0, MAX_HORIZON),
             taken: 0,
             abort: None,
+            begun: None,
             end: None,
             suppressed: Vec::new(),
             unfinished: Vec::new(),
             declined: None,
             expectations: Vec::new(),
             assumptions: Vec::new(),
+            is_over: false,
         }
     }
 
-    /// Runs to the end: tasks first, then time.
+    /// Goes on to `until`, s of lab time, or to the end of the plan; whether that has come. Nothing that happens depends on where
+    /// it pauses.
+    pub fn go_on(&mut self, around: Around<'p, '_>, until: f64) -> bool {
+        let Around { plan, scene, backend, limits, out } = around;
+        if !self.is_over {
+            let mut run = Executor { plan, scene, backend, out, limits, until, state: self };
+            run.drive();
+        }
+        self.is_over
+    }
+
+    /// Lab time, s.
+    pub fn now(&self) -> f64 {
+        self.now
+    }
+}
+
+impl<'p> Executor<'p, '_> {
+    /// Runs to the end, or to where it pauses: tasks first, then time.
     fn drive(&mut self) {
-        let begun = self.in_order();
+        if self.state.begun.is_none() && !self.begin_plan() {
+            self.state.is_over = true;
+            return;
+        }
+        while self.state.end.is_none() {
+            if self.is_to_end() {
+                self.state.abort = Some(Abort::Cancelled);
+                self.stop_all(Stop::Now, false);
+                self.drain();
+                continue;
+            }
+            if self.state.now >= self.until {
+                return;
+            }
+            self.begin_asked();
+            self.pass_time();
+        }
+        let begun = self.state.begun.take().unwrap_or_default();
+        if let Err(fault) = self.judge_ends(&begun) {
+            self.abort(FailureTrace::of_fault(self.plan, fault));
+        }
+        self.state.is_over = true;
+    }
+
+    /// Begins the plan; false where it is none.
+    fn begin_plan(&mut self) -> bool {
+        if let Err(message) = tree::check(self.plan) {
+            let fault = Fault::new(codes::RUN_FAILED, 0.0, message);
+            self.state.abort = Some(Abort::Fault(Box::new(FailureTrace::of_fault(self.plan, fault))));
+            return false;
+        }
+        self.state.begun = Some(self.in_order());
         let root = self.insert(None, None);
         self.set_kind(root, Kind::Pass);
         self.spawn(root, self.plan.root);
         self.alarmed();
         self.drain();
-        while self.end.is_none() {
-            if self.is_to_end() {
-                self.abort = Some(Abort::Cancelled);
-                self.stop_all(Stop::Now, false);
-                self.drain();
-                continue;
-            }
-            self.begin_asked();
-            self.pass_time();
-        }
-        if let Err(fault) = self.judge_ends(&begun) {
-            self.abort(FailureTrace::of_fault(self.plan, fault));
-        }
+        true
     }
 
     /// Whether somebody has ended it early, which has not been heeded yet.
     fn is_to_end(&self) -> bool {
-        self.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed))
+        self.state.abort.is_none() && self.limits.cancel.is_some_and(|c| c.load(Ordering::Relaxed))
     }
 
     /// Works off all tasks.
     fn drain(&mut self) {
-        while let Some(task) = self.tasks.pop() {
-            self.taken += 1;
-            if self.taken > self.limits.steps_per_instant {
-                self.tasks.push(task);
+        while let Some(task) = self.state.tasks.pop() {
+            self.state.taken += 1;
+            if self.state.taken > self.limits.steps_per_instant {
+                self.state.tasks.push(task);
                 self.give_up_instant();
                 continue;
             }
@@ -300,26 +348,26 @@ impl<'p, 'b> Executor<'p, 'b> {
     }
 
     fn give_up_instant(&mut self) {
-        self.taken = 0;
+        self.state.taken = 0;
         let message = format!("more than {} steps are taken within one instant", self.limits.steps_per_instant);
         let fault = self.run_fault(codes::ENDLESS_INSTANT, message);
         self.fault_everywhere(fault);
     }
 
     fn run_fault(&self, code: Code, message: String) -> Fault {
-        Fault::new(code, self.now, message)
+        Fault::new(code, self.state.now, message)
     }
 
     /// A new frame under `parent`.
     fn insert(&mut self, parent: Option<FrameId>, step: Option<StepId>) -> FrameId {
-        let id = self.created;
-        self.created += 1;
-        let finally = parent.and_then(|p| self.frames.get(&p)).is_some_and(|p| p.finally || p.shields());
+        let id = self.state.created;
+        self.state.created += 1;
+        let finally = parent.and_then(|p| self.state.frames.get(&p)).is_some_and(|p| p.finally || p.shields());
         let frame = Frame {
             step,
             parent,
             children: Vec::new(),
-            started: self.now,
+            started: self.state.now,
             stop: None,
             job: false,
             asked: false,
@@ -328,8 +376,8 @@ impl<'p, 'b> Executor<'p, 'b> {
             jobs: Vec::new(),
             joining: None,
         };
-        self.frames.insert(id, frame);
-        if let Some(parent) = parent.and_then(|p| self.frames.get_mut(&p)) {
+        self.state.frames.insert(id, frame);
+        if let Some(parent) = parent.and_then(|p| self.state.frames.get_mut(&p)) {
             parent.children.push(id);
         }
         id
@@ -338,18 +386,18 @@ impl<'p, 'b> Executor<'p, 'b> {
     /// A child that begins when its task is reached.
     fn spawn(&mut self, parent: FrameId, step: StepId) -> FrameId {
         let id = self.insert(Some(parent), Some(step));
-        self.tasks.push(Task::Enter(id));
+        self.state.tasks.push(Task::Enter(id));
         id
     }
 
     fn set_kind(&mut self, id: FrameId, kind: Kind) {
-        if let Some(frame) = self.frames.get_mut(&id) {
+        if let Some(frame) = self.state.frames.get_mut(&id) {
             frame.kind = kind;
         }
     }
 
     fn push_end(&mut self, id: FrameId, end: End) {
-        self.tasks.push(Task::Finish(id, end));
+        self.state.tasks.push(Task::Finish(id, end));
     }
 
     /// The frames around `id`, innermost first, without itself.
@@ -358,29 +406,35 @@ impl<'p, 'b> Executor<'p, 'b> {
     }
 
     fn parent(&self, id: FrameId) -> Option<FrameId> {
-        self.frames.get(&id).and_then(|f| f.parent)
+        self.state.frames.get(&id).and_then(|f| f.parent)
     }
 
     fn mark(&mut self, step: StepId, state: StepState) {
-        let record = &mut self.steps[step.0 as usize];
+        let record = &mut self.state.steps[step.0 as usize];
         record.state = state;
         match state {
             StepState::Running => {
-                record.started = Some(self.now);
+                record.started = Some(self.state.now);
                 record.ended = None;
                 record.runs += 1;
             }
-            StepState::Done | StepState::Failed => record.ended = Some(self.now),
-            StepState::Skipped if record.started.is_some() && record.ended.is_none() => record.ended = Some(self.now),
+            StepState::Done | StepState::Failed => record.ended = Some(self.state.now),
+            StepState::Skipped if record.started.is_some() && record.ended.is_none() => {
+                record.ended = Some(self.state.now)
+            }
             StepState::Skipped | StepState::Pending => {}
         }
-        self.out.step(self.now, step, state);
+        self.out.step(self.state.now, step, state);
     }
+}
 
-    fn into_execution(mut self) -> Execution {
-        for index in 0..self.steps.len() {
-            if self.steps[index].state == StepState::Pending {
-                self.mark(StepId(index as u32), StepState::Skipped);
+impl Progress<'_> {
+    /// What has come of it. What has not begun by then is skipped, and `out` is told so.
+    pub fn into_execution(mut self, out: &mut dyn Listener) -> Execution {
+        for (step, record) in (0..).map(StepId).zip(&mut self.steps) {
+            if record.state == StepState::Pending {
+                record.state = StepState::Skipped;
+                out.step(self.now, step, StepState::Skipped);
             }
         }
         let unmet = self.expectations.iter().any(|e| e.verdict == Verdict::Failed);

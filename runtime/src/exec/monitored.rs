@@ -85,12 +85,12 @@ impl Executor<'_, '_> {
 
     pub(super) fn monitored_ended(&mut self, id: FrameId, end: End) -> Result<(), Fault> {
         let plan = self.plan;
-        let Some(frame) = self.frames.get_mut(&id) else { return Ok(()) };
+        let Some(frame) = self.state.frames.get_mut(&id) else { return Ok(()) };
         let (Kind::Monitored { breach, .. }, Some(step)) = (&mut frame.kind, frame.step) else { return Ok(()) };
         let started = frame.started;
         if let Some(breach) = breach.take() {
             if let End::Failed(trace) = end {
-                self.suppressed.push(*trace);
+                self.state.suppressed.push(*trace);
             }
             self.conclude(id, End::Failed(breach));
             return Ok(());
@@ -126,7 +126,7 @@ impl Executor<'_, '_> {
         let (Some(low), Some(high)) = (self.backend.value(low, self.out)?, self.backend.value(high, self.out)?) else {
             return Ok(None);
         };
-        let (took, rounding) = (self.now - started, 1e-9 * self.now.abs().max(1.0));
+        let (took, rounding) = (self.state.now - started, 1e-9 * self.state.now.abs().max(1.0));
         if took >= low - rounding && took <= high + rounding {
             return Ok(None);
         }
@@ -138,7 +138,7 @@ impl Executor<'_, '_> {
     /// An invariant of a frame no longer holds: its body is stopped, then the frame fails.
     pub(super) fn breach(&mut self, id: FrameId, index: usize) {
         let plan = self.plan;
-        let Some(frame) = self.frames.get(&id) else { return };
+        let Some(frame) = self.state.frames.get(&id) else { return };
         if frame.stop.is_some() || !matches!(frame.kind, Kind::Monitored { breach: None, .. }) {
             return;
         }
@@ -154,7 +154,7 @@ impl Executor<'_, '_> {
         let raised = self.broken(condition);
         let trace = Box::new(self.trace(id, raised));
         self.out.failure(&trace);
-        if let Some(Kind::Monitored { breach, .. }) = self.frames.get_mut(&id).map(|f| &mut f.kind) {
+        if let Some(Kind::Monitored { breach, .. }) = self.state.frames.get_mut(&id).map(|f| &mut f.kind) {
             *breach = Some(trace);
         }
         for child in children {
@@ -163,7 +163,8 @@ impl Executor<'_, '_> {
     }
 
     pub(super) fn look_at_monitors(&mut self, id: FrameId, fired: &[NodeId]) -> Result<(), Fault> {
-        let Some(Kind::Monitored { monitors, breach: None }) = self.frames.get(&id).map(|f| f.kind.clone()) else {
+        let Some(Kind::Monitored { monitors, breach: None }) = self.state.frames.get(&id).map(|f| f.kind.clone())
+        else {
             return Ok(());
         };
         let mut monitors = monitors;

@@ -14,7 +14,7 @@ impl Executor<'_, '_> {
         let mut open = vec![id];
         let mut over = Vec::new();
         while let Some(id) = open.pop() {
-            let Some(frame) = self.frames.get_mut(&id) else { continue };
+            let Some(frame) = self.state.frames.get_mut(&id) else { continue };
             frame.stop = frame.stop.max(Some(stop));
             let halted = stop == Stop::Now && matches!(frame.kind, Kind::Operation { .. });
             if frame.waits() || halted {
@@ -36,7 +36,7 @@ impl Executor<'_, '_> {
 
     /// A frame cannot go on: the run ends, or the `finally` it stands in if the run is ending already.
     pub(super) fn fault(&mut self, id: FrameId, fault: Fault) {
-        let is_asked = |id| self.frames.get(&id).is_some_and(|f| f.asked);
+        let is_asked = |id| self.state.frames.get(&id).is_some_and(|f| f.asked);
         let is_of_numbers = matches!(
             fault.code,
             codes::UNUSABLE_NUMBER | codes::TRANSFER_FRACTION | codes::NOT_A_NUMBER | codes::ENDLESS_INSTANT
@@ -51,18 +51,18 @@ impl Executor<'_, '_> {
         self.stop_all(Stop::Now, false);
         let in_finally = std::iter::once(id)
             .chain(self.ancestors(id))
-            .find(|&f| self.parent(f).and_then(|p| self.frames.get(&p)).is_some_and(super::Frame::shields));
+            .find(|&f| self.parent(f).and_then(|p| self.state.frames.get(&p)).is_some_and(super::Frame::shields));
         if let Some(root) = in_finally {
             self.stop(root, Stop::Now, true);
         }
-        if self.frames.get(&id).is_some_and(|f| f.children.is_empty()) {
+        if self.state.frames.get(&id).is_some_and(|f| f.children.is_empty()) {
             self.push_end(id, End::Stopped);
         }
     }
 
     /// The backend cannot go on: everything that runs is given up; each `finally` not yet begun still gets its turn.
     pub(super) fn fault_everywhere(&mut self, fault: Fault) {
-        let leaf = self.frames.iter().find(|(_, f)| f.children.is_empty() && f.step.is_some()).map(|(&id, _)| id);
+        let leaf = self.state.frames.iter().find(|(_, f)| f.children.is_empty() && f.step.is_some()).map(|(&id, _)| id);
         let trace = match leaf {
             Some(id) => self.fault_trace(id, fault),
             None => FailureTrace::of_fault(self.plan, fault),
@@ -91,9 +91,9 @@ impl Executor<'_, '_> {
 
     pub(super) fn abort(&mut self, trace: FailureTrace) {
         self.out.failure(&trace);
-        match self.abort {
-            None => self.abort = Some(Abort::Fault(Box::new(trace))),
-            Some(_) => self.suppressed.push(trace),
+        match self.state.abort {
+            None => self.state.abort = Some(Abort::Fault(Box::new(trace))),
+            Some(_) => self.state.suppressed.push(trace),
         }
     }
 }

@@ -49,7 +49,7 @@ type Fired = BTreeMap<FrameId, Vec<NodeId>>;
 impl Executor<'_, '_> {
     /// Advances to the next instant at which something may happen, and lets it happen.
     pub(super) fn pass_time(&mut self) {
-        self.taken += 1;
+        self.state.taken += 1;
         let agenda = self.agenda();
         let fired = if !agenda.progress { self.unblock() } else { self.advance(&agenda) };
         let looked = fired.and_then(|fired| self.sample().map(|()| fired));
@@ -69,7 +69,7 @@ impl Executor<'_, '_> {
 
     fn agenda(&self) -> Agenda {
         let mut agenda = Agenda { next: f64::INFINITY, watches: Vec::new(), owners: Vec::new(), progress: false };
-        for (&id, frame) in &self.frames {
+        for (&id, frame) in &self.state.frames {
             let mut waits = true;
             match &frame.kind {
                 Kind::Wait { at } => agenda.at(*at),
@@ -96,7 +96,7 @@ impl Executor<'_, '_> {
             }
             agenda.progress |= waits;
         }
-        if let Some(due) = self.claims.next_due(self.now) {
+        if let Some(due) = self.state.claims.next_due(self.state.now) {
             agenda.at(due);
             agenda.progress = true;
         }
@@ -105,21 +105,21 @@ impl Executor<'_, '_> {
 
     /// Lets time pass.
     fn advance(&mut self, agenda: &Agenda) -> Result<Fired, Fault> {
-        if self.taken > self.limits.steps_per_instant {
-            self.taken = 0;
+        if self.state.taken > self.limits.steps_per_instant {
+            self.state.taken = 0;
             let limit = self.limits.steps_per_instant;
             let message = format!("more than {limit} steps are taken within one instant");
             return Err(self.run_fault(codes::ENDLESS_INSTANT, message));
         }
-        let recordings = self.recordings.values().map(super::Recording::due).fold(f64::INFINITY, f64::min);
-        let look = self.limits.looks.times.get(self.looked).copied().unwrap_or(f64::INFINITY);
-        let until = agenda.next.min(recordings).min(look).min(self.horizon).max(self.now);
-        let before = self.now;
+        let recordings = self.state.recordings.values().map(super::Recording::due).fold(f64::INFINITY, f64::min);
+        let look = self.limits.looks.times.get(self.state.looked).copied().unwrap_or(f64::INFINITY);
+        let until = agenda.next.min(recordings).min(look).min(self.state.horizon).min(self.until).max(self.state.now);
+        let before = self.state.now;
         let advance = self.backend.advance(until, &agenda.watches, self.out);
-        self.now = self.backend.now().max(before);
+        self.state.now = self.backend.now().max(before);
         let fired = match advance? {
             Advance::Reached => {
-                self.now = self.now.max(until);
+                self.state.now = self.state.now.max(until);
                 Fired::new()
             }
             Advance::Watch(indices) => fired(agenda, indices),
@@ -128,10 +128,10 @@ impl Executor<'_, '_> {
                 Fired::new()
             }
         };
-        if self.now > before {
-            self.taken = 0;
+        if self.state.now > before {
+            self.state.taken = 0;
         }
-        if self.now >= self.horizon && fired.is_empty() && agenda.next > self.horizon {
+        if self.state.now >= self.state.horizon && fired.is_empty() && agenda.next > self.state.horizon {
             return Err(self.out_of_time());
         }
         Ok(fired)
@@ -151,8 +151,8 @@ impl Executor<'_, '_> {
     /// The fault of waiting beyond the horizon, which moves on so that what is left can still be done.
     fn out_of_time(&mut self) -> Fault {
         let days = show_number(self.limits.horizon / 86_400.0);
-        self.horizon = self.now + self.limits.horizon;
-        let waits = self.frames.values().filter_map(|f| f.step.filter(|_| f.children.is_empty()));
+        self.state.horizon = self.state.now + self.limits.horizon;
+        let waits = self.state.frames.values().filter_map(|f| f.step.filter(|_| f.children.is_empty()));
         let (mut span, mut what) = (None, None);
         for step in waits {
             let node = self.plan.get(step);
@@ -166,14 +166,14 @@ impl Executor<'_, '_> {
         }
         let what = what.unwrap_or_else(|| "the run".to_owned());
         let message = format!("{what} is still waited for after {days} days of lab time");
-        Fault { span, ..Fault::new(codes::WAITS_FOR_EVER, self.now, message).help("give it a `timeout`") }
+        Fault { span, ..Fault::new(codes::WAITS_FOR_EVER, self.state.now, message).help("give it a `timeout`") }
     }
 
     /// Looks at every frame in the order in which they began; what follows from one happens before the next.
     fn look_at_all(&mut self, fired: &Fired) {
         self.grant(false);
         self.drain();
-        let ids: Vec<FrameId> = self.frames.keys().copied().collect();
+        let ids: Vec<FrameId> = self.state.frames.keys().copied().collect();
         for id in ids {
             let nodes = fired.get(&id).map_or(&[][..], Vec::as_slice);
             if let Err(fault) = self.look(id, nodes) {
@@ -184,7 +184,7 @@ impl Executor<'_, '_> {
     }
 
     fn look(&mut self, id: FrameId, fired: &[NodeId]) -> Result<(), Fault> {
-        let Some(frame) = self.frames.get(&id) else { return Ok(()) };
+        let Some(frame) = self.state.frames.get(&id) else { return Ok(()) };
         let stopped = frame.stop.is_some();
         match &frame.kind {
             Kind::Held if !stopped => {
@@ -193,10 +193,10 @@ impl Executor<'_, '_> {
                 }
             }
             Kind::Asked { .. } => self.look_at_question(id)?,
-            Kind::Wait { at } if self.now >= *at => self.push_end(id, End::Done),
+            Kind::Wait { at } if self.state.now >= *at => self.push_end(id, End::Done),
             Kind::WaitUntil { .. } => self.look_at_wait(id, fired)?,
             Kind::Hold { .. } => self.look_at_hold(id, fired)?,
-            Kind::Operation { until, .. } if !fired.is_empty() || until.is_some_and(|u| self.now >= u) => {
+            Kind::Operation { until, .. } if !fired.is_empty() || until.is_some_and(|u| self.state.now >= u) => {
                 self.poll(id)?;
             }
             Kind::Monitored { .. } if !stopped => self.look_at_monitors(id, fired)?,
@@ -215,15 +215,15 @@ impl Executor<'_, '_> {
         if fired.contains(&follower.node()) {
             return Ok(Some(value));
         }
-        if self.now < follower.next {
+        if self.state.now < follower.next {
             return Ok(None);
         }
-        follower.looked(self.now);
+        follower.looked(self.state.now);
         self.follower_holds(follower).map(Some)
     }
 
     fn look_at_wait(&mut self, id: FrameId, fired: &[NodeId]) -> Result<(), Fault> {
-        let Some(Kind::WaitUntil { follower, deadline }) = self.frames.get(&id).map(|f| f.kind.clone()) else {
+        let Some(Kind::WaitUntil { follower, deadline }) = self.state.frames.get(&id).map(|f| f.kind.clone()) else {
             return Ok(());
         };
         let mut follower = follower;
@@ -231,18 +231,18 @@ impl Executor<'_, '_> {
         self.set_kind(id, Kind::WaitUntil { follower, deadline });
         if news == Some(true) {
             self.push_end(id, End::Done);
-        } else if self.now >= deadline {
+        } else if self.state.now >= deadline {
             self.time_out(id);
         }
         Ok(())
     }
 
     fn look_at_hold(&mut self, id: FrameId, fired: &[NodeId]) -> Result<(), Fault> {
-        let Some(Kind::Hold { follower, duration, end, deadline }) = self.frames.get(&id).map(|f| f.kind.clone())
+        let Some(Kind::Hold { follower, duration, end, deadline }) = self.state.frames.get(&id).map(|f| f.kind.clone())
         else {
             return Ok(());
         };
-        if end.is_some_and(|e| self.now >= e) {
+        if end.is_some_and(|e| self.state.now >= e) {
             self.push_end(id, End::Done);
             return Ok(());
         }
@@ -253,9 +253,9 @@ impl Executor<'_, '_> {
             None => {}
         }
         self.set_kind(id, Kind::Hold { follower, duration, end, deadline });
-        if end.is_some_and(|e| self.now >= e) {
+        if end.is_some_and(|e| self.state.now >= e) {
             self.push_end(id, End::Done);
-        } else if self.now >= deadline {
+        } else if self.state.now >= deadline {
             self.time_out(id);
         }
         Ok(())
@@ -263,8 +263,8 @@ impl Executor<'_, '_> {
 
     fn time_out(&mut self, id: FrameId) {
         let plan = self.plan;
-        let Some(frame) = self.frames.get(&id) else { return };
-        let waited = show_number(self.now - frame.started);
+        let Some(frame) = self.state.frames.get(&id) else { return };
+        let waited = show_number(self.state.now - frame.started);
         let condition = frame.step.and_then(|s| match &plan.get(s).step {
             Step::WaitUntil { condition, .. } | Step::Hold { condition, .. } => Some(condition),
             _ => None,

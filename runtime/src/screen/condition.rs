@@ -6,6 +6,7 @@ use matterix_ir::{BinaryOp, Graph, NodeId, Op};
 use crate::process::Engine;
 
 /// A condition, as parts that must all hold.
+#[derive(Clone)]
 pub(super) struct Condition {
     node: NodeId,
     /// The shortest first.
@@ -13,6 +14,7 @@ pub(super) struct Condition {
 }
 
 /// A part of a condition, as it came out last.
+#[derive(Clone)]
 struct Part {
     formula: Formula,
     /// What it rests on that can change, with the values of then.

@@ -4,9 +4,12 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_runtime::exec::{Limits, Listener, OperationState, StepState};
+use matterix_ir::{Program, Unit};
+use matterix_runtime::backend::Prepared;
+use matterix_runtime::exec::{ExpectationResult, FailureTrace, Limits, Listener, OperationState, StepState};
 use matterix_runtime::process::{Engine, Observer};
-use matterix_runtime::run::{Fidelity, Outcome, RunOptions, run};
+use matterix_runtime::record::{Recording, Sampler};
+use matterix_runtime::run::{Fidelity, Outcome, RunOptions, Underway, run};
 use proptest::prelude::*;
 
 use crate::exec_build::{Lab, unit};
@@ -246,6 +249,115 @@ fn go(lab: &Lab, fidelity: Fidelity, cancel_at: usize) -> (Outcome, CancelAt<'st
         CancelAt { cancel, left: AtomicUsize::new(cancel_at), trace: Vec::new(), used: Vec::new(), overlap: false };
     let outcome = run(&lab.program, &options, &mut listener);
     (outcome, listener)
+}
+
+/// Everything that is said in a run, and what of it is recorded.
+#[derive(Clone)]
+struct Diary {
+    said: Vec<String>,
+    sampler: Sampler,
+    recording: Recording,
+}
+
+impl Diary {
+    fn of(program: &Program) -> Self {
+        Diary { said: Vec::new(), sampler: Sampler::new(&program.model), recording: Recording::new(program) }
+    }
+
+    fn says(&mut self, time: f64, what: impl std::fmt::Debug) {
+        self.said.push(format!("{:x} {what:?}", time.to_bits()));
+    }
+}
+
+impl Observer for Diary {
+    fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        self.sampler.sample(&mut self.recording, time, engine, changed);
+    }
+    fn event(&mut self, time: f64, event: usize) {
+        self.says(time, event);
+    }
+    fn process(&mut self, time: f64, process: usize, running: bool) {
+        self.says(time, (process, running));
+    }
+}
+
+impl Listener for Diary {
+    fn step(&mut self, time: f64, step: StepId, state: StepState) {
+        self.says(time, (step, state));
+    }
+    fn operation(&mut self, time: f64, step: StepId, _: &Operation, state: OperationState) {
+        self.says(time, (step, state));
+    }
+    fn reading(&mut self, time: f64, reading: usize, value: f64) {
+        self.says(time, (reading, value.to_bits()));
+    }
+    fn record(&mut self, time: f64, step: StepId, _: &str, values: &[f64], _: &Unit) {
+        self.says(time, (step, values));
+    }
+    fn expectation(&mut self, result: &ExpectationResult) {
+        self.says(result.time, result);
+    }
+    fn failure(&mut self, failure: &FailureTrace) {
+        self.says(failure.time, failure);
+    }
+}
+
+/// What a run has come to and said: with the states to the last bit.
+fn told(outcome: &Outcome, diary: &Diary) -> (String, Vec<Option<u64>>) {
+    let bits = outcome.states.iter().map(|state| state.map(f64::to_bits)).collect();
+    let Outcome { status, failure, suppressed, steps, end_time, .. } = outcome;
+    (format!("{status:?} {failure:?} {suppressed:?} {steps:?} {end_time:?} {:?}", diary.said), bits)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A run that pauses anywhere, and one that goes on from a snapshot of it while the first goes another way, are as one that
+    /// does neither; the recordings are the same up to the samples that a pause adds.
+    #[test]
+    fn a_snapshot_of_a_run_goes_on_to_the_last_bit(
+        tree in tree(),
+        pauses in prop::collection::vec(0.0..30.0_f64, 1..5),
+        saved in 0usize..5,
+    ) {
+        let mut builder = Builder::new();
+        builder.lab.program.plan.root = builder.build(&tree);
+        let program = &builder.lab.program;
+        let limits = Limits { horizon: 500.0, steps_per_instant: 5_000, ..Limits::default() };
+        let options = RunOptions { seed: 3, limits, ..RunOptions::default() };
+        let mut whole = Diary::of(program);
+        let expected = run(program, &options, &mut whole);
+        let expected = told(&expected, &whole);
+
+        let prepared = Prepared::new(program);
+        let mut diary = Diary::of(program);
+        let params = program.model.params.iter().map(|p| p.value).collect();
+        let Ok(mut underway) = Underway::begin(program, &prepared, params, &options, &mut diary) else {
+            return Err(TestCaseError::fail("it cannot begin"));
+        };
+        let mut snapshot = (underway.clone(), diary.clone());
+        let mut pauses = pauses;
+        pauses.sort_by(f64::total_cmp);
+        for (number, pause) in pauses.iter().enumerate() {
+            underway.go_on(*pause, &mut diary);
+            if number == saved % pauses.len() {
+                snapshot = (underway.clone(), diary.clone());
+            }
+        }
+        underway.go_on(f64::INFINITY, &mut diary);
+        let paused = underway.finish(&mut diary);
+        prop_assert_eq!(&told(&paused, &diary), &expected);
+
+        let (mut again, mut from_there) = snapshot;
+        again.go_on(f64::INFINITY, &mut from_there);
+        let resumed = again.finish(&mut from_there);
+        prop_assert_eq!(&told(&resumed, &from_there), &expected);
+        // The rest of the same recording; `pauses` after the snapshot only add samples.
+        prop_assert_eq!(&from_there.recording.events, &whole.recording.events);
+        if saved % pauses.len() + 1 == pauses.len() {
+            prop_assert_eq!(&from_there.recording, &diary.recording);
+        }
+    }
 }
 
 proptest! {
