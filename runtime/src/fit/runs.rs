@@ -9,7 +9,7 @@ use matterix_ir::{NodeId, Program};
 use super::solve::Model;
 use crate::backend::Prepared;
 use crate::exec::{Limits, Listener, Looks, RunStatus};
-use crate::process::{Engine, Observer};
+use crate::process::{self, Engine, Observer};
 use crate::run::{self, RunOptions};
 
 /// The program of a fit, made ready once.
@@ -60,7 +60,9 @@ impl<'p> Runs<'p> {
         }
         let looks = Looks { times: &self.times, nodes: &self.nodes };
         let limits = Limits { cancel: Some(self.cancel), looks, ..Limits::default() };
-        let options = RunOptions { seed: self.seed, limits, ..RunOptions::default() };
+        // The threads have runs of their own.
+        let process = process::Options { is_shared: false, ..process::Options::default() };
+        let options = RunOptions { seed: self.seed, limits, process, ..RunOptions::default() };
         let mut seen = Seen::default();
         let outcome = run::run_ready(self.program, &self.prepared, params, &options, &mut seen);
         if !matches!(outcome.status, RunStatus::Passed | RunStatus::ExpectationFailed) {

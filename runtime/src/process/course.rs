@@ -3,10 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::NodeId;
+use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
 
 use super::lookout::Lookout;
 use super::mode::NOWHERE;
 use super::part::Part;
+
+/// Steps of fewer parts are not worth other threads.
+const MANY: usize = 8;
 
 /// Things that keep their number as long as they are there.
 #[derive(Clone)]
@@ -50,6 +54,14 @@ impl<T> Slab<T> {
 
     pub(super) fn get_mut(&mut self, id: u32) -> Option<&mut T> {
         self.items.get_mut(id as usize)?.as_mut()
+    }
+
+    /// Takes some out for as long as `work` has them.
+    fn lend(&mut self, ids: &[u32], work: impl FnOnce(&mut [T])) {
+        let at = |id: &u32| *id as usize;
+        let mut lent: Vec<T> = ids.iter().filter_map(|id| self.items[at(id)].take()).collect();
+        work(&mut lent);
+        ids.iter().zip(lent).for_each(|(id, item)| self.items[at(id)] = Some(item));
     }
 
     /// The numbers that are taken, ascending.
@@ -128,12 +140,23 @@ pub(super) struct Course {
     pub(super) sights: Vec<Sights>,
     /// By part, the roots that look out for something that rests on it.
     pub(super) noticing: Vec<BTreeSet<u32>>,
+    /// Parts of which no step beyond the present one was taken when they were last looked at.
+    short: BTreeSet<u32>,
+    /// Whether steps of many parts are taken on several threads.
+    is_shared: bool,
 }
 
 impl Course {
     /// Of so many states, none of which moves.
-    pub(super) fn new(states: usize) -> Self {
-        Course { part_of: vec![NOWHERE; states], ..Course::default() }
+    pub(super) fn new(states: usize, is_shared: bool) -> Self {
+        Course { part_of: vec![NOWHERE; states], is_shared, ..Course::default() }
+    }
+
+    /// Takes a part in.
+    pub(super) fn add(&mut self, part: Part) -> u32 {
+        let id = self.parts.insert(part);
+        self.short.insert(id);
+        id
     }
 
     /// The part that moves a state, if its solution stands.
@@ -182,14 +205,33 @@ impl Course {
 
     /// A part goes on to its next step if it has come to the end of one, and is due where that ends.
     pub(super) fn enqueue_part(&mut self, id: u32) -> Result<(), super::integrator::Stuck> {
+        self.run_short(id);
         let Some(part) = self.parts.get_mut(id) else { return Ok(()) };
         part.step()?;
+        if part.is_short() {
+            self.short.insert(id);
+        }
         let until = part.until();
         self.queue.set(Who::Part(id), until);
         for lookout in self.lookouts_on(id) {
             self.enqueue_lookout(lookout);
         }
         Ok(())
+    }
+
+    /// Where a part has no more steps, many others may be about to have none: all of them take theirs at once. A step is the same
+    /// whenever it is taken.
+    fn run_short(&mut self, id: u32) {
+        if !self.is_shared || self.short.len() < MANY || !self.parts.get(id).is_some_and(Part::is_short) {
+            return;
+        }
+        let parts = &self.parts;
+        self.short.retain(|other| parts.get(*other).is_some_and(Part::is_short));
+        if self.short.len() < MANY {
+            return;
+        }
+        let ids: Vec<u32> = std::mem::take(&mut self.short).into_iter().collect();
+        self.parts.lend(&ids, |parts| parts.par_iter_mut().for_each(Part::run));
     }
 
     /// A lookout is due as far as it has looked.

@@ -81,11 +81,13 @@ pub struct Options {
     pub rtol: f64,
     /// More events than this at one instant are a fault.
     pub max_events_per_instant: usize,
+    /// Whether parts that have nothing to do with each other are followed on several threads, where there are many. It changes no bit.
+    pub is_shared: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { rtol: 1e-8, max_events_per_instant: 1000 }
+        Options { rtol: 1e-8, max_events_per_instant: 1000, is_shared: true }
     }
 }
 
@@ -193,7 +195,7 @@ impl<'m> Engine<'m> {
             index: Index::new(model, []),
             facts: Facts::new(&model.graph),
             moving: vec![false; model.states.len()],
-            course: Course::new(model.states.len()),
+            course: Course::new(model.states.len(), options.is_shared),
             due: Due::default(),
             watching: BTreeSet::new(),
             suspects: Vec::new(),

@@ -154,18 +154,28 @@ impl Part {
         if self.at < self.leg.dense.end {
             return Ok(false);
         }
-        if let (true, None) = (self.ahead.is_empty(), self.stuck) {
-            let Part { integrator, sight, ahead, .. } = self;
-            let run = integrator.run(&mut |dense| {
-                let ending = sight.look(dense, dense.start);
-                ahead.push_back(Leg { dense: dense.clone(), ending });
-                if ending.is_some() { Next::Stop } else { Next::Step }
-            });
-            self.stuck = run.err();
+        if self.is_short() {
+            self.run();
         }
         self.leg = self.ahead.pop_front().ok_or(self.stuck.unwrap_or(Stuck::Short))?;
         self.at = self.leg.dense.start;
         Ok(true)
+    }
+
+    /// Whether the present step is the last one that was taken, and more can be.
+    pub(super) fn is_short(&self) -> bool {
+        self.ahead.is_empty() && self.stuck.is_none() && self.leg.ending.is_none() && !self.is_broken
+    }
+
+    /// Takes steps beyond the present one. That rests on nothing outside of the part, so it does not matter when it is done.
+    pub(super) fn run(&mut self) {
+        let Part { integrator, sight, ahead, .. } = self;
+        let run = integrator.run(&mut |dense| {
+            let ending = sight.look(dense, dense.start);
+            ahead.push_back(Leg { dense: dense.clone(), ending });
+            if ending.is_some() { Next::Stop } else { Next::Step }
+        });
+        self.stuck = run.err();
     }
 
     /// What ends the law in the present step.

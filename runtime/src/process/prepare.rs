@@ -270,7 +270,7 @@ impl Engine<'_> {
     /// Gives a part its place.
     fn settle_in(&mut self, part: Part, concerned: &mut Concerned) {
         let moving = part.moving().to_vec();
-        let id = self.course.parts.insert(part);
+        let id = self.course.add(part);
         let memo = self.memo.get_mut();
         for &state in &moving {
             self.course.part_of[state as usize] = id;

@@ -14,6 +14,7 @@ use matterix_ir::study::Study;
 
 use crate::backend::Prepared;
 use crate::exec::{Limits, RunStatus};
+use crate::process;
 use crate::run::{self, RunOptions};
 
 pub use design::Design;
@@ -71,7 +72,9 @@ pub fn runs(program: &Program, study: &Study, options: &Options<'_>, done: &mut 
         }
         let seed = options.seed.wrapping_add(number);
         let limits = Limits { cancel: Some(options.cancel), ..Limits::default() };
-        let run_options = RunOptions { seed, limits, ..RunOptions::default() };
+        // The threads have runs of their own.
+        let process = process::Options { is_shared: false, ..process::Options::default() };
+        let run_options = RunOptions { seed, limits, process, ..RunOptions::default() };
         let mut watcher = Watcher::new(study, program.plan.locals.len());
         let outcome = run::run_ready(program, &prepared, params, &run_options, &mut watcher);
         let ended = matches!(outcome.status, RunStatus::Passed | RunStatus::ExpectationFailed);

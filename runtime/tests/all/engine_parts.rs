@@ -1,7 +1,7 @@
 //! Parts of a model that have nothing to do with each other are followed apart, and come to what they come to alone.
 
 use matterix_ir::NodeId;
-use matterix_runtime::process::{Advance, Watch};
+use matterix_runtime::process::{Advance, Options, Watch};
 
 use crate::engine_model::{Build, Trace, assign, close, engine, run};
 
@@ -312,4 +312,22 @@ fn a_snapshot_goes_on_to_the_last_bit() {
     saved.advance(400.0, &[], &mut after).expect("advance");
     assert_eq!(bits(&engine), bits(&saved));
     assert_eq!(trace, after);
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let b = many(40);
+    let followed = |is_shared: bool| {
+        let options = Options { is_shared, ..Options::default() };
+        let params = b.model.params.iter().map(|p| p.value).collect();
+        let mut engine = matterix_runtime::process::Engine::new(&b.model, params, 0, options).expect("an engine");
+        let mut trace = Trace::default();
+        engine.start(&mut trace).expect("start");
+        for until in [10.0, 77.7, 400.0] {
+            engine.advance(until, &[], &mut trace).expect("advance");
+        }
+        let bits: Vec<u64> = engine.states().iter().map(|s| s.to_bits()).collect();
+        (bits, trace)
+    };
+    assert_eq!(followed(true), followed(false));
 }
