@@ -6,6 +6,7 @@ use std::rc::Rc;
 use matterix_ir::Span;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Step, StepId};
+use rustc_hash::FxHashMap;
 
 use super::Flow;
 use super::facts::Facts;
@@ -165,23 +166,48 @@ impl Flow<'_, '_> {
 
     /// States, and all that laws and events change by them.
     pub(super) fn behind(&self, states: &BTreeSet<u32>) -> BTreeSet<u32> {
-        let mut out = states.clone();
-        let mut todo: Vec<u32> = states.iter().copied().collect();
-        while let Some(state) = todo.pop() {
-            let rates = self.rates_of.get(&state).into_iter().flatten();
-            let moved = rates.map(|i| self.derivatives[*i as usize].state);
-            let events = self.events_of.get(&state).into_iter().flatten();
-            let set = events.flat_map(|i| &self.events[*i as usize].actions).flat_map(|action| match action {
-                Action::Assign { state, .. } => vec![*state],
-                Action::Move { from, to, .. } => {
-                    let both = [from, to].map(|m| &self.mixtures[*m as usize]);
-                    both.into_iter().flatten().map(|(_, state)| *state).collect()
-                }
-            });
-            let new: Vec<u32> = moved.chain(set).filter(|s| !out.contains(s)).collect();
-            out.extend(&new);
-            todo.extend(new);
-        }
-        out
+        closed(states, |state| self.led_on(state))
     }
+
+    /// States, and all by which laws and events change them.
+    pub(super) fn ahead_of(&self, states: &BTreeSet<u32>) -> BTreeSet<u32> {
+        let led_by = self.led_by.get_or_init(|| {
+            let mut led_by: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
+            for state in self.rates_of.keys().chain(self.events_of.keys()) {
+                self.led_on(*state).into_iter().for_each(|to| led_by.entry(to).or_default().push(*state));
+            }
+            led_by
+        });
+        closed(states, |state| led_by.get(&state).cloned().unwrap_or_default())
+    }
+
+    /// What the whole plan changes, and what laws and events change by that.
+    pub(super) fn behind_plan(&self) -> &BTreeSet<u32> {
+        self.by_plan.get_or_init(|| self.behind(&self.writes(self.plan.root)))
+    }
+
+    /// The states that laws and events change by one at once.
+    fn led_on(&self, state: u32) -> Vec<u32> {
+        let rates = self.rates_of.get(&state).into_iter().flatten();
+        let moved = rates.map(|i| self.derivatives[*i as usize].state);
+        let events = self.events_of.get(&state).into_iter().flatten();
+        let set = events.flat_map(|i| &self.events[*i as usize].actions).flat_map(|action| match action {
+            Action::Assign { state, .. } => vec![*state],
+            Action::Move { from, to, .. } => {
+                let both = [from, to].map(|m| &self.mixtures[*m as usize]);
+                both.into_iter().flatten().map(|(_, state)| *state).collect()
+            }
+        });
+        moved.chain(set).collect()
+    }
+}
+
+/// A set with all that it leads to.
+fn closed(set: &BTreeSet<u32>, next: impl Fn(u32) -> Vec<u32>) -> BTreeSet<u32> {
+    let mut out = set.clone();
+    let mut todo: Vec<u32> = set.iter().copied().collect();
+    while let Some(state) = todo.pop() {
+        todo.extend(next(state).into_iter().filter(|s| out.insert(*s)));
+    }
+    out
 }

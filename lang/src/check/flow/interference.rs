@@ -49,10 +49,8 @@ impl<'p> Flow<'p, '_> {
                 self.effects(*step, place, &mut time, facts, &mut effects);
             }
         }
-        effects.retain(|effect| {
-            let behind = self.behind(&self.changed_by(effect.actions));
-            parts.states.iter().any(|s| behind.contains(s))
-        });
+        let ahead = self.ahead_of(&parts.states.iter().copied().collect());
+        effects.retain(|effect| self.changed_by(effect.actions).iter().any(|s| ahead.contains(s)));
         effects.sort_by(|a, b| a.at.0.total_cmp(&b.at.0));
         if effects.iter().any(|e| e.at.0 != e.at.1 || e.at.0 < now) {
             return;
@@ -233,7 +231,7 @@ impl<'p> Flow<'p, '_> {
     fn lasts_beside(&mut self, duration: NodeId, facts: &Facts) -> (f64, f64) {
         let parts = self.parts(duration);
         let changes = |flow: &Self| {
-            let changed = flow.behind(&flow.writes(flow.plan.root));
+            let changed = flow.behind_plan();
             parts.states.iter().any(|s| changed.contains(s))
         };
         if !parts.states.is_empty() && changes(self) {

@@ -49,6 +49,7 @@ mod value;
 mod walk;
 mod words;
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
@@ -109,6 +110,10 @@ struct Flow<'l, 'a> {
     rates_of: BTreeMap<u32, Vec<u32>>,
     /// Events that depend on a state.
     events_of: BTreeMap<u32, Vec<u32>>,
+    /// By state, those by which laws and events change it; made when it is first asked for.
+    led_by: OnceCell<FxHashMap<u32, Vec<u32>>>,
+    /// What the whole plan changes, and what laws and events change by that; the same.
+    by_plan: OnceCell<BTreeSet<u32>>,
     /// Limits that depend on a state, by index.
     limits_of: BTreeMap<u32, Vec<u32>>,
     /// Conditions that steps presume to have held, by the states they depend on.
@@ -324,6 +329,8 @@ impl<'l, 'a> Flow<'l, 'a> {
             sums: FxHashMap::default(),
             rates_of: BTreeMap::new(),
             events_of: BTreeMap::new(),
+            led_by: OnceCell::new(),
+            by_plan: OnceCell::new(),
             limits_of: BTreeMap::new(),
             presumed_of: BTreeMap::new(),
             timed: Vec::new(),
