@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use matterix_runtime::motion::Perturbation;
+use rmcp::schemars::JsonSchema;
+use serde::Deserialize;
 
 use crate::pipeline::{Fixes, Options, Target};
 
@@ -217,7 +219,9 @@ pub struct PlanArgs {
 }
 
 /// How closely motions are simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(crate = "rmcp::schemars", inline)]
 pub enum Fidelity {
     /// Motions take their declared time.
     Process,

@@ -6,9 +6,7 @@ use serde::Serialize;
 
 use crate::backend::{Backend, Dry, Moves, Prepared, Sim};
 use crate::exec::Tee;
-use crate::exec::{
-    self, Around, Assumption, Execution, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepRecord,
-};
+use crate::exec::{self, Around, Execution, FailureTrace, Limits, Listener, RunStatus, StepRecord};
 use crate::fault::Fault;
 use crate::motion::Stage;
 use crate::process::{BalanceReport, Engine, Options};
@@ -53,27 +51,14 @@ pub struct RunOptions<'c> {
     pub process: Options,
 }
 
-/// What came of a run.
+/// What came of a run: of its plan, and of the lab.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
-    /// How it ended.
-    pub status: RunStatus,
-    /// What ended it, if something did.
-    pub failure: Option<FailureTrace>,
-    /// Failures that did not decide the end: in a `finally`, or in branches that were being stopped.
-    pub suppressed: Vec<FailureTrace>,
-    /// What the run has left on or in hand, with the steps that used it last.
-    pub unfinished: Vec<FailureTrace>,
+    /// Of its plan.
+    #[serde(flatten)]
+    pub execution: Execution,
     /// Warnings of the screen, in order: species that have met and should not, and hazards that came about. An error is a failure.
     pub findings: Vec<Finding>,
-    /// In the order of their judgement.
-    pub expectations: Vec<ExpectationResult>,
-    /// Conditions that were taken to hold.
-    pub assumptions: Vec<Assumption>,
-    /// Nodes of the plan, by their id.
-    pub steps: Vec<StepRecord>,
-    /// s.
-    pub end_time: f64,
     /// Parameters as used, by index, SI.
     pub params: Vec<f64>,
     /// States at the end, by index, SI; absent where a dry run cannot know them.
@@ -81,6 +66,14 @@ pub struct Outcome {
     /// How the sums over the lab closed; none in a dry run.
     #[serde(skip)]
     pub balances: Vec<BalanceReport>,
+}
+
+impl std::ops::Deref for Outcome {
+    type Target = Execution;
+
+    fn deref(&self) -> &Execution {
+        &self.execution
+    }
 }
 
 /// Runs `program` to its end and tells `out` what happens. A run never panics and always ends within its limits.
@@ -190,7 +183,7 @@ impl<'p> Underway<'p> {
         outcome.findings = screen.into_found();
         let is_grave = outcome.findings.iter().any(|f| f.diagnostic.severity == Severity::Error);
         if is_grave && outcome.status == RunStatus::Passed {
-            outcome.status = RunStatus::ExpectationFailed;
+            outcome.execution.status = RunStatus::ExpectationFailed;
         }
         outcome
     }
@@ -205,8 +198,9 @@ impl<'p> Underway<'p> {
         if let (Err(fault), true) = (finished, outcome.status != RunStatus::Fault) {
             let trace = FailureTrace::of_fault(&self.program.plan, fault);
             out.failure(&trace);
-            outcome.status = RunStatus::Fault;
-            outcome.suppressed.extend(outcome.failure.replace(trace));
+            let Execution { status, suppressed, failure, .. } = &mut outcome.execution;
+            *status = RunStatus::Fault;
+            suppressed.extend(failure.replace(trace));
         }
         outcome
     }
@@ -249,20 +243,5 @@ fn refused(program: &Program, fault: Fault) -> Outcome {
 }
 
 fn outcome(execution: Execution, params: Vec<f64>, states: Vec<Option<f64>>) -> Outcome {
-    let Execution { status, failure, suppressed, unfinished, expectations, assumptions, steps, end_time } = execution;
-    let balances = Vec::new();
-    Outcome {
-        status,
-        failure,
-        suppressed,
-        unfinished,
-        findings: Vec::new(),
-        expectations,
-        assumptions,
-        steps,
-        end_time,
-        params,
-        states,
-        balances,
-    }
+    Outcome { execution, findings: Vec::new(), params, states, balances: Vec::new() }
 }

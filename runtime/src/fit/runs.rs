@@ -66,7 +66,7 @@ impl<'p> Runs<'p> {
         let mut seen = Seen::default();
         let outcome = run::run_ready(self.program, &self.prepared, params, &options, &mut seen);
         if !matches!(outcome.status, RunStatus::Passed | RunStatus::ExpectationFailed) {
-            let why = outcome.failure.map_or("cancelled".to_string(), |f| format!("{}: {}", f.name, f.text));
+            let why = outcome.execution.failure.map_or("cancelled".to_string(), |f| format!("{}: {}", f.name, f.text));
             return Err(why);
         }
         let mut out = Vec::with_capacity(self.fit.rows.len());

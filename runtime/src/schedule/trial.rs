@@ -70,6 +70,6 @@ pub(super) fn trial(program: &Program, options: &RunOptions<'_>) -> Result<Trace
     let outcome = run(&free, options, &mut trace);
     match outcome.status {
         RunStatus::Passed | RunStatus::ExpectationFailed => Ok(trace),
-        _ => Err(outcome.failure.map(Box::new)),
+        _ => Err(outcome.execution.failure.map(Box::new)),
     }
 }

@@ -79,7 +79,7 @@ pub fn runs(program: &Program, study: &Study, options: &Options<'_>, done: &mut 
         let outcome = run::run_ready(program, &prepared, params, &run_options, &mut watcher);
         let ended = matches!(outcome.status, RunStatus::Passed | RunStatus::ExpectationFailed);
         let reports = if ended { watcher.reports } else { vec![None; study.reports.len()] };
-        let fault = outcome.failure.map(|f| f.name);
+        let fault = outcome.failure.as_ref().map(|f| f.name.clone());
         Row { run: number, seed, varied, status: outcome.status, fault, reports }
     };
     let rows = shared(options.runs, options.jobs, options.cancel, one, done);

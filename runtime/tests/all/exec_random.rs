@@ -6,7 +6,7 @@ use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Program, Unit};
 use matterix_runtime::backend::Prepared;
-use matterix_runtime::exec::{ExpectationResult, FailureTrace, Limits, Listener, OperationState, StepState};
+use matterix_runtime::exec::{Execution, ExpectationResult, FailureTrace, Limits, Listener, OperationState, StepState};
 use matterix_runtime::process::{Engine, Observer};
 use matterix_runtime::record::{Recording, Sampler};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions, Underway, run};
@@ -305,7 +305,7 @@ impl Listener for Diary {
 /// What a run has come to and said: with the states to the last bit.
 fn told(outcome: &Outcome, diary: &Diary) -> (String, Vec<Option<u64>>) {
     let bits = outcome.states.iter().map(|state| state.map(f64::to_bits)).collect();
-    let Outcome { status, failure, suppressed, steps, end_time, .. } = outcome;
+    let Execution { status, failure, suppressed, steps, end_time, .. } = &outcome.execution;
     (format!("{status:?} {failure:?} {suppressed:?} {steps:?} {end_time:?} {:?}", diary.said), bits)
 }
 

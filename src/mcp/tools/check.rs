@@ -7,8 +7,7 @@ use rmcp::schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::Task;
-use super::arguments::Fidelity;
-use crate::args;
+use crate::args::Fidelity;
 use crate::mcp::answer::Answer;
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
@@ -46,7 +45,7 @@ impl Task for Check {
 
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
-        let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
+        let fidelity = self.fidelity.unwrap_or(Fidelity::Motion);
         let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
         let found = judged(named(&sources, found), self.strict);
         let (data, text) = told(&sources, &found);

@@ -9,12 +9,12 @@ use rmcp::schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Task;
-use super::arguments::Fidelity;
+use crate::args::Fidelity;
+use crate::files;
 use crate::mcp::answer::Answer;
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
 use crate::pipeline::{self, Advice, Fixes, Input, Mended, Mending};
-use crate::{args, files};
 
 /// Which corrections are made.
 #[derive(Clone, Copy, Deserialize, JsonSchema)]
@@ -95,7 +95,7 @@ impl Task for FixTask {
         if self.write && self.path.is_none() {
             return Err("a `text` is in no file that could be written; give its `path`".to_string());
         }
-        let fidelity = self.fidelity.map_or(args::Fidelity::Motion, args::Fidelity::from);
+        let fidelity = self.fidelity.unwrap_or(Fidelity::Motion);
         let Mending { input: mended, done, sources, found } = match (&self.ids, self.which) {
             (Some(ids), None) => chosen(input, ids, fidelity, desk)?,
             (None, Some(Which::Sure)) => pipeline::mend(input, Fixes::Sure, fidelity, desk),
@@ -127,7 +127,7 @@ impl Task for FixTask {
 }
 
 /// A text after the corrections that have these names.
-fn chosen(input: Input, ids: &[String], fidelity: args::Fidelity, desk: &Desk) -> Result<Mending, String> {
+fn chosen(input: Input, ids: &[String], fidelity: Fidelity, desk: &Desk) -> Result<Mending, String> {
     let (sources, found) = pipeline::check(&input, fidelity, Advice::Given, desk);
     let found = named(&sources, found);
     let offered: Vec<(&String, &Fix)> = found.iter().flat_map(|n| n.ids.iter().zip(&n.diagnostic.fixes)).collect();

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::Task;
-use super::arguments::{Fidelity, bytes, options};
-use crate::args;
+use super::arguments::{bytes, options};
+use crate::args::Fidelity;
 use crate::mcp::answer::{Answer, bounded, pruned};
 use crate::mcp::desk::Desk;
 use crate::mcp::found::{Findings, judged, named, told};
@@ -77,10 +77,10 @@ impl Task for Run {
     fn perform(self, desk: &Desk, stop: &Arc<AtomicBool>) -> Result<Answer, String> {
         let bytes = bytes(self.bytes)?;
         let input = desk.input(self.path.as_deref(), self.text.as_deref())?.until(stop);
-        let fidelity = self.fidelity.map_or(args::Fidelity::Process, args::Fidelity::from);
+        let fidelity = self.fidelity.unwrap_or(Fidelity::Process);
         let (sources, program, mut found) = pipeline::compile(&input, &options(self.workflow, self.lab, self.set));
         let Some(program) = program.filter(|_| !is_wrong(&found)) else { return unrun(&sources, found) };
-        if fidelity == args::Fidelity::Motion {
+        if fidelity == Fidelity::Motion {
             found.extend(pipeline::motions(&program, desk));
             if is_wrong(&found) {
                 return unrun(&sources, found);
