@@ -111,7 +111,7 @@ pub fn run_ready(
 }
 
 /// A run of a program on the twin that can be left at any time. A clone is a snapshot: it goes on as the run does, to the last bit,
-/// wherever either of them pauses. What listens goes along as a clone of itself, such as of a [`Recorder`](crate::record::Recorder).
+/// wherever either of them pauses. What listens goes along as a clone of itself, such as of a [`Recording`](crate::record::Recording).
 #[derive(Clone)]
 pub struct Underway<'p> {
     program: &'p Program,

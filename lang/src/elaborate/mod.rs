@@ -167,6 +167,9 @@ pub struct Asked {
     pub terms: Vec<Term>,
 }
 
+/// Instances, and of how many they were chosen.
+type Counted = (usize, Arc<[InstanceId]>);
+
 /// Working state of the elaboration of one lab (or of a prototype).
 pub struct Elaborator<'a> {
     /// What is declared.
@@ -311,7 +314,7 @@ pub struct Elaborator<'a> {
     /// What parts of things that are alike are shaped like.
     pub known_geometries: FxHashMap<geometry::Alike, geometry::Geometry>,
     /// Instances by kind, and how many there were when they were looked for.
-    pub by_kind: RwLock<BTreeMap<DeclId, (usize, Arc<[InstanceId]>)>>,
+    pub by_kind: RwLock<BTreeMap<DeclId, Counted>>,
     /// Members being evaluated.
     pub open_members: Vec<(InstanceId, MemberKey)>,
     /// Functions being evaluated.
