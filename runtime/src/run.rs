@@ -134,46 +134,16 @@ impl<'p> Underway<'p> {
         out: &mut dyn Listener,
     ) -> Result<Self, Box<Outcome>> {
         let mut screen = Some(Screen::new(program)).filter(|screen| !screen.is_idle());
-        let mut tee;
-        let out = match &mut screen {
-            Some(screen) => {
-                tee = Tee(screen, out);
-                &mut tee as &mut dyn Listener
-            }
-            None => out,
-        };
-        let engine = Engine::new(&prepared.model, params.clone(), program.plan.locals.len(), options.process);
-        let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
-        let mut engine = started.map_err(|fault| Box::new(refused(program, fault)))?;
-        engine.heed(options.limits.cancel);
-        let mut sim = Sim::new(engine, prepared, options.seed);
-        let moves = options.fidelity == Fidelity::Motion;
-        sim = match Stage::new(program) {
-            Ok(stage) if moves || !stage.fixtures.is_empty() => {
-                sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out)
-            }
-            Err(message) if moves => {
-                return Err(Box::new(refused(program, Fault::new(codes::URDF_FILE, 0.0, message))));
-            }
-            _ => sim,
-        };
+        let sim = beside(&mut screen, out, |out| twin(program, prepared, &params, options, out))?;
         let progress = exec::Progress::new(&program.plan, sim.now(), options.limits);
         Ok(Underway { program, params, sim, progress, limits: options.limits, screen })
     }
 
     /// Goes on to `until`, s of lab time, or to the end of the plan; whether that has come.
     pub fn go_on(&mut self, until: f64, out: &mut dyn Listener) -> bool {
-        let Underway { sim, limits, screen, .. } = self;
-        let Program { plan, scene, .. } = self.program;
-        let mut tee;
-        let out = match screen {
-            Some(screen) => {
-                tee = Tee(screen, out);
-                &mut tee as &mut dyn Listener
-            }
-            None => out,
-        };
-        self.progress.go_on(Around { plan, scene, backend: sim, limits: *limits, out }, until)
+        let Underway { program, sim, progress, limits, screen, .. } = self;
+        let Program { plan, scene, .. } = program;
+        beside(screen, out, |out| progress.go_on(Around { plan, scene, backend: sim, limits: *limits, out }, until))
     }
 
     /// What has come of it.
@@ -203,6 +173,37 @@ impl<'p> Underway<'p> {
             suppressed.extend(failure.replace(trace));
         }
         outcome
+    }
+}
+
+/// Does what `out` listens to, and a screen as well if there is one.
+fn beside<R>(screen: &mut Option<Screen<'_>>, out: &mut dyn Listener, work: impl FnOnce(&mut dyn Listener) -> R) -> R {
+    match screen {
+        Some(screen) => work(&mut Tee(screen, out)),
+        None => work(out),
+    }
+}
+
+/// The twin as it stands when the plan begins. Where it cannot begin there is an outcome already.
+fn twin<'p>(
+    program: &'p Program,
+    prepared: &'p Prepared,
+    params: &[f64],
+    options: &RunOptions<'p>,
+    out: &mut dyn Listener,
+) -> Result<Sim<'p>, Box<Outcome>> {
+    let engine = Engine::new(&prepared.model, params.to_vec(), program.plan.locals.len(), options.process);
+    let started = engine.and_then(|mut engine| engine.start(out).map(|()| engine));
+    let mut engine = started.map_err(|fault| Box::new(refused(program, fault)))?;
+    engine.heed(options.limits.cancel);
+    let sim = Sim::new(engine, prepared, options.seed);
+    let moves = options.fidelity == Fidelity::Motion;
+    match Stage::new(program) {
+        Ok(stage) if moves || !stage.fixtures.is_empty() => {
+            Ok(sim.with_stage(stage, Moves { robots: moves, beside: runs_beside(&program.plan) }, out))
+        }
+        Err(message) if moves => Err(Box::new(refused(program, Fault::new(codes::URDF_FILE, 0.0, message)))),
+        _ => Ok(sim),
     }
 }
 

@@ -203,11 +203,9 @@ impl<'a> Elaborator<'a> {
 
     /// An instance's parts, and theirs.
     fn all_parts(&self, of: InstanceId, out: &mut Candidates) {
-        let instance = &self.instances[of.0 as usize];
-        let children = instance.grids.iter().flat_map(|grid| grid.children.values());
-        for part in instance.parts.values().chain(children) {
-            if out.insert(*part) {
-                self.all_parts(*part, out);
+        for part in self.instances[of.0 as usize].children() {
+            if out.insert(part) {
+                self.all_parts(part, out);
             }
         }
     }

@@ -95,6 +95,11 @@ impl<'a> Instance<'a> {
         self.settings.iter().find(is_own).copied()
     }
 
+    /// Its parts, those that stand in its grids last.
+    pub fn children(&self) -> impl Iterator<Item = InstanceId> {
+        self.parts.values().chain(self.grids.iter().flat_map(|grid| grid.children.values())).copied()
+    }
+
     /// What stands in its grid, where it has no parts and one place.
     pub fn only_part(&self) -> Option<InstanceId> {
         match (self.parts.is_empty(), self.grids.as_slice()) {

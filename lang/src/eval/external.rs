@@ -290,13 +290,11 @@ impl Elaborator<'_> {
     }
 
     fn parts_below(&self, id: InstanceId, kind: DeclId, out: &mut Vec<InstanceId>) {
-        let instance = &self.instances[id.0 as usize];
-        let parts = instance.parts.values().chain(instance.grids.iter().flat_map(|g| g.children.values()));
-        for part in parts {
-            if self.instance_is(*part, kind) {
-                out.push(*part);
+        for part in self.instances[id.0 as usize].children() {
+            if self.instance_is(part, kind) {
+                out.push(part);
             }
-            self.parts_below(*part, kind, out);
+            self.parts_below(part, kind, out);
         }
     }
 

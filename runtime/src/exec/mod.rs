@@ -276,11 +276,6 @@ impl<'p> Progress<'p> {
         }
         self.is_over
     }
-
-    /// Lab time, s.
-    pub fn now(&self) -> f64 {
-        self.now
-    }
 }
 
 impl<'p> Executor<'p, '_> {

@@ -60,8 +60,7 @@ impl<'p> Runs<'p> {
         }
         let looks = Looks { times: &self.times, nodes: &self.nodes };
         let limits = Limits { cancel: Some(self.cancel), looks, ..Limits::default() };
-        // The threads have runs of their own.
-        let process = process::Options { is_shared: false, ..process::Options::default() };
+        let process = process::Options::of_one_of_many();
         let options = RunOptions { seed: self.seed, limits, process, ..RunOptions::default() };
         let mut seen = Seen::default();
         let outcome = run::run_ready(self.program, &self.prepared, params, &options, &mut seen);

@@ -70,7 +70,8 @@ impl Bent {
             return None;
         }
         let bends = bends(rates);
-        if bends.len() > MOST_BENDS {
+        // Most laws that are integrated do not bend.
+        if bends.len() > MOST_BENDS || bends.is_empty() && !is_linear(rates) {
             return None;
         }
         let registers = rates.registers();
@@ -203,23 +204,29 @@ fn first_below(control: Vector6<f64>, from: f64, to: f64, pieces: &mut usize) ->
     first_below(left, from, middle, pieces).or_else(|| first_below(right, middle, to, pieces))
 }
 
+/// By register, whether it moves.
+fn moving(tape: &Tape) -> Vec<bool> {
+    let mut moves = vec![true; tape.first_result()];
+    moves[..tape.time()].fill(false);
+    for step in &tape.steps {
+        let mut any = false;
+        tape.operands(step, &mut |register| any |= moves[register as usize]);
+        moves.push(any);
+    }
+    moves
+}
+
 /// The steps of a law that take one of two that move.
 fn bends(rates: &Tape) -> Vec<Bend> {
-    let mut moves = vec![true; rates.first_result()];
-    moves[..rates.time()].fill(false);
-    let mut out = Vec::new();
-    for (i, step) in rates.steps.iter().enumerate() {
-        let mut any = false;
-        rates.operands(step, &mut |register| any |= moves[register as usize]);
-        moves.push(any);
-        match *step {
-            _ if !any => {}
-            Step::Binary(BinaryOp::Min | BinaryOp::Max, a, b) => out.push(Bend { step: i, a, b: Some(b) }),
-            Step::Unary(UnaryOp::Abs, a) => out.push(Bend { step: i, a, b: None }),
-            _ => {}
-        }
-    }
-    out
+    let moves = moving(rates);
+    let own = &moves[rates.first_result()..];
+    let steps = rates.steps.iter().enumerate().filter(|(i, _)| own[*i]);
+    let bend = |(step, what): (usize, &Step)| match *what {
+        Step::Binary(BinaryOp::Min | BinaryOp::Max, a, b) => Some(Bend { step, a, b: Some(b) }),
+        Step::Unary(UnaryOp::Abs, a) => Some(Bend { step, a, b: None }),
+        _ => None,
+    };
+    steps.filter_map(bend).collect()
 }
 
 /// The law on these sides of its bends.
@@ -242,13 +249,7 @@ fn watched(tape: &Tape, bends: &[Bend]) -> Vec<usize> {
     let first = tape.first_result();
     let mut registers = tape.registers();
     tape.run(0.0, &vec![0.0; tape.inputs], &mut registers);
-    let mut moves = vec![true; first];
-    moves[..tape.time()].fill(false);
-    for step in &tape.steps {
-        let mut any = false;
-        tape.operands(step, &mut |register| any |= moves[register as usize]);
-        moves.push(any);
-    }
+    let moves = moving(tape);
     let is_zero = |register: u32| !moves[register as usize] && registers[register as usize] == 0.0;
     let mut needed = vec![false; first + tape.steps.len()];
     tape.outputs.iter().for_each(|output| needed[*output as usize] = true);
@@ -289,8 +290,8 @@ impl Stride {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::exact::tests::integrator;
     use super::super::integrator::{Integrator, Next};
-    use super::super::tolerance::Tolerance;
     use super::*;
 
     /// A tape in the making: constants first, then as many states, then steps.
@@ -324,12 +325,6 @@ mod tests {
             self.0.outputs = outputs.to_vec();
             self.0
         }
-    }
-
-    fn integrator(tape: &Tape, values: &[f64]) -> Integrator {
-        let scales = vec![Some(1.0); values.len()];
-        let tolerance = Tolerance::new(2e-10, scales, &vec![0.0; values.len()], tape, 0.0, values);
-        Integrator::new(tape.clone(), (0..values.len() as u32).collect(), 0.0, values, tolerance)
     }
 
     /// The states at these times, s, and how many steps it took.

@@ -301,7 +301,7 @@ pub(super) fn is_linear(tape: &Tape) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use proptest::prelude::*;
 
     use super::super::integrator::{Integrator, Next};
@@ -325,7 +325,7 @@ mod tests {
         tape
     }
 
-    fn integrator(tape: &Tape, values: &[f64]) -> Integrator {
+    pub(in crate::process) fn integrator(tape: &Tape, values: &[f64]) -> Integrator {
         let scales = vec![Some(1.0); values.len()];
         let tolerance = Tolerance::new(2e-10, scales, &vec![0.0; values.len()], tape, 0.0, values);
         Integrator::new(tape.clone(), (0..values.len() as u32).collect(), 0.0, values, tolerance)

@@ -85,6 +85,13 @@ pub struct Options {
     pub is_shared: bool,
 }
 
+impl Options {
+    /// For one of many runs that have threads of their own.
+    pub fn of_one_of_many() -> Self {
+        Options { is_shared: false, ..Options::default() }
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Options { rtol: 1e-8, max_events_per_instant: 1000, is_shared: true }

@@ -72,8 +72,7 @@ pub fn runs(program: &Program, study: &Study, options: &Options<'_>, done: &mut 
         }
         let seed = options.seed.wrapping_add(number);
         let limits = Limits { cancel: Some(options.cancel), ..Limits::default() };
-        // The threads have runs of their own.
-        let process = process::Options { is_shared: false, ..process::Options::default() };
+        let process = process::Options::of_one_of_many();
         let run_options = RunOptions { seed, limits, process, ..RunOptions::default() };
         let mut watcher = Watcher::new(study, program.plan.locals.len());
         let outcome = run::run_ready(program, &prepared, params, &run_options, &mut watcher);

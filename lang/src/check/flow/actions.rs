@@ -466,17 +466,8 @@ impl Flow<'_, '_> {
             Some(event) => self.cascades(event),
             None => self.cascades_perhaps(),
         }
-        let mixtures = &self.mixtures;
-        let states = |action: &Action| -> Vec<u32> {
-            match action {
-                Action::Assign { state, .. } => vec![*state],
-                Action::Move { from, to, .. } => {
-                    [from, to].into_iter().flat_map(|m| &mixtures[*m as usize]).map(|(_, state)| *state).collect()
-                }
-            }
-        };
         let changed: BTreeSet<u32> =
-            due.iter().flat_map(|i| &self.events[*i as usize].actions).flat_map(states).collect();
+            due.iter().flat_map(|i| self.changed_by(&self.events[*i as usize].actions)).collect();
         self.forget(&changed.into_iter().collect::<Vec<_>>(), facts);
     }
 

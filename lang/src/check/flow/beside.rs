@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::rc::Rc;
 
 use matterix_ir::Span;
-use matterix_ir::model::Action;
 use matterix_ir::plan::{Step, StepId};
 use rustc_hash::FxHashMap;
 
@@ -191,13 +190,7 @@ impl Flow<'_, '_> {
         let rates = self.rates_of.get(&state).into_iter().flatten();
         let moved = rates.map(|i| self.derivatives[*i as usize].state);
         let events = self.events_of.get(&state).into_iter().flatten();
-        let set = events.flat_map(|i| &self.events[*i as usize].actions).flat_map(|action| match action {
-            Action::Assign { state, .. } => vec![*state],
-            Action::Move { from, to, .. } => {
-                let both = [from, to].map(|m| &self.mixtures[*m as usize]);
-                both.into_iter().flatten().map(|(_, state)| *state).collect()
-            }
-        });
+        let set = events.flat_map(|i| self.changed_by(&self.events[*i as usize].actions));
         moved.chain(set).collect()
     }
 }

@@ -164,9 +164,6 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnO
         effect.into.iter().for_each(|g| into.entry(*g).or_default().push(*id));
         effect.from.iter().for_each(|g| from.entry(*g).or_default().push(*id));
     }
-    if !into.keys().any(|g| from.contains_key(g)) {
-        return;
-    }
     // Where there is one species there is nothing that it could meet.
     let several = shared.of_several();
     into.retain(|group, _| several.contains(group));
