@@ -415,7 +415,7 @@ module.exports = grammar({
     ),
     event: ($) => seq(
       'event', field('name', $.identifier), optional($.parameters), optional($._nl_more), 'when', field('condition', $.expression),
-      $._law_block,
+      optional(seq(optional($._nl_more), choice('for', 'after'), nl($), field('delay', $._operand))), $._law_block,
     ),
     relation: ($) => seq(
       'relation', field('name', $.identifier), $.parameters, optional('symmetric'), optional(seq('=', nl($), field('value', $.expression))),

@@ -722,7 +722,7 @@ fn build<'a>(
             elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
             // A step that is wrong is not in the plan.
             if !elaborator.diagnostics.iter().any(Diagnostic::is_error) {
-                elaborator.diagnostics.extend(checks::idle(&plan, item.span, &elaborator));
+                elaborator.diagnostics.extend(checks::idle(&plan, item.span, &elaborator, &events));
             }
         }
         uses = checks::uses(&elaborator, sources, lab, &plan);

@@ -8,6 +8,7 @@ use matterix_ir::model::Event;
 use matterix_ir::plan::Plan;
 use matterix_ir::script::Wiring;
 
+use crate::elaborate::events::Happenings;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::lower::{Planner, Wires};
@@ -104,7 +105,7 @@ fn written<'a>(
     planner.of_no_use = of_no_use;
     let wiring = |transport: &str| Wiring { transport: transport.to_string(), ..Wiring::default() };
     planner.wiring = purpose.transport.map(wiring);
-    let (plan, wiring) = planner.task(task);
+    let (mut plan, wiring) = planner.task(task);
     if of_no_use() {
         return None;
     }
@@ -112,11 +113,12 @@ fn written<'a>(
         lab.initialise();
     }
     lab.targets.close();
-    let mut events = lab.events();
+    let Happenings { mut events, limits } = lab.events();
     lab.targets.close();
     lab.processes();
     events.extend(lab.stream_events());
     lab.targets.close();
+    plan.limits.extend(limits);
     let reach = Reach::compute(&lab);
     Some(Settled { lab, plan, wiring, events, reach })
 }

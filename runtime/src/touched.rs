@@ -1,6 +1,6 @@
 //! What a change of some states concerns, so that whoever follows a run looks at that alone.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Model;
 use matterix_ir::{NodeId, Op};
@@ -36,12 +36,16 @@ impl Below {
     }
 }
 
+/// So many things are put in order by comparing them; more are marked.
+const FEW: usize = 64;
+
 /// Things by what they rest on.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Touched {
     count: u32,
-    /// By state, the things above it.
-    above: Vec<Vec<u32>>,
+    /// By state, which of `sets` is above it. All amounts of a mixture have the same things above them, its concentrations.
+    above: Vec<u32>,
+    sets: Vec<Vec<u32>>,
     /// Those that rest on time too.
     timed: Vec<u32>,
 }
@@ -49,17 +53,26 @@ pub(crate) struct Touched {
 impl Touched {
     /// Of a model with so many states.
     pub(crate) fn new(states: usize, things: impl IntoIterator<Item = Below>) -> Self {
-        let mut touched = Touched { above: vec![Vec::new(); states], ..Touched::default() };
+        let (mut above, mut touched) = (vec![Vec::new(); states], Touched::default());
         for below in things {
             if below.is_timed {
                 touched.timed.push(touched.count);
             }
             for state in below.states {
-                if let Some(above) = touched.above.get_mut(state as usize) {
+                if let Some(above) = above.get_mut(state as usize) {
                     above.push(touched.count);
                 }
             }
             touched.count += 1;
+        }
+        let mut numbers: BTreeMap<Vec<u32>, u32> = BTreeMap::new();
+        for things in above {
+            let next = numbers.len() as u32;
+            touched.above.push(*numbers.entry(things).or_insert(next));
+        }
+        touched.sets = vec![Vec::new(); numbers.len()];
+        for (things, number) in numbers {
+            touched.sets[number as usize] = things;
         }
         touched
     }
@@ -74,12 +87,35 @@ impl Touched {
         if changed.len() == self.above.len() {
             return self.all();
         }
-        let above = changed.iter().filter_map(|state| self.above.get(*state as usize)).flatten();
-        let mut touched: Vec<u32> = above.chain(&self.timed).copied().collect();
+        let mut sets: Vec<u32> = changed.iter().filter_map(|state| self.above.get(*state as usize).copied()).collect();
+        sets.sort_unstable();
+        sets.dedup();
+        let above = sets.iter().flat_map(|set| &self.sets[*set as usize]).chain(&self.timed).copied();
+        let many = sets.iter().map(|set| self.sets[*set as usize].len()).sum::<usize>() > FEW;
+        if many {
+            return in_order(above, self.count);
+        }
+        let mut touched: Vec<u32> = above.collect();
         touched.sort_unstable();
         touched.dedup();
         touched
     }
+}
+
+/// Numbers below `count`, ascending, each once.
+fn in_order(numbers: impl Iterator<Item = u32>, count: u32) -> Vec<u32> {
+    let mut marks = vec![0u64; count.div_ceil(u64::BITS) as usize];
+    for number in numbers {
+        marks[(number / u64::BITS) as usize] |= 1 << (number % u64::BITS);
+    }
+    let mut out = Vec::new();
+    for (word, mut bits) in (0..).zip(marks) {
+        while bits != 0 {
+            out.push(word * u64::BITS + bits.trailing_zeros());
+            bits &= bits - 1;
+        }
+    }
+    out
 }
 
 #[cfg(test)]
@@ -94,5 +130,16 @@ mod tests {
         assert_eq!(touched.by(&[1]), [0, 2]);
         assert_eq!(touched.by(&[1, 2]), [0, 1, 2]);
         assert_eq!(touched.by(&[0, 1, 2, 3]), [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn many_things_come_in_order_and_once() {
+        let things: Vec<Below> = (0..300).map(|i| Below::states([i % 3, (i / 2) % 5])).collect();
+        let touched = Touched::new(6, things.clone());
+        for changed in [vec![0], vec![1, 4], vec![0, 1, 2], vec![3, 4, 5]] {
+            let rests = |below: &Below| changed.iter().any(|state| below.states.contains(state));
+            let plain: Vec<u32> = (0..300).filter(|i| rests(&things[*i as usize])).collect();
+            assert_eq!(touched.by(&changed), plain);
+        }
     }
 }

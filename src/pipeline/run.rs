@@ -9,7 +9,7 @@ use matterix_runtime::exec::{
     self, ExpectationResult, FailureTrace, Limits, Listener, RunStatus, StepState, Turn, Verdict,
 };
 use matterix_runtime::motion::{Moment, Moved};
-use matterix_runtime::process::{Engine, Observer};
+use matterix_runtime::process::{Engine, Observer, Options};
 use matterix_runtime::record::{self, Level, Outputs, Recording, Report, Run, RunInfo, Sampler};
 use matterix_runtime::run::{Fidelity, Outcome, RunOptions};
 
@@ -73,7 +73,8 @@ pub fn run<'a>(
 ) -> Ran<'a> {
     let fidelity = choices.fidelity();
     let limits = Limits { cancel: Some(cancel), turns: &choices.turns, ..Limits::default() };
-    let options = RunOptions { seed: choices.seed, fidelity, limits, ..RunOptions::default() };
+    let process = Options { curves: choices.keep == Keep::Curves, ..Options::default() };
+    let options = RunOptions { seed: choices.seed, fidelity, limits, process, ..RunOptions::default() };
     let recording = Recording::within(program, choices.keep.error());
     let mut follower = Follower { recording, sampler: Sampler::new(&program.model), progress };
     for moved in &choices.moved {
@@ -144,6 +145,10 @@ impl Observer for Follower<'_, '_> {
     fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         self.sampler.sample(&mut self.recording, time, engine, changed);
         self.progress.moved(time);
+    }
+
+    fn curve(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]) {
+        self.sampler.sample(&mut self.recording, time, engine, changed);
     }
 
     fn event(&mut self, time: f64, event: usize) {

@@ -8,6 +8,7 @@ mod blame;
 mod book;
 mod budget;
 mod contents;
+mod delayed;
 mod deploy;
 mod determinism;
 mod devices;

@@ -197,6 +197,7 @@ codes! {
     BALANCE_BREACH "balance-breach" "X0" "a balance of the lab does not close";
     NONPHYSICAL_TEMPERATURE "nonphysical-temperature" "X0" "a law brings a mixture to an impossible temperature";
     CHATTERING "chattering" "X0" "a condition switches back and forth without end";
+    EVENT_PENDING "event-pending" "X0" "a delayed event is set off again before it has happened";
     EVENT_CASCADE "event-cascade" "X0" "events set each other off at one instant without end";
     INTEGRATION_FAILED "integration-failed" "X0" "a quantity changes faster than any step can follow";
     NOT_A_NUMBER "not-a-number" "X0" "a quantity has no finite value";

@@ -34,15 +34,17 @@ pub enum UnaryOp {
     Sin,
     /// cosine of radians
     Cos,
+    /// arc tangent, radians
+    Atan,
     /// largest whole number not above x
     Floor,
 }
 
 impl UnaryOp {
     /// All of them.
-    pub const ALL: [UnaryOp; 9] = {
-        use UnaryOp::{Abs, Cos, Exp, Floor, Ln, Neg, Not, Sin, Sqrt};
-        [Neg, Not, Exp, Ln, Sqrt, Abs, Sin, Cos, Floor]
+    pub const ALL: [UnaryOp; 10] = {
+        use UnaryOp::{Abs, Atan, Cos, Exp, Floor, Ln, Neg, Not, Sin, Sqrt};
+        [Neg, Not, Exp, Ln, Sqrt, Abs, Sin, Cos, Atan, Floor]
     };
 }
 
@@ -557,6 +559,7 @@ pub fn unary(op: UnaryOp, a: f64) -> f64 {
         UnaryOp::Abs => a.abs(),
         UnaryOp::Sin => math::sin(a),
         UnaryOp::Cos => math::cos(a),
+        UnaryOp::Atan => math::atan(a),
         UnaryOp::Floor => a.floor(),
     }
 }

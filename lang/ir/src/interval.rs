@@ -19,7 +19,7 @@ pub fn of_unary(op: UnaryOp, (low, high): Interval) -> Interval {
         UnaryOp::Neg => (-high, -low),
         UnaryOp::Not if low > 0.0 || high < 0.0 => (0.0, 0.0),
         UnaryOp::Not => truth(low == 0.0 && high == 0.0, false),
-        UnaryOp::Exp => widened(unary(op, low), unary(op, high)),
+        UnaryOp::Exp | UnaryOp::Atan => widened(unary(op, low), unary(op, high)),
         UnaryOp::Floor => (low.floor(), high.floor()),
         UnaryOp::Ln | UnaryOp::Sqrt if low >= 0.0 => widened(unary(op, low), unary(op, high)),
         UnaryOp::Ln | UnaryOp::Sqrt => ALL,

@@ -35,6 +35,11 @@ pub fn cos(x: f64) -> f64 {
     libm::cos(x)
 }
 
+/// Arc tangent, radians.
+pub fn atan(x: f64) -> f64 {
+    libm::atan(x)
+}
+
 /// Sine and cosine of an angle in radians.
 pub fn sin_cos(x: f64) -> (f64, f64) {
     libm::sincos(x)

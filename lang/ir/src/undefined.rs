@@ -19,6 +19,7 @@ pub fn why(op: Op) -> &'static str {
         Op::Unary(UnaryOp::Sqrt, _) => "the root of a number below 0",
         Op::Unary(UnaryOp::Ln, _) => "the logarithm of a number that is not above 0",
         Op::Binary(BinaryOp::Pow, ..) => "a power that no number is",
+        Op::Select(..) => "a table is read beyond its first or last point",
         _ => "it is too large, or endless less endless",
     }
 }
@@ -57,7 +58,9 @@ impl Search<'_> {
         self.left -= 1;
         let op = self.graph.op(node);
         if let Op::Select(c, a, b) = op {
+            let is_gap = |n: NodeId| self.graph.constant(n).is_some_and(f64::is_nan);
             return match (self.decides(c), (self.value)(c)) {
+                (None, Some(c)) if is_gap(if c != 0.0 { a } else { b }) => Some(node),
                 (None, Some(c)) => self.of(if c != 0.0 { a } else { b }),
                 (broken, _) => broken,
             };

@@ -2,11 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use matterix_ir::model::Event;
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use crate::ast::{Clause, ClauseKind, ItemKind, Sig, WireKind};
 use crate::elaborate::Elaborator;
+use crate::elaborate::mixtures::changed;
 use crate::names::verb_text;
 
 /// Names of failures, each with the first statement that it comes from.
@@ -74,7 +76,7 @@ pub fn beyond(plan: &Plan, within: Span) -> Vec<Diagnostic> {
 }
 
 /// Handlers of a workflow for failures that nothing in their block raises, though others do; each once.
-pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> {
+pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>, events: &[Event]) -> Vec<Diagnostic> {
     let tables = lab.tables;
     let handles = |s: &PlanStep| matches!(&s.step, Step::Guarded { handlers, .. } if !handlers.is_empty());
     if !plan.steps.iter().any(handles) {
@@ -111,7 +113,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>) -> Vec<Diagnostic> 
                 continue;
             }
             let Caught::Named(name) = caught else { continue };
-            let by_time = || takes_time(plan, *body) && may_flow(plan, lab, name);
+            let by_time = || takes_time(plan, *body) && may_flow(plan, lab, events, name);
             let known = raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name);
             if known || by_time() || is_declared(plan, *body, lab, name) {
                 needed.insert(at);
@@ -148,9 +150,15 @@ fn is_declared(plan: &Plan, root: StepId, lab: &Elaborator<'_>, failure: &str) -
     false
 }
 
-/// Whether laws may break a limit of this failure while time passes.
-fn may_flow(plan: &Plan, lab: &Elaborator<'_>, failure: &str) -> bool {
-    let moves = |op: &Op| matches!(op, Op::Time) || matches!(op, Op::State(s) if lab.rates.contains_key(s));
+/// Whether laws or events may break a limit of this failure while time passes.
+fn may_flow(plan: &Plan, lab: &Elaborator<'_>, events: &[Event], failure: &str) -> bool {
+    let extensive = lab.extensive_by_mixture();
+    let set: BTreeSet<u32> = events.iter().flat_map(|event| changed(&event.actions, &extensive)).collect();
+    let moves = |op: &Op| match op {
+        Op::Time => true,
+        Op::State(s) => lab.rates.contains_key(s) || set.contains(s),
+        _ => false,
+    };
     let mut limits = plan.limits.iter().map(|l| &l.condition).filter(|c| c.failure() == failure);
     limits.any(|condition| lab.graph.depends(condition.node, moves))
 }

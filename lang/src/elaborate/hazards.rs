@@ -286,9 +286,10 @@ impl<'a> Elaborator<'a> {
     }
 
     fn endangered(&mut self, declared: Declared<'a>, shown: &str, scope: &mut Scope) -> Option<Hazard> {
-        self.terms.clear();
-        let (node, bound) = self.beware(declared.when, scope)?;
-        let terms = std::mem::take(&mut self.terms);
+        self.terms = Some(Vec::new());
+        let found = self.beware(declared.when, scope);
+        let terms = self.terms.take().unwrap_or_default();
+        let (node, bound) = found?;
         if self.never(node) || self.initial_mode && self.glance(node) == Some(0.0) {
             return None;
         }

@@ -156,8 +156,7 @@ fn nodes_of(value: &Value, out: &mut Vec<NodeId>) {
 impl<'a> Elaborator<'a> {
     /// What the lines of an event do, in the order of the text; `of` is its name and place.
     pub(super) fn event_actions(&mut self, laws: &'a [Law], scope: &mut Scope, of: (&str, Span)) -> Vec<Action> {
-        let bound = scope.vars.iter().find_map(|(_, v)| if let Value::Instance(i) = v { Some(*i) } else { None });
-        let owner = scope.this.or(bound).unwrap_or(InstanceId(0));
+        let owner = super::events::owner(scope);
         let new = |kept| Instant { actions: Vec::new(), taken: Vec::new(), open: Vec::new(), kept, of, owner };
         let mut lines = new(BTreeSet::new());
         self.each_law(laws, None, scope, &mut lines);

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Action, Event};
+use matterix_ir::model::Action;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
@@ -66,7 +66,7 @@ enum Target {
 }
 
 /// Whether lines call anything, as those do that move or soil.
-fn has_calls(laws: &[Law]) -> bool {
+pub(super) fn has_calls(laws: &[Law]) -> bool {
     laws.iter().any(|law| match &law.kind {
         LawKind::Call(_) => true,
         LawKind::For { body, .. } => has_calls(body),
@@ -639,50 +639,6 @@ impl<'a> Elaborator<'a> {
         mixture
     }
 
-    /// Writes out every event, in the order of the text.
-    pub fn events(&mut self) -> Vec<Event> {
-        let mut found: Vec<(&'a ast::Event, Scope, String)> = Vec::new();
-        for i in 0..self.instances.len() as u32 {
-            let id = InstanceId(i);
-            for m in self.all_members(id).iter().copied() {
-                if let MemberKind::Event(e) = &m.member.kind
-                    && (!self.draft || has_calls(&e.laws))
-                {
-                    let name = format!("{}({})", e.name.text, self.instances[i as usize].name);
-                    found.push((e, Scope::of_member(id, m), name));
-                }
-            }
-        }
-        for index in 0..self.tables.names.decls.len() {
-            let decl = self.tables.names.decls[index];
-            if let ItemKind::Event(e) = &decl.item.kind
-                && (!self.draft || has_calls(&e.laws))
-            {
-                let mut tuples = self.tuples(&e.params, decl.module, Some(&e.when), &e.name);
-                while let Some((scope, name)) = tuples.next(self) {
-                    found.push((e, scope, name));
-                }
-            }
-        }
-        let mut events = Vec::new();
-        for (e, mut scope, name) in found {
-            let event = if self.enter(e.name.span) { self.event(e, &mut scope, name) } else { None };
-            self.leave();
-            events.extend(event);
-        }
-        events
-    }
-
-    /// Writes out one event; none where it never happens or does nothing.
-    fn event(&mut self, e: &'a ast::Event, scope: &mut Scope, name: String) -> Option<Event> {
-        let when = self.truth(&e.when, scope)?;
-        if self.never(when) {
-            return None;
-        }
-        let actions = self.event_actions(&e.laws, scope, (&name, e.name.span));
-        (!actions.is_empty()).then_some(Event { name, when, actions, span: e.name.span })
-    }
-
     /// A transfer; mixtures are numbered in the order of the instances.
     fn move_action(&mut self, fraction: NodeId, from: InstanceId, to: InstanceId, span: Span) -> Action {
         self.moves.insert((from, to));
@@ -771,11 +727,5 @@ impl<'a> Elaborator<'a> {
                 );
             }
         }
-    }
-
-    /// Checks an event by itself; its parameters are bound in the scope.
-    pub fn check_event(&mut self, e: &'a ast::Event, scope: &mut Scope) {
-        self.truth(&e.when, scope);
-        self.event_actions(&e.laws, scope, (&e.name.text, e.name.span));
     }
 }

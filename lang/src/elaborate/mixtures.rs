@@ -55,7 +55,15 @@ pub fn written<'o>(
     operation: &'o Operation,
     extensive: &'o [Vec<(ExtensiveKey, u32)>],
 ) -> impl Iterator<Item = u32> + 'o {
-    operation.at_start.iter().chain(&operation.at_end).flat_map(|action| {
+    changed(operation.at_start.iter().chain(&operation.at_end), extensive)
+}
+
+/// The states that actions change, some of them more than once.
+pub fn changed<'o>(
+    actions: impl IntoIterator<Item = &'o Action> + 'o,
+    extensive: &'o [Vec<(ExtensiveKey, u32)>],
+) -> impl Iterator<Item = u32> + 'o {
+    actions.into_iter().flat_map(|action| {
         let (state, mixtures) = match action {
             Action::Assign { state, .. } => (Some(*state), None),
             Action::Move { from, to, .. } => (None, Some([*from, *to])),

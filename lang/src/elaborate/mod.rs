@@ -6,6 +6,7 @@ mod candidates;
 mod conserve;
 pub mod contents;
 mod coverings;
+pub mod events;
 mod extents;
 pub mod fields;
 pub mod geometry;
@@ -271,8 +272,8 @@ pub struct Elaborator<'a> {
     pub view_values: BTreeMap<(InstanceId, SpeciesId), BTreeMap<(DeclId, Dimension), Value>>,
     /// What the expression evaluated last compared.
     pub comparisons: Vec<Compared>,
-    /// The members that the expression evaluated last names.
-    pub terms: Vec<Term>,
+    /// The members that a condition names, where they are asked for.
+    pub terms: Option<Vec<Term>>,
     /// Where a call says of what it takes something, and its sources are looked into.
     pub looked_into: BTreeSet<Span>,
     /// What the expression evaluated last asks of each of several things.
@@ -379,7 +380,7 @@ impl<'a> Elaborator<'a> {
             touched_flow: false,
             view_values: BTreeMap::new(),
             comparisons: Vec::new(),
-            terms: Vec::new(),
+            terms: None,
             looked_into: BTreeSet::new(),
             asked_of: Vec::new(),
             noting: false,

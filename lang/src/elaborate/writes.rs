@@ -49,7 +49,10 @@ pub fn vanishes(graph: &Graph, node: NodeId, never: &dyn Fn(NodeId) -> bool, zer
             Op::Const(v) => v == 0.0,
             Op::State(state) => zero(state),
             Op::Time | Op::Param(_) | Op::Local(_) | Op::Reading(_) => false,
-            Op::Unary(UnaryOp::Neg | UnaryOp::Sqrt | UnaryOp::Abs | UnaryOp::Sin | UnaryOp::Floor, a) => look(a),
+            Op::Unary(
+                UnaryOp::Neg | UnaryOp::Sqrt | UnaryOp::Abs | UnaryOp::Sin | UnaryOp::Atan | UnaryOp::Floor,
+                a,
+            ) => look(a),
             Op::Unary(UnaryOp::Not | UnaryOp::Exp | UnaryOp::Ln | UnaryOp::Cos, _) => false,
             Op::Binary(BinaryOp::Mul, a, b) => look(a) || look(b),
             Op::Binary(BinaryOp::Div, a, b) => look(a) && !look(b),

@@ -433,6 +433,13 @@ impl<'a> Elaborator<'a> {
         value == Some(0.0)
     }
 
+    /// Whether the first part of a condition of a law decides it, and nobody wants to know what the second one names.
+    fn is_settled(&self, op: Binary, first: NodeId) -> bool {
+        let alone = if op == Binary::And { 0.0 } else { 1.0 };
+        let is_asked = self.prototype || self.terms.is_some() || self.meanings.is_some();
+        !is_asked && self.graph.constant(first) == Some(alone)
+    }
+
     fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
         match op {
             Binary::And if self.noting_any => {
@@ -445,7 +452,12 @@ impl<'a> Elaborator<'a> {
                 Value::Bool(self.graph.binary(BinaryOp::And, x, y))
             }
             Binary::And | Binary::Or => {
-                let (x, y) = (self.truth(a, scope), self.truth(b, scope));
+                let x = self.truth(a, scope);
+                // Laws are written out for many combinations, most of which their first condition excludes.
+                if let Some(x) = x.filter(|x| self.is_settled(op, *x)) {
+                    return Value::Bool(x);
+                }
+                let y = self.truth(b, scope);
                 let (Some(x), Some(y)) = (x, y) else { return Value::Error };
                 let op = if op == Binary::And { BinaryOp::And } else { BinaryOp::Or };
                 Value::Bool(self.graph.binary(op, x, y))
@@ -534,7 +546,10 @@ impl<'a> Elaborator<'a> {
             fold.text == "all" && items.len() > 1 && self.open_members.is_empty() && self.open_calls.is_empty();
         for item in items {
             let of = if single { self.spoken(&item) } else { None };
-            let outer = of.is_some().then(|| (std::mem::take(&mut self.comparisons), std::mem::take(&mut self.terms)));
+            let outer = of.is_some().then(|| {
+                let terms = self.terms.as_mut().map(std::mem::take);
+                (std::mem::take(&mut self.comparisons), terms)
+            });
             let instance = match &item {
                 Value::Instance(id) | Value::Qualified(id, _) => Some(*id),
                 _ => None,
@@ -563,9 +578,12 @@ impl<'a> Elaborator<'a> {
                 std::mem::swap(&mut compared, &mut self.comparisons);
                 std::mem::swap(&mut terms, &mut self.terms);
                 self.comparisons.extend(compared.iter().cloned());
-                for term in &terms {
-                    if !self.terms.iter().any(|t| t.node == term.node) {
-                        self.terms.push(term.clone());
+                let terms = terms.unwrap_or_default();
+                if let Some(all) = &mut self.terms {
+                    for term in &terms {
+                        if !all.iter().any(|t| t.node == term.node) {
+                            all.push(term.clone());
+                        }
                     }
                 }
                 if let Value::Bool(node) = value {

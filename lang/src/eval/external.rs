@@ -29,6 +29,8 @@ enum Bound {
     Absolute,
     /// One of two values by a condition.
     Choose,
+    /// A value read off the lines between points.
+    Interpolate,
     /// The species of a set that state a property.
     Having,
     /// The species that split into some of a set, and water, alone.
@@ -74,6 +76,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("ln", Bound::Unary(UnaryOp::Ln)),
     ("sin", Bound::Unary(UnaryOp::Sin)),
     ("cos", Bound::Unary(UnaryOp::Cos)),
+    ("arctan", Bound::Unary(UnaryOp::Atan)),
     ("floor", Bound::Unary(UnaryOp::Floor)),
     ("min", Bound::Extreme(BinaryOp::Min)),
     ("max", Bound::Extreme(BinaryOp::Max)),
@@ -86,6 +89,7 @@ const TABLE: &[(&str, Bound)] = &[
     ("footing", Bound::Footing),
     ("grouped", Bound::Grouped),
     ("having", Bound::Having),
+    ("interpolate", Bound::Interpolate),
     ("measures", Bound::Measures),
     ("nth", Bound::Nth),
     ("label", Bound::Label),
@@ -153,6 +157,7 @@ impl Elaborator<'_> {
                 Value::Num(Num { point: false, unit: None, literal: false, ..n.clone() })
             }
             (Bound::Choose, [Value::Bool(c), a, b]) => self.choose(*c, a.clone(), b.clone(), at),
+            (Bound::Interpolate, [Value::Num(x), Value::List(points)]) => self.interpolate(x, points, at),
             (Bound::Having, [Value::List(set), Value::Text(property)]) => {
                 let states = |v: &Value| match v {
                     Value::Species(s) => {

@@ -307,6 +307,7 @@ impl<'a> Elaborator<'a> {
 
     /// Notes a member that a condition names itself, not inside a definition it uses.
     fn note_term(&mut self, id: InstanceId, m: MemberRef<'a>, value: &Value) {
+        let Some(terms) = &self.terms else { return };
         if !self.open_members.is_empty() || !self.open_calls.is_empty() {
             return;
         }
@@ -316,7 +317,7 @@ impl<'a> Elaborator<'a> {
         else {
             return;
         };
-        if self.terms.iter().any(|t| t.node == node) || !self.graph.leaves(node).meets(Leaves::STATE) {
+        if terms.iter().any(|t| t.node == node) || !self.graph.leaves(node).meets(Leaves::STATE) {
             return;
         }
         let domain = match value {
@@ -329,7 +330,9 @@ impl<'a> Elaborator<'a> {
             _ => Domain::Instance,
         };
         let name = format!("{}.{}", self.spoken_name(id), name.text);
-        self.terms.push(Term { name, node, domain });
+        if let Some(terms) = &mut self.terms {
+            terms.push(Term { name, node, domain });
+        }
     }
 
     /// The name of the thing that answers for an instance: the vessel for its only part.

@@ -13,6 +13,7 @@ pub mod lists;
 mod measures;
 pub mod member;
 pub mod reaction;
+mod table;
 pub mod types;
 pub mod value;
 pub mod words;

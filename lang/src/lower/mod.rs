@@ -16,7 +16,7 @@ pub mod wires;
 
 pub use barred::BARS;
 pub use call::Verb;
-pub use text::{FAILURES, dangers, declared_failures};
+pub use text::{FAILURES, PENDING, dangers, declared_failures};
 pub use wires::Wires;
 
 use std::cell::RefCell;

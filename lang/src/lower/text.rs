@@ -18,8 +18,11 @@ use crate::names::{Names, near, verb_text};
 
 /// Failures of the language: `failure`, which stands for all, those that the executor itself raises, and the one of a run in which
 /// substances meet that must not.
-pub const FAILURES: [&str; 11] =
-    ["failure", "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job", MIX];
+pub const FAILURES: [&str; 12] =
+    ["failure", "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job", PENDING, MIX];
+
+/// The failure of a delayed event that is set off again before it has happened.
+pub const PENDING: &str = "event_pending";
 
 /// The failure of a run in which substances meet that must not.
 const MIX: &str = "incompatible_mix";
@@ -168,16 +171,17 @@ impl<'a> Planner<'a, '_> {
     /// A condition with what it compares, the names of parameters replaced by those of the instances given where that is `named`.
     fn condition_with(&mut self, e: &'a Expr, scope: &mut Scope, named: bool) -> Option<Condition> {
         self.lab.comparisons.clear();
-        self.lab.terms.clear();
+        self.lab.terms = Some(Vec::new());
         self.lab.asked_of.clear();
         self.lab.absent.clear();
-        let node = self.lab.truth(e, scope)?;
+        let node = self.lab.truth(e, scope);
+        let terms = self.lab.terms.take().unwrap_or_default();
+        let node = node?;
         let absent = std::mem::take(&mut self.lab.absent);
         if !absent.is_empty() {
             self.lab.absent_in.insert(e.span, absent);
         }
         let compared = std::mem::take(&mut self.lab.comparisons);
-        let terms = std::mem::take(&mut self.lab.terms);
         let each = std::mem::take(&mut self.lab.asked_of);
         let given: &[(String, Value)] = if named { &scope.vars } else { &[] };
         let each = each.into_iter().map(|asked| {

@@ -1,6 +1,6 @@
 //! Capabilities and assets: members, defaults, and what concrete types say of themselves.
 
-use crate::ast::{AssetLine, Item, ItemKind, Member, MemberKind, Path, Role};
+use crate::ast::{AssetLine, Delay, Item, ItemKind, Member, MemberKind, Path, Role};
 
 use super::calls;
 use super::markdown::{cell, code, line, paragraphs, table};
@@ -37,7 +37,12 @@ pub fn capability(library: &Library, module: &Module, item: &Item) -> String {
             }
             MemberKind::Event(e) => {
                 let when = module.shown(e.when.span);
-                out += &told(&format!("Event `{}` when `{when}`", e.name.text), &member.docs);
+                let how = |d: &Delay| {
+                    let word = if d.sustained { "for" } else { "after" };
+                    format!(" {word} `{}`", module.shown(d.time.span))
+                };
+                let delay = e.delay.as_ref().map(how).unwrap_or_default();
+                out += &told(&format!("Event `{}` when `{when}`{delay}", e.name.text), &member.docs);
             }
             MemberKind::Limit { at_end, cond, refusal } => {
                 let how = if *at_end { "At the end" } else { "Always" };

@@ -579,10 +579,21 @@ pub struct Event {
     pub name: Name,
     /// Over what; empty for the instance itself.
     pub params: Vec<Param>,
-    /// When it happens.
+    /// What sets it off as it becomes true.
     pub when: Expr,
+    /// How much later it happens.
+    pub delay: Option<Delay>,
     /// What happens.
     pub laws: Vec<Law>,
+}
+
+/// `for TIME` or `after TIME` behind the condition of an event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Delay {
+    /// `for`: the condition has to hold all the while.
+    pub sustained: bool,
+    /// How long.
+    pub time: Expr,
 }
 
 /// A line of a law body.

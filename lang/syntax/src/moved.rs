@@ -95,7 +95,8 @@ parts! {
     Grid { name from to literal at pitch row }
     Member { docs kind span }
     Process { name params guard laws }
-    Event { name params when laws }
+    Event { name params when delay laws }
+    Delay { sustained time }
     Law { kind span }
     Text { parts span }
     Type { paths words argument optional condition span }

@@ -51,7 +51,7 @@ impl Engine<'_> {
                 self.cancel = None;
                 return Ok(Advance::Watch(Vec::new()));
             }
-            self.release(observer);
+            self.release(observer)?;
             self.prepare(observer)?;
             if !self.due.events.is_empty() {
                 self.settle(None, observer)?;
@@ -90,6 +90,9 @@ impl Engine<'_> {
                 return Ok(Left::Jump(jumps));
             }
             match who {
+                Who::Part(id) if self.course.parts.get(id).is_some_and(|part| part.next_show().is_some()) => {
+                    self.show_within(id, observer)?;
+                }
                 Who::Part(id) => {
                     self.step(id, observer)?;
                     if self.is_cancelled() || observer.stops() {
@@ -116,7 +119,8 @@ impl Engine<'_> {
         match who {
             Who::Part(id) => {
                 let ending = self.course.parts.get(id).and_then(|part| part.ending());
-                matches!(ending, Some(Ending::Crossed(_)))
+                let is_within = self.course.parts.get(id).is_some_and(|part| part.next_show().is_some());
+                !is_within && matches!(ending, Some(Ending::Crossed(_)))
             }
             Who::Lookout(id) | Who::Sooner(id) => {
                 let lookout = self.course.lookouts.get(id);
@@ -149,6 +153,24 @@ impl Engine<'_> {
                 self.look_out(lookout)?;
             }
         }
+        Ok(())
+    }
+
+    /// Shows the curves of a part within its step to who wants them; nothing else comes of it.
+    fn show_within(&mut self, id: u32, observer: &mut dyn Observer) -> Result<(), Fault> {
+        let Some(part) = self.course.parts.get_mut(id) else { return Ok(()) };
+        let Some(time) = part.next_show() else { return Ok(()) };
+        let lab = part.due();
+        part.reach(time, &mut self.states);
+        self.arrive(lab);
+        let Some(part) = self.course.parts.get(id) else { return Ok(()) };
+        let memo = self.memo.get_mut();
+        for &state in part.moving() {
+            memo.change_all(&self.index.users, self.index.leaves(state));
+        }
+        self.check_states(part.moving())?;
+        observer.curve(self.time, self, part.moving());
+        self.course.shown(id);
         Ok(())
     }
 

@@ -189,6 +189,25 @@ impl Analysis<'_> {
         self.graph.op(node)
     }
 
+    /// The operations that a value is computed from within the segment; none where it is a leaf, or does not change.
+    pub(super) fn below(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        let operands = self.varies(node).then(|| self.graph.op(node).operands());
+        operands.into_iter().flatten().map(|operand| self.same(operand))
+    }
+
+    /// The operation that has the value of this one throughout the segment.
+    pub(super) fn same(&self, node: NodeId) -> NodeId {
+        NodeId(self.fact(node).same)
+    }
+
+    /// The moving state that an operation is.
+    pub(super) fn moving_state(&self, node: NodeId) -> Option<u32> {
+        match self.graph.op(node) {
+            Op::State(state) if self.varies(node) => Some(state),
+            _ => None,
+        }
+    }
+
     fn fact(&self, node: NodeId) -> Fact {
         self.facts[node.0 as usize]
     }

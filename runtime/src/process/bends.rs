@@ -169,7 +169,7 @@ fn differences(bends: &[Bend], law: &Tape, values: &[f64], registers: &mut [f64]
 }
 
 /// The control points of the Bernstein form of a polynomial that is given at [`POINTS`]: it lies between the least and the greatest.
-fn control(sampled: Vector6<f64>) -> Vector6<f64> {
+pub(super) fn control(sampled: Vector6<f64>) -> Vector6<f64> {
     static FROM_SAMPLES: OnceLock<Matrix6<f64>> = OnceLock::new();
     let matrix = FROM_SAMPLES.get_or_init(|| {
         const CHOICES: [f64; 6] = [1.0, 5.0, 10.0, 10.0, 5.0, 1.0];

@@ -142,14 +142,16 @@ pub(super) struct Course {
     pub(super) noticing: Vec<BTreeSet<u32>>,
     /// Parts of which no step beyond the present one was taken when they were last looked at.
     short: BTreeSet<u32>,
+    /// Whether the curves of steps are shown.
+    curves: bool,
     /// Whether steps of many parts are taken on several threads.
     is_shared: bool,
 }
 
 impl Course {
     /// Of so many states, none of which moves.
-    pub(super) fn new(states: usize, is_shared: bool) -> Self {
-        Course { part_of: vec![NOWHERE; states], is_shared, ..Course::default() }
+    pub(super) fn new(states: usize, is_shared: bool, curves: bool) -> Self {
+        Course { part_of: vec![NOWHERE; states], is_shared, curves, ..Course::default() }
     }
 
     /// Takes a part in.
@@ -207,16 +209,25 @@ impl Course {
     pub(super) fn enqueue_part(&mut self, id: u32) -> Result<(), super::integrator::Stuck> {
         self.run_short(id);
         let Some(part) = self.parts.get_mut(id) else { return Ok(()) };
-        part.step()?;
+        if part.step()? && self.curves {
+            part.show_within();
+        }
         if part.is_short() {
             self.short.insert(id);
         }
-        let until = part.until();
-        self.queue.set(Who::Part(id), until);
+        let due = part.due();
+        self.queue.set(Who::Part(id), due);
         for lookout in self.lookouts_on(id) {
             self.enqueue_lookout(lookout);
         }
         Ok(())
+    }
+
+    /// The curves of a part were shown within its step.
+    pub(super) fn shown(&mut self, id: u32) {
+        if let Some(part) = self.parts.get(id) {
+            self.queue.set(Who::Part(id), part.due());
+        }
     }
 
     /// Where a part has no more steps, many others may be about to have none: all of them take theirs at once. A step is the same

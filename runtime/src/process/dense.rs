@@ -75,6 +75,16 @@ impl Dense {
         (1..DEGREE).map(|k| self.time(k))
     }
 
+    /// How far the curve of a state, by its place, lies from the straight line between its ends at most, and its least and greatest value; as
+    /// its points show it.
+    pub(super) fn bulge(&self, place: usize) -> (f64, f64, f64) {
+        let at = |k: usize| self.values[k][place];
+        let line = |k: usize| at(0) + POINTS[k] * (at(DEGREE) - at(0));
+        (0..=DEGREE).fold((0.0, f64::INFINITY, f64::NEG_INFINITY), |(bulge, least, most): (f64, f64, f64), k| {
+            (bulge.max((at(k) - line(k)).abs()), least.min(at(k)), most.max(at(k)))
+        })
+    }
+
     /// The moving states at the local `time`, s, within the interval.
     pub(super) fn at(&self, time: f64, out: &mut [f64]) {
         match self.shares(time) {

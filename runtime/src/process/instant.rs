@@ -21,7 +21,7 @@ impl Engine<'_> {
     /// processes that began or ceased. `cause` is shown where a balance breaks.
     pub(super) fn settle(&mut self, cause: Option<Span>, observer: &mut dyn Observer) -> Result<(), Fault> {
         let (mut fired, mut ready) = (BTreeMap::new(), BTreeSet::new());
-        while let Some(event) = self.next_event(&mut ready) {
+        while let Some(event) = self.next_event(&mut ready)? {
             let times: &mut usize = fired.entry(event).or_default();
             *times += 1;
             if *times > self.options.max_events_per_instant {
@@ -37,7 +37,7 @@ impl Engine<'_> {
             }
             self.judge_instant(&format!("`{}`", of.name), Some(of.span))?;
         }
-        self.report_processes(observer);
+        self.report_processes(observer)?;
         if !self.unshown.is_empty() {
             self.show(observer);
             self.check_temperatures()?;
@@ -50,10 +50,12 @@ impl Engine<'_> {
     }
 
     /// The first event whose condition has become true since it was last looked at; `ready` are those that wait for their turn.
-    fn next_event(&mut self, ready: &mut BTreeSet<u32>) -> Option<u32> {
+    fn next_event(&mut self, ready: &mut BTreeSet<u32>) -> Result<Option<u32>, Fault> {
         self.digest();
         for event in std::mem::take(&mut self.due.events) {
-            let now = self.truth(self.model.events[event as usize].when);
+            let of = &self.model.events[event as usize];
+            self.within_tables(of.when, &of.name, of.span)?;
+            let now = self.truth(of.when);
             if !now {
                 self.armed[event as usize] = false;
             }
@@ -63,9 +65,11 @@ impl Engine<'_> {
                 ready.remove(&event);
             }
         }
-        let next = ready.pop_first()?;
-        self.armed[next as usize] = true;
-        Some(next)
+        let next = ready.pop_first();
+        if let Some(next) = next {
+            self.armed[next as usize] = true;
+        }
+        Ok(next)
     }
 
     fn cascade(&self, event: u32) -> Fault {
@@ -77,16 +81,19 @@ impl Engine<'_> {
             .help("events that make each other's condition true never come to rest")
     }
 
-    fn report_processes(&mut self, observer: &mut dyn Observer) {
+    fn report_processes(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         self.digest();
         for process in std::mem::take(&mut self.due.processes) {
             let i = process as usize;
+            let of = &self.model.processes[i];
+            of.guard.map_or(Ok(()), |guard| self.within_tables(guard, &of.name, of.span))?;
             let running = self.model.processes[i].guard.is_none_or(|g| self.truth(g));
             if running != self.running[i] {
                 self.running[i] = running;
                 observer.process(self.time, i, running);
             }
         }
+        Ok(())
     }
 
     /// Performs one action; `who` does, where that is not the step under way.
@@ -182,10 +189,10 @@ impl Engine<'_> {
     }
 
     /// Equalities that were true at one instant only are false again.
-    pub(super) fn release(&mut self, observer: &mut dyn Observer) {
+    pub(super) fn release(&mut self, observer: &mut dyn Observer) -> Result<(), Fault> {
         let touches = std::mem::take(&mut self.touches);
         if touches.is_empty() {
-            return;
+            return Ok(());
         }
         self.memo.get_mut().unpin(&self.index.users);
         let (due, mut events) = (&mut self.due, Vec::new());
@@ -197,7 +204,7 @@ impl Engine<'_> {
         for i in events {
             self.armed[i] = self.armed[i] && self.truth(self.model.events[i].when);
         }
-        self.report_processes(observer);
+        self.report_processes(observer)
     }
 
     /// Counts the crossing of `node`; too many in too short a time are a fault.

@@ -67,22 +67,18 @@ impl Lookout {
             self.until = f64::INFINITY;
             return Ok(());
         }
-        let (clock, from, times) = match self.parts[..] {
-            [] => (Clock::LAB, now, vec![now + LOOK]),
+        let (clock, from, end) = match self.parts[..] {
+            [] => (Clock::LAB, now, now + LOOK),
             [part] => {
                 let Some(part) = parts.get(part) else { return Ok(()) };
                 let dense = part.dense();
                 let at = dense.clock.local(now).max(part.at()).min(dense.end);
-                let inner = dense.times().filter(|&t| t > at && t < dense.end);
-                (dense.clock, at, inner.chain([dense.end]).collect())
+                (dense.clock, at, dense.end)
             }
             _ => {
                 let denses = self.parts.iter().filter_map(|p| parts.get(*p)).map(Part::dense);
                 let end = denses.clone().map(|d| d.clock.lab(d.end)).fold(f64::INFINITY, f64::min);
-                let times = denses.flat_map(|d| d.times().map(|t| d.clock.lab(t)));
-                let mut times: Vec<f64> = times.filter(|&t| t > now && t < end).chain([end]).collect();
-                times.sort_by(f64::total_cmp);
-                (Clock::LAB, now, times)
+                (Clock::LAB, now, end)
             }
         };
         let places = &self.places;
@@ -93,8 +89,7 @@ impl Lookout {
                 dense.some(local.clamp(dense.start, dense.end), &[*place], std::slice::from_mut(out));
             }
         };
-        let end = times.last().copied().unwrap_or(from);
-        let found = self.switches.first_crossing(clock, from, times.into_iter(), &mut self.values, &mut path)?;
+        let found = self.switches.first_crossing(clock, (from, end), &mut self.values, &mut path)?;
         self.found = found.map(|crossing| (crossing, clock));
         self.until = clock.lab(found.map_or(end, |crossing| crossing.time));
         Ok(())

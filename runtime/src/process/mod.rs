@@ -83,6 +83,8 @@ pub struct Options {
     pub max_events_per_instant: usize,
     /// Whether parts that have nothing to do with each other are followed on several threads, where there are many. It changes no bit.
     pub is_shared: bool,
+    /// Whether [`Observer::curve`] is called; it changes no bit of a result either.
+    pub curves: bool,
 }
 
 impl Options {
@@ -94,7 +96,7 @@ impl Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Options { rtol: 1e-8, max_events_per_instant: 1000, is_shared: true }
+        Options { rtol: 1e-8, max_events_per_instant: 1000, is_shared: true, curves: false }
     }
 }
 
@@ -103,6 +105,9 @@ pub trait Observer {
     /// After each step of a part and before and after each discontinuity: two samples at one time are possible. `changed` are the
     /// states, ascending, that may differ from when they were last shown; all others follow the way they were on.
     fn sample(&mut self, time: f64, engine: &Engine<'_>, changed: &[u32]);
+    /// Within a step of a part, where [`Options::curves`] asks for it: states, ascending, that are on a curve there. Straight lines between
+    /// all that is shown of a state lie close to it.
+    fn curve(&mut self, _time: f64, _engine: &Engine<'_>, _changed: &[u32]) {}
     /// An event has fired, by its index in the model.
     fn event(&mut self, time: f64, event: usize);
     /// A process has begun or ceased to run, by its index in the model.
@@ -169,6 +174,8 @@ pub struct Engine<'m> {
     sizes: Vec<f64>,
     /// Set from outside to leave off early, once.
     cancel: Option<&'m AtomicBool>,
+    /// Conditions of events and processes that tables stand in.
+    tables: BTreeSet<NodeId>,
     /// Truth of each event's condition when last looked at.
     armed: Vec<bool>,
     /// Which processes run.
@@ -202,12 +209,13 @@ impl<'m> Engine<'m> {
             index: Index::new(model, []),
             facts: Facts::new(&model.graph),
             moving: vec![false; model.states.len()],
-            course: Course::new(model.states.len(), options.is_shared),
+            course: Course::new(model.states.len(), options.is_shared, options.curves),
             due: Due::default(),
             watching: BTreeSet::new(),
             suspects: Vec::new(),
             sizes: vec![0.0; model.states.len()],
             cancel: None,
+            tables: with_tables(model),
             armed: vec![false; model.events.len()],
             running: vec![false; model.processes.len()],
             touches: Vec::new(),
@@ -358,7 +366,7 @@ impl<'m> Engine<'m> {
     /// Performs `actions` in order, then fires the events that became true. Fails on a transfer that cannot be made, a
     /// number that is not finite, a cascade without end or a balance that does not close.
     pub fn apply(&mut self, actions: &[Action], observer: &mut dyn Observer) -> Result<(), Fault> {
-        self.release(observer);
+        self.release(observer)?;
         self.expose(actions, observer);
         for action in actions {
             self.perform(action, None, observer)?;
@@ -422,4 +430,16 @@ impl<'m> Engine<'m> {
         }
         Ok(())
     }
+}
+
+/// Conditions of events and processes that a table stands in: what it is beyond its ends is not a number.
+fn with_tables(model: &Model) -> BTreeSet<NodeId> {
+    let gap = |n: NodeId| model.graph.constant(n).is_some_and(f64::is_nan);
+    let is_table = |op: &Op| matches!(*op, Op::Select(_, _, beyond) if gap(beyond));
+    if !model.graph.ops().iter().any(is_table) {
+        return BTreeSet::new();
+    }
+    let guards = model.processes.iter().filter_map(|process| process.guard);
+    let all = model.events.iter().map(|event| event.when).chain(guards);
+    all.filter(|condition| model.graph.schedule([*condition]).iter().any(|n| is_table(&model.graph.op(*n)))).collect()
 }

@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::{NodeId, Op};
+use rustc_hash::FxHashMap;
 
 use super::analysis::Analysis;
 use super::tape::Tape;
@@ -75,25 +76,117 @@ impl Together {
     }
 }
 
+/// A walk from the rates of states, which comes by each operation once: what several rates share is looked at for the first of them.
+#[derive(Default)]
+pub(super) struct Walk {
+    /// By operation, one of the moving states below it.
+    below: FxHashMap<NodeId, Option<u32>>,
+}
+
+impl Walk {
+    /// Moving states below `rate`: all of them, or for what the walk has come by before one that moves together with the others.
+    pub(super) fn from(&mut self, analysis: Analysis<'_>, rate: NodeId) -> Vec<u32> {
+        let mut found = Vec::new();
+        let mut todo = vec![(analysis.same(rate), false)];
+        while let Some((node, is_ready)) = todo.pop() {
+            if let Some(known) = self.below.get(&node) {
+                found.extend(*known);
+                continue;
+            }
+            match analysis.moving_state(node) {
+                Some(state) => _ = self.below.insert(node, Some(state)),
+                None if is_ready => {
+                    let one = analysis.below(node).find_map(|n| self.below.get(&n).copied().flatten());
+                    self.below.insert(node, one);
+                }
+                None => {
+                    todo.push((node, true));
+                    todo.extend(analysis.below(node).map(|n| (n, false)));
+                    continue;
+                }
+            }
+            found.extend(self.below.get(&node).copied().flatten());
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+}
+
+/// The parts that the moving states below an operation belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Parts {
+    None,
+    One(u32),
+    Several,
+}
+
+impl Parts {
+    fn and(self, other: Parts) -> Parts {
+        match (self, other) {
+            (Parts::None, one) | (one, Parts::None) => one,
+            (a, b) if a == b => a,
+            _ => Parts::Several,
+        }
+    }
+}
+
+/// The parts below operations, as far as they were asked for: each is worked out once, as long as neither law nor parts change.
+#[derive(Default)]
+pub(super) struct PartsBelow {
+    known: FxHashMap<NodeId, Parts>,
+}
+
+impl PartsBelow {
+    fn of(&mut self, analysis: Analysis<'_>, node: NodeId, part_of: &[u32]) -> Parts {
+        let node = analysis.same(node);
+        let mut todo = vec![(node, false)];
+        while let Some((at, is_ready)) = todo.pop() {
+            if self.known.contains_key(&at) {
+                continue;
+            }
+            let below = || analysis.below(at);
+            match analysis.moving_state(at) {
+                Some(state) => _ = self.known.insert(at, Parts::One(part_of[state as usize])),
+                None if is_ready => {
+                    let all = below().filter_map(|n| self.known.get(&n).copied()).fold(Parts::None, Parts::and);
+                    self.known.insert(at, all);
+                }
+                None => {
+                    todo.push((at, true));
+                    todo.extend(below().map(|n| (n, false)));
+                }
+            }
+        }
+        self.known.get(&node).copied().unwrap_or(Parts::Several)
+    }
+}
+
 /// Comparisons by the parts that they rest on; those that cannot change as they are now are left out.
-pub(super) fn groups(analysis: Analysis<'_>, nodes: &[NodeId], part_of: &[u32]) -> Vec<Group> {
-    let mut found: BTreeMap<Vec<u32>, Group> = BTreeMap::new();
+pub(super) fn groups(
+    analysis: Analysis<'_>,
+    nodes: &[NodeId],
+    part_of: &[u32],
+    below: &mut PartsBelow,
+) -> Vec<(Vec<u32>, Vec<NodeId>)> {
+    let mut found: BTreeMap<Vec<u32>, Vec<NodeId>> = BTreeMap::new();
     for &node in nodes {
         let Op::Binary(_, a, b) = analysis.op(node) else { continue };
         if !(analysis.varies(a) || analysis.varies(b)) {
             continue;
         }
-        let states = analysis.states_below(&[a, b]);
-        let mut parts: Vec<u32> = states.iter().map(|s| part_of[*s as usize]).collect();
-        parts.sort_unstable();
-        parts.dedup();
-        let group = found.entry(parts.clone()).or_insert_with(|| Group { parts, ..Group::default() });
-        group.nodes.push(node);
-        group.states.extend(states);
+        let [one, other] = [a, b].map(|side| below.of(analysis, side, part_of));
+        let parts = match one.and(other) {
+            Parts::None => Vec::new(),
+            Parts::One(part) => vec![part],
+            Parts::Several => {
+                let mut parts: Vec<u32> = analysis.states_below(&[a, b]).iter().map(|s| part_of[*s as usize]).collect();
+                parts.sort_unstable();
+                parts.dedup();
+                parts
+            }
+        };
+        found.entry(parts).or_default().push(node);
     }
-    for group in found.values_mut() {
-        group.states.sort_unstable();
-        group.states.dedup();
-    }
-    found.into_values().collect()
+    found.into_iter().collect()
 }

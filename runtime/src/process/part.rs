@@ -10,6 +10,13 @@ use super::mode::Piece;
 use super::suspicion::{Scarce, first_drained};
 use super::switch::{Crossing, Switches, Unseen};
 
+/// So far may straight lines between the points of a step that are shown lie from its curves, as a share of what a state has spanned: a
+/// small part of what recordings promise.
+const CLOSE: f64 = 1.5e-4;
+
+/// A step is shown in so many pieces at most.
+const MOST_SHOWN: f64 = 100.0;
+
 /// What ends the law of a part within a step; times are s on the clock of the step.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ending {
@@ -42,6 +49,10 @@ pub(super) struct Part {
     at: f64,
     /// What its states are there.
     values: Vec<f64>,
+    /// Where within the leg its curves are shown, s on its clock, the next one last.
+    shows: Vec<f64>,
+    /// The least and the greatest value of each of its states so far, where curves are shown.
+    spans: Vec<(f64, f64)>,
     /// A state was set from outside: what is known of the solution is wrong.
     pub(super) is_broken: bool,
 }
@@ -65,17 +76,15 @@ impl Sight {
 
     /// The first thing that ends the law in a step, from `from` on, s on the clock of the step.
     fn look(&mut self, dense: &Dense, from: f64) -> Option<Ending> {
-        let mut times: Vec<f64> = dense.times().filter(|&t| t > from && t < dense.end).collect();
-        times.push(dense.end);
         let (switches, places) = (&mut self.switches, &self.places);
         let mut path = |time, out: &mut [f64]| dense.some(time, places, out);
-        let found = switches.first_crossing(dense.clock, from, times.iter().copied(), &mut self.values, &mut path);
+        let found = switches.first_crossing(dense.clock, (from, dense.end), &mut self.values, &mut path);
         let crossing = match found {
             Ok(crossing) => crossing,
             Err(Unseen(node)) => return Some(Ending::Unseen(node)),
         };
         let end = crossing.map_or(dense.end, |c| c.time);
-        times.retain(|&t| t < end);
+        let mut times: Vec<f64> = dense.times().filter(|&t| t > from && t < end).collect();
         times.push(end);
         let drained = first_drained(dense, &self.scarce, from, &times);
         drained.map(|(time, which)| Ending::Drained(time, which)).or(crossing.map(Ending::Crossed))
@@ -88,7 +97,8 @@ impl Part {
         let leg = Leg { dense: integrator.begin(), ending: None };
         let sight = Sight::new(Switches::none(), Vec::new(), scarce);
         let values = vec![0.0; integrator.moving.len()];
-        Part { integrator, sight, leg, ahead: VecDeque::new(), stuck: None, at: 0.0, values, is_broken: false }
+        let (ahead, shows, spans) = (VecDeque::new(), Vec::new(), Vec::new());
+        Part { integrator, sight, leg, ahead, stuck: None, at: 0.0, values, shows, spans, is_broken: false }
     }
 
     /// Whether its solution goes on under the law of `piece`.
@@ -160,6 +170,34 @@ impl Part {
         self.leg = self.ahead.pop_front().ok_or(self.stuck.unwrap_or(Stuck::Short))?;
         self.at = self.leg.dense.start;
         Ok(true)
+    }
+
+    /// Shows the step that has just begun at so many points within it that straight lines from one to the next stay as close to its
+    /// curves as [`CLOSE`].
+    pub(super) fn show_within(&mut self) {
+        let dense = &self.leg.dense;
+        self.spans.resize(self.integrator.moving.len(), (f64::INFINITY, f64::NEG_INFINITY));
+        let mut pieces = 1.0_f64;
+        for (place, span) in (0..).zip(&mut self.spans) {
+            let (bulge, least, most) = dense.bulge(place);
+            *span = (span.0.min(least), span.1.max(most));
+            let size = span.1 - span.0;
+            if bulge > CLOSE * size {
+                pieces = pieces.max((bulge / (CLOSE * size)).sqrt().ceil());
+            }
+        }
+        let (from, length, pieces) = (dense.start, dense.end - dense.start, pieces.min(MOST_SHOWN));
+        self.shows = (1..pieces as u32).rev().map(|k| from + length * f64::from(k) / pieces).collect();
+    }
+
+    /// Where its curves are shown next within the present step, s on its clock.
+    pub(super) fn next_show(&self) -> Option<f64> {
+        self.shows.iter().rev().copied().find(|time| *time > self.at).filter(|time| *time < self.limit())
+    }
+
+    /// When it is to be gone on with: where its curves are shown next, or at the end of its step; s of lab time.
+    pub(super) fn due(&self) -> f64 {
+        self.next_show().map_or_else(|| self.until(), |time| self.leg.dense.clock.lab(time))
     }
 
     /// Whether the present step is the last one that was taken, and more can be.

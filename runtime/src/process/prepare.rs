@@ -9,7 +9,7 @@ use super::course::Who;
 use super::index::Root;
 use super::integrator::{Integrator, STEP_SHARE};
 use super::lookout::Lookout;
-use super::mode::{Group, NOWHERE, Piece, Together, groups};
+use super::mode::{Group, NOWHERE, PartsBelow, Piece, Together, Walk, groups};
 use super::part::Part;
 use super::switch::{Switches, Unseen};
 use super::tolerance::Tolerance;
@@ -155,9 +155,9 @@ impl Engine<'_> {
         }
         let altered = |root: &u32| facts.is_altered(self.index.root(*root).1);
         concerned.sights.extend(region.roots.iter().copied().filter(altered));
-        let mut lookouts = Vec::new();
+        let (mut lookouts, mut below) = (Vec::new(), PartsBelow::default());
         for root in std::mem::take(&mut concerned.sights) {
-            lookouts.extend(self.sight(known, root, concerned));
+            lookouts.extend(self.sight((known, &mut below), root, concerned));
         }
         for &part in &concerned.parts {
             self.sight_of(known, part);
@@ -192,8 +192,9 @@ impl Engine<'_> {
             todo.extend(self.course.parts.get(*part).into_iter().flat_map(|part| part.moving()));
         }
         todo.retain(|state| self.moving[*state as usize] && together.add(*state));
+        let mut walk = Walk::default();
         while let Some(state) = todo.pop() {
-            for other in rate(state).map(|rate| known.states_below(&[rate])).unwrap_or_default() {
+            for other in rate(state).map(|rate| walk.from(known, rate)).unwrap_or_default() {
                 if together.add(other) {
                     todo.push(other);
                     let part = part_of[other as usize];
@@ -282,7 +283,12 @@ impl Engine<'_> {
 
     /// Finds what a root looks out for. What a single part decides is left to that part, unless only the caller asks for it; for the
     /// rest there are lookouts, which are returned.
-    fn sight(&mut self, known: Analysis<'_>, root: u32, concerned: &mut Concerned) -> Vec<u32> {
+    fn sight(
+        &mut self,
+        (known, below): (Analysis<'_>, &mut PartsBelow),
+        root: u32,
+        concerned: &mut Concerned,
+    ) -> Vec<u32> {
         let before = std::mem::take(self.course.sights(root));
         for part in before.parts {
             self.course.noticing(part).remove(&root);
@@ -298,19 +304,23 @@ impl Engine<'_> {
         if let (Root::Limit(i), true) = (kind, known.feels(node)) {
             self.limits.due.insert(i);
         }
-        let found = groups(known, &known.switches([node]), &self.course.part_of);
+        let found = groups(known, &known.switches([node]), &self.course.part_of, below);
         let mut sights = super::course::Sights::default();
-        for group in found {
-            for &part in &group.parts {
+        for (parts, nodes) in found {
+            for &part in &parts {
                 sights.parts.insert(part);
                 self.course.noticing(part).insert(root);
             }
-            match group.parts[..] {
+            match parts[..] {
                 [part] if kind != Root::Watch => {
-                    sights.own.extend(group.nodes.iter().map(|node| (part, *node)));
+                    sights.own.extend(nodes.iter().map(|node| (part, *node)));
                     concerned.parts.insert(part);
                 }
-                _ => sights.lookouts.push(self.lookout(known, root, group)),
+                _ => {
+                    let sides: Vec<NodeId> = nodes.iter().flat_map(|node| known.op(*node).operands()).collect();
+                    let group = Group { parts, states: known.states_below(&sides), nodes };
+                    sights.lookouts.push(self.lookout(known, root, group));
+                }
             }
         }
         let lookouts = sights.lookouts.clone();

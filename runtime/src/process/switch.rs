@@ -4,9 +4,14 @@ use matterix_ir::graph::binary;
 use matterix_ir::interval::Interval;
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
+use nalgebra::Vector6;
+
 use super::analysis::Analysis;
+use super::bends::control;
 use super::clock::Clock;
+use super::dense::POINTS;
 use super::tape::{Step, Tape};
+use super::timed::kind;
 
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
@@ -20,11 +25,14 @@ const NARROW: f64 = 1e-6;
 /// So many pieces of the way between two points are looked at before it is given up where a side is a wave.
 const MOST_PIECES: usize = 20_000;
 
-/// The same where a side only may turn round, as a magnitude: sides that go together are never told apart piece by piece.
-const FEW_PIECES: usize = 500;
+/// The same where a side only may turn round, as a product: sides that go together are never told apart piece by piece.
+const FEW_PIECES: usize = 200;
 
-/// A state may go beyond its values at the ends and in the middle of a piece by this share of their distance.
-const BULGE: f64 = 0.5;
+/// Pieces of a polynomial that are looked at.
+const MOST_HALVES: usize = 200;
+
+/// A polynomial is halved no further than to this share of its piece.
+const FINEST: f64 = 1e-12;
 
 /// A comparison that may change unseen.
 #[derive(Clone, Copy, Debug)]
@@ -48,9 +56,28 @@ impl Switch {
         }
     }
 
+    /// The sign that left minus right has while the comparison keeps its truth; none where it is true at one instant only.
+    fn keeps(&self) -> Option<f64> {
+        match self.op {
+            BinaryOp::Lt | BinaryOp::Le => Some(if self.truth { -1.0 } else { 1.0 }),
+            _ if self.truth || self.side == 0.0 => None,
+            _ => Some(self.side),
+        }
+    }
+
     fn clearly_changed(&self, left: f64, right: f64) -> bool {
         self.changed(left, right) && (left - right).abs() > NOISE * left.abs().max(right.abs())
     }
+}
+
+/// Left minus right of a comparison at the points of a piece.
+#[derive(Clone, Copy, Debug, Default)]
+struct Apart {
+    by: Vector6<f64>,
+    /// Differences below this are rounding.
+    noise: f64,
+    /// Whether the comparison has clearly changed there.
+    changed: [bool; POINTS.len()],
 }
 
 /// The comparisons to be watched during one segment.
@@ -59,6 +86,10 @@ pub(super) struct Switches {
     tape: Tape,
     list: Vec<Switch>,
     registers: Vec<f64>,
+    /// Whether the sides of each comparison follow states and time in straight lines.
+    straight: Vec<bool>,
+    /// How far the sides of each are apart in the piece that was sampled last.
+    apart: Vec<Apart>,
     /// Which time the path counts.
     clock: Clock,
     /// The first instant at which a comparison of time itself changes, s; infinite if none does.
@@ -67,7 +98,7 @@ pub(super) struct Switches {
     folded: Folded,
 }
 
-/// The comparisons that may change and change back between two points: one side is a wave, a square, a magnitude.
+/// The comparisons that may change and change back between two points: one side is a wave, a product, a magnitude.
 #[derive(Clone, Debug, Default)]
 struct Folded {
     /// By their place among the comparisons.
@@ -77,8 +108,8 @@ struct Folded {
     /// Their sides, in the same order.
     tape: Tape,
     bounds: Vec<Interval>,
-    /// Values of the moving states at the ends and in the middle of a piece.
-    ends: [Vec<f64>; 3],
+    /// Values of the moving states at the points of a piece.
+    ends: [Vec<f64>; POINTS.len()],
 }
 
 /// A comparison that has just changed.
@@ -123,7 +154,9 @@ impl Switches {
         }
         switches.tape = analysis.tape(&sides, moving);
         switches.registers = switches.tape.registers();
-        if switches.tape.steps.iter().any(folds) {
+        let curved = curved(&switches.tape);
+        switches.straight = (0..switches.list.len()).map(|i| !curved[2 * i] && !curved[2 * i + 1]).collect();
+        if switches.straight.contains(&false) {
             switches.fold(&analysis, &sides, moving);
         }
         switches
@@ -141,8 +174,8 @@ impl Switches {
 
     /// Finds the comparisons that may turn round.
     fn fold(&mut self, analysis: &Analysis<'_>, sides: &[NodeId], moving: &[u32]) {
-        let (turns, wavy) = (self.tape.rests_on(folds), self.tape.rests_on(is_wave));
-        let list: Vec<usize> = (0..self.list.len()).filter(|i| turns[2 * i] || turns[2 * i + 1]).collect();
+        let wavy = self.tape.rests_on(is_wave);
+        let list: Vec<usize> = (0..self.list.len()).filter(|i| !self.straight[*i]).collect();
         let waves = list.iter().map(|i| wavy[2 * i] || wavy[2 * i + 1]).collect();
         let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
         let tape = analysis.tape(&sides, moving);
@@ -160,45 +193,77 @@ impl Switches {
         (at(2 * i), at(2 * i + 1))
     }
 
-    /// The earliest change of any comparison between `from` and the last of `times` (ascending, s on `clock`), located to a
-    /// few units of rounding of that time. `path` gives the moving states.
+    /// The earliest change of any comparison in `piece`, s on `clock`, in which `path`, the moving states, is a polynomial; located to
+    /// a few units of rounding of the time.
     pub(super) fn first_crossing(
         &mut self,
         clock: Clock,
-        from: f64,
-        times: impl Iterator<Item = f64>,
+        piece: Interval,
         moving: &mut [f64],
         path: &mut dyn FnMut(f64, &mut [f64]),
     ) -> Result<Option<Crossing>, Unseen> {
-        if self.list.is_empty() {
+        let (from, to) = piece;
+        if self.list.is_empty() || from >= to {
             return Ok(None);
         }
         self.clock = clock;
-        let mut low = from;
-        for high in times {
-            path(high, moving);
-            self.run(high, moving);
-            let changed: Vec<usize> =
-                (0..self.list.len()).filter(|&i| self.is_changed(i, Switch::clearly_changed)).collect();
-            let mut located: Vec<(f64, usize)> = Vec::new();
-            for i in changed {
-                located.push((self.locate(i, low, high, moving, path), i));
+        self.sample(piece, moving, path);
+        let mut located: Vec<(f64, usize)> = Vec::new();
+        for i in 0..self.list.len() {
+            if let Some((before, after)) = self.sampled_change(i) {
+                let [before, after] = [before, after].map(|share| instant(piece, share));
+                located.push((self.locate(i, before, after, moving, path), i));
             }
-            for place in self.open(low, high, path) {
-                let end = located.iter().fold(high, |end, (time, _)| end.min(*time));
-                if let Some(seen) = self.hidden(place, low, end, moving, path)? {
-                    let i = self.folded.list[place];
-                    located.push((self.locate(i, low, seen, moving, path), i));
-                }
-            }
-            if let Some((time, i)) = located.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) {
-                let Switch { node, op, truth, .. } = self.list[i];
-                let time = self.settled(i, time, high, moving, path);
-                return Ok(Some(Crossing { time, node, touch: op == BinaryOp::Eq && !truth }));
-            }
-            low = high;
         }
-        Ok(None)
+        for place in self.open(from, to, path) {
+            let end = located.iter().fold(to, |end, (time, _)| end.min(*time));
+            if let Some((before, after)) = self.hidden(place, from, end, moving, path)? {
+                let i = self.folded.list[place];
+                located.push((self.locate(i, before, after, moving, path), i));
+            }
+        }
+        let first = located.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(first.map(|(time, i)| {
+            let Switch { node, op, truth, .. } = self.list[i];
+            let time = self.settled(i, time, to, moving, path);
+            Crossing { time, node, touch: op == BinaryOp::Eq && !truth }
+        }))
+    }
+
+    /// Notes how far the sides of all comparisons are apart at the points of a piece.
+    fn sample(&mut self, piece: Interval, moving: &mut [f64], path: &mut dyn FnMut(f64, &mut [f64])) {
+        let mut apart = std::mem::take(&mut self.apart);
+        apart.clear();
+        apart.resize(self.list.len(), Apart::default());
+        for (k, share) in POINTS.into_iter().enumerate() {
+            let time = instant(piece, share);
+            path(time, moving);
+            self.run(time, moving);
+            for (i, apart) in apart.iter_mut().enumerate() {
+                let (left, right) = self.sides(i);
+                apart.by[k] = left - right;
+                apart.noise = apart.noise.max(NOISE * left.abs().max(right.abs()));
+                // What is so at the start has been seen before.
+                apart.changed[k] = k > 0 && self.list[i].clearly_changed(left, right);
+            }
+        }
+        self.apart = apart;
+    }
+
+    /// The first change of a comparison within the piece that was sampled last, between two shares of it: of sides that follow the
+    /// states in straight lines exactly, of others as far as the points show it.
+    fn sampled_change(&self, i: usize) -> Option<(f64, f64)> {
+        let apart = &self.apart[i];
+        let seen = || {
+            let k = apart.changed.iter().position(|changed| *changed)?;
+            Some((POINTS[k - 1], POINTS[k]))
+        };
+        match self.list[i].keeps() {
+            Some(sign) if self.straight[i] && apart.by.iter().all(|v| v.is_finite()) => {
+                first_below(sign * apart.by, apart.noise).or_else(seen)
+            }
+            _ => seen(),
+        }
     }
 
     /// The places of comparisons that may turn round somewhere in a piece.
@@ -210,8 +275,8 @@ impl Switches {
         (0..self.folded.list.len()).filter(|place| !self.stays(*place)).collect()
     }
 
-    /// An instant between `low` and `high` at which a comparison that may turn round has changed, the first that is found from
-    /// `low` on; none where its sides stay apart.
+    /// Two instants between `low` and `high`: a comparison that may turn round has changed at the second, and not before the first.
+    /// None where its sides stay apart, as far as the pieces that are looked at show it.
     fn hidden(
         &mut self,
         place: usize,
@@ -219,46 +284,49 @@ impl Switches {
         high: f64,
         moving: &mut [f64],
         path: &mut dyn FnMut(f64, &mut [f64]),
-    ) -> Result<Option<f64>, Unseen> {
+    ) -> Result<Option<Interval>, Unseen> {
         let i = self.folded.list[place];
-        let mut todo = vec![(low, high)];
+        let (mut todo, mut cleared, mut seen) = (vec![(low, high)], low, None);
         let mut pieces = 0;
+        // From left to right, so that nothing comes before what is found.
         while let Some((from, to)) = todo.pop() {
             pieces += 1;
             match self.folded.waves[place] {
                 true if pieces > MOST_PIECES => return Err(Unseen(self.list[i].node)),
-                false if pieces > FEW_PIECES => return Ok(None),
+                false if pieces > FEW_PIECES => break,
                 _ => {}
             }
             self.enclose((from, to), path);
             if self.stays(place) {
+                cleared = to;
+                continue;
+            }
+            if to - from <= NARROW.max(64.0 * rounding(to)) {
                 continue;
             }
             let middle = from + 0.5 * (to - from);
             path(middle, moving);
             self.run(middle, moving);
             if self.is_changed(i, Switch::clearly_changed) {
-                return Ok(Some(middle));
+                // What comes later does not matter any more.
+                (todo, seen) = (Vec::new(), Some(middle));
+            } else {
+                todo.push((middle, to));
             }
-            if to - from > NARROW.max(64.0 * rounding(to)) {
-                todo.extend([(middle, to), (from, middle)]);
-            }
+            todo.push((from, middle));
         }
-        Ok(None)
+        Ok(seen.map(|seen| (cleared, seen)))
     }
 
     /// Bounds the sides of all comparisons that may turn round over a piece.
     fn enclose(&mut self, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
         let Folded { tape, bounds, ends, .. } = &mut self.folded;
         if tape.inputs > 0 {
-            let times = [from, from + 0.5 * (to - from), to];
-            ends.iter_mut().zip(times).for_each(|(values, time)| path(time, values));
+            ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant((from, to), share), values));
         }
-        let [first, middle, last] = &*ends;
-        let states = first.iter().zip(middle).zip(last).map(|((a, b), c)| {
-            let (low, high) = (a.min(*b).min(*c), a.max(*b).max(*c));
-            let more = BULGE * (high - low);
-            (low - more, high + more)
+        let states = (0..ends[0].len()).map(|state| {
+            let points = control(Vector6::from_fn(|k, _| ends[k][state]));
+            (points.min(), points.max())
         });
         tape.enclose((self.clock.lab(from), self.clock.lab(to)), states, bounds);
     }
@@ -358,12 +426,63 @@ fn is_wave(step: &Step) -> bool {
     matches!(step, Step::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor, _))
 }
 
-/// Whether a step may turn round: give the same value before and after it gave others.
-fn folds(step: &Step) -> bool {
-    match *step {
-        Step::Unary(op, _) => matches!(op, UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Abs | UnaryOp::Floor),
-        Step::Binary(BinaryOp::Mul, a, b) => a == b,
-        Step::Binary(op, ..) => op == BinaryOp::Pow,
-        _ => false,
+/// Whether the outputs of a tape follow states and time in more than straight lines.
+fn curved(tape: &Tape) -> Vec<bool> {
+    let first = tape.first_result();
+    let mut kinds = vec![0_u8; first];
+    kinds[tape.time()..].fill(1);
+    for step in &tape.steps {
+        kinds.push(kind(tape, step, &kinds));
     }
+    tape.outputs.iter().map(|output| kinds[*output as usize] > 1).collect()
+}
+
+/// A place of a piece of time, as a share of it.
+fn instant((from, to): Interval, share: f64) -> f64 {
+    if share == 1.0 { to } else { from + share * (to - from) }
+}
+
+/// Where a polynomial that is given at [`POINTS`] first falls below `-noise`, between two shares of the piece: it does not before the first,
+/// and has at the second. By its control points: it lies between the least and the greatest of them (Bernstein form).
+fn first_below(sampled: Vector6<f64>, noise: f64) -> Option<(f64, f64)> {
+    let mut todo = vec![(control(sampled), 0.0, 1.0)];
+    let (mut cleared, mut seen, mut halves) = (0.0, None, 0);
+    while let Some((points, from, to)) = todo.pop() {
+        halves += 1;
+        if points.iter().all(|v| *v >= -noise) {
+            cleared = to;
+            continue;
+        }
+        let is_below = points[5] < -noise;
+        let turns = points.as_slice().windows(2).filter(|pair| (pair[0] < 0.0) != (pair[1] < 0.0)).count();
+        // One change of sign among the control points is one of the polynomial (Descartes).
+        if is_below && (turns == 1 || to - from < FINEST) {
+            return Some((from, to));
+        }
+        if to - from < FINEST || halves > MOST_HALVES {
+            continue;
+        }
+        let (left, right) = halved(points);
+        let middle = from + 0.5 * (to - from);
+        if right[0] < -noise {
+            (todo, seen) = (Vec::new(), Some(middle));
+        } else {
+            todo.push((right, middle, to));
+        }
+        todo.push((left, from, middle));
+    }
+    seen.map(|seen| (cleared, seen))
+}
+
+/// The control points of both halves (de Casteljau).
+fn halved(mut points: Vector6<f64>) -> (Vector6<f64>, Vector6<f64>) {
+    let (mut left, mut right) = (points, points);
+    for level in 1..6 {
+        for k in 0..6 - level {
+            points[k] = 0.5 * (points[k] + points[k + 1]);
+        }
+        left[level] = points[0];
+        right[5 - level] = points[5 - level];
+    }
+    (left, right)
 }

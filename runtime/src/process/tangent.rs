@@ -83,6 +83,7 @@ pub(super) fn unary(op: UnaryOp, a: f64, value: f64) -> f64 {
         UnaryOp::Abs => 1f64.copysign(a),
         UnaryOp::Sin => math::cos(a),
         UnaryOp::Cos => -math::sin(a),
+        UnaryOp::Atan => 1.0 / (1.0 + a * a),
         UnaryOp::Not | UnaryOp::Floor => 0.0,
     }
 }

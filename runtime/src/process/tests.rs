@@ -1,5 +1,7 @@
 //! The tape against the graph's own evaluator, and its tangent against differences.
 
+use std::collections::BTreeSet;
+
 use matterix_ir::graph::Env;
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 use proptest::prelude::*;
@@ -8,6 +10,7 @@ use super::analysis::Facts;
 use super::dense::Dense;
 use super::index::users;
 use super::memo::{Leaf, Memo};
+use super::mode::{PartsBelow, Together, Walk, groups};
 use super::tangent;
 
 const STATES: usize = 4;
@@ -55,6 +58,7 @@ fn operation(kind: u8, (a, b, c): (NodeId, NodeId, NodeId), value: f64) -> Op {
         20 => Op::Unary(Not, a),
         21 => Op::Unary(Abs, a),
         22 => Op::Unary(Exp, a),
+        23 => Op::Unary(Atan, a),
         _ => Op::Select(a, b, c),
     }
 }
@@ -96,6 +100,45 @@ proptest! {
             prop_assert_eq!(registers[tape.outputs[i] as usize], expected);
             prop_assert_eq!(memo.eval(&graph, node, |op| Leaf { value: env.leaf(op), flows: false }), expected);
             prop_assert_eq!(analysis.now(node), expected);
+        }
+    }
+
+    /// What a walk that comes by each operation once finds together is what all states below each rate are.
+    #[test]
+    fn a_walk_finds_what_moves_together(
+        (graph, nodes) in graph(false),
+        states in states(),
+        marked in prop::array::uniform4(any::<bool>()),
+        picks in prop::collection::vec(any::<prop::sample::Index>(), STATES),
+        part_of in prop::array::uniform4(0..2u32),
+    ) {
+        let env = env(1.5, &states, &[0.7]);
+        let mut facts = Facts::new(&graph);
+        facts.begin();
+        facts.look(&graph, nodes.iter().copied(), |op| env.leaf(op), &marked);
+        let analysis = facts.of(&graph);
+        let rates: Vec<NodeId> = picks.iter().map(|pick| *pick.get(&nodes)).collect();
+        let (mut walk, mut short, mut long) = (Walk::default(), Together::default(), Together::default());
+        for (state, &rate) in (0..).zip(&rates) {
+            for (together, others) in
+                [(&mut short, walk.from(analysis, rate)), (&mut long, analysis.states_below(&[rate]))]
+            {
+                together.add(state);
+                for other in others {
+                    together.add(other);
+                    together.join(state, other);
+                }
+            }
+        }
+        prop_assert_eq!(short.into_lists(), long.into_lists());
+        let mut below = PartsBelow::default();
+        for (parts, compared) in groups(analysis, &nodes, &part_of, &mut below) {
+            for node in compared {
+                let sides: Vec<NodeId> = graph.op(node).operands().collect();
+                let states = analysis.states_below(&sides);
+                let plain: BTreeSet<u32> = states.iter().map(|s| part_of[*s as usize]).collect();
+                prop_assert_eq!(&parts, &plain.into_iter().collect::<Vec<u32>>());
+            }
         }
     }
 

@@ -143,8 +143,8 @@ impl Timed {
     }
 }
 
-/// What a result follows.
-fn kind(tape: &Tape, step: &Step, kinds: &[u8]) -> u8 {
+/// What a result follows: 0 nothing, 1 straight lines, more than that otherwise.
+pub(super) fn kind(tape: &Tape, step: &Step, kinds: &[u8]) -> u8 {
     let of = |register: &u32| kinds[*register as usize];
     let most = operands(tape, step).iter().map(of).max().unwrap_or(0);
     let straight = match step {

@@ -17,6 +17,7 @@ impl Engine<'_> {
             Op::Unary(UnaryOp::Sqrt, _) => "the square root of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) < 0.0 => "a power of a negative number",
             Op::Binary(BinaryOp::Pow, a, _) if self.eval(a) == 0.0 => "a division by zero",
+            Op::Select(..) => "a table that is read beyond its first or last point",
             Op::Local(_) | Op::Reading(_) => "it depends on a value that is not set yet",
             _ => "a number too large",
         }
@@ -26,7 +27,7 @@ impl Engine<'_> {
     pub(super) fn values_below(&self, operation: NodeId) -> String {
         let operand = match self.model.graph.op(operation) {
             Op::Binary(BinaryOp::Div, _, b) if self.eval(b) == 0.0 => b,
-            Op::Binary(BinaryOp::Pow, a, _) | Op::Unary(_, a) => a,
+            Op::Binary(BinaryOp::Pow, a, _) | Op::Unary(_, a) | Op::Select(a, ..) => a,
             _ => operation,
         };
         let mut values = Vec::new();

@@ -166,6 +166,11 @@ impl Recording {
         }
     }
 
+    /// Whether nothing is kept of its curves but both ends.
+    pub fn keeps_ends(&self) -> bool {
+        self.error == f64::INFINITY
+    }
+
     /// Something is sampled at a time.
     pub fn sampled(&mut self, time: f64) {
         self.reach(time);

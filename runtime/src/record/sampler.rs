@@ -19,9 +19,13 @@ impl Sampler {
         Sampler { observables: Touched::new(model.states.len(), below) }
     }
 
-    /// Takes a sample: of the first one all, later only `changed` states and what rests on them.
+    /// Takes a sample: of the first one all, later only `changed` states and what rests on them. A recording of both ends of
+    /// each curve takes what lies between only where all states are shown, as they are at the end.
     pub fn sample(&self, recording: &mut Recording, time: f64, engine: &Engine<'_>, changed: &[u32]) {
         let model = engine.model();
+        if recording.keeps_ends() && recording.sampled.is_some() && changed.len() < model.states.len() {
+            return recording.sampled(time);
+        }
         let (states, touched): (Vec<u32>, _) = match recording.sampled {
             None => ((0..model.states.len() as u32).collect(), self.observables.all()),
             Some(_) => (changed.to_vec(), self.observables.by(changed)),

@@ -113,6 +113,7 @@ impl Walk<'_> {
             ItemKind::Event(e) => {
                 self.params(&e.params);
                 self.expr(&e.when);
+                self.exprs(e.delay.iter().map(|d| &d.time));
                 self.laws(&e.laws);
             }
             ItemKind::Relation { params, definition, .. } => {

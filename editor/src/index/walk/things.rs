@@ -61,6 +61,7 @@ impl Walk<'_> {
                 self.declares(e.name.span);
                 self.params(&e.params);
                 self.expr(&e.when);
+                self.exprs(e.delay.iter().map(|d| &d.time));
                 self.laws(&e.laws);
             }
             MemberKind::Limit { cond, refusal, .. } => self.condition(cond, refusal.as_ref()),

@@ -211,12 +211,8 @@ impl Flow<'_, '_> {
         }
         let due = self.events_on(&changed);
         self.fire(due, facts);
-        self.limits_on(&changed, facts)
-    }
-
-    /// Looks at the limits that depend on these states.
-    pub(super) fn limits_on(&mut self, states: &[u32], facts: &mut Facts) -> Asked {
-        let limits = self.limits_that_ask_for(states);
+        let limits = self.limits_that_ask_for(&changed);
+        limits.iter().for_each(|limit| _ = facts.unkept.remove(limit));
         self.limits(limits, facts)
     }
 
@@ -480,10 +476,12 @@ impl Flow<'_, '_> {
     pub fn happen(&mut self, event: u32, facts: &mut Facts) -> Vec<u32> {
         let events = self.events;
         let after = self.meanwhile.clone().map(|span| std::mem::replace(&mut facts.time, span));
-        let changed = events[event as usize].actions.iter().flat_map(|action| self.act(action, facts)).collect();
+        let changed: Vec<u32> =
+            events[event as usize].actions.iter().flat_map(|action| self.act(action, facts)).collect();
         if let Some(after) = after {
             facts.time = after;
         }
+        facts.unkept.extend(self.limits_that_ask_for(&changed));
         changed
     }
 

@@ -308,11 +308,14 @@ impl Bonds {
         let (mut low, mut high) = (0.0, 0.0);
         for extent in &self.extents {
             let (mut total, mut size) = (0.0, 0.0_f64);
-            let terms = form.terms.iter().zip(&bound).filter(|(_, bound)| **bound);
-            for (state, a) in terms.map(|(term, _)| term) {
-                if let Ok(at) = extent.direction.binary_search_by_key(state, |(s, _)| *s) {
-                    total += a * extent.direction[at].1;
-                    size = size.max((a * extent.direction[at].1).abs());
+            // What goes on changes few states, and a sum may be of many.
+            for (state, c) in extent.direction.iter() {
+                if let Ok(at) = form.terms.binary_search_by_key(state, |(s, _)| *s)
+                    && bound[at]
+                {
+                    let part = form.terms[at].1 * c;
+                    total += part;
+                    size = size.max(part.abs());
                 }
             }
             if total.abs() > CANCELS * size {

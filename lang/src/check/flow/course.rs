@@ -17,6 +17,9 @@ use super::value::{CLOSE, Known, Why};
 /// Changes of conditions within one step before the rest of it is followed in bounds.
 const MOST_CHANGES: usize = 1000;
 
+/// Where it is looked whether a difference changes evenly, as shares of the time.
+const BETWEEN: [f64; 3] = [0.23, 0.5, 0.81];
+
 /// A difference that departs from a straight line by less than this share of what is compared is one.
 const STRAIGHT: f64 = 1e-9;
 
@@ -195,14 +198,23 @@ impl Flow<'_, '_> {
         }
         for side in followed {
             let (now, _, size) = self.difference(side, even, 0.0, facts)?;
-            let (half, ..) = self.difference(side, even, 0.5 * end, facts)?;
             let (then, _, far) = self.difference(side, even, end, facts)?;
-            let bends = (half - 0.5 * (now + then)).abs() > STRAIGHT * size.max(far);
+            let mut bends = self.is_wave(side);
+            for share in BETWEEN {
+                let (between, ..) = self.difference(side, even, share * end, facts)?;
+                bends |= (between - (now + share * (then - now))).abs() > STRAIGHT * size.max(far);
+            }
             if bends && !self.stays_apart(side, even, end, facts) {
                 return None;
             }
         }
         Some(next)
+    }
+
+    /// Whether a side is a wave: it may turn as often as it likes between two moments.
+    fn is_wave(&mut self, (a, b): Sides) -> bool {
+        let waves = |op: Op| matches!(op, Op::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor, _));
+        [Some(a), b].into_iter().flatten().any(|node| self.order(node).iter().any(|n| waves(self.lab.graph.op(*n))))
     }
 
     /// Whether a node hangs on what a device reads.

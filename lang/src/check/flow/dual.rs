@@ -59,6 +59,7 @@ impl Rules for Along<'_> {
             UnaryOp::Ln => 1.0 / a.value,
             UnaryOp::Sqrt => 0.5 / value,
             UnaryOp::Abs => a.value.signum(),
+            UnaryOp::Atan => 1.0 / (1.0 + a.value * a.value),
             UnaryOp::Sin | UnaryOp::Cos => return None,
         };
         Some(Dual { value, slope: rate * a.slope })

@@ -121,6 +121,11 @@ impl Flow<'_, '_> {
         if longest <= 0.0 {
             return;
         }
+        let unkept = std::mem::take(&mut facts.unkept).into_iter().collect();
+        if self.limits(unkept, facts) == Asked::Handled {
+            self.stopped = true;
+            return;
+        }
         let watched = self.may_break_here(facts);
         let course = duration.exact().map(|exact| self.course(exact, &watched, facts));
         let rest = match course {
@@ -166,6 +171,7 @@ impl Flow<'_, '_> {
             let moving = facts.moving.iter().map(|i| self.derivatives[*i as usize].state);
             let touched: Vec<u32> = moved.iter().copied().chain(moving).collect();
             let mut due = self.limits_that_ask_for(&touched);
+            due.extend(std::mem::take(&mut facts.unkept));
             due.retain(|limit| !passed.contains(limit));
             if self.limits(due, facts) == Asked::Handled {
                 self.stopped = true;

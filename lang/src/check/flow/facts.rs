@@ -51,6 +51,8 @@ pub struct Facts {
     pub history: History,
     /// Derivatives that may have changed since time last passed, by index.
     pub unsettled: BTreeSet<u32>,
+    /// Limits on what events have changed since time last passed, by index: they are judged as it passes.
+    pub unkept: BTreeSet<u32>,
     /// Derivatives that are not known to be zero, by index.
     pub moving: BTreeSet<u32>,
     /// Bounds of what moves for all time to come, while nothing else changes.
@@ -84,6 +86,7 @@ impl Facts {
             time,
             history: None,
             unsettled: BTreeSet::new(),
+            unkept: BTreeSet::new(),
             moving: BTreeSet::new(),
             barrier: None,
             bonds: None,
@@ -220,6 +223,7 @@ impl Facts {
         out.locals = a.locals.iter().zip(&b.locals).map(|(x, y)| x.join(y, why)).collect();
         out.time = a.time.join(&b.time, Why::Unknown);
         out.unsettled.extend(a.unsettled.iter().chain(&b.unsettled));
+        out.unkept.extend(a.unkept.iter().chain(&b.unkept));
         out.moving.extend(a.moving.iter().chain(&b.moving));
         out.barrier = None;
         out.bonds = match (&a.bonds, &b.bonds) {

@@ -192,7 +192,7 @@ impl Known {
                 Some(truth) => Known::Point(f64::from(u8::from(!truth))),
                 None => Known::either(why),
             },
-            UnaryOp::Exp | UnaryOp::Floor => Known::range(unary(op, low), unary(op, high), why),
+            UnaryOp::Exp | UnaryOp::Atan | UnaryOp::Floor => Known::range(unary(op, low), unary(op, high), why),
             UnaryOp::Ln | UnaryOp::Sqrt if low >= 0.0 => Known::range(unary(op, low), unary(op, high), why),
             UnaryOp::Abs if low >= 0.0 => Known::range(low, high, why),
             UnaryOp::Abs if high <= 0.0 => Known::range(-high, -low, why),

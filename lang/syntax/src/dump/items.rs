@@ -288,7 +288,9 @@ fn event(of: &Event) -> Sexp {
     node("event")
         .with([name(&of.name)])
         .with(of.params.iter().map(param))
-        .with([node("when").with([expr(&of.when)]), laws(&of.laws)])
+        .with([node("when").with([expr(&of.when)])])
+        .with(of.delay.as_ref().map(|d| node(if d.sustained { "for" } else { "after" }).with([expr(&d.time)])))
+        .with([laws(&of.laws)])
 }
 
 fn laws(laws: &[Law]) -> Sexp {

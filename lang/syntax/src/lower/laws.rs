@@ -7,7 +7,7 @@ use super::{
     },
     Lower,
 };
-use crate::ast::{AssignOp, Event, Expr, Law, LawKind, Process};
+use crate::ast::{AssignOp, Delay, Event, Expr, Law, LawKind, Process};
 
 impl Lower<'_> {
     pub(super) fn process(&mut self, node: Node) -> Process {
@@ -23,7 +23,11 @@ impl Lower<'_> {
         let name = self.name_in(&mut kids);
         let params = self.params_in(&mut kids);
         let when = self.expr_in(&mut kids);
-        Event { name, params, when, laws: self.laws_in(&mut kids) }
+        let delay = kids.eat(Rule::sustained).or_else(|| kids.eat(Rule::delayed)).map(|node| {
+            let sustained = node.as_rule() == Rule::sustained;
+            Delay { sustained, time: self.expr_in(&mut Kids::of(node)) }
+        });
+        Event { name, params, when, delay, laws: self.laws_in(&mut kids) }
     }
 
     fn laws_in(&mut self, kids: &mut Kids) -> Vec<Law> {

@@ -5,8 +5,8 @@ mod features;
 mod paced;
 mod values;
 
+use matterix_ir::Program;
 use matterix_ir::plan::{Condition, PlanStep, Step, StepId};
-use matterix_ir::{Program, Span};
 
 pub use desk::{Attendant, Desk};
 pub use features::{Catalogue, catalogue};
