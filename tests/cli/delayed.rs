@@ -179,6 +179,25 @@ fn what_is_no_table_is_said() {
     assert_eq!(findings("triple", &fluid("(0 mm, 1, 2), (10 mm, 3, 4)", "0 .. 100")), ["type-mismatch"]);
 }
 
+#[test]
+fn a_wait_beside_what_sets_it_off_is_of_no_known_length() {
+    let clock = "capability Clock: Body {
+    state phase: Duration = 0 s
+    process goes { phase' += 1 }
+}
+asset Wall: Clock { mass: 1 kg }
+lab bench { ambient: 22 degC, wall = Wall at (1, 0, 0) m, ";
+    for how in ["", "for 2 s", "after 2 s"] {
+        let steps = "parallel {
+    sequence { want by bulb; wait 2.5 s }
+    sequence { wait until bulb.times >= 1 timeout 20 s; expect elapsed in 0 s .. 2.01 s }
+}";
+        let text = lamp(how, steps).replace("lab bench { ambient: 22 degC, ", clock);
+        assert_eq!(findings("beside", &text), Vec::<String>::new(), "{how}");
+        assert_eq!(times("beside", &text, "").0, 0, "{how}");
+    }
+}
+
 /// What a run says of conditions on a state that moves evenly, so that the steps are long.
 #[test]
 fn conditions_that_come_and_go_within_a_step_are_met() {

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-use matterix_ir::Span;
 use matterix_ir::plan::{Step, StepId};
+use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
 use super::Flow;
@@ -178,6 +178,31 @@ impl Flow<'_, '_> {
             led_by
         });
         closed(states, |state| led_by.get(&state).cloned().unwrap_or_default())
+    }
+
+    /// Whether steps beside the one that is followed set off events that change what a condition rests on.
+    pub(super) fn is_set_off_beside(&mut self, condition: NodeId) -> bool {
+        let beside: BTreeSet<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
+        if beside.is_empty() {
+            return false;
+        }
+        let states: BTreeSet<u32> = self.parts(condition).states.iter().copied().collect();
+        if self.ahead_of(&states).is_disjoint(&beside) {
+            return false;
+        }
+        let events = self.events;
+        let (mut seen, mut todo): (BTreeSet<u32>, Vec<u32>) = (BTreeSet::new(), states.into_iter().collect());
+        while let Some(state) = todo.pop() {
+            if !seen.insert(state) {
+                continue;
+            }
+            for event in events {
+                if self.changed_by(&event.actions).contains(&state) {
+                    todo.extend(self.parts(event.when).states.iter().copied());
+                }
+            }
+        }
+        !seen.is_disjoint(&beside)
     }
 
     /// What the whole plan changes, and what laws and events change by that.
