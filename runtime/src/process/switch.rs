@@ -210,9 +210,15 @@ impl Switches {
         self.sample(piece, moving, path);
         let mut located: Vec<(f64, usize)> = Vec::new();
         for i in 0..self.list.len() {
-            if let Some((before, after)) = self.sampled_change(i) {
+            for (before, after) in self.sampled_changes(i).into_iter().flatten() {
                 let [before, after] = [before, after].map(|share| instant(piece, share));
-                located.push((self.locate(i, before, after, moving, path), i));
+                path(after, moving);
+                self.run(after, moving);
+                // The polynomial through the points of a curved side is not the side itself.
+                if self.straight[i] || self.is_changed(i, Switch::clearly_changed) {
+                    located.push((self.locate(i, before, after, moving, path), i));
+                    break;
+                }
             }
         }
         for place in self.open(from, to, path) {
@@ -250,20 +256,15 @@ impl Switches {
         self.apart = apart;
     }
 
-    /// The first change of a comparison within the piece that was sampled last, between two shares of it: of sides that follow the
-    /// states in straight lines exactly, of others as far as the points show it.
-    fn sampled_change(&self, i: usize) -> Option<(f64, f64)> {
+    /// Where a comparison changes first within the piece that was sampled last, between two shares of it: by the polynomial through the points,
+    /// which is exact for sides that follow the states in straight lines; and as the points themselves show it.
+    fn sampled_changes(&self, i: usize) -> [Option<(f64, f64)>; 2] {
         let apart = &self.apart[i];
-        let seen = || {
-            let k = apart.changed.iter().position(|changed| *changed)?;
-            Some((POINTS[k - 1], POINTS[k]))
-        };
-        match self.list[i].keeps() {
-            Some(sign) if self.straight[i] && apart.by.iter().all(|v| v.is_finite()) => {
-                first_below(sign * apart.by, apart.noise).or_else(seen)
-            }
-            _ => seen(),
-        }
+        let is_finite = apart.by.iter().all(|v| v.is_finite());
+        let drawn =
+            self.list[i].keeps().filter(|_| is_finite).and_then(|sign| first_below(sign * apart.by, apart.noise));
+        let seen = apart.changed.iter().position(|changed| *changed).map(|k| (POINTS[k - 1], POINTS[k]));
+        [drawn, seen]
     }
 
     /// The places of comparisons that may turn round somewhere in a piece.
