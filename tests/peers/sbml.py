@@ -479,6 +479,8 @@ def judge(matterixc, folder, suite, name):
         said = [line for line in (done.stderr + done.stdout).splitlines() if "error" in line or "×" in line or "fail" in line]
         if "event_pending" in done.stdout:
             return name, "refused", "an event that is set off again before it has happened"
+        if "chattering" in done.stdout:
+            return name, "refused", "events that follow one another ever faster"
         return name, "failed", "; ".join(said[:2])[:200] or f"exit status {done.returncode}"
     found = collections.defaultdict(list)
     for row in csv.DictReader(open(f"{out}/records.csv")):
