@@ -53,15 +53,14 @@ def falloff(rate):
     return f"troe(pr, {centre})"
 
 
-def written(gas, start, until, every):
+def written(gas, until, every):
     name = {s: f"s{i}" for i, s in enumerate(gas.species_names)}
     members, laws = [], []
     members.append(f"state T: Ratio = {num(gas.T)}")
     for s, c in zip(gas.species_names, gas.concentrations):
         members.append(f"state c_{name[s]}: Ratio = {num(c)}")
     for s in gas.species():
-        low_high = s.thermo.coeffs
-        middle, high, low = low_high[0], low_high[1:8], low_high[8:15]
+        middle, high, low = s.thermo.coeffs[0], s.thermo.coeffs[1:8], s.thermo.coeffs[8:15]
         h = lambda a: " + ".join([num(a[0])] + [f"{num(a[i] / (i + 1))} * T ^ {i}" for i in range(1, 5)] + [f"{num(a[5])} / T"])
         cp = lambda a: " + ".join([num(a[0])] + [f"{num(a[i])} * T ^ {i}" for i in range(1, 5)])
         sr = lambda a: " + ".join([f"{num(a[0])} * ln(T)"] + [f"{num(a[i] / i)} * T ^ {i}" for i in range(1, 5)] + [num(a[6])])
@@ -73,10 +72,9 @@ def written(gas, start, until, every):
         third = r.third_body
         m = None
         if third is not None:
-            special = {s: e for s, e in third.efficiencies.items()}
             terms = []
             for s in gas.species_names:
-                e = special.get(s, third.default_efficiency)
+                e = third.efficiencies.get(s, third.default_efficiency)
                 if e:
                     terms.append(f"c_{name[s]}" if e == 1 else f"{num(e)} * c_{name[s]}")
             m = " + ".join(terms)
@@ -154,7 +152,7 @@ def main():
         # 20 times, the tenth a little before ignition.
         until, every = 2.0 * ignition, 0.1 * ignition
         gas.state = start
-        text, watched = written(gas, kelvin, until, every)
+        text, watched = written(gas, until, every)
         file = os.path.join(folder, f"gri-{kelvin:.0f}.mtx")
         open(file, "w").write(text)
         began = time.perf_counter()
@@ -177,7 +175,7 @@ def main():
             apart_T = abs(found[t]["m.T"] / reactor.T - 1.0)
             if apart_T > apart:
                 apart, at = apart_T, f"T at {t:.6g} s"
-            for w, s, x in zip(watched[1:], gas.species_names, reactor.phase.X if hasattr(reactor, "phase") else reactor.thermo.X):
+            for w, s, x in zip(watched[1:], gas.species_names, reactor.phase.X):
                 if x > 1e-8:
                     off = abs(found[t][f"m.{w}"] / total / x - 1.0)
                     if off > apart:

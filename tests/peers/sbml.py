@@ -1,6 +1,6 @@
 """Cases of SBML's semantic test suite, written as processes and events of a capability, run and compared with the suite's results.
 
-    sbml.py MATTERIXC FOLDER SUITE [FROM [TO]] [--show]
+    sbml.py MATTERIXC FOLDER SUITE [FROM [TO]]
 
 SUITE is the folder `cases/semantic` of the suite, FOLDER is where the files and recordings go. A case counts as passed where every value
 is within the suite's own tolerances, as refused where a model asks for something that laws have no form for; the reasons are
@@ -103,7 +103,7 @@ class Mapping:
             return f"r_{sid}"
         known = sid in self.species or sid in self.compartments or sid in self.parameters or sid in self.references
         if not known:
-            raise Refused(f"a name of another kind")
+            raise Refused("a name of another kind")
         return f"x_{sid}"
 
     def amount(self, sid):
@@ -133,7 +133,7 @@ class Mapping:
             return number(math.e)
         if kind == sb.AST_CONSTANT_PI:
             return number(math.pi)
-        if kind in (sb.AST_PLUS, sb.AST_FUNCTION_PLUS if hasattr(sb, "AST_FUNCTION_PLUS") else sb.AST_PLUS):
+        if kind == sb.AST_PLUS:
             return "(" + " + ".join(map(n, kids)) + ")" if kids else "0.0"
         if kind == sb.AST_TIMES:
             return "(" + " * ".join(map(n, kids)) + ")" if kids else "1.0"
@@ -498,7 +498,7 @@ def judge(matterixc, folder, suite, name):
 
 
 def main():
-    words = [w for w in sys.argv[1:] if not w.startswith("--")]
+    words = sys.argv[1:]
     matterixc, folder, suite = words[:3]
     first, last = (int(words[3]) if len(words) > 3 else 1), (int(words[4]) if len(words) > 4 else 10**6)
     os.makedirs(folder, exist_ok=True)

@@ -46,6 +46,11 @@ impl UnaryOp {
         use UnaryOp::{Abs, Atan, Cos, Exp, Floor, Ln, Neg, Not, Sin, Sqrt};
         [Neg, Not, Exp, Ln, Sqrt, Abs, Sin, Cos, Atan, Floor]
     };
+
+    /// Whether it may turn as often as it likes while its operand goes one way.
+    pub fn is_wave(self) -> bool {
+        matches!(self, UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor)
+    }
 }
 
 /// Operations on two numbers.
@@ -357,6 +362,16 @@ impl Graph {
     /// A constant.
     pub fn number(&mut self, value: f64) -> NodeId {
         self.add(Op::Const(value))
+    }
+
+    /// Whether a node is what a table has beyond its ends: no number, and meant to be none.
+    pub fn is_gap(&self, node: NodeId) -> bool {
+        self.constant(node).is_some_and(f64::is_nan)
+    }
+
+    /// Whether an operation reads off a table, and has no value beyond its ends.
+    pub fn is_table(&self, op: Op) -> bool {
+        matches!(op, Op::Select(_, _, beyond) if self.is_gap(beyond))
     }
 
     /// An operation on one operand.

@@ -58,9 +58,8 @@ impl Search<'_> {
         self.left -= 1;
         let op = self.graph.op(node);
         if let Op::Select(c, a, b) = op {
-            let is_gap = |n: NodeId| self.graph.constant(n).is_some_and(f64::is_nan);
             return match (self.decides(c), (self.value)(c)) {
-                (None, Some(c)) if is_gap(if c != 0.0 { a } else { b }) => Some(node),
+                (None, Some(c)) if self.graph.is_gap(if c != 0.0 { a } else { b }) => Some(node),
                 (None, Some(c)) => self.of(if c != 0.0 { a } else { b }),
                 (broken, _) => broken,
             };

@@ -1,5 +1,6 @@
 //! Failures that leave a skill or a workflow without a word about them.
 
+use std::cell::LazyCell;
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::Event;
@@ -96,6 +97,10 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>, events: &[Event]) -
         .collect();
     let declared = tables.failures();
     let dangers = tables.dangers();
+    let set = LazyCell::new(|| {
+        let extensive = lab.extensive_by_mixture();
+        events.iter().flat_map(|event| changed(&event.actions, &extensive)).collect()
+    });
     let mut out: Vec<Diagnostic> = Vec::new();
     let mut needed: BTreeSet<Span> = BTreeSet::new();
     for step in &plan.steps {
@@ -113,7 +118,7 @@ pub fn idle(plan: &Plan, within: Span, lab: &Elaborator<'_>, events: &[Event]) -
                 continue;
             }
             let Caught::Named(name) = caught else { continue };
-            let by_time = || takes_time(plan, *body) && may_flow(plan, lab, events, name);
+            let by_time = || takes_time(plan, *body) && may_flow(plan, lab, &set, name);
             let known = raised.contains(name) || told.contains(name.as_str()) || dangers.contains(name);
             if known || by_time() || is_declared(plan, *body, lab, name) {
                 needed.insert(at);
@@ -150,10 +155,8 @@ fn is_declared(plan: &Plan, root: StepId, lab: &Elaborator<'_>, failure: &str) -
     false
 }
 
-/// Whether laws or events may break a limit of this failure while time passes.
-fn may_flow(plan: &Plan, lab: &Elaborator<'_>, events: &[Event], failure: &str) -> bool {
-    let extensive = lab.extensive_by_mixture();
-    let set: BTreeSet<u32> = events.iter().flat_map(|event| changed(&event.actions, &extensive)).collect();
+/// Whether laws may break a limit of this failure while time passes, or events, which change the states of `set`.
+fn may_flow(plan: &Plan, lab: &Elaborator<'_>, set: &BTreeSet<u32>, failure: &str) -> bool {
     let moves = |op: &Op| match op {
         Op::Time => true,
         Op::State(s) => lab.rates.contains_key(s) || set.contains(s),

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_ir::model::{Balance, Derivative, Domain, Doubt, State};
+use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op, UnaryOp, Unit};
 
 use super::{Contribution, Elaborator, SpeciesId, origin};
@@ -79,16 +80,10 @@ impl Elaborator<'_> {
             }
             let all = Contribution { process, node: sum, span: self.processes[process].span };
             let rate = self.gated(&all);
-            let index = self.states.len() as u32;
             let info = &self.processes[process];
-            self.states.push(State {
-                name: format!("{member} by {}", info.name),
-                domain: Domain::Quantity(unit.clone()),
-                initial: self.graph.number(0.0),
-                scale,
-                span: info.span,
-            });
-            self.state_owner.push(matterix_ir::scene::InstanceId(0));
+            let (name, span) = (format!("{member} by {}", info.name), info.span);
+            let (domain, initial) = (Domain::Quantity(unit.clone()), self.graph.number(0.0));
+            let index = self.add_state(InstanceId(0), State { name, domain, initial, scale, span });
             derivatives.push(Derivative { state: index, rate, terms: origin::terms(&[all]) });
             exchanges.push(index);
         }
@@ -143,16 +138,10 @@ impl Elaborator<'_> {
         }
         let all = Contribution { process, node: sum, span: self.processes[process].span };
         let rate = self.gated(&all);
-        let state = self.states.len() as u32;
         let info = &self.processes[process];
-        self.states.push(State {
-            name: format!("{balance} by {}", info.name),
-            domain: Domain::Quantity(unit.clone()),
-            initial: self.graph.number(0.0),
-            scale: Some(DOUBT_SCALE),
-            span: info.span,
-        });
-        self.state_owner.push(matterix_ir::scene::InstanceId(0));
+        let (name, span) = (format!("{balance} by {}", info.name), info.span);
+        let (domain, initial) = (Domain::Quantity(unit.clone()), self.graph.number(0.0));
+        let state = self.add_state(InstanceId(0), State { name, domain, initial, scale: Some(DOUBT_SCALE), span });
         derivatives.push(Derivative { state, rate, terms: origin::terms(&[all]) });
         Some(Doubt { process: process as u32, state })
     }

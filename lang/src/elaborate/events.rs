@@ -168,10 +168,8 @@ impl<'a> Elaborator<'a> {
 
     /// A state that an event keeps for itself; 0 at the start.
     fn noted(&mut self, owner: InstanceId, name: String, domain: Domain, span: Span) -> u32 {
-        let (index, initial) = (self.states.len() as u32, self.graph.number(0.0));
-        self.states.push(State { name, domain, initial, scale: Some(1.0), span });
-        self.state_owner.push(owner);
-        index
+        let initial = self.graph.number(0.0);
+        self.add_state(owner, State { name, domain, initial, scale: Some(1.0), span })
     }
 }
 

@@ -111,11 +111,9 @@ impl Instant<'_> {
         if !lab.graph.leaves(node).meets(Leaves::STATE) {
             return node;
         }
-        let state = lab.states.len() as u32;
         let name = format!("{}.kept[{}]", self.of.0, self.actions.len());
         let initial = lab.graph.number(if domain == Domain::Instance { -1.0 } else { 0.0 });
-        lab.states.push(State { name, domain, initial, scale: Some(1.0), span: self.of.1 });
-        lab.state_owner.push(self.owner);
+        let state = lab.add_state(self.owner, State { name, domain, initial, scale: Some(1.0), span: self.of.1 });
         lab.note_target(state, node);
         self.actions.push(Action::Assign { state, value: node, span: self.of.1 });
         lab.graph.add(Op::State(state))

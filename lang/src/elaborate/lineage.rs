@@ -22,9 +22,8 @@ impl Elaborator<'_> {
         let (name, span) = (format!("{}.origins[{origin}]", inst.name), inst.span);
         let held = inst.origin.as_deref() == Some(origin);
         let initial = self.graph.number(f64::from(u8::from(held)));
-        let index = self.states.len() as u32;
-        self.state_owner.push(mixture);
-        self.states.push(State { name, domain: Domain::Bool, initial, scale: Some(1.0), span });
+        let state = State { name, domain: Domain::Bool, initial, scale: Some(1.0), span };
+        let index = self.add_state(mixture, state);
         self.lineage.entry(mixture).or_default().insert(origin.to_string(), index);
         Some(self.graph.add(Op::State(index)))
     }

@@ -16,7 +16,7 @@ impl Elaborator<'_> {
     pub fn note_place(&mut self, node: NodeId, span: Span) {
         let may_fail = match self.graph.op(node) {
             Op::Binary(BinaryOp::Div, _, by) => self.graph.constant(by).is_none(),
-            Op::Select(_, _, beyond) => self.graph.constant(beyond).is_some_and(f64::is_nan),
+            op @ Op::Select(..) => self.graph.is_table(op),
             Op::Binary(BinaryOp::Pow, ..) | Op::Unary(UnaryOp::Sqrt | UnaryOp::Ln, _) => true,
             _ => false,
         };

@@ -76,9 +76,14 @@ impl<'a> Elaborator<'a> {
             _ => Domain::Quantity(self.declared_unit(options, ty).unwrap_or_else(|| self.type_unit(ty))),
         };
         let initial = self.graph.number(f64::NAN);
+        self.add_state(owner, State { name, domain, initial, scale, span })
+    }
+
+    /// Takes in a state of an instance; its number.
+    pub(super) fn add_state(&mut self, owner: InstanceId, state: State) -> u32 {
         let index = self.states.len() as u32;
         self.state_owner.push(owner);
-        self.states.push(State { name, domain, initial, scale, span });
+        self.states.push(state);
         index
     }
 

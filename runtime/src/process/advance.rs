@@ -90,9 +90,7 @@ impl Engine<'_> {
                 return Ok(Left::Jump(jumps));
             }
             match who {
-                Who::Part(id) if self.course.parts.get(id).is_some_and(|part| part.next_show().is_some()) => {
-                    self.show_within(id, observer)?;
-                }
+                Who::Part(id) if self.is_within(id) => self.show_within(id, observer)?,
                 Who::Part(id) => {
                     self.step(id, observer)?;
                     if self.is_cancelled() || observer.stops() {
@@ -119,8 +117,7 @@ impl Engine<'_> {
         match who {
             Who::Part(id) => {
                 let ending = self.course.parts.get(id).and_then(|part| part.ending());
-                let is_within = self.course.parts.get(id).is_some_and(|part| part.next_show().is_some());
-                !is_within && matches!(ending, Some(Ending::Crossed(_)))
+                !self.is_within(id) && matches!(ending, Some(Ending::Crossed(_)))
             }
             Who::Lookout(id) | Who::Sooner(id) => {
                 let lookout = self.course.lookouts.get(id);
@@ -156,6 +153,11 @@ impl Engine<'_> {
         Ok(())
     }
 
+    /// Whether the curves of a part are shown before its step ends.
+    fn is_within(&self, id: u32) -> bool {
+        self.course.parts.get(id).is_some_and(|part| part.next_show().is_some())
+    }
+
     /// Shows the curves of a part within its step to who wants them; nothing else comes of it.
     fn show_within(&mut self, id: u32, observer: &mut dyn Observer) -> Result<(), Fault> {
         let Some(part) = self.course.parts.get_mut(id) else { return Ok(()) };
@@ -163,25 +165,26 @@ impl Engine<'_> {
         let lab = part.due();
         part.reach(time, &mut self.states);
         self.arrive(lab);
+        self.followed(id)?;
         let Some(part) = self.course.parts.get(id) else { return Ok(()) };
-        let memo = self.memo.get_mut();
-        for &state in part.moving() {
-            memo.change_all(&self.index.users, self.index.leaves(state));
-        }
-        self.check_states(part.moving())?;
         observer.curve(self.time, self, part.moving());
         self.course.shown(id);
         Ok(())
     }
 
-    /// A part has been followed: its states have to be finite, and to be shown.
+    /// A part has been followed to where it is to be shown.
     fn arrived(&mut self, id: u32) -> Result<(), Fault> {
+        self.unshown.extend(self.course.parts.get(id).into_iter().flat_map(|part| part.moving()));
+        self.followed(id)
+    }
+
+    /// A part has been followed: its states are others, and have to be finite.
+    fn followed(&mut self, id: u32) -> Result<(), Fault> {
         let Some(part) = self.course.parts.get(id) else { return Ok(()) };
         let memo = self.memo.get_mut();
         for &state in part.moving() {
             memo.change_all(&self.index.users, self.index.leaves(state));
         }
-        self.unshown.extend(part.moving());
         self.check_states(part.moving())
     }
 

@@ -275,10 +275,7 @@ impl Analysis<'_> {
 
     /// The moving states that values rest on, ascending.
     pub(super) fn states_below(&self, nodes: &[NodeId]) -> Vec<u32> {
-        let state = |i: usize| match self.graph.op(NodeId(i as u32)) {
-            Op::State(s) if self.facts[i].varies => Some(s),
-            _ => None,
-        };
+        let state = |i: usize| self.moving_state(NodeId(i as u32));
         let mut states: Vec<u32> = self.needed(nodes).into_iter().filter_map(state).collect();
         states.sort_unstable();
         states
@@ -434,7 +431,6 @@ impl Analysis<'_> {
 
     /// The tape that computes `outputs`; `moving` lists the moving states in the order of its inputs.
     pub(super) fn tape(&self, outputs: &[NodeId], moving: &[u32]) -> Tape {
-        let same = |n: NodeId| self.fact(n).same as usize;
         let needed = self.needed(outputs);
         let mut tape = Tape { inputs: moving.len(), ..Tape::default() };
         let mut scratch = self.scratch.borrow_mut();
@@ -447,7 +443,7 @@ impl Analysis<'_> {
             });
         }
         for i in needed.into_iter().filter(|&i| self.facts[i].varies) {
-            let at = |n: NodeId| place[same(n)];
+            let at = |n: NodeId| place[self.same(n).0 as usize];
             let step = match self.graph.op(NodeId(i as u32)) {
                 Op::Unary(op, a) => Step::Unary(op, at(a)),
                 Op::Binary(op, a, b) => Step::Binary(op, at(a), at(b)),
@@ -465,24 +461,21 @@ impl Analysis<'_> {
             place[i] = (tape.first_result() + tape.steps.len()) as u32;
             tape.steps.push(step);
         }
-        tape.outputs = outputs.iter().map(|&n| place[same(n)]).collect();
+        tape.outputs = outputs.iter().map(|&n| place[self.same(n).0 as usize]).collect();
         tape
     }
 
     /// The operations that `outputs` are computed from, by index, in order.
     fn needed(&self, outputs: &[NodeId]) -> Vec<usize> {
-        let same = |n: NodeId| self.fact(n).same as usize;
         let scratch = &mut *self.scratch.borrow_mut();
         scratch.begin(self.facts.len());
         let mut needed = Vec::new();
-        let mut todo: Vec<usize> = outputs.iter().map(|&n| same(n)).collect();
-        while let Some(i) = todo.pop() {
-            if !scratch.is_new(i) {
-                continue;
-            }
-            needed.push(i);
-            if self.facts[i].varies {
-                todo.extend(self.graph.op(NodeId(i as u32)).operands().map(same));
+        let mut todo: Vec<NodeId> = outputs.iter().map(|&n| self.same(n)).collect();
+        while let Some(node) = todo.pop() {
+            let i = node.0 as usize;
+            if scratch.is_new(i) {
+                needed.push(i);
+                todo.extend(self.below(node));
             }
         }
         needed.sort_unstable();

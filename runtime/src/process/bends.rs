@@ -4,11 +4,10 @@
 //! Between bends such a law is propagated ([`Exact`]). A step that would go past a bend ends there, and the law beyond it is another
 //! one. Nothing else need know of it: on both sides of a bend the rates are the same.
 
-use std::sync::OnceLock;
-
 use matterix_ir::{BinaryOp, UnaryOp};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Vector6;
 
+use super::bernstein::{control, halved};
 use super::dense::{POINTS, shares};
 use super::exact::{Exact, MOST, Stride, is_linear};
 use super::slopes::Slopes;
@@ -168,17 +167,6 @@ fn differences(bends: &[Bend], law: &Tape, values: &[f64], registers: &mut [f64]
     bends.iter().map(difference).collect()
 }
 
-/// The control points of the Bernstein form of a polynomial that is given at [`POINTS`]: it lies between the least and the greatest.
-pub(super) fn control(sampled: Vector6<f64>) -> Vector6<f64> {
-    static FROM_SAMPLES: OnceLock<Matrix6<f64>> = OnceLock::new();
-    let matrix = FROM_SAMPLES.get_or_init(|| {
-        const CHOICES: [f64; 6] = [1.0, 5.0, 10.0, 10.0, 5.0, 1.0];
-        let shares = |k: usize, j: usize| CHOICES[j] * POINTS[k].powi(j as i32) * (1.0 - POINTS[k]).powi(5 - j as i32);
-        Matrix6::from_fn(shares).try_inverse().unwrap_or_else(Matrix6::zeros)
-    });
-    matrix * sampled
-}
-
 /// Where a polynomial first falls below zero between `from` and `to`. One that goes along zero, so that no number of pieces tells, counts
 /// as below from there on.
 fn first_below(control: Vector6<f64>, from: f64, to: f64, pieces: &mut usize) -> Option<f64> {
@@ -192,14 +180,7 @@ fn first_below(control: Vector6<f64>, from: f64, to: f64, pieces: &mut usize) ->
     if to - from <= CLOSE {
         return (control[5] < 0.0).then_some(to);
     }
-    let (mut left, mut right, mut row) = (control, control, control);
-    for level in 1..6 {
-        for j in 0..6 - level {
-            row[j] = 0.5 * (row[j] + row[j + 1]);
-        }
-        left[level] = row[0];
-        right[5 - level] = row[5 - level];
-    }
+    let (left, right) = halved(control);
     let middle = from + 0.5 * (to - from);
     first_below(left, from, middle, pieces).or_else(|| first_below(right, middle, to, pieces))
 }

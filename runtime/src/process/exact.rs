@@ -8,11 +8,10 @@
 
 use std::collections::BTreeMap;
 
-use matterix_ir::{BinaryOp, UnaryOp};
-
 use super::dense::POINTS;
 use super::slopes::Slopes;
-use super::tape::{Step, Tape};
+use super::tape::Tape;
+use super::timed::kinds;
 
 /// More states than this are integrated: a product of matrices grows with the third power.
 pub(super) const MOST: usize = 10;
@@ -280,31 +279,17 @@ fn balance(matrix: &mut Square) -> Vec<f64> {
 
 /// Whether all results are sums of constant multiples of states, and of constants.
 pub(super) fn is_linear(tape: &Tape) -> bool {
-    // What each register is: 0 constant, 1 linear, 2 anything else.
-    let mut kinds = vec![1_u8; tape.first_result()];
-    kinds[..tape.time()].fill(0);
-    kinds[tape.time()] = 2;
-    for step in &tape.steps {
-        let of = |register: u32| kinds[register as usize];
-        let mut most = 0;
-        tape.operands(step, &mut |register| most = most.max(of(register)));
-        let is_straight = match *step {
-            Step::Unary(UnaryOp::Neg, _) | Step::Binary(BinaryOp::Add | BinaryOp::Sub, ..) | Step::Sum(..) => true,
-            Step::Binary(BinaryOp::Mul, a, b) => of(a).min(of(b)) == 0,
-            Step::Binary(BinaryOp::Div, _, b) => of(b) == 0,
-            Step::Select(c, ..) => of(c) == 0,
-            _ => false,
-        };
-        kinds.push(if most == 1 && !is_straight { 2 } else { most });
-    }
+    let kinds = kinds(tape, 2, |_| 1);
     tape.outputs.iter().all(|output| kinds[*output as usize] < 2)
 }
 
 #[cfg(test)]
 pub(super) mod tests {
+    use matterix_ir::BinaryOp;
     use proptest::prelude::*;
 
     use super::super::integrator::{Integrator, Next};
+    use super::super::tape::Step;
     use super::super::tape::Term;
     use super::super::tolerance::Tolerance;
     use super::*;

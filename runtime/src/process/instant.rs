@@ -87,7 +87,7 @@ impl Engine<'_> {
             let i = process as usize;
             let of = &self.model.processes[i];
             of.guard.map_or(Ok(()), |guard| self.within_tables(guard, &of.name, of.span))?;
-            let running = self.model.processes[i].guard.is_none_or(|g| self.truth(g));
+            let running = of.guard.is_none_or(|g| self.truth(g));
             if running != self.running[i] {
                 self.running[i] = running;
                 observer.process(self.time, i, running);

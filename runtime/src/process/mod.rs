@@ -11,7 +11,8 @@
 //! - `course`: both of these in the order of time.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
-//! - `exact`: steps of parts that need no integration.
+//! - `exact`, `bends`: steps of parts that need no integration.
+//! - `bernstein`: polynomials by their control points.
 //! - `equations`, `slopes`, `shifted`, `linear`, `sparse`: the linear systems of steps.
 //! - `limits`: what things keep at all times.
 //! - `tolerance`, `timed`: how accurate steps are, and what they must not step over.
@@ -23,6 +24,7 @@
 mod advance;
 mod analysis;
 mod bends;
+mod bernstein;
 mod blame;
 mod clock;
 mod course;
@@ -434,12 +436,11 @@ impl<'m> Engine<'m> {
 
 /// Conditions of events and processes that a table stands in: what it is beyond its ends is not a number.
 fn with_tables(model: &Model) -> BTreeSet<NodeId> {
-    let gap = |n: NodeId| model.graph.constant(n).is_some_and(f64::is_nan);
-    let is_table = |op: &Op| matches!(*op, Op::Select(_, _, beyond) if gap(beyond));
-    if !model.graph.ops().iter().any(is_table) {
+    let graph = &model.graph;
+    if !graph.ops().iter().any(|op| graph.is_table(*op)) {
         return BTreeSet::new();
     }
     let guards = model.processes.iter().filter_map(|process| process.guard);
     let all = model.events.iter().map(|event| event.when).chain(guards);
-    all.filter(|condition| model.graph.schedule([*condition]).iter().any(|n| is_table(&model.graph.op(*n)))).collect()
+    all.filter(|condition| graph.schedule([*condition]).iter().any(|n| graph.is_table(graph.op(*n)))).collect()
 }

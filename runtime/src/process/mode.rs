@@ -76,46 +76,68 @@ impl Together {
     }
 }
 
+/// What the moving states below operations come to together. Each operation is worked out once, as long as neither law nor parts change.
+#[derive(Default)]
+struct Below<T> {
+    known: FxHashMap<NodeId, T>,
+}
+
+impl<T: Copy + Default> Below<T> {
+    /// What `state` gives for each moving state below `node` and is met for the first time, joined by `and` with what is known.
+    fn of(
+        &mut self,
+        analysis: Analysis<'_>,
+        node: NodeId,
+        state: &mut impl FnMut(u32) -> T,
+        and: &mut impl FnMut(T, T) -> T,
+    ) -> T {
+        let node = analysis.same(node);
+        let mut todo = vec![(node, false)];
+        while let Some((at, is_ready)) = todo.pop() {
+            if self.known.contains_key(&at) {
+                continue;
+            }
+            let below = || analysis.below(at);
+            match analysis.moving_state(at) {
+                Some(moving) => _ = self.known.insert(at, state(moving)),
+                None if is_ready => {
+                    let all = below().filter_map(|n| self.known.get(&n).copied()).fold(T::default(), &mut *and);
+                    self.known.insert(at, all);
+                }
+                None => {
+                    todo.push((at, true));
+                    todo.extend(below().map(|n| (n, false)));
+                }
+            }
+        }
+        self.known.get(&node).copied().unwrap_or_default()
+    }
+}
+
 /// A walk from the rates of states, which comes by each operation once: what several rates share is looked at for the first of them.
 #[derive(Default)]
 pub(super) struct Walk {
-    /// By operation, one of the moving states below it.
-    below: FxHashMap<NodeId, Option<u32>>,
+    /// One of the moving states below.
+    below: Below<Option<u32>>,
 }
 
 impl Walk {
     /// Moving states below `rate`: all of them, or for what the walk has come by before one that moves together with the others.
     pub(super) fn from(&mut self, analysis: Analysis<'_>, rate: NodeId) -> Vec<u32> {
-        let mut found = Vec::new();
-        let mut todo = vec![(analysis.same(rate), false)];
-        while let Some((node, is_ready)) = todo.pop() {
-            if let Some(known) = self.below.get(&node) {
-                found.extend(*known);
-                continue;
-            }
-            match analysis.moving_state(node) {
-                Some(state) => _ = self.below.insert(node, Some(state)),
-                None if is_ready => {
-                    let one = analysis.below(node).find_map(|n| self.below.get(&n).copied().flatten());
-                    self.below.insert(node, one);
-                }
-                None => {
-                    todo.push((node, true));
-                    todo.extend(analysis.below(node).map(|n| (n, false)));
-                    continue;
-                }
-            }
-            found.extend(self.below.get(&node).copied().flatten());
-        }
-        found.sort_unstable();
-        found.dedup();
-        found
+        let mut found = BTreeSet::new();
+        let one = self.below.of(analysis, rate, &mut Some, &mut |a, b| {
+            found.extend(a.into_iter().chain(b));
+            a.or(b)
+        });
+        found.extend(one);
+        found.into_iter().collect()
     }
 }
 
-/// The parts that the moving states below an operation belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The parts that moving states belong to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Parts {
+    #[default]
     None,
     One(u32),
     Several,
@@ -131,35 +153,20 @@ impl Parts {
     }
 }
 
-/// The parts below operations, as far as they were asked for: each is worked out once, as long as neither law nor parts change.
+/// The parts below operations.
 #[derive(Default)]
-pub(super) struct PartsBelow {
-    known: FxHashMap<NodeId, Parts>,
-}
+pub(super) struct PartsBelow(Below<Parts>);
 
 impl PartsBelow {
     fn of(&mut self, analysis: Analysis<'_>, node: NodeId, part_of: &[u32]) -> Parts {
-        let node = analysis.same(node);
-        let mut todo = vec![(node, false)];
-        while let Some((at, is_ready)) = todo.pop() {
-            if self.known.contains_key(&at) {
-                continue;
-            }
-            let below = || analysis.below(at);
-            match analysis.moving_state(at) {
-                Some(state) => _ = self.known.insert(at, Parts::One(part_of[state as usize])),
-                None if is_ready => {
-                    let all = below().filter_map(|n| self.known.get(&n).copied()).fold(Parts::None, Parts::and);
-                    self.known.insert(at, all);
-                }
-                None => {
-                    todo.push((at, true));
-                    todo.extend(below().map(|n| (n, false)));
-                }
-            }
-        }
-        self.known.get(&node).copied().unwrap_or(Parts::Several)
+        self.0.of(analysis, node, &mut |state| Parts::One(part_of[state as usize]), &mut Parts::and)
     }
+}
+
+/// The moving states that comparisons rest on, ascending.
+pub(super) fn rested_on(analysis: Analysis<'_>, comparisons: &[NodeId]) -> Vec<u32> {
+    let sides: Vec<NodeId> = comparisons.iter().flat_map(|node| analysis.op(*node).operands()).collect();
+    analysis.states_below(&sides)
 }
 
 /// Comparisons by the parts that they rest on; those that cannot change as they are now are left out.
@@ -180,7 +187,7 @@ pub(super) fn groups(
             Parts::None => Vec::new(),
             Parts::One(part) => vec![part],
             Parts::Several => {
-                let mut parts: Vec<u32> = analysis.states_below(&[a, b]).iter().map(|s| part_of[*s as usize]).collect();
+                let mut parts: Vec<u32> = rested_on(analysis, &[node]).iter().map(|s| part_of[*s as usize]).collect();
                 parts.sort_unstable();
                 parts.dedup();
                 parts

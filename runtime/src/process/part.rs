@@ -192,7 +192,7 @@ impl Part {
 
     /// Where its curves are shown next within the present step, s on its clock.
     pub(super) fn next_show(&self) -> Option<f64> {
-        self.shows.iter().rev().copied().find(|time| *time > self.at).filter(|time| *time < self.limit())
+        self.shows.last().copied().filter(|time| *time < self.limit())
     }
 
     /// When it is to be gone on with: where its curves are shown next, or at the end of its step; s of lab time.
@@ -239,6 +239,9 @@ impl Part {
     /// Goes on to `time`, s on the clock of the present step, and sets the states there.
     pub(super) fn reach(&mut self, time: f64, states: &mut [f64]) {
         self.at = time.clamp(self.at, self.leg.dense.end);
+        while self.shows.last().is_some_and(|time| *time <= self.at) {
+            self.shows.pop();
+        }
         let Part { integrator, values, leg, .. } = self;
         leg.dense.at(self.at, values);
         for (&state, &value) in integrator.moving.iter().zip(values.iter()) {

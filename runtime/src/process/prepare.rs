@@ -9,7 +9,7 @@ use super::course::Who;
 use super::index::Root;
 use super::integrator::{Integrator, STEP_SHARE};
 use super::lookout::Lookout;
-use super::mode::{Group, NOWHERE, PartsBelow, Piece, Together, Walk, groups};
+use super::mode::{Group, NOWHERE, PartsBelow, Piece, Together, Walk, groups, rested_on};
 use super::part::Part;
 use super::switch::{Switches, Unseen};
 use super::tolerance::Tolerance;
@@ -317,8 +317,7 @@ impl Engine<'_> {
                     concerned.parts.insert(part);
                 }
                 _ => {
-                    let sides: Vec<NodeId> = nodes.iter().flat_map(|node| known.op(*node).operands()).collect();
-                    let group = Group { parts, states: known.states_below(&sides), nodes };
+                    let group = Group { parts, states: rested_on(known, &nodes), nodes };
                     sights.lookouts.push(self.lookout(known, root, group));
                 }
             }
@@ -338,8 +337,7 @@ impl Engine<'_> {
     /// A part looks out for what it alone decides.
     fn sight_of(&mut self, known: Analysis<'_>, part: u32) {
         let nodes = self.course.own_of(part);
-        let sides: Vec<NodeId> = nodes.iter().flat_map(|node| known.op(*node).operands()).collect();
-        let states = known.states_below(&sides);
+        let states = rested_on(known, &nodes);
         self.reach_now(part);
         let switches = Switches::new(known, &nodes, &states, self.time, &|node| self.eval(node));
         if let Some(part) = self.course.parts.get_mut(part) {

@@ -2,16 +2,16 @@
 
 use matterix_ir::graph::binary;
 use matterix_ir::interval::Interval;
-use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
+use matterix_ir::{BinaryOp, NodeId, Op};
 
 use nalgebra::Vector6;
 
 use super::analysis::Analysis;
-use super::bends::control;
+use super::bernstein::{control, halved};
 use super::clock::Clock;
 use super::dense::POINTS;
 use super::tape::{Step, Tape};
-use super::timed::kind;
+use super::timed::kinds;
 
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
@@ -212,16 +212,19 @@ impl Switches {
         for i in 0..self.list.len() {
             for (before, after) in self.sampled_changes(i).into_iter().flatten() {
                 let [before, after] = [before, after].map(|share| instant(piece, share));
-                path(after, moving);
-                self.run(after, moving);
-                // The polynomial through the points of a curved side is not the side itself.
-                if self.straight[i] || self.is_changed(i, Switch::clearly_changed) {
-                    located.push((self.locate(i, before, after, moving, path), i));
-                    break;
+                if !self.straight[i] {
+                    // The polynomial through the points of a curved side is not the side itself.
+                    path(after, moving);
+                    self.run(after, moving);
+                    if !self.is_changed(i, Switch::clearly_changed) {
+                        continue;
+                    }
                 }
+                located.push((self.locate(i, before, after, moving, path), i));
+                break;
             }
         }
-        for place in self.open(from, to, path) {
+        for place in self.open(piece) {
             let end = located.iter().fold(to, |end, (time, _)| end.min(*time));
             if let Some((before, after)) = self.hidden(place, from, end, moving, path)? {
                 let i = self.folded.list[place];
@@ -245,6 +248,9 @@ impl Switches {
             let time = instant(piece, share);
             path(time, moving);
             self.run(time, moving);
+            if !self.folded.list.is_empty() {
+                self.folded.ends[k].copy_from_slice(moving);
+            }
             for (i, apart) in apart.iter_mut().enumerate() {
                 let (left, right) = self.sides(i);
                 apart.by[k] = left - right;
@@ -267,12 +273,12 @@ impl Switches {
         [drawn, seen]
     }
 
-    /// The places of comparisons that may turn round somewhere in a piece.
-    fn open(&mut self, from: f64, to: f64, path: &mut dyn FnMut(f64, &mut [f64])) -> Vec<usize> {
+    /// The places of comparisons that may turn round somewhere in the piece that was sampled last.
+    fn open(&mut self, piece: Interval) -> Vec<usize> {
         if self.folded.list.is_empty() {
             return Vec::new();
         }
-        self.enclose((from, to), path);
+        self.bound(piece);
         (0..self.folded.list.len()).filter(|place| !self.stays(*place)).collect()
     }
 
@@ -320,11 +326,17 @@ impl Switches {
     }
 
     /// Bounds the sides of all comparisons that may turn round over a piece.
-    fn enclose(&mut self, (from, to): Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
-        let Folded { tape, bounds, ends, .. } = &mut self.folded;
+    fn enclose(&mut self, piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
+        let Folded { tape, ends, .. } = &mut self.folded;
         if tape.inputs > 0 {
-            ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant((from, to), share), values));
+            ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
         }
+        self.bound(piece);
+    }
+
+    /// The same where the moving states at the points of the piece are known.
+    fn bound(&mut self, (from, to): Interval) {
+        let Folded { tape, bounds, ends, .. } = &mut self.folded;
         let states = (0..ends[0].len()).map(|state| {
             let points = control(Vector6::from_fn(|k, _| ends[k][state]));
             (points.min(), points.max())
@@ -424,17 +436,12 @@ fn stop(analysis: &Analysis<'_>, (a, b): (NodeId, NodeId), switch: &Switch, now:
 
 /// Whether a step is a wave.
 fn is_wave(step: &Step) -> bool {
-    matches!(step, Step::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor, _))
+    matches!(step, Step::Unary(op, _) if op.is_wave())
 }
 
 /// Whether the outputs of a tape follow states and time in more than straight lines.
 fn curved(tape: &Tape) -> Vec<bool> {
-    let first = tape.first_result();
-    let mut kinds = vec![0_u8; first];
-    kinds[tape.time()..].fill(1);
-    for step in &tape.steps {
-        kinds.push(kind(tape, step, &kinds));
-    }
+    let kinds = kinds(tape, 1, |_| 1);
     tape.outputs.iter().map(|output| kinds[*output as usize] > 1).collect()
 }
 
@@ -473,17 +480,4 @@ fn first_below(sampled: Vector6<f64>, noise: f64) -> Option<(f64, f64)> {
         todo.push((left, from, middle));
     }
     seen.map(|seen| (cleared, seen))
-}
-
-/// The control points of both halves (de Casteljau).
-fn halved(mut points: Vector6<f64>) -> (Vector6<f64>, Vector6<f64>) {
-    let (mut left, mut right) = (points, points);
-    for level in 1..6 {
-        for k in 0..6 - level {
-            points[k] = 0.5 * (points[k] + points[k + 1]);
-        }
-        left[level] = points[0];
-        right[5 - level] = points[5 - level];
-    }
-    (left, right)
 }

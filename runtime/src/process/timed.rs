@@ -46,14 +46,7 @@ impl Timed {
         let constant = |register: u32| tape.constants.get(register as usize).copied();
         let paces: Vec<Option<f64>> = tape.outputs.iter().map(|o| constant(*o)).collect();
         // What each register follows: 0 nothing, 1 the clock in a straight line, 2 the clock in a curve, 3 more than the clock.
-        let mut kinds = vec![0_u8; first];
-        kinds[tape.time()] = 1;
-        for (i, pace) in paces.iter().enumerate() {
-            kinds[tape.time() + 1 + i] = if pace.is_some() { 1 } else { 3 };
-        }
-        for step in &tape.steps {
-            kinds.push(kind(tape, step, &kinds));
-        }
+        let kinds = kinds(tape, 1, |i| if paces[i].is_some() { 1 } else { 3 });
         let mut outputs: Vec<u32> = Vec::new();
         let mut ask = |register: u32| {
             if kinds[register as usize] == 2 {
@@ -143,17 +136,25 @@ impl Timed {
     }
 }
 
-/// What a result follows: 0 nothing, 1 straight lines, more than that otherwise.
-pub(super) fn kind(tape: &Tape, step: &Step, kinds: &[u8]) -> u8 {
-    let of = |register: &u32| kinds[*register as usize];
-    let most = operands(tape, step).iter().map(of).max().unwrap_or(0);
-    let straight = match step {
-        Step::Unary(UnaryOp::Neg, _) | Step::Binary(BinaryOp::Add | BinaryOp::Sub, ..) | Step::Sum(..) => true,
-        Step::Binary(BinaryOp::Mul, a, b) => of(a).min(of(b)) == 0,
-        Step::Binary(BinaryOp::Div, _, b) => of(b) == 0,
-        _ => false,
-    };
-    if most == 1 && !straight { 2 } else { most }
+/// By register, what it follows: 0 nothing, 1 straight lines, more than that otherwise; of the time and of each state it is said.
+pub(super) fn kinds(tape: &Tape, time: u8, state: impl Fn(usize) -> u8) -> Vec<u8> {
+    let mut kinds = vec![0; tape.first_result()];
+    kinds[tape.time()] = time;
+    kinds[tape.time() + 1..].iter_mut().enumerate().for_each(|(i, kind)| *kind = state(i));
+    for step in &tape.steps {
+        let of = |register: u32| kinds[register as usize];
+        let mut most = 0;
+        tape.operands(step, &mut |register| most = most.max(of(register)));
+        let is_straight = match *step {
+            Step::Unary(UnaryOp::Neg, _) | Step::Binary(BinaryOp::Add | BinaryOp::Sub, ..) | Step::Sum(..) => true,
+            Step::Binary(BinaryOp::Mul, a, b) => of(a).min(of(b)) == 0,
+            Step::Binary(BinaryOp::Div, _, b) => of(b) == 0,
+            Step::Select(c, ..) => of(c) == 0,
+            _ => false,
+        };
+        kinds.push(if most == 1 && !is_straight { 2 } else { most });
+    }
+    kinds
 }
 
 fn operands(tape: &Tape, step: &Step) -> Vec<u32> {

@@ -14,6 +14,7 @@ use super::cases;
 use super::course::Course;
 use super::facts::Facts;
 use super::value::{Known, Why};
+use crate::elaborate::mixtures::written;
 
 /// Events that set each other off at one instant before the rest is left to the run.
 const MOST_EVENTS: usize = 200;
@@ -501,7 +502,7 @@ impl Flow<'_, '_> {
         let began = facts.time.clone();
         if !met {
             // Said already: what it would have done is not known.
-            let written = self.written(operation);
+            let written: Vec<u32> = written(operation, &self.mixtures).collect();
             self.forget(&written, &mut facts);
         }
         // How long it takes follows from what it finds, not from what it does.
@@ -549,20 +550,5 @@ impl Flow<'_, '_> {
             self.still_kept(label, &facts);
         }
         Some(facts)
-    }
-
-    /// The states that an operation writes.
-    fn written(&self, operation: &Operation) -> Vec<u32> {
-        let mut out = Vec::new();
-        for action in operation.at_start.iter().chain(&operation.at_end) {
-            match action {
-                Action::Assign { state, .. } => out.push(*state),
-                Action::Move { from, to, .. } => {
-                    let both = [from, to].map(|m| &self.mixtures[*m as usize]);
-                    out.extend(both.into_iter().flatten().map(|(_, state)| *state));
-                }
-            }
-        }
-        out
     }
 }

@@ -180,29 +180,14 @@ impl Flow<'_, '_> {
         closed(states, |state| led_by.get(&state).cloned().unwrap_or_default())
     }
 
-    /// Whether steps beside the one that is followed set off events that change what a condition rests on.
-    pub(super) fn is_set_off_beside(&mut self, condition: NodeId) -> bool {
-        let beside: BTreeSet<u32> = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
-        if beside.is_empty() {
+    /// Whether steps beside the one that is followed change what a condition rests on, themselves or by events that they set off.
+    pub(super) fn is_set_beside(&mut self, condition: NodeId) -> bool {
+        if self.shared.is_empty() && self.jobs.is_empty() {
             return false;
         }
-        let states: BTreeSet<u32> = self.parts(condition).states.iter().copied().collect();
-        if self.ahead_of(&states).is_disjoint(&beside) {
-            return false;
-        }
-        let events = self.events;
-        let (mut seen, mut todo): (BTreeSet<u32>, Vec<u32>) = (BTreeSet::new(), states.into_iter().collect());
-        while let Some(state) = todo.pop() {
-            if !seen.insert(state) {
-                continue;
-            }
-            for event in events {
-                if self.changed_by(&event.actions).contains(&state) {
-                    todo.extend(self.parts(event.when).states.iter().copied());
-                }
-            }
-        }
-        !seen.is_disjoint(&beside)
+        let beside = self.shared.iter().chain(self.of_jobs()).flatten().copied().collect();
+        let set = closed(&beside, |state| self.set_off_by(state).collect());
+        self.parts(condition).states.iter().any(|state| set.contains(state))
     }
 
     /// What the whole plan changes, and what laws and events change by that.
@@ -214,9 +199,13 @@ impl Flow<'_, '_> {
     fn led_on(&self, state: u32) -> Vec<u32> {
         let rates = self.rates_of.get(&state).into_iter().flatten();
         let moved = rates.map(|i| self.derivatives[*i as usize].state);
+        moved.chain(self.set_off_by(state)).collect()
+    }
+
+    /// The states that events change that one sets off.
+    fn set_off_by(&self, state: u32) -> impl Iterator<Item = u32> {
         let events = self.events_of.get(&state).into_iter().flatten();
-        let set = events.flat_map(|i| self.changed_by(&self.events[*i as usize].actions));
-        moved.chain(set).collect()
+        events.flat_map(|i| self.changed_by(&self.events[*i as usize].actions))
     }
 }
 

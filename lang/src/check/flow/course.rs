@@ -213,7 +213,7 @@ impl Flow<'_, '_> {
 
     /// Whether a side is a wave: it may turn as often as it likes between two moments.
     fn is_wave(&mut self, (a, b): Sides) -> bool {
-        let waves = |op: Op| matches!(op, Op::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor, _));
+        let waves = |op: Op| matches!(op, Op::Unary(op, _) if op.is_wave());
         [Some(a), b].into_iter().flatten().any(|node| self.order(node).iter().any(|n| waves(self.lab.graph.op(*n))))
     }
 

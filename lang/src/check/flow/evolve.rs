@@ -216,7 +216,7 @@ impl Flow<'_, '_> {
         if self.eval(when, &within).truth().is_some() {
             return false;
         }
-        let waves = |op: Op| matches!(op, Op::Unary(UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor | UnaryOp::Abs, _));
+        let waves = |op: Op| matches!(op, Op::Unary(op, _) if op.is_wave() || op == UnaryOp::Abs);
         let changed = self.happen(event, &mut within);
         self.order(when).iter().any(|n| waves(self.lab.graph.op(*n)))
             || self.parts(when).states.iter().any(|s| changed.contains(s))

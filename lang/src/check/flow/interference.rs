@@ -11,6 +11,7 @@ use matterix_ir::{Diagnostic, NodeId, Severity, Span, codes};
 use super::Flow;
 use super::facts::Facts;
 use super::value::{Known, Why};
+use crate::elaborate::mixtures::changed;
 
 /// Steps that go on beside others.
 #[derive(Clone, Debug)]
@@ -128,14 +129,7 @@ impl<'p> Flow<'p, '_> {
 
     /// The states that actions change.
     pub(super) fn changed_by(&self, actions: &[Action]) -> BTreeSet<u32> {
-        let states = |action: &Action| match action {
-            Action::Assign { state, .. } => vec![*state],
-            Action::Move { from, to, .. } => {
-                let both = [from, to].map(|m| &self.mixtures[*m as usize]);
-                both.into_iter().flatten().map(|(_, state)| *state).collect()
-            }
-        };
-        actions.iter().flat_map(states).collect()
+        changed(actions, &self.mixtures).collect()
     }
 
     /// What a step and those in it do, and when; `time` is when it begins, and then when it ends, and `place` the statement of the

@@ -306,7 +306,7 @@ impl<'l> Flow<'l, '_> {
             return Some(facts);
         }
         let parts = self.parts(condition.node);
-        let shared = self.is_shared(condition.node) || self.is_set_off_beside(condition.node);
+        let shared = self.is_set_beside(condition.node);
         let longest = match timeout {
             Some(node) => self.duration(node, &facts).bounds().1,
             None => f64::INFINITY,
