@@ -418,6 +418,11 @@ impl Graph {
             Op::Binary(BinaryOp::Mul, a, b) if one(self, a) => Some(b),
             Op::Binary(BinaryOp::Mul | BinaryOp::Div | BinaryOp::Pow, a, b) if one(self, b) => Some(a),
             Op::Binary(BinaryOp::Mul, a, b) if zero(self, a) || zero(self, b) => Some(self.number(0.0)),
+            Op::Binary(BinaryOp::Pow, _, b) if zero(self, b) => Some(self.number(1.0)),
+            Op::Binary(BinaryOp::Pow, a, b) if self.constant(b) == Some(-1.0) => {
+                let one = self.number(1.0);
+                Some(self.binary(BinaryOp::Div, one, a))
+            }
             Op::Binary(BinaryOp::And, a, b) => match (self.constant(a), self.constant(b)) {
                 (Some(x), _) => Some(if x == 0.0 { a } else { b }),
                 (_, Some(y)) => Some(if y == 0.0 { b } else { a }),

@@ -20,6 +20,8 @@ pub fn pow(x: f64, y: f64) -> f64 {
         x * x * x
     } else if y == 0.0 {
         1.0
+    } else if y == -1.0 {
+        1.0 / x
     } else {
         libm::pow(x, y)
     }

@@ -9,7 +9,7 @@ use nalgebra::Vector6;
 
 use super::bernstein::{control, halved};
 use super::dense::{POINTS, shares};
-use super::exact::{Exact, MOST, Stride, is_linear};
+use super::exact::{Exact, Stride, is_linear};
 use super::slopes::Slopes;
 use super::tape::{Step, Tape, Term};
 
@@ -65,9 +65,6 @@ pub(super) struct Bent {
 impl Bent {
     /// For a law that is linear by constant coefficients where its states are `values`, but for bends.
     pub(super) fn of(rates: &Tape, values: &[f64]) -> Option<Self> {
-        if rates.inputs > MOST {
-            return None;
-        }
         let bends = bends(rates);
         // Most laws that are integrated do not bend.
         if bends.len() > MOST_BENDS || bends.is_empty() && !is_linear(rates) {

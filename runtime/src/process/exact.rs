@@ -1,20 +1,20 @@
 //! Parts that need no integration: rates linear in the states, by coefficients that stay as they are until the next discontinuity.
 //!
 //! From `x` on, after `s`, the states are `x + P(s) f`: `f` are the rates at `x`, `P(s) = s + A s^2 / 2 + A^2 s^3 / 6 ...`. It holds for
-//! matrices of every kind, defective and singular ones among them. Steps are powers of 2, so that the matrices of a length are made
-//! from those of half of it, `P(2 s) = 2 P(s) + P(s) A P(s)`, and serve for all steps of that length. A step is as long as its polynomial is good; as what
+//! matrices of every kind, defective and singular ones among them. Steps are powers of 2. A few states are moved by the matrices `P`
+//! ([`Doubled`]), many by the series applied to their rates ([`Series`]). A step is as long as its polynomial is good; as what
 //! moves dies out, steps grow. Only rounding accumulates: by as much as the fastest rate is faster than a step is long, so
 //! that a part with rates that are too far apart is left to the integrator.
 
-use std::collections::BTreeMap;
-
 use super::dense::POINTS;
+use super::doubled::Doubled;
+use super::series::Series;
 use super::slopes::Slopes;
 use super::tape::Tape;
 use super::timed::kinds;
 
-/// More states than this are integrated: a product of matrices grows with the third power.
-pub(super) const MOST: usize = 10;
+/// More states than this are moved by series: a product of matrices grows with the third power.
+const FEW: usize = 10;
 
 /// Powers of 2, s: no step is longer or shorter.
 const LENGTHS: std::ops::RangeInclusive<i32> = -100..=40;
@@ -22,14 +22,14 @@ const LENGTHS: std::ops::RangeInclusive<i32> = -100..=40;
 /// Steps this much longer than the fastest rate lose six digits.
 const STIFF: f64 = 1e5;
 
-/// So many steps that only [`STIFF`] keeps short lead nowhere.
+/// Steps of many states are this much longer than the fastest rate at most: an integrator is cheaper then.
+const FAR: f64 = 32.0;
+
+/// So many steps that only [`STIFF`] or [`FAR`] keeps short lead nowhere.
 const HELD: usize = 24;
 
-/// Terms of the series, enough where the norm is at most [`NEAR`].
-const TERMS: usize = 13;
-
-/// The norm up to which the series is used.
-const NEAR: f64 = 0.5;
+/// A first step has this norm at most.
+const FIRST: f64 = 0.25;
 
 /// The error of a polynomial of degree 5 grows with this power of 2 when the step is twice as long; half as much again is left over.
 const GROWTH: f64 = 96.0;
@@ -44,54 +44,35 @@ const SHORT: f64 = 1.0 / 8.0;
 /// Where the solution is computed, as parts of a step: where a polynomial is sampled, and where that is worst.
 pub(super) const PLACES: [f64; 6] = [POINTS[1], POINTS[2], POINTS[3], POINTS[4], 1.0, 0.5];
 
-/// A square matrix, row by row.
-#[derive(Clone, Debug)]
-struct Square {
-    size: usize,
-    entries: Vec<f64>,
+/// States at [`PLACES`].
+pub(super) type States = [Vec<f64>; PLACES.len()];
+
+/// What a state's rate has of a state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Entry {
+    pub(super) row: u32,
+    pub(super) column: u32,
+    pub(super) value: f64,
 }
 
-impl Square {
-    fn zeros(size: usize) -> Self {
-        Square { size, entries: vec![0.0; size * size] }
-    }
-
-    fn times(&self, other: &Square) -> Square {
-        let mut product = Square::zeros(self.size);
-        for (row, out) in self.rows().zip(product.entries.chunks_mut(self.size)) {
-            for (factor, other) in row.iter().zip(other.rows()).filter(|(factor, _)| **factor != 0.0) {
-                out.iter_mut().zip(other).for_each(|(out, other)| *out += factor * other);
-            }
-        }
-        product
-    }
-
-    fn add(&mut self, factor: f64, other: &Square) {
-        self.entries.iter_mut().zip(&other.entries).for_each(|(a, b)| *a += factor * b);
-    }
-
-    fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.entries.chunks(self.size)
-    }
-
-    /// The largest sum of a row.
-    fn norm(&self) -> f64 {
-        self.rows().map(|row| row.iter().map(|e| e.abs()).sum()).fold(0.0, f64::max)
-    }
+/// How steps are computed.
+#[derive(Clone)]
+enum Means {
+    Doubled(Doubled),
+    Series(Series),
 }
 
 /// A part's law as a matrix, in units in which its rows and columns are alike.
 #[derive(Clone)]
 pub(super) struct Exact {
-    /// The first powers of the matrix, the unit matrix before them.
-    powers: Vec<Square>,
+    means: Means,
     norm: f64,
     /// The units of the states: powers of 2, which round nothing.
     units: Vec<f64>,
-    /// By the exponent of the length, [`PLACES`] of a step.
-    known: BTreeMap<i32, Vec<Square>>,
     /// The exponent of the next step.
     next: i32,
+    /// That of the longest one.
+    most: i32,
     /// Steps in a row that could have been longer.
     held: usize,
     rates: Vec<f64>,
@@ -102,37 +83,42 @@ pub(super) struct Exact {
 /// A step that is good enough: its length, s, and the states at [`PLACES`].
 pub(super) struct Stride {
     pub(super) length: f64,
-    pub(super) states: [Vec<f64>; 6],
+    pub(super) states: States,
 }
 
 impl Exact {
     /// For a law that is linear by constant coefficients; `slopes` has no hubs.
     pub(super) fn of(rates: &Tape, slopes: &Slopes) -> Option<Self> {
-        if rates.inputs > MOST || !is_linear(rates) {
+        if !is_linear(rates) {
             return None;
         }
         let mut registers = rates.registers();
         rates.run(0.0, &vec![0.0; rates.inputs], &mut registers);
         let pattern = &slopes.pattern;
-        let mut entries = vec![0.0; pattern.columns.len()];
-        slopes.evaluate(rates, &registers, &mut slopes.memory(), &mut entries);
-        let mut matrix = Square::zeros(rates.inputs);
+        let mut values = vec![0.0; pattern.columns.len()];
+        slopes.evaluate(rates, &registers, &mut slopes.memory(), &mut values);
+        let mut entries = Vec::new();
         for row in 0..rates.inputs {
-            for entry in pattern.row(row) {
-                matrix.entries[row * rates.inputs + pattern.columns[entry] as usize] = entries[entry];
-            }
+            let of_row =
+                pattern.row(row).map(|at| Entry { row: row as u32, column: pattern.columns[at], value: values[at] });
+            entries.extend(of_row.filter(|entry| entry.value != 0.0));
         }
-        Some(Exact::new(matrix))
+        Some(Exact::new(rates.inputs, entries))
     }
 
-    fn new(mut matrix: Square) -> Self {
-        let units = balance(&mut matrix);
-        let (norm, size) = (matrix.norm(), matrix.size);
-        let mut one = Square::zeros(size);
-        (0..size).for_each(|i| one.entries[i * size + i] = 1.0);
-        let next = if norm > 0.0 { exponent(NEAR / 2.0 / norm) } else { 0 };
+    fn new(size: usize, mut entries: Vec<Entry>) -> Self {
+        let units = balance(size, &mut entries);
+        let norm = norm(size, &entries);
+        let (means, most) = match size <= FEW {
+            true => (Means::Doubled(Doubled::new(size, &entries, norm)), STIFF),
+            false => (Means::Series(Series::new(entries, norm)), FAR),
+        };
+        let (next, most) = match norm > 0.0 {
+            true => (exponent(FIRST / norm), exponent(most / norm).min(*LENGTHS.end())),
+            false => (0, *LENGTHS.end()),
+        };
         let (rates, seen) = (vec![0.0; size], vec![(f64::INFINITY, f64::NEG_INFINITY); size]);
-        Exact { powers: vec![one, matrix], norm, units, known: BTreeMap::new(), next, held: 0, rates, seen }
+        Exact { means, norm, units, next: next.min(most), most, held: 0, rates, seen }
     }
 
     /// A step from `values` on, at which the rates are `slopes`; the polynomial through it may be off by `allowed`. None where
@@ -140,21 +126,20 @@ impl Exact {
     pub(super) fn stride(&mut self, values: &[f64], slopes: &[f64], allowed: &[f64]) -> Option<Stride> {
         self.rates.iter_mut().zip(slopes).zip(&self.units).for_each(|((r, s), u)| *r = s / u);
         self.seen.iter_mut().zip(values).for_each(|(seen, value)| *seen = (seen.0.min(*value), seen.1.max(*value)));
-        let most = if self.norm > 0.0 { exponent(STIFF / self.norm) } else { *LENGTHS.end() };
-        self.next = self.next.min(most);
         loop {
             if !LENGTHS.contains(&self.next) || self.held > HELD {
                 return None;
             }
-            let states = self.states(values);
+            let states = self.states(values, allowed);
             let is_drawn = self.norm * 2f64.powi(self.next) <= SHORT;
             let bend = if is_drawn { 0.0 } else { bend(values, &states, allowed, &self.seen) };
             let error = worst(values, &states, allowed).max(bend);
             if error <= 1.0 {
                 let length = 2f64.powi(self.next);
                 let more = [1.0, GROWTH].iter().filter(|more| GROWTH * *more * error < 1.0).count() as i32;
-                self.held = if self.next == most && most < *LENGTHS.end() && more > 0 { self.held + 1 } else { 0 };
-                self.next = (self.next + more).min(most).min(*LENGTHS.end());
+                let is_held = self.next == self.most && self.most < *LENGTHS.end() && more > 0;
+                self.held = if is_held { self.held + 1 } else { 0 };
+                self.next = (self.next + more).min(self.most);
                 return Some(Stride { length, states });
             }
             self.next -= 1;
@@ -172,60 +157,39 @@ impl Exact {
         both.for_each(|(seen, before)| *seen = (seen.0.min(before.0), seen.1.max(before.1)));
     }
 
-    fn states(&mut self, values: &[f64]) -> [Vec<f64>; 6] {
-        self.prepare(self.next);
-        let matrices = &self.known[&self.next];
-        std::array::from_fn(|k| {
-            let moved = matrices[k].rows().map(|row| row.iter().zip(&self.rates).map(|(a, b)| a * b).sum::<f64>());
-            moved.zip(&self.units).zip(values).map(|((moved, unit), value)| value + unit * moved).collect()
-        })
-    }
-
-    /// Makes the matrices of steps of one length.
-    fn prepare(&mut self, length: i32) {
-        let mut begin = length;
-        while !self.known.contains_key(&begin) && self.norm * 2f64.powi(begin) > NEAR {
-            begin -= 1;
+    fn states(&mut self, values: &[f64], allowed: &[f64]) -> States {
+        let units = &self.units;
+        let mut states = match &mut self.means {
+            Means::Doubled(doubled) => doubled.moved(self.next, &self.rates),
+            Means::Series(series) => {
+                let allowed: Vec<f64> = allowed.iter().zip(units).map(|(allowed, unit)| allowed / unit).collect();
+                series.moved(self.next, &self.rates, &allowed)
+            }
+        };
+        for states in &mut states {
+            for ((state, unit), value) in states.iter_mut().zip(units).zip(values) {
+                *state = value + unit * *state;
+            }
         }
-        if !self.known.contains_key(&begin) {
-            let made = PLACES.iter().map(|place| self.series(place * 2f64.powi(begin))).collect();
-            self.known.insert(begin, made);
-        }
-        for length in begin..length {
-            let twice = |half: &Square| {
-                let mut twice = half.times(&self.powers[1].times(half));
-                twice.add(2.0, half);
-                twice
-            };
-            let made = self.known[&length].iter().map(twice).collect();
-            self.known.insert(length + 1, made);
-        }
-    }
-
-    /// `P(span)` by its series.
-    fn series(&mut self, span: f64) -> Square {
-        while self.powers.len() <= TERMS {
-            let next = self.powers[1].times(&self.powers[self.powers.len() - 1]);
-            self.powers.push(next);
-        }
-        let mut sum = Square::zeros(self.rates.len());
-        // The smallest first.
-        for (k, power) in self.powers.iter().enumerate().rev() {
-            let factor = (0..=k).map(|i| span / (i + 1) as f64).product();
-            sum.add(factor, power);
-        }
-        sum
+        states
     }
 }
 
+/// The largest sum of a row.
+fn norm(size: usize, entries: &[Entry]) -> f64 {
+    let mut sums = vec![0.0; size];
+    entries.iter().for_each(|e| sums[e.row as usize] += e.value.abs());
+    sums.into_iter().fold(0.0, f64::max)
+}
+
 /// The exponent of the power of 2 next below `length`.
-fn exponent(length: f64) -> i32 {
+pub(super) fn exponent(length: f64) -> i32 {
     const BIAS: i32 = 1023;
     ((length.to_bits() >> 52) & 0x7ff) as i32 - BIAS
 }
 
 /// How far the polynomial through a step is off, as a part of what is allowed.
-fn worst(values: &[f64], states: &[Vec<f64>; 6], allowed: &[f64]) -> f64 {
+fn worst(values: &[f64], states: &States, allowed: &[f64]) -> f64 {
     // The Lagrange polynomials of the points at the middle.
     const SHARES: [f64; 6] =
         [0.1, -0.247_213_595_499_958, 0.647_213_595_499_958, 0.647_213_595_499_958, -0.247_213_595_499_958, 0.1];
@@ -240,7 +204,7 @@ fn worst(values: &[f64], states: &[Vec<f64>; 6], allowed: &[f64]) -> f64 {
 }
 
 /// How far off a straight line is, as a part of what it may be; it grows with the length like [`worst`].
-fn bend(values: &[f64], states: &[Vec<f64>; 6], allowed: &[f64], seen: &[(f64, f64)]) -> f64 {
+fn bend(values: &[f64], states: &States, allowed: &[f64], seen: &[(f64, f64)]) -> f64 {
     let part = |i: usize| {
         let (start, middle, end) = (values[i], states[5][i], states[4][i]);
         let (least, most) = (seen[i].0.min(end), seen[i].1.max(end));
@@ -250,25 +214,29 @@ fn bend(values: &[f64], states: &[Vec<f64>; 6], allowed: &[f64], seen: &[(f64, f
 }
 
 /// Gives states units in which rows and columns are alike (Parlett and Reinsch 1969, without permutations).
-fn balance(matrix: &mut Square) -> Vec<f64> {
-    let size = matrix.size;
+fn balance(size: usize, entries: &mut [Entry]) -> Vec<f64> {
     let mut units = vec![1.0; size];
+    // The entries off the diagonal, by row and by column.
+    let (mut rows, mut columns) = (vec![Vec::new(); size], vec![Vec::new(); size]);
+    for (k, entry) in entries.iter().enumerate().filter(|(_, e)| e.row != e.column) {
+        rows[entry.row as usize].push(k);
+        columns[entry.column as usize].push(k);
+    }
     let mut is_done = false;
     for _ in 0..100 {
         if std::mem::replace(&mut is_done, true) {
             break;
         }
         for (i, own) in units.iter_mut().enumerate() {
-            let others = || (0..size).filter(|j| *j != i);
-            let row: f64 = others().map(|j| matrix.entries[i * size + j].abs()).sum();
-            let column: f64 = others().map(|j| matrix.entries[j * size + i].abs()).sum();
+            let sum = |of: &[usize]| of.iter().map(|k| entries[*k].value.abs()).sum::<f64>();
+            let (row, column) = (sum(&rows[i]), sum(&columns[i]));
             if !(row.is_normal() && column.is_normal()) {
                 continue;
             }
             let unit = 2f64.powi((exponent(row) - exponent(column)) / 2);
             if (row / unit + column * unit) < 0.95 * (row + column) {
-                others().for_each(|j| matrix.entries[i * size + j] /= unit);
-                others().for_each(|j| matrix.entries[j * size + i] *= unit);
+                rows[i].iter().for_each(|k| entries[*k].value /= unit);
+                columns[i].iter().for_each(|k| entries[*k].value *= unit);
                 *own *= unit;
                 is_done = false;
             }
@@ -399,6 +367,72 @@ pub(super) mod tests {
         let heat = 2e-3 * 5e3 / 0.09 * (f64::exp(-0.3) - f64::exp(-3.0));
         close(&states, &[2e-3 * f64::exp(-3.0), heat], 1e-7);
         assert!(steps < 80, "{steps}");
+    }
+
+    /// A network of `size` species: each becomes three others, at rates between 1 and `spread` per second.
+    fn network(size: usize, spread: f64) -> Vec<f64> {
+        let mut matrix = vec![0.0; size * size];
+        for from in 0..size {
+            for k in 0..3 {
+                let (to, share) = ((from * (7 + k) + 1 + k) % size, ((from * 13 + k * 5) % 17) as f64 / 16.0);
+                let rate = spread.powf(share);
+                matrix[to * size + from] += rate;
+                matrix[from * size + from] -= rate;
+            }
+        }
+        matrix
+    }
+
+    #[test]
+    fn many_states_are_moved_as_the_integrator_moves_them() {
+        for (size, spread, time) in [(11, 1.0, 3.0), (40, 10.0, 2.0), (200, 3.0, 5.0)] {
+            let law = law(&network(size, spread), &vec![0.0; size]);
+            let values: Vec<f64> = (0..size).map(|i| f64::from(u8::from(i == 3))).collect();
+            let exact = integrator(&law, &values);
+            assert!(exact.exact.is_some());
+            let (found, steps) = at(exact, time);
+            assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-13);
+            let mut integrated = integrator(&law, &values);
+            integrated.exact = None;
+            let (expected, others) = at(integrated, time);
+            for (a, b) in found.iter().zip(&expected) {
+                assert!((a - b).abs() < 1e-9, "{a} is not {b}");
+            }
+            assert!(steps < others, "{steps} steps, {others} by the integrator");
+        }
+    }
+
+    #[test]
+    fn many_states_with_rates_far_apart_are_integrated_in_the_end() {
+        let law = law(&network(30, 1e6), &[0.0; 30]);
+        let values: Vec<f64> = (0..30).map(|i| f64::from(u8::from(i == 3))).collect();
+        let (states, steps) = at(integrator(&law, &values), 100.0);
+        assert!((states.iter().sum::<f64>() - 1.0).abs() < 1e-7);
+        assert!(steps < 1000, "{steps}");
+    }
+
+    /// Each of 60 vessels in a row leaks into the next: what has arrived in the last one is 1 less the terms of a series.
+    #[test]
+    fn a_long_row_is_exact() {
+        let size = 60;
+        let mut matrix = vec![0.0; size * size];
+        for i in 0..size {
+            if i + 1 < size {
+                matrix[i * size + i] = -1.0;
+                matrix[(i + 1) * size + i] = 1.0;
+            }
+        }
+        let values: Vec<f64> = (0..size).map(|i| f64::from(u8::from(i == 0))).collect();
+        let time: f64 = 50.0;
+        let (states, _) = exactly(&matrix, &vec![0.0; size], &values, time);
+        let mut term = (-time).exp();
+        let mut left = 0.0;
+        for (i, state) in states[..size - 1].iter().enumerate() {
+            assert!((state - term).abs() < 1e-12, "{i}: {state} is not {term}");
+            left += term;
+            term *= time / (i + 1) as f64;
+        }
+        assert!((states[size - 1] - (1.0 - left)).abs() < 1e-11);
     }
 
     #[test]

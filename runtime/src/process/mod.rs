@@ -11,7 +11,7 @@
 //! - `course`: both of these in the order of time.
 //! - `switch`: the comparisons, and where they change.
 //! - `integrator`, `dense`, `clock`: steps, the solution between them, and the time that they count.
-//! - `exact`, `bends`: steps of parts that need no integration.
+//! - `exact`, `doubled`, `series`, `bends`: steps of parts that need no integration.
 //! - `bernstein`: polynomials by their control points.
 //! - `equations`, `slopes`, `shifted`, `linear`, `sparse`: the linear systems of steps.
 //! - `limits`: what things keep at all times.
@@ -29,6 +29,7 @@ mod blame;
 mod clock;
 mod course;
 mod dense;
+mod doubled;
 mod equations;
 mod exact;
 mod index;
@@ -41,6 +42,7 @@ mod memo;
 mod mode;
 mod part;
 mod prepare;
+mod series;
 mod shifted;
 mod slopes;
 mod sparse;

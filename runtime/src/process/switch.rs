@@ -13,6 +13,9 @@ use super::dense::POINTS;
 use super::tape::{Step, Tape};
 use super::timed::kinds;
 
+/// Sides whose bounds are this share of them apart do not meet, whatever rounding makes of them.
+const CLEAR: f64 = 1e-9;
+
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
@@ -65,6 +68,18 @@ impl Switch {
         }
     }
 
+    /// Whether it keeps its truth while its sides are within these bounds.
+    fn stays(&self, (a, b): Interval, (c, d): Interval) -> bool {
+        match self.op {
+            BinaryOp::Lt if self.truth => b < c,
+            BinaryOp::Lt => a >= d,
+            BinaryOp::Le if self.truth => b <= c,
+            BinaryOp::Le => a > d,
+            // An equality that does not hold is crossed where the sides change places.
+            _ => b < c || a > d,
+        }
+    }
+
     fn clearly_changed(&self, left: f64, right: f64) -> bool {
         self.changed(left, right) && (left - right).abs() > NOISE * left.abs().max(right.abs())
     }
@@ -90,6 +105,10 @@ pub(super) struct Switches {
     straight: Vec<bool>,
     /// How far the sides of each are apart in the piece that was sampled last.
     apart: Vec<Apart>,
+    /// Values of the moving states at the points of a piece.
+    ends: [Vec<f64>; POINTS.len()],
+    /// Bounds of all registers in a piece.
+    bounds: Vec<Interval>,
     /// Which time the path counts.
     clock: Clock,
     /// The first instant at which a comparison of time itself changes, s; infinite if none does.
@@ -108,8 +127,6 @@ struct Folded {
     /// Their sides, in the same order.
     tape: Tape,
     bounds: Vec<Interval>,
-    /// Values of the moving states at the points of a piece.
-    ends: [Vec<f64>; POINTS.len()],
 }
 
 /// A comparison that has just changed.
@@ -154,6 +171,8 @@ impl Switches {
         }
         switches.tape = analysis.tape(&sides, moving);
         switches.registers = switches.tape.registers();
+        switches.bounds = switches.tape.intervals();
+        switches.ends = std::array::from_fn(|_| vec![0.0; moving.len()]);
         let curved = curved(&switches.tape);
         switches.straight = (0..switches.list.len()).map(|i| !curved[2 * i] && !curved[2 * i + 1]).collect();
         if switches.straight.contains(&false) {
@@ -179,8 +198,7 @@ impl Switches {
         let waves = list.iter().map(|i| wavy[2 * i] || wavy[2 * i + 1]).collect();
         let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
         let tape = analysis.tape(&sides, moving);
-        let ends = std::array::from_fn(|_| vec![0.0; moving.len()]);
-        self.folded = Folded { bounds: tape.intervals(), list, waves, tape, ends };
+        self.folded = Folded { bounds: tape.intervals(), list, waves, tape };
     }
 
     fn run(&mut self, time: f64, moving: &[f64]) {
@@ -207,7 +225,11 @@ impl Switches {
             return Ok(None);
         }
         self.clock = clock;
-        self.sample(piece, moving, path);
+        self.look_over(piece, path);
+        if (0..self.list.len()).all(|i| self.is_clear(i)) {
+            return Ok(None);
+        }
+        self.sample(piece);
         let mut located: Vec<(f64, usize)> = Vec::new();
         for i in 0..self.list.len() {
             for (before, after) in self.sampled_changes(i).into_iter().flatten() {
@@ -224,7 +246,7 @@ impl Switches {
                 break;
             }
         }
-        for place in self.open(piece) {
+        for place in self.open() {
             let end = located.iter().fold(to, |end, (time, _)| end.min(*time));
             if let Some((before, after)) = self.hidden(place, from, end, moving, path)? {
                 let i = self.folded.list[place];
@@ -239,18 +261,29 @@ impl Switches {
         }))
     }
 
-    /// Notes how far the sides of all comparisons are apart at the points of a piece.
-    fn sample(&mut self, piece: Interval, moving: &mut [f64], path: &mut dyn FnMut(f64, &mut [f64])) {
+    /// Bounds the sides of all comparisons over a piece.
+    fn look_over(&mut self, piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
+        self.ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
+        let span = (self.clock.lab(piece.0), self.clock.lab(piece.1));
+        self.tape.enclose(span, hulls(&self.ends), &mut self.bounds);
+    }
+
+    /// Whether the sides of a comparison are clearly apart throughout the piece that was looked over, as its truth has it.
+    fn is_clear(&self, i: usize) -> bool {
+        let side = |k: usize| self.bounds[self.tape.outputs[k] as usize];
+        let ((a, b), (c, d)) = (side(2 * i), side(2 * i + 1));
+        let sizes = [a, b, c, d].into_iter().map(f64::abs).filter(|size| size.is_finite());
+        let gap = CLEAR * sizes.fold(0.0, f64::max);
+        self.list[i].stays((a - gap, b + gap), (c, d))
+    }
+
+    /// Notes how far the sides of all comparisons are apart at the points of the piece that was looked over.
+    fn sample(&mut self, piece: Interval) {
         let mut apart = std::mem::take(&mut self.apart);
         apart.clear();
         apart.resize(self.list.len(), Apart::default());
         for (k, share) in POINTS.into_iter().enumerate() {
-            let time = instant(piece, share);
-            path(time, moving);
-            self.run(time, moving);
-            if !self.folded.list.is_empty() {
-                self.folded.ends[k].copy_from_slice(moving);
-            }
+            self.tape.run(self.clock.lab(instant(piece, share)), &self.ends[k], &mut self.registers);
             for (i, apart) in apart.iter_mut().enumerate() {
                 let (left, right) = self.sides(i);
                 apart.by[k] = left - right;
@@ -273,13 +306,9 @@ impl Switches {
         [drawn, seen]
     }
 
-    /// The places of comparisons that may turn round somewhere in the piece that was sampled last.
-    fn open(&mut self, piece: Interval) -> Vec<usize> {
-        if self.folded.list.is_empty() {
-            return Vec::new();
-        }
-        self.bound(piece);
-        (0..self.folded.list.len()).filter(|place| !self.stays(*place)).collect()
+    /// The places of comparisons that may turn round somewhere in the piece that was looked over.
+    fn open(&self) -> Vec<usize> {
+        (0..self.folded.list.len()).filter(|place| !self.is_clear(self.folded.list[*place])).collect()
     }
 
     /// Two instants between `low` and `high`: a comparison that may turn round has changed at the second, and not before the first.
@@ -327,37 +356,19 @@ impl Switches {
 
     /// Bounds the sides of all comparisons that may turn round over a piece.
     fn enclose(&mut self, piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
-        let Folded { tape, ends, .. } = &mut self.folded;
+        let Folded { tape, bounds, .. } = &mut self.folded;
         if tape.inputs > 0 {
-            ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
+            self.ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
         }
-        self.bound(piece);
+        let span = (self.clock.lab(piece.0), self.clock.lab(piece.1));
+        tape.enclose(span, hulls(&self.ends), bounds);
     }
 
-    /// The same where the moving states at the points of the piece are known.
-    fn bound(&mut self, (from, to): Interval) {
-        let Folded { tape, bounds, ends, .. } = &mut self.folded;
-        let states = (0..ends[0].len()).map(|state| {
-            let points = control(Vector6::from_fn(|k, _| ends[k][state]));
-            (points.min(), points.max())
-        });
-        tape.enclose((self.clock.lab(from), self.clock.lab(to)), states, bounds);
-    }
-
-    /// Whether a comparison has the same truth throughout the piece that was bounded last.
+    /// Whether a comparison has the same truth throughout the piece that was enclosed last.
     fn stays(&self, place: usize) -> bool {
         let Folded { list, tape, bounds, .. } = &self.folded;
         let side = |k: usize| bounds[tape.outputs[k] as usize];
-        let ((a, b), (c, d)) = (side(2 * place), side(2 * place + 1));
-        let switch = &self.list[list[place]];
-        match switch.op {
-            BinaryOp::Lt if switch.truth => b < c,
-            BinaryOp::Lt => a >= d,
-            BinaryOp::Le if switch.truth => b <= c,
-            BinaryOp::Le => a > d,
-            // An equality that does not hold is crossed where the sides change places.
-            _ => b < c || a > d,
-        }
+        self.list[list[place]].stays(side(2 * place), side(2 * place + 1))
     }
 
     fn is_changed(&self, i: usize, test: fn(&Switch, f64, f64) -> bool) -> bool {
@@ -401,6 +412,14 @@ impl Switches {
         self.run(later, moving);
         if self.is_changed(i, Switch::changed) { later } else { time }
     }
+}
+
+/// Bounds of states that are polynomials through their values at [`POINTS`].
+fn hulls(ends: &[Vec<f64>; POINTS.len()]) -> impl Iterator<Item = Interval> {
+    (0..ends[0].len()).map(|state| {
+        let points = control(Vector6::from_fn(|k, _| ends[k][state]));
+        (points.min(), points.max())
+    })
 }
 
 /// The sign of left minus right.

@@ -23,3 +23,4 @@ mod fit;
 mod ledger;
 
 mod record;
+mod stiff;
