@@ -4,19 +4,22 @@
 //! [`syntax`] text to tree, [`names`] modules and scopes, [`elaborate`] the lab's instances and laws as one flat model,
 //! [`lower`] the workflow as a plan, [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
-mod budget;
+mod calibration;
 pub mod check;
 pub mod chem;
 pub mod elaborate;
+mod escapes;
 pub mod eval;
 pub mod import;
+mod labs;
 mod labware;
 pub mod library;
+pub mod load;
 pub mod loader;
 pub mod lower;
 pub mod meanings;
-mod measured;
 pub mod names;
+mod near;
 pub mod points;
 pub mod program;
 pub mod prose;
@@ -27,6 +30,7 @@ mod settle;
 mod share;
 mod sila;
 pub mod stock;
+mod stop;
 mod study;
 mod supposed;
 pub mod task;
@@ -34,11 +38,11 @@ pub mod units;
 
 pub use matterix_syntax::{self as syntax, ast, fmt};
 
-pub use budget::Stop;
+pub use calibration::{Calibration, Gauged};
 pub use loader::{LibraryOnly, Loader};
 pub use lower::Wires;
 pub use meanings::{Gathered, Meanings};
-pub use measured::{Gauged, Measured};
 pub use program::{Compiled, Options, Test, check, check_and, compile, contents, document, many_runs, script, tests};
 pub use session::{Foreseen, Session};
+pub use stop::Stop;
 pub use study::Many;

@@ -2,7 +2,7 @@
 
 use matterix_ir::FileId;
 
-use crate::budget::Stop;
+use crate::stop::Stop;
 
 /// Finds the text of imported modules.
 pub trait Loader {

@@ -11,21 +11,26 @@ use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
-use crate::budget;
+use crate::calibration::{self, Calibration};
 use crate::check as checks;
+use crate::elaborate::choices::Choice;
 use crate::elaborate::geometry::Geometry;
 use crate::elaborate::hazards::dangers;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, ExtensiveKey, Tables};
+use crate::escapes::unhandled;
 use crate::eval::{Num, Type, Value};
+use crate::labs;
+use crate::load::load;
 use crate::loader::Loader;
 use crate::lower::Wires;
 use crate::meanings::{Around as Declared, Gathered, Noted};
-use crate::measured::{self, Measured};
-use crate::names::{self, DeclId, Module, Names, near};
+use crate::names::{DeclId, Module, Names, imports, item_name};
+use crate::near;
 use crate::points::Questions;
 use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
 use crate::settle::{self, Purpose, Settled};
+use crate::stop::stopped;
 use crate::study::{self, Many};
 use crate::supposed;
 use crate::task::{self, Given, Task};
@@ -42,7 +47,7 @@ pub struct Options {
     /// What is asked of drivers.
     pub wires: Wires,
     /// What was measured of things of the lab.
-    pub measured: Measured,
+    pub measured: Calibration,
 }
 
 /// A test, ready to run.
@@ -111,8 +116,8 @@ pub fn examined(
 
 /// What a check saw; of one that was stopped, that it was: no finding would say that nothing is wrong.
 fn whole(seen: Option<Examined>, file: FileId) -> Examined {
-    let stopped = || vec![budget::stopped(Span::new(file, 0, 0))];
-    seen.unwrap_or_else(|| Examined { findings: stopped(), ..Examined::default() })
+    let given_up = || vec![stopped(Span::new(file, 0, 0))];
+    seen.unwrap_or_else(|| Examined { findings: given_up(), ..Examined::default() })
 }
 
 /// What is asked of a check.
@@ -132,7 +137,7 @@ fn examine(
     session: &mut Session,
 ) -> Option<Examined> {
     let wanted = asked.wanted;
-    let (modules, mut diagnostics) = names::load(sources, file, loader, session);
+    let (modules, mut diagnostics) = load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
     let (mut tables, found) = Tables::new(&names);
@@ -147,7 +152,7 @@ fn examine(
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
     for item in items.iter().copied() {
-        match task::labs(&tables, sources, root, item, &[]) {
+        match labs::labs(&tables, sources, root, item, &[]) {
             Ok(labs) => {
                 let given = |lab| Task { item, lab, given: task::given(&tables, item, &[]), supposed: None };
                 tasks.extend(labs.into_iter().map(given));
@@ -262,10 +267,10 @@ fn compile_and<T>(
     wanted: Wanted,
     then: impl for<'a> FnOnce(&Program, &Task<'a>, (&'a Tables<'a>, &Sources)) -> T,
 ) -> (Option<Made<T>>, Vec<Diagnostic>) {
-    let (mut modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
+    let (mut modules, mut diagnostics) = load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     if let Some(module) = modules.get_mut(root) {
-        diagnostics.extend(measured::put(&options.measured, module, sources));
+        diagnostics.extend(calibration::put(&options.measured, module, sources));
     }
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -307,7 +312,7 @@ fn task_of<'a>(
 ) -> Option<Task<'a>> {
     let given: Vec<Given<'_>> = set.iter().map(|(name, value)| Given { name, value, module: root }).collect();
     diagnostics.extend(task::check_given(tables, item, &given));
-    match task::lab(tables, sources, root, item, &given, options.lab.as_deref()) {
+    match labs::lab(tables, sources, root, item, &given, options.lab.as_deref()) {
         Ok(lab) => Some(Task { item, lab, given, supposed: None }),
         Err(d) => {
             diagnostics.push(*d);
@@ -333,7 +338,7 @@ pub fn many_runs(
     options: &Options,
     fits: bool,
 ) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
+    let (modules, mut diagnostics) = load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
@@ -370,7 +375,7 @@ pub fn many_runs(
 /// Compiles the tests of a file whose names hold `wanted`, in the order of the text; what is wrong with the file beside
 /// them is returned apart.
 pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &str) -> (Vec<Test>, Vec<Diagnostic>) {
-    let (modules, mut diagnostics) = names::load(sources, file, loader, &mut Session::default());
+    let (modules, mut diagnostics) = load(sources, file, loader, &mut Session::default());
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
@@ -386,7 +391,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
         let given = task::given(&tables, item, &[]);
         let mut found = task::check_given(&tables, item, &given);
         let mut program = None;
-        match task::lab(&tables, sources, root, item, &given, None) {
+        match labs::lab(&tables, sources, root, item, &given, None) {
             Ok(lab) => {
                 let (task, wanted) = (Task { item, lab, given, supposed: None }, Wanted::Program(Wires::Off));
                 let built = build(&tables, sources, &task, wanted, None, &|| false).unwrap_or_default();
@@ -446,7 +451,7 @@ fn finish(mut diagnostics: Vec<Diagnostic>, sources: &Sources) -> Vec<Diagnostic
             out.push(d);
         }
     }
-    checks::without_consequences(names::imports::joined(out), sources)
+    checks::without_consequences(imports::joined(out), sources)
 }
 
 /// The values of `--set name=value`, each read as it was typed.
@@ -547,7 +552,7 @@ struct Built {
     uses: Option<checks::Uses>,
     many: Option<Many>,
     /// Truth values and words among the parameters that have only their default.
-    choices: Vec<task::Choice>,
+    choices: Vec<Choice>,
     /// What can get where, where that was found anew.
     reach: Option<Reach>,
     /// What looking at motions has found, where that was asked for.
@@ -648,7 +653,7 @@ fn judge<'a>(
     // What is wrong with the defaults is mended first.
     if let (ItemKind::Workflow { name, .. }, true) = (&item.kind, built.findings.iter().all(|d| !d.is_error())) {
         let usual = built.reach.clone();
-        let supposing = |choice: &task::Choice| {
+        let supposing = |choice: &Choice| {
             let task = Task { supposed: Some(choice.clone()), ..task.clone() };
             build(tables, sources, &task, Wanted::Findings, usual.as_ref(), &stop).map(|built| built.findings)
         };
@@ -671,7 +676,7 @@ fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<About> {
     // What it runs may stand in another file, where its name leads to it.
     let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
     let lab = names.decl(task.lab);
-    let (lab_name, _) = names::item_name(lab.item)?;
+    let (lab_name, _) = item_name(lab.item)?;
     Some(About { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
 }
 
@@ -718,7 +723,7 @@ fn build<'a>(
     if !to_run {
         let item = tables.names.decl(task.item).item;
         if let ItemKind::Workflow { name, .. } = &item.kind {
-            elaborator.diagnostics.extend(checks::unhandled(&plan, name.span, item.span));
+            elaborator.diagnostics.extend(unhandled(&plan, name.span, item.span));
             elaborator.diagnostics.extend(checks::beyond(&plan, item.span));
             // A step that is wrong is not in the plan.
             if !elaborator.diagnostics.iter().any(Diagnostic::is_error) {

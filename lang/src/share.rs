@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::names::STACK;
+/// Bytes of stack of a thread: what the main one has.
+pub(crate) const STACK: usize = 8 << 20;
 
 /// How many processors there are to share work.
 pub(crate) fn processors() -> usize {

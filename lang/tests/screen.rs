@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use matterix_ir::Sources;
 use matterix_lang::elaborate::Tables;
-use matterix_lang::names::{self, Names};
+use matterix_lang::load;
+use matterix_lang::names::Names;
 use matterix_lang::screen::Party;
 use matterix_lang::{LibraryOnly, Session};
 
@@ -20,7 +21,7 @@ fn groups(tables: &Tables<'_>, name: &str) -> BTreeSet<String> {
 fn common_species_belong_to_their_groups() {
     let mut sources = Sources::default();
     let file = sources.add("bench.mtx", "mtx 1\n");
-    let (modules, found) = names::load(&mut sources, file, &LibraryOnly, &mut Session::default());
+    let (modules, found) = load::load(&mut sources, file, &LibraryOnly, &mut Session::default());
     assert_eq!(found, []);
     let (names, found) = Names::new(&modules);
     assert_eq!(found, []);

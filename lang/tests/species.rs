@@ -3,14 +3,15 @@
 use matterix_ir::Sources;
 use matterix_lang::elaborate::reach::Reach;
 use matterix_lang::elaborate::{Elaborator, Tables};
-use matterix_lang::names::{self, DeclId, Names};
+use matterix_lang::load;
+use matterix_lang::names::{DeclId, Names};
 use matterix_lang::{LibraryOnly, Session};
 
 /// The codes of what is found in the species of a file and of the library.
 fn found_in(text: &str) -> Vec<String> {
     let mut sources = Sources::default();
     let file = sources.add("species.mtx", text);
-    let (modules, _) = names::load(&mut sources, file, &LibraryOnly, &mut Session::default());
+    let (modules, _) = load::load(&mut sources, file, &LibraryOnly, &mut Session::default());
     let (names, _) = Names::new(&modules);
     let (tables, mut found) = Tables::new(&names);
     let mut lab = Elaborator::new(&tables, Reach::default());

@@ -17,7 +17,7 @@ use matterix_ir::{Diagnostic, FileId, Program};
 use super::run::Findings;
 use crate::args::{Color, DeployArgs, DeployMode, Fidelity, RunFormat};
 use crate::panel::{Board, Panel, Watcher};
-use crate::pipeline::{self, Choices, DeployPlan, Gauged, Input, Keep, Measured, Options, Wires};
+use crate::pipeline::{self, Calibration, Choices, DeployPlan, Gauged, Input, Keep, Options, Wires};
 use crate::progress::{Kind, Progress};
 use crate::reads::Account;
 use crate::record::{About, Bound, Folder, Gauge, Taken};
@@ -205,10 +205,10 @@ fn shown(journal: &mut Kept, board: &Arc<Board>) {
 }
 
 /// What the bindings say was measured of the lab.
-fn measured(args: &DeployArgs, bindings: &str) -> Measured {
+fn measured(args: &DeployArgs, bindings: &str) -> Calibration {
     let gauged = |c: Calibrated| Gauged { thing: c.thing, field: c.field, value: c.value };
     let given = calibration::read(bindings).into_iter().map(gauged).collect();
-    Measured { name: args.bind.display().to_string(), text: bindings.to_owned(), given }
+    Calibration { name: args.bind.display().to_string(), text: bindings.to_owned(), given }
 }
 
 /// The folder of the record that is asked for, and the first file of the program in it.
@@ -224,7 +224,7 @@ fn recorded(args: &DeployArgs, read: &[Account], bindings: &str) -> Result<Optio
 }
 
 /// What a record says of what a deployment is given.
-fn about(args: &DeployArgs, program: &Program, (file, bindings): (FileId, &str), measured: &Measured) -> About {
+fn about(args: &DeployArgs, program: &Program, (file, bindings): (FileId, &str), measured: &Calibration) -> About {
     let (bound, _) = binding::read(program, file, bindings);
     let driver = |index: usize| program.drivers.get(index).map(|d| d.name.clone());
     let device = |b: &Binding| {
@@ -274,7 +274,7 @@ fn journal(path: Option<&Path>, args: &DeployArgs) -> Result<Kept, String> {
 }
 
 /// Whether a person says that it is still so.
-fn stands(measured: &Measured) -> bool {
+fn stands(measured: &Calibration) -> bool {
     let value = |g: &Gauged| measured.text.get(g.value.clone()).unwrap_or_default().to_owned();
     let all: Vec<String> =
         measured.given.iter().map(|g| format!("  {}.{}: {}\n", g.thing.0, g.field.0, value(g))).collect();

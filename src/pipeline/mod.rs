@@ -33,7 +33,7 @@ pub use deploy::{Plan as DeployPlan, deploy};
 pub use emit::{Target, emit};
 pub use emulate::{Line, emulate};
 pub use many::{Asked, as_fit, as_study, fit, many, study};
-pub use matterix_lang::{Gauged, Measured, Options, Test, Wires};
+pub use matterix_lang::{Calibration, Gauged, Options, Test, Wires};
 pub use mend::{Fixes, Mended, Mending, correct, mend};
 pub use neighbours::Neighbours;
 pub use plan::{Search, chart, picture, schedule, schedule_json, turns};

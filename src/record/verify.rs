@@ -20,7 +20,7 @@ use super::folder::{Manifest, gather};
 use super::report::Report;
 use super::{BINDINGS, JOURNAL, MANIFEST, PROGRAM, REPORT};
 use crate::files;
-use crate::pipeline::{self, Gauged, Input, Measured, Options, Wires};
+use crate::pipeline::{self, Calibration, Gauged, Input, Options, Wires};
 
 /// What was found of a record.
 #[derive(Debug, Default, serde::Serialize)]
@@ -99,7 +99,7 @@ fn replayed(dir: &Path, manifest: &Manifest, past: &Past, checked: &mut Checked)
     let bindings = String::from_utf8(files::read(&dir.join(BINDINGS))?).map_err(|_| "the bindings are no text")?;
     let gauged = |c: calibration::Calibrated| Gauged { thing: c.thing, field: c.field, value: c.value };
     let given = calibration::read(&bindings).into_iter().map(gauged).collect();
-    let measured = Measured { name: BINDINGS.to_owned(), text: bindings.clone(), given };
+    let measured = Calibration { name: BINDINGS.to_owned(), text: bindings.clone(), given };
     let (workflow, set, lab) = (about.workflow.clone(), about.set.clone(), about.lab.clone());
     let options = Options { workflow, set, lab, wires: Wires::Called, measured };
     let (mut sources, program, found) = pipeline::compile(&Input::file(&main, files::read(&main)?), &options);

@@ -24,7 +24,7 @@ pub struct Stock {
 
 /// A species that has to be measured out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
+pub struct MeasuredOut {
     /// The species.
     pub substance: String,
     /// The solutions it goes into, as a path from the one that is held; empty where it is held as it is.
@@ -35,7 +35,7 @@ pub struct Measured {
 
 impl Stock {
     /// What the holdings are made of, `masses` (kg) being theirs in their order: each species once for each way in.
-    pub fn measure_out(&self, masses: &[f64]) -> Vec<Measured> {
+    pub fn measure_out(&self, masses: &[f64]) -> Vec<MeasuredOut> {
         let mut out = Vec::new();
         for (holding, mass) in self.holdings.iter().zip(masses) {
             self.break_down(&holding.substance, &mut Vec::new(), *mass, &mut out);
@@ -43,13 +43,13 @@ impl Stock {
         out
     }
 
-    fn break_down(&self, name: &str, within: &mut Vec<String>, mass: f64, out: &mut Vec<Measured>) {
+    fn break_down(&self, name: &str, within: &mut Vec<String>, mass: f64, out: &mut Vec<MeasuredOut>) {
         // A recipe that contains itself is refused before there is a program.
         let recipe = self.recipe(name).filter(|_| !within.iter().any(|w| w == name));
         let Some(recipe) = recipe else {
             match out.iter_mut().find(|m| m.substance == name && m.within == *within) {
                 Some(line) => line.mass += mass,
-                None => out.push(Measured { substance: name.to_owned(), within: within.clone(), mass }),
+                None => out.push(MeasuredOut { substance: name.to_owned(), within: within.clone(), mass }),
             }
             return;
         };

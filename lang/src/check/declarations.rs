@@ -4,7 +4,7 @@ use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::{ignored, returns};
 use crate::ast::{AssetLine, Field, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
-use crate::budget::Budget;
+use crate::elaborate::budget::Budget;
 use crate::elaborate::reach::Reach;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::types::unsupported;
@@ -68,7 +68,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
         ItemKind::Hazard { params, .. } => {
             let mut scope = Scope::module(module);
             bind(lab, params, module, &mut scope);
-            lab.check_hazard(&item.kind, sources, &mut scope);
+            lab.check_hazard(&item.kind, &mut scope);
         }
         ItemKind::Fn { params, body, external, name, result, options } => {
             report(lab, ignored::function(params.len(), options));

@@ -5,13 +5,13 @@ use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, NamedExpr, Role};
 use crate::elaborate::Elaborator;
+use crate::elaborate::failures::BARS;
 use crate::elaborate::given::{GIVEN_BY, INSTEAD, ONLY_WITH, word};
 use crate::elaborate::lab::SYMMETRIC;
 use crate::elaborate::properties::{GIVES, GIVES_AT};
 use crate::elaborate::tables::{MATTER, is_true};
 use crate::eval::Type;
-use crate::lower::BARS;
-use crate::names::near;
+use crate::near;
 use crate::stock::{COUNTS_AS, count_of};
 
 /// Options of a member that mean nothing for a member of its kind.

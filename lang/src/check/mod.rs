@@ -30,7 +30,7 @@ use crate::share;
 
 pub use consequences::without_consequences;
 pub use declarations::{bind, declarations, declarations_and};
-pub use failures::{beyond, idle, undeclared, unhandled};
+pub use failures::{beyond, idle};
 pub use unused::{Uses, reagents, things, uses};
 
 /// Checks a lab that no workflow of its file uses, and notes what names mean where that is asked for.

@@ -9,7 +9,7 @@ use super::instances::Setting;
 use super::joints::clothe;
 use crate::ast::{AssetLine, ExprKind, FieldValue};
 use crate::eval::{Type, Value};
-use crate::names::near::{nearest, question};
+use crate::near::{nearest, question};
 
 impl<'a> Elaborator<'a> {
     /// Whether anything in the lab has links and joints.

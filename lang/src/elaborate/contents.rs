@@ -2,11 +2,11 @@
 
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 
+use super::held::Held;
 use super::{Elaborator, SpeciesId};
 use crate::ast::{Binary, Expr, ExprKind, Name};
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
-use crate::stock::Held;
 
 /// What a name in a recipe or after `of` stands for.
 pub enum Substance {

@@ -9,10 +9,10 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, Unit, codes};
 
 use super::Elaborator;
+use super::failures::PENDING;
 use super::laws::has_calls;
 use crate::ast::{self, Delay, ItemKind, MemberKind};
 use crate::eval::{Scope, Type, Value};
-use crate::lower::PENDING;
 
 /// What happens by itself, and what must hold for that.
 #[derive(Default)]

@@ -3,7 +3,7 @@
 use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, Field, FieldValue};
-use crate::names::near;
+use crate::near;
 
 /// Reports keys given twice.
 pub fn repeated(fields: &[Field], diagnostics: &mut Vec<Diagnostic>) {

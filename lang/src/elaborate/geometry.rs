@@ -13,7 +13,7 @@ use super::instances::Setting;
 use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
-use crate::names::near::{nearest, question};
+use crate::near::{nearest, question};
 
 /// The shapes and what they are given.
 const SHAPES: &[(&str, &str)] = &[

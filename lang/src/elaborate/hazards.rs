@@ -6,13 +6,13 @@ use matterix_ir::model::Danger;
 
 use matterix_ir::plan::{Said, Term};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Sources, Span, codes};
+use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Span, codes};
 
 use super::{Elaborator, Tables};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
 use crate::eval::{Num, Scope, Type, Value};
-use crate::lower::Planner;
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 use crate::units::Dimension;
 
 /// The kept value that stands for the share of its source which a transfer takes, in what is said of transfers.
@@ -293,8 +293,7 @@ impl<'a> Elaborator<'a> {
         if self.never(node) || self.initial_mode && self.glance(node) == Some(0.0) {
             return None;
         }
-        let sources = Sources::default();
-        let said = declared.because.map(|words| Planner::new(self, &sources).beware(node, words, bound, scope));
+        let said = declared.because.map(|words| self.said_of_danger(node, words, bound, scope));
         let said = said.unwrap_or_default();
         let states = self.graph.schedule([node]).into_iter().filter_map(|n| match self.graph.op(n) {
             Op::State(s) => Some(s),
@@ -320,7 +319,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Checks the declaration of a hazard on stand-ins for its instances, which `scope` has bound.
-    pub fn check_hazard(&mut self, kind: &'a ItemKind, sources: &Sources, scope: &mut Scope) {
+    pub fn check_hazard(&mut self, kind: &'a ItemKind, scope: &mut Scope) {
         let ItemKind::Hazard { params, of, after, when, because, .. } = kind else { return };
         let parameter = |e: &Expr| bare(e).is_some_and(|name| params.iter().any(|p| p.name.text == name));
         let moved = after.as_ref().or(of.as_ref()).and_then(transfer);
@@ -353,7 +352,7 @@ impl<'a> Elaborator<'a> {
         }
         let held = self.beware(when, scope);
         if let (Some((node, bound)), Some(words)) = (held, because) {
-            Planner::new(self, sources).beware(node, words, bound, scope);
+            self.said_of_danger(node, words, bound, scope);
         }
     }
 

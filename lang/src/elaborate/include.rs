@@ -10,7 +10,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::Elaborator;
 use crate::ast::{Expr, Holding, ItemKind, LabLine, LabLineKind, Name, NamedExpr, Param, Path};
 use crate::eval::{Scope, Type, Value};
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 
 /// More labs than any holds; each of two that holds two others grows fast.
 const MOST_LABS: usize = 500;
@@ -200,7 +201,7 @@ impl<'a> Elaborator<'a> {
 
     fn lab_to_include(&mut self, path: &Path, module: usize, open: &[DeclId]) -> Option<DeclId> {
         let is_lab = |k: &ItemKind| matches!(k, ItemKind::Lab { .. });
-        match crate::task::find(self.tables, module, path, "lab", is_lab) {
+        match self.tables.names.find(module, path, "lab", is_lab) {
             Ok(id) if open.contains(&id) => {
                 let name = path.segments.last().map_or("", |n| n.text.as_str());
                 let headline = format!("`{name}` includes itself");

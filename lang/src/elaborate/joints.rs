@@ -8,7 +8,7 @@ use super::Elaborator;
 use super::geometry::Geometry;
 use crate::ast::{AssetLine, At, Expr, ExprKind, FieldValue, Jointed, Name};
 use crate::eval::{Scope, Type, Value};
-use crate::names::near::{nearest, question};
+use crate::near::{nearest, question};
 
 /// The joints of an asset's lines do not move by themselves: the states that they follow have the limits.
 const FREE: JointLimits =

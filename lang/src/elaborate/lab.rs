@@ -12,7 +12,8 @@ use crate::ast::{
     self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
 };
 use crate::eval::{Scope, Type, Value};
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 
 /// Fields every asset may have beside the members of its capabilities: geometry, and what follows from it.
 pub(crate) const GEOMETRY: &[&str] =

@@ -2,17 +2,21 @@
 
 pub mod articulation;
 pub mod balances;
+pub mod budget;
 mod candidates;
+pub mod choices;
 mod conserve;
 pub mod contents;
 mod coverings;
 pub mod events;
 mod extents;
+pub mod failures;
 pub mod fields;
 pub mod geometry;
 pub mod given;
 pub mod grids;
 pub mod hazards;
+pub mod held;
 pub mod include;
 mod inertia;
 pub mod instances;
@@ -25,6 +29,7 @@ pub mod laws;
 mod lineage;
 mod mended;
 pub mod mixtures;
+pub mod open;
 mod origin;
 pub mod properties;
 pub mod prune;
@@ -38,6 +43,7 @@ pub mod tables;
 pub mod targets;
 mod tuples;
 pub mod units;
+pub mod verbs;
 mod whereabouts;
 pub mod writes;
 
@@ -50,8 +56,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Graph, Leaves, NodeId, Op, Span};
 use rustc_hash::{FxHashMap, FxHashSet};
 
+use self::budget::Budget;
 use crate::ast::{self, Expr, FieldValue};
-use crate::budget::Budget;
 pub use crate::eval::SpeciesId;
 use crate::eval::call::KnownCall;
 use crate::eval::{ReactionId, Type, Value};
@@ -198,9 +204,9 @@ pub struct Elaborator<'a> {
     /// Which states say what has touched a mixture, by mixture, then by reagent.
     pub lineage: BTreeMap<InstanceId, BTreeMap<String, u32>>,
     /// Terms of what vessels hold at the start, in the order of the text.
-    pub held: Vec<crate::stock::Held>,
+    pub held: Vec<held::Held>,
     /// What the verbs of calls were found to mean, by the place of the call.
-    pub verbs: BTreeMap<Span, crate::lower::Verb<'a>>,
+    pub verbs: BTreeMap<Span, verbs::Verb<'a>>,
     /// Something asks for lineage.
     pub follows_lineage: bool,
     /// What names of the lab begin with while the text of an included one is read: empty, or `left.`.
@@ -217,13 +223,13 @@ pub struct Elaborator<'a> {
     /// Parameters of the workflow that have only their default, by index.
     pub defaulted: BTreeSet<u32>,
     /// Truth values and words among the parameters of the workflow that have only their default.
-    pub choices: Vec<crate::task::Choice>,
+    pub choices: Vec<choices::Choice>,
     /// Pair parameters.
     pub pairs: Vec<Pair<'a>>,
     /// Parameters of the model.
     pub params: Vec<model::Param>,
     /// What studies and fits may vary.
-    pub open: crate::study::Open,
+    pub open: open::Open,
     /// States of the model.
     pub states: Vec<model::State>,
     /// What states that hold an instance may point at.
@@ -356,7 +362,7 @@ impl<'a> Elaborator<'a> {
             choices: Vec::new(),
             pairs: Vec::new(),
             params: Vec::new(),
-            open: crate::study::Open::default(),
+            open: open::Open::default(),
             states: Vec::new(),
             targets: targets::Targets::default(),
             extensive: BTreeMap::new(),

@@ -6,16 +6,16 @@ use std::sync::{Arc, OnceLock, RwLock};
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 use rustc_hash::FxHashMap;
 
+use super::failures::{dangers, declared_failures};
 use super::kinds::Kinds;
 use super::properties::{self, Properties};
 use super::reach::Reach;
 use super::species::SpeciesTable;
 use super::{Elaborator, units};
 use crate::ast::{AssetLine, Expr, ExprKind, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
-use crate::budget::Stop;
-use crate::lower::{dangers, declared_failures};
 use crate::names::{DeclId, Names, verb_text};
 use crate::screen::Screen;
+use crate::stop::Stop;
 use crate::units::text::UnitError;
 use crate::units::{Dimension, Resolved, Units};
 

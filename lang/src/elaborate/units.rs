@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Binary, Expr, ExprKind, Item, ItemKind, Name, Unary, UnitText};
-use crate::names::{Names, near};
+use crate::names::Names;
+use crate::near;
 use crate::units::text::UnitError;
 use crate::units::{Dimension, DimensionDef, Rational, UnitDef, Units, called};
 

@@ -6,7 +6,8 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 use super::{Num, ReactionId, Scope, SpeciesId, Type, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
 use crate::elaborate::{Elaborator, Pair};
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 use crate::units::Dimension;
 
 /// A function, what it was called with, how many instances there were, and how members are read.

@@ -4,7 +4,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::{Num, Type, Value};
 use crate::elaborate::Elaborator;
-use crate::names::near;
+use crate::near;
 
 impl Elaborator<'_> {
     /// The value as the type, or a report; `what` names the place in messages.

@@ -8,7 +8,8 @@ use super::{Num, ReactionId, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
 use crate::elaborate::units::unit_error;
 use crate::elaborate::{Asked, Elaborator};
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 use crate::units::Dimension;
 
 impl<'a> Elaborator<'a> {

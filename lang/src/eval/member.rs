@@ -14,7 +14,8 @@ use crate::elaborate::instances::Setting;
 use crate::elaborate::lab::GEOMETRY;
 use crate::elaborate::tables::MemberRef;
 use crate::elaborate::{Elaborator, MemberKey, Tables};
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 use crate::units::Dimension;
 
 impl<'a> Elaborator<'a> {

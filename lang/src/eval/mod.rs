@@ -14,6 +14,7 @@ mod measures;
 pub mod member;
 pub mod reaction;
 mod table;
+mod texts;
 pub mod types;
 pub mod value;
 pub mod words;

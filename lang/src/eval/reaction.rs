@@ -62,14 +62,14 @@ impl<'a> Elaborator<'a> {
                     "basis",
                     "requires",
                 ];
-                let near = crate::names::near::nearest(&name.text, known);
+                let near = crate::near::nearest(&name.text, known);
                 let mut d = Diagnostic::error(
                     codes::UNKNOWN_MEMBER,
                     name.span,
                     format!("a reaction has no `{}`", name.text),
                     "not a member",
                 );
-                d.help.extend(crate::names::near::question(&near));
+                d.help.extend(crate::near::question(&near));
                 self.report(d);
                 Value::Error
             }

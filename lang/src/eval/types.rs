@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, codes};
 use crate::ast;
 use crate::elaborate::Tables;
 use crate::names::DeclId;
-use crate::names::near;
+use crate::near;
 use crate::units::Dimension;
 
 /// A resolved type.

@@ -8,7 +8,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 use super::{Scope, Type, Value};
 use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name};
 use crate::elaborate::Elaborator;
-use crate::names::near;
+use crate::near;
 
 impl<'a> Elaborator<'a> {
     /// An expression where a type is expected: a word of an enumerated type stands for itself.

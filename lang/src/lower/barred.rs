@@ -13,10 +13,8 @@ use matterix_ir::{Op, UnaryOp};
 
 use super::Planner;
 use crate::ast::MemberKind;
+use crate::elaborate::failures::BARS;
 use crate::elaborate::given::word;
-
-/// The option of a state that names the failure of a use while it holds.
-pub const BARS: &str = "bars";
 
 impl Planner<'_, '_> {
     /// Asks of every operation that uses what another one of the plan may bar that it is not barred.

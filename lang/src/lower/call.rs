@@ -10,19 +10,11 @@ use super::{Planner, ResultSlot};
 use crate::ast::{
     Block, Call, Clause, ClauseKind, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig,
 };
-use crate::elaborate::tables::MemberRef;
+use crate::elaborate::verbs::Verb;
 use crate::eval::{Scope, Type, Value};
-use crate::names::{DeclId, near, verb_text};
+use crate::names::{DeclId, verb_text};
+use crate::near;
 use crate::syntax::{STEP_WORDS, is_step};
-
-/// What a verb can mean.
-#[derive(Clone, Debug)]
-pub enum Verb<'a> {
-    /// A skill in scope.
-    Skill(DeclId),
-    /// A command of a capability.
-    Command(DeclId, MemberRef<'a>),
-}
 
 /// The arguments of a call, in the words of its signature.
 pub struct Bound {

@@ -14,9 +14,7 @@ mod stmt;
 mod text;
 pub mod wires;
 
-pub use barred::BARS;
-pub use call::Verb;
-pub use text::{FAILURES, PENDING, dangers, declared_failures};
+pub use crate::elaborate::failures::FAILURES;
 pub use wires::Wires;
 
 use std::cell::RefCell;
@@ -31,9 +29,11 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use self::clauses::Clauses;
 use crate::ast::{Block, Clause, Handlers, ItemKind};
 use crate::elaborate::Elaborator;
+use crate::elaborate::choices::Choice;
+use crate::elaborate::verbs::Verb;
 use crate::eval::{Scope, Type, Value};
 use crate::names::DeclId;
-use crate::task::{self, Choice, Given, Task};
+use crate::task::{self, Given, Task};
 
 /// Working state of the lowering of one workflow.
 pub struct Planner<'a, 'e> {

@@ -12,6 +12,7 @@ use super::call::Bound;
 use super::clauses::Outcome;
 use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, Expr, MemberKind, Sig};
 use crate::elaborate::tables::MemberRef;
+use crate::escapes::undeclared;
 use crate::eval::{Scope, Type, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -406,7 +407,7 @@ impl<'a> Planner<'a, '_> {
                 let lowered = self.skill_body(sig, clauses, body, handlers, "", sig.span, &mut scope);
                 self.open.pop();
                 if let Some((root, _)) = lowered {
-                    let found = crate::check::undeclared(sig, clauses, decl.item.span, &self.steps, root);
+                    let found = undeclared(sig, clauses, decl.item.span, &self.steps, root);
                     found.into_iter().for_each(|d| self.lab.report(d));
                 }
             }

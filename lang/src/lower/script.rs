@@ -127,7 +127,7 @@ impl<'a> Planner<'a, '_> {
                     _ => {}
                 }
                 parts.push(TextPart::Plain(" ".to_string()));
-                if !self.showable(value, sig.span, &mut parts) {
+                if !self.lab.showable(value, sig.span, &mut parts) {
                     return;
                 }
             }
@@ -142,7 +142,7 @@ impl<'a> Planner<'a, '_> {
     }
 
     fn messages(&mut self, sends: &'a [Text], scope: &mut Scope) -> Vec<Message> {
-        sends.iter().filter_map(|text| Some(Message { text: self.filled(text, scope)?, span: text.span })).collect()
+        sends.iter().filter_map(|text| Some(Message { text: self.lab.filled(text, scope)?, span: text.span })).collect()
     }
 
     /// The wiring with all devices, where it is asked for.

@@ -8,8 +8,9 @@ use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
+use crate::elaborate::choices::Choice;
 use crate::eval::{Num, Scope, Type, Value};
-use crate::task::{Choice, Given};
+use crate::task::Given;
 
 impl<'a> Planner<'a, '_> {
     /// Lowers a statement; none where it has no run-time part or is wrong (which is reported).
@@ -218,14 +219,14 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::Await { name } => {
                 if !self.jobs.contains(&name.text) {
-                    let near = crate::names::near::nearest(&name.text, &self.jobs);
+                    let near = crate::near::nearest(&name.text, &self.jobs);
                     let mut d = Diagnostic::error(
                         codes::UNKNOWN_NAME,
                         name.span,
                         format!("no job `{}` was started", name.text),
                         "not started above",
                     );
-                    d.help.extend(crate::names::near::question(&near));
+                    d.help.extend(crate::near::question(&near));
                     self.lab.report(d);
                     return None;
                 }
@@ -233,7 +234,7 @@ impl<'a> Planner<'a, '_> {
             }
             StmtKind::Fail { name, text } => {
                 let text = match text {
-                    Some(text) => self.filled(text, scope)?,
+                    Some(text) => self.lab.filled(text, scope)?,
                     None => Text::default(),
                 };
                 let name = name.as_ref().map_or("failure", |n| n.text.as_str()).to_string();
@@ -252,8 +253,8 @@ impl<'a> Planner<'a, '_> {
                 Step::Expect(conditions)
             }
             StmtKind::Record { value, every } => return self.record(value, every, s.span, scope),
-            StmtKind::Note(text) => Step::Note(self.filled(text, scope)?),
-            StmtKind::Ask(text) => Step::Ask(self.filled(text, scope)?),
+            StmtKind::Note(text) => Step::Note(self.lab.filled(text, scope)?),
+            StmtKind::Ask(text) => Step::Ask(self.lab.filled(text, scope)?),
             StmtKind::Return { value } => return self.give(value, s.span, scope),
             StmtKind::Run { .. } => {
                 self.lab.report(

@@ -1,80 +1,17 @@
 //! Labels and conditions in the words of the source.
 
-use std::collections::BTreeSet;
-
 use matterix_ir::plan::{Comparison, Condition, Refusal, Said};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
+use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Planner;
-use super::barred::BARS;
 use super::call::Bound;
 use super::columns::with_names;
-use crate::ast::{self, Call, Clause, ClauseKind, Expr, ItemKind, MemberKind, Name, Param, Sig};
+use crate::ast::{self, Call, Clause, ClauseKind, Expr, Name, Param, Sig};
 use crate::elaborate::Compared;
-use crate::elaborate::given::word;
 use crate::eval::{Scope, Type, Value};
-use crate::names::{Names, near, verb_text};
-
-/// Failures of the language: `failure`, which stands for all, those that the executor itself raises, and the one of a run in which
-/// substances meet that must not.
-pub const FAILURES: [&str; 12] =
-    ["failure", "timeout", "late", "max", "broken", "need", "promise", "claimed", "wrong_reagent", "job", PENDING, MIX];
-
-/// The failure of a delayed event that is set off again before it has happened.
-pub const PENDING: &str = "event_pending";
-
-/// The failure of a run in which substances meet that must not.
-const MIX: &str = "incompatible_mix";
-
-/// What a run may fail with at any step: what must not meet, and hazards.
-pub fn dangers(names: &Names<'_>) -> BTreeSet<String> {
-    let hazards = names.decls.iter().filter_map(|decl| match &decl.item.kind {
-        ItemKind::Hazard { grave: true, name, .. } => Some(name.text.clone()),
-        _ => None,
-    });
-    hazards.chain([MIX.to_string()]).collect()
-}
-
-/// Every failure that something declares or the executor raises.
-pub fn declared_failures(names: &Names<'_>) -> BTreeSet<String> {
-    let mut out: BTreeSet<String> = FAILURES.map(String::from).into();
-    out.extend(dangers(names));
-    let add = |clauses: &[Clause], out: &mut BTreeSet<String>| {
-        for c in clauses {
-            match &c.kind {
-                ClauseKind::Fails(names) => out.extend(names.iter().map(|n| n.text.clone())),
-                ClauseKind::Needs { refusal, .. } => out.extend(refusal.iter().map(|r| r.failure.text.clone())),
-                _ => {}
-            }
-        }
-    };
-    for decl in &names.decls {
-        match &decl.item.kind {
-            ItemKind::Driver { wires, .. } => out.extend(wires.iter().filter_map(|w| match &w.kind {
-                ast::WireKind::Reply { fails, .. } => Some(fails.text.clone()),
-                _ => None,
-            })),
-            ItemKind::Skill { clauses, .. } => add(clauses, &mut out),
-            ItemKind::Capability { members, .. } => {
-                for m in members {
-                    match &m.kind {
-                        MemberKind::Command { clauses, .. } => add(clauses, &mut out),
-                        MemberKind::Limit { at_end: false, refusal, .. } => {
-                            out.extend(refusal.iter().map(|r| r.failure.text.clone()))
-                        }
-                        MemberKind::Value { options, .. } => {
-                            out.extend(word(options, BARS).map(str::to_owned));
-                        }
-                        _ => {}
-                    }
-                }
-            }
-            _ => {}
-        }
-    }
-    out
-}
+use crate::names::verb_text;
+use crate::near;
 
 impl<'a> Planner<'a, '_> {
     /// The source under a span on one line, shortened; what is written once is asked for at every turn of a loop.
@@ -252,20 +189,6 @@ impl<'a> Planner<'a, '_> {
         Some(Condition { refusal, ..condition })
     }
 
-    /// What is said where a condition holds to beware of: of each that `any` asks about, with what is bound there.
-    pub fn beware(
-        &mut self,
-        node: NodeId,
-        words: &'a ast::Text,
-        mut bound: Vec<(NodeId, Vec<(String, Value)>)>,
-        scope: &mut Scope,
-    ) -> Vec<Said> {
-        if bound.is_empty() {
-            bound.push((node, scope.vars.clone()));
-        }
-        self.said_of_each(words, bound, scope)
-    }
-
     /// Words for each that a condition asks about; for all of it where it asks about nothing in turn.
     fn said(
         &mut self,
@@ -277,116 +200,10 @@ impl<'a> Planner<'a, '_> {
         if bound.is_empty() {
             // A list of nothing is asked about in vain, and its elements have no names here.
             let holds = self.lab.graph.constant(condition.node).is_some_and(|v| v != 0.0);
-            let text = if holds { None } else { self.filled(words, scope) };
+            let text = if holds { None } else { self.lab.filled(words, scope) };
             return text.map(|text| Said { node: condition.node, text }).into_iter().collect();
         }
-        self.said_of_each(words, bound, scope)
-    }
-
-    /// Words for each that is asked about, with what is bound there.
-    fn said_of_each(
-        &mut self,
-        words: &'a ast::Text,
-        bound: Vec<(NodeId, Vec<(String, Value)>)>,
-        scope: &mut Scope,
-    ) -> Vec<Said> {
-        let mut out = Vec::new();
-        for (node, vars) in bound {
-            let outside = std::mem::replace(&mut scope.vars, vars);
-            let text = self.filled(words, scope);
-            scope.vars = outside;
-            out.extend(text.map(|text| Said { node, text }));
-        }
-        out
-    }
-
-    /// A text with its values as parts.
-    pub fn filled(&mut self, text: &'a ast::Text, scope: &mut Scope) -> Option<Text> {
-        let mut parts = Vec::new();
-        let mut good = true;
-        for part in &text.parts {
-            match part {
-                ast::TextPart::Plain(text) => parts.push(TextPart::Plain(text.clone())),
-                ast::TextPart::Value { form: Some(form), .. } => {
-                    let headline = "a text for people shows digits after the point and nothing else";
-                    let d = Diagnostic::error(codes::SYNTAX, form.span, headline, "of a line to a device");
-                    self.lab.report(d.help("as in `{t as degC :.1}`"));
-                    good = false;
-                }
-                ast::TextPart::Value { value, digits, .. } => {
-                    let v = self.lab.expr(value, scope);
-                    good &= self.shown(v, *digits, value.span, &mut parts);
-                }
-            }
-        }
-        good.then_some(Text { parts })
-    }
-
-    /// Adds a value as a text shows it; false, without a finding, where it has none.
-    pub(super) fn showable(&mut self, value: Value, span: Span, out: &mut Vec<TextPart>) -> bool {
-        let value = match value {
-            Value::Frame(id, frame) if frame.is_empty() => Value::Instance(id),
-            Value::Frame(id, frame) => Value::Text(format!("{}.{frame}", self.lab.instances[id.0 as usize].name)),
-            other => other,
-        };
-        let (found, reported) = (self.lab.diagnostics.len(), self.lab.reported);
-        let good = self.shown(value, None, span, out);
-        self.lab.diagnostics.truncate(found);
-        self.lab.reported = reported;
-        good
-    }
-
-    /// Adds a value as a text shows it; false where it has none.
-    fn shown(&mut self, value: Value, digits: Option<u8>, span: Span, out: &mut Vec<TextPart>) -> bool {
-        let plain = |text: &str| TextPart::Plain(text.to_owned());
-        if digits.is_some() && !matches!(value, Value::Num(_) | Value::Error) {
-            self.lab.expected("a quantity, of which digits can be shown", &value, span);
-            return false;
-        }
-        match value {
-            Value::Error => return false,
-            Value::Num(n) => {
-                let unit = self.lab.unit_of(&n);
-                out.push(TextPart::Quantity { value: n.node, unit, digits });
-            }
-            Value::Bool(n) => out.push(TextPart::Bool(n)),
-            Value::Enum(n, words) => out.push(TextPart::Word(n, words.to_vec())),
-            Value::InstanceNode(n) => out.push(TextPart::Instance(n)),
-            Value::Instance(i) | Value::Qualified(i, _) => {
-                out.push(plain(&self.lab.instances[i.0 as usize].name));
-            }
-            Value::Text(text) => out.push(plain(&text)),
-            Value::Nothing => out.push(plain("nothing")),
-            Value::Unlimited => out.push(plain("unlimited")),
-            Value::Species(s) => out.push(plain(&self.lab.tables.species.get(s).name)),
-            Value::Reaction(r) => out.push(plain(&self.lab.tables.reactions[r.0 as usize].name)),
-            Value::Range(low, high) => {
-                self.shown(Value::Num(*low), None, span, out);
-                out.push(plain(" .. "));
-                self.shown(Value::Num(*high), None, span, out);
-            }
-            Value::Tuple(items) | Value::List(items) => {
-                out.push(plain("("));
-                for (i, item) in items.into_iter().enumerate() {
-                    if i > 0 {
-                        out.push(plain(", "));
-                    }
-                    if !self.shown(item, None, span, out) {
-                        return false;
-                    }
-                }
-                out.push(plain(")"));
-            }
-            Value::Concentration(..) => {
-                self.lab.kindless(span);
-                return false;
-            }
-            other => {
-                self.lab.expected("a value that a text can show", &other, span);
-                return false;
-            }
-        }
-        true
+        self.lab.said_of_each(words, bound, scope)
     }
 
     /// A failure name in a handler must be one that something can raise.

@@ -15,10 +15,10 @@ pub use sort::Sort;
 
 use crate::ast::{ItemKind, MemberKind};
 use crate::elaborate::tables::{MemberRef, member_name};
+use crate::elaborate::verbs::Verb;
 use crate::elaborate::{Elaborator, Tables};
 use crate::eval::Value;
 use crate::library;
-use crate::lower::Verb;
 use crate::names::{DeclId, item_name};
 use crate::units::Units;
 

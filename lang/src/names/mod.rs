@@ -1,17 +1,14 @@
 //! Modules, declarations and scopes: which item a name stands for.
 
 pub mod imports;
-pub mod near;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use matterix_ir::{Diagnostic, FileId, Sources, Span, codes};
+use matterix_ir::{Diagnostic, FileId, Span, codes};
 
 use crate::ast::{self, Item, ItemKind, Name};
-use crate::loader::Loader;
-use crate::session::{self, Session};
-use crate::{import, library};
+use crate::near;
 
 /// A module: one file.
 #[derive(Clone, Debug)]
@@ -60,129 +57,8 @@ pub struct Names<'a> {
     own: Vec<BTreeMap<Arc<str>, DeclId>>,
 }
 
-/// Parses the root file and everything it imports; the library comes first.
-///
-/// What the session knows of texts that have not changed is taken from there.
-pub fn load(
-    sources: &mut Sources,
-    root: FileId,
-    loader: &dyn Loader,
-    session: &mut Session,
-) -> (Vec<Arc<Module>>, Vec<Diagnostic>) {
-    let package = sources.get(root).map_or_else(String::new, |source| source.name.clone());
-    let (mut modules, mut diagnostics, first) = library(sources, root, &package, session);
-    session.beside = 0;
-    let mut queue = vec![(String::new(), root)];
-    let mut parsed = Some(first);
-    while let Some((name, file)) = queue.pop() {
-        let (module, found) = parsed.take().unwrap_or_else(|| session.module(sources, &package, &name, file));
-        diagnostics.extend(found);
-        for item in &module.tree.items {
-            let ItemKind::Use { path, names } = &item.kind else { continue };
-            let known = |m: &str, modules: &[Arc<Module>], queue: &[(String, FileId)]| {
-                modules.iter().any(|x| x.name == m) || queue.iter().any(|x| x.0 == m)
-            };
-            if path.segments[0].text == "std" {
-                continue;
-            }
-            let found = module_candidates(path, names.is_some()).into_iter().find_map(|module| {
-                if known(&module, &modules, &queue) || module == name {
-                    return Some(None);
-                }
-                loader.load(file, &module).map(|(display, text)| Some((module, sources.add(display, text))))
-            });
-            match found {
-                Some(Some(new)) => queue.push(new),
-                Some(None) => {}
-                None => {
-                    let module = module_candidates(path, names.is_some()).swap_remove(0);
-                    diagnostics.push(
-                        Diagnostic::error(
-                            codes::UNKNOWN_MODULE,
-                            path.span,
-                            format!("there is no module `{module}`"),
-                            "imported here",
-                        )
-                        .help(format!("a module is a file: `{}.mtx` beside this one", module.replace("::", "/"))),
-                    );
-                }
-            }
-        }
-        modules.push(module);
-    }
-    session.tidy(&package);
-    let used = used(&modules);
-    for (module, _) in modules.iter_mut().zip(used).filter(|(module, used)| *used && import::reads(&module.tree)) {
-        let (made, found) = session::imported(session, module, loader);
-        *module = made;
-        diagnostics.extend(found);
-    }
-    if modules.iter().any(|m| import::has_features(&m.tree)) {
-        let units = crate::elaborate::units::declare(&Names::new(&modules).0, &mut Vec::new());
-        for module in modules.iter_mut().filter(|module| import::has_features(&module.tree)) {
-            let module = Arc::make_mut(module);
-            diagnostics.extend(session::features(session, module, &units, sources, loader));
-        }
-    }
-    (modules, diagnostics)
-}
-
-/// Which modules the user's files import, directly or through others: data files of the others are not read.
-fn used(modules: &[Arc<Module>]) -> Vec<bool> {
-    let mut used: Vec<bool> = modules.iter().map(|m| !m.is_library()).collect();
-    let mut todo: Vec<usize> = (0..modules.len()).filter(|i| used[*i]).collect();
-    while let Some(index) = todo.pop() {
-        for item in &modules[index].tree.items {
-            let ItemKind::Use { path, names } = &item.kind else { continue };
-            let candidates = module_candidates(path, names.is_some());
-            let found = candidates.iter().find_map(|c| modules.iter().position(|m| m.name == *c));
-            if let Some(found) = found.filter(|f| !std::mem::replace(&mut used[*f], true)) {
-                todo.push(found);
-            }
-        }
-    }
-    used
-}
-
-/// A module with what is wrong with its text.
-type Read = (Arc<Module>, Vec<Diagnostic>);
-
-/// The library's modules and their findings, and the module of the root file, which is parsed meanwhile.
-fn library(
-    sources: &mut Sources,
-    root: FileId,
-    package: &str,
-    session: &mut Session,
-) -> (Vec<Arc<Module>>, Vec<Diagnostic>, Read) {
-    let files: Vec<FileId> = library::MODULES.iter().map(|module| sources.add(module.name, module.text)).collect();
-    if session.library.iter().map(|module| module.file).eq(files.iter().copied()) {
-        let first = session.module(sources, package, "", root);
-        return (session.library.clone(), Vec::new(), first);
-    }
-    let read = || -> Vec<_> { files.iter().enumerate().map(|(index, file)| library::read(index, *file)).collect() };
-    let (trees, first) = std::thread::scope(|scope| {
-        let reading = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, read);
-        let first = session.module(sources, package, "", root);
-        // Where there is no thread to be had, this one does the work.
-        (reading.ok().and_then(|reading| reading.join().ok()).unwrap_or_else(read), first)
-    });
-    let mut diagnostics = Vec::new();
-    let module = |((module, file), (tree, found)): ((&library::Module, FileId), _)| {
-        diagnostics.extend(found);
-        Arc::new(Module { name: module.name.to_string(), file, tree, header: 0 })
-    };
-    let modules: Vec<Arc<Module>> = library::MODULES.iter().zip(files.iter().copied()).zip(trees).map(module).collect();
-    if diagnostics.is_empty() {
-        session.library.clone_from(&modules);
-    }
-    (modules, diagnostics, first)
-}
-
-/// Bytes of stack of a thread: what the main one has.
-pub(crate) const STACK: usize = 8 << 20;
-
 /// Module paths a `use` may mean: with braces the path, without them the path or the path less its last segment.
-fn module_candidates(path: &ast::Path, braces: bool) -> Vec<String> {
+pub(crate) fn module_candidates(path: &ast::Path, braces: bool) -> Vec<String> {
     let join = |n: usize| path.segments[..n].iter().map(|s| s.text.as_str()).collect::<Vec<_>>().join("::");
     let n = path.segments.len();
     if braces || n == 1 { vec![join(n)] } else { vec![join(n - 1), join(n)] }
@@ -420,6 +296,23 @@ impl<'a> Names<'a> {
     fn declaring(&self, name: &str) -> impl Iterator<Item = (&Module, DeclId)> {
         let all = self.modules.iter().zip(&self.own);
         all.filter_map(move |(module, own)| Some((&**module, *own.get(name)?)))
+    }
+
+    /// The item of a kind, called `what`, that a path names as a module sees it.
+    pub fn find(
+        &self,
+        module: usize,
+        path: &ast::Path,
+        what: &str,
+        fits: impl Fn(&ItemKind) -> bool,
+    ) -> Result<DeclId, Box<Diagnostic>> {
+        let Some(word) = path.segments.last() else {
+            return Err(Box::new(Diagnostic::error(codes::SYNTAX, path.span, format!("a {what} is missing"), "here")));
+        };
+        match self.lookup(module, &word.text) {
+            Some(id) if fits(&self.decl(id).item.kind) => Ok(id),
+            _ => Err(Box::new(self.unknown(module, word, what, fits))),
+        }
     }
 
     /// A name that nothing visible has, with suggestions among what `fits`.

@@ -12,7 +12,8 @@ use crate::elaborate::fields::{forms, unknown_fields};
 use crate::elaborate::species::{SpeciesTable, field};
 use crate::elaborate::{Elaborator, SpeciesId};
 use crate::eval::{Scope, Value};
-use crate::names::{DeclId, Names, near};
+use crate::names::{DeclId, Names};
+use crate::near;
 
 const GROUP: &[&str] = &["title", "smarts", "unless", "members", "above", "source"];
 const MATERIAL: &[&str] = &["title", "source", "friction"];

@@ -8,29 +8,12 @@ use std::collections::BTreeSet;
 use matterix_ir::model::Mixture;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::stock::{Count, Holding, Stock, Tally};
-use matterix_ir::{BinaryOp, NodeId, Sources, Span};
+use matterix_ir::{BinaryOp, Sources};
 
 use crate::ast::{ExprKind, ItemKind, MemberKind, NamedExpr};
 use crate::elaborate::{Elaborator, SpeciesId};
-use crate::eval::{Num, Value};
+use crate::eval::Value;
 use crate::names::DeclId;
-
-/// A term of a `holding`, as the lab noted it.
-#[derive(Clone, Debug)]
-pub struct Held {
-    /// The mixture.
-    pub mixture: Option<InstanceId>,
-    /// The species or solution.
-    pub substance: String,
-    /// The declaration of a solution.
-    pub solution: Option<DeclId>,
-    /// As written.
-    pub quantity: Num,
-    /// mol, or kg where counted by mass.
-    pub amounts: Vec<(SpeciesId, NodeId)>,
-    /// Where it is written.
-    pub span: Span,
-}
 
 /// The option of a member that says how its value is counted.
 pub const COUNTS_AS: &str = "counts_as";

@@ -3,7 +3,8 @@
 use matterix_ir::{Diagnostic, FileId, Span, codes};
 
 use crate::ast::{ItemKind, Name};
-use crate::names::{DeclId, Names, near};
+use crate::names::{DeclId, Names};
+use crate::near;
 
 /// The one that is asked for, or the only one.
 pub fn choose(

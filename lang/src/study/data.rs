@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, FileId, Sources, Span, Unit, codes, hidden};
 
 use crate::elaborate::Tables;
 use crate::loader::Loader;
-use crate::names::near;
+use crate::near;
 
 /// Reads the data of a fit into it.
 pub fn read(

@@ -3,11 +3,11 @@
 use matterix_ir::study::{Draw, Free, MOST_RUNS};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::open::Named;
 use crate::ast::{Arg, Expr, Name};
 use crate::elaborate::Elaborator;
+use crate::elaborate::open::Named;
 use crate::eval::{Scope, Type, Value};
-use crate::names::near;
+use crate::near;
 
 /// Ways to draw.
 const DRAWS: &[&str] = &["uniform", "sobol", "grid", "normal"];

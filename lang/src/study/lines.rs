@@ -5,9 +5,9 @@ use matterix_ir::{Diagnostic, codes};
 
 use super::Many;
 use super::draws::{count, draw};
-use super::open::Named;
 use crate::ast::{Expr, FitLine, ItemKind, Name, StudyLine};
 use crate::elaborate::Elaborator;
+use crate::elaborate::open::Named;
 use crate::eval::{Num, Scope, Type, Value};
 use crate::task::Task;
 

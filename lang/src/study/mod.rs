@@ -5,13 +5,11 @@ mod choose;
 pub mod data;
 mod draws;
 mod lines;
-mod open;
 mod paths;
 mod reports;
 
 pub use choose::choose;
 pub use lines::{count_of, resolve};
-pub use open::Open;
 
 use matterix_ir::Span;
 use matterix_ir::study::{Fit, Study};

@@ -3,11 +3,11 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Op, codes};
 
-use super::open::Named;
 use crate::ast::{Expr, ExprKind};
 use crate::elaborate::Elaborator;
+use crate::elaborate::open::Named;
 use crate::eval::Value;
-use crate::names::near;
+use crate::near;
 
 /// What may vary, for messages.
 const KINDS: &str = "what may vary: parameters of the workflow and of things, what vessels hold at the start \

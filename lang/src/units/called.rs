@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::{Dimension, PREFIXES, UnitDef, Units};
-use crate::names::near::same_letters;
+use crate::near::same_letters;
 
 /// What the documentation of a unit calls it, in lower case: `The litre, a cubic decimetre.` is `litre`.
 pub(crate) fn called(docs: &[String]) -> Option<Arc<str>> {

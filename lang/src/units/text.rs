@@ -3,7 +3,7 @@
 use matterix_ir::Unit;
 
 use super::{Dimension, Rational, Resolved, Units};
-use crate::names::near::nearest;
+use crate::near::nearest;
 
 /// Why a unit could not be read.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,7 +9,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 use crate::ast::{Arg, Binary, Expr, ExprKind, Field, FieldValue, ItemKind, Name};
 use crate::eval::Scope;
 use crate::lower::Planner;
-use crate::names::{DeclId, near};
+use crate::names::DeclId;
+use crate::near;
 
 const FIELDS: &[&str] = &["carries", "frame", "request", "reply", "length", "check", "silence"];
 const MARKS: &[(&str, Mark)] = &[

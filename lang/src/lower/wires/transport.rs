@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name};
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
-use crate::names::near;
+use crate::near;
 
 /// A line, understood.
 pub(super) struct Line {

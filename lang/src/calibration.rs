@@ -10,7 +10,7 @@ use crate::names::Module;
 
 /// Fields for instances of the file's labs, with the text they stand in.
 #[derive(Clone, Debug, Default)]
-pub struct Measured {
+pub struct Calibration {
     /// The file, as shown in findings.
     pub name: String,
     /// Its text.
@@ -31,7 +31,7 @@ pub struct Gauged {
 }
 
 /// Puts the fields where a module's labs declare the instances, in place of theirs of the same names.
-pub(crate) fn put(measured: &Measured, module: &mut Arc<Module>, sources: &mut Sources) -> Vec<Diagnostic> {
+pub(crate) fn put(measured: &Calibration, module: &mut Arc<Module>, sources: &mut Sources) -> Vec<Diagnostic> {
     if measured.given.is_empty() {
         return Vec::new();
     }

@@ -2,15 +2,13 @@
 //!
 //! Functions, skills and loops are written out, so a short text can ask for more work than there is time or memory. Each task (a workflow
 //! in its lab, a declaration by itself) has a budget of its own, counted in steps rather than in seconds, so that the same text gives the
-//! same findings on every machine. The caller may also stop a check from outside ([`Stop`]).
-
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+//! same findings on every machine. The caller may also stop a check from outside ([`Stop`](crate::Stop)).
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use crate::elaborate::Elaborator;
+use super::Elaborator;
 use crate::eval::Value;
+use crate::stop::stopped;
 
 /// Expressions evaluated, tuples tried and statements written out for one task: some seconds of work. A protocol of 1,500 wells that
 /// are filled one by one takes under a tenth of it.
@@ -30,22 +28,6 @@ const ELEMENT: u64 = 10;
 
 /// How many steps are made between two looks at whether the check was stopped.
 const LOOK: u64 = 1 << 12;
-
-/// Whether a check is of no use any more: shared with whoever may stop it.
-#[derive(Clone, Debug, Default)]
-pub struct Stop(Arc<AtomicBool>);
-
-impl Stop {
-    /// A stop that follows a flag.
-    pub fn when(flag: &Arc<AtomicBool>) -> Self {
-        Stop(flag.clone())
-    }
-
-    /// Whether it was asked for.
-    pub fn asked(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
 
 /// What a task has spent.
 #[derive(Debug, Default)]
@@ -164,10 +146,4 @@ fn too_large(at: Span, headline: String) -> Diagnostic {
         "functions, skills and `for` are written out wherever they are used, and a law once for every combination of things that fits it: \
          use `repeat`, a smaller set, or a narrower type",
     )
-}
-
-/// The finding of a check that was stopped from outside: what it would have found is not known.
-pub fn stopped(at: Span) -> Diagnostic {
-    Diagnostic::error(codes::BUDGET_SPENT, at, "the check was stopped before its end", "still at work here")
-        .help("allow more time, or check a smaller protocol")
 }

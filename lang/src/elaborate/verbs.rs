@@ -1,0 +1,13 @@
+//! What the verb of a call stands for.
+
+use super::tables::MemberRef;
+use crate::names::DeclId;
+
+/// What a verb can mean.
+#[derive(Clone, Debug)]
+pub enum Verb<'a> {
+    /// A skill in scope.
+    Skill(DeclId),
+    /// A command of a capability.
+    Command(DeclId, MemberRef<'a>),
+}
