@@ -45,7 +45,9 @@ struct Straight {
     less: Vec<bool>,
     /// The bends that it ends at.
     watched: Vec<usize>,
-    tape: Tape,
+    /// What they rest on alone: the first of each, and the second if there is one.
+    sides: Tape,
+    registers: Vec<f64>,
     /// None where it is not linear.
     exact: Option<Exact>,
 }
@@ -115,11 +117,12 @@ impl Bent {
         self.now = known.unwrap_or_else(|| {
             let tape = straightened(rates, &self.bends, &less);
             let watched = watched(&tape, &self.bends);
-            let sides = watched.iter().map(|i| self.bends[*i]).flat_map(|bend| std::iter::once(bend.a).chain(bend.b));
-            let decides = Tape { outputs: sides.collect(), ..tape.clone() };
-            let is_straight = is_linear(&tape) && is_linear(&decides);
+            let outputs = watched.iter().map(|i| self.bends[*i]).flat_map(|bend| std::iter::once(bend.a).chain(bend.b));
+            let sides = tape.only(outputs.collect());
+            let is_straight = is_linear(&tape) && is_linear(&sides);
             let exact = is_straight.then(|| Exact::of(&tape, &Slopes::new(&tape, false))).flatten();
-            self.met.push(Straight { less, watched, tape, exact });
+            let registers = sides.registers();
+            self.met.push(Straight { less, watched, sides, registers, exact });
             self.met.len() - 1
         });
         if let (Some(seen), Some(exact)) = (seen, &mut self.met[self.now].exact) {
@@ -129,22 +132,20 @@ impl Bent {
 
     /// The first bend within a step, as a share of it, with all that bend there.
     fn first_bend(&mut self, values: &[f64], stride: &Stride) -> Option<(f64, Vec<usize>)> {
-        let straight = &self.met[self.now];
+        let straight = &mut self.met[self.now];
         if straight.watched.is_empty() {
             return None;
         }
         let inner = &stride.states[..POINTS.len() - 1];
-        let points = std::iter::once(values).chain(inner.iter().map(Vec::as_slice));
         // Beyond a bend the law is drawn out: what bends there as well has to be the polynomial that it is up to there.
-        let registers = &mut self.registers;
-        let sampled: Vec<Vec<(f64, f64)>> =
-            points.map(|values| differences(&self.bends, &straight.tape, values, registers)).collect();
+        let points = std::iter::once(values).chain(inner.iter().map(Vec::as_slice));
+        let sampled: Vec<Vec<(f64, f64)>> = points.map(|values| straight.differences(&self.bends, values)).collect();
         let mut found: Vec<(f64, usize)> = Vec::new();
-        for &bend in &straight.watched {
+        for (k, &bend) in straight.watched.iter().enumerate() {
             // As a number that is positive as long as the law is the same.
             let sign = if straight.less[bend] { -1.0 } else { 1.0 };
-            let noise = sampled.iter().map(|all| all[bend].1).fold(0.0, f64::max);
-            let difference = Vector6::from_iterator(sampled.iter().map(|all| sign * all[bend].0 + noise));
+            let noise = sampled.iter().map(|all| all[k].1).fold(0.0, f64::max);
+            let difference = Vector6::from_iterator(sampled.iter().map(|all| sign * all[k].0 + noise));
             let mut pieces = MOST_PIECES;
             found.extend(first_below(control(difference), 0.0, 1.0, &mut pieces).map(|at| (at, bend)));
         }
@@ -153,15 +154,27 @@ impl Bent {
     }
 }
 
-/// By bend, how much more its first is than its second, and a difference that is none.
+impl Straight {
+    /// By bend that is watched, how much more its first is than its second, and a difference that is none.
+    fn differences(&mut self, bends: &[Bend], values: &[f64]) -> Vec<(f64, f64)> {
+        self.sides.run(0.0, values, &mut self.registers);
+        let mut outputs = self.sides.outputs.iter().map(|output| self.registers[*output as usize]);
+        let mut next = || outputs.next().unwrap_or_default();
+        let watched = self.watched.iter().map(|bend| bends[*bend].b.is_some());
+        watched.map(|has_both| (next(), if has_both { next() } else { 0.0 })).map(apart).collect()
+    }
+}
+
+/// How much more one is than the other, and a difference that is none.
+fn apart((a, b): (f64, f64)) -> (f64, f64) {
+    (a - b, NOISE * a.abs().max(b.abs()))
+}
+
+/// The same by bend, of all that a law has.
 fn differences(bends: &[Bend], law: &Tape, values: &[f64], registers: &mut [f64]) -> Vec<(f64, f64)> {
     law.run(0.0, values, registers);
     let worth = |register: u32| registers[register as usize];
-    let difference = |bend: &Bend| {
-        let (a, b) = (worth(bend.a), bend.b.map_or(0.0, worth));
-        (a - b, NOISE * a.abs().max(b.abs()))
-    };
-    bends.iter().map(difference).collect()
+    bends.iter().map(|bend| apart((worth(bend.a), bend.b.map_or(0.0, worth)))).collect()
 }
 
 /// Where a polynomial first falls below zero between `from` and `to`. One that goes along zero, so that no number of pieces tells, counts

@@ -22,8 +22,8 @@ const LENGTHS: std::ops::RangeInclusive<i32> = -100..=40;
 /// Steps this much longer than the fastest rate lose six digits.
 const STIFF: f64 = 1e5;
 
-/// Steps of many states are this much longer than the fastest rate at most: an integrator is cheaper then.
-const FAR: f64 = 32.0;
+/// Steps of many states are this much longer than the fastest rate at most: beyond, terms of the series cancel, and an integrator is cheaper.
+pub(super) const FAR: f64 = 4.0;
 
 /// So many steps that only [`STIFF`] or [`FAR`] keeps short lead nowhere.
 const HELD: usize = 24;
@@ -111,7 +111,7 @@ impl Exact {
         let norm = norm(size, &entries);
         let (means, most) = match size <= FEW {
             true => (Means::Doubled(Doubled::new(size, &entries, norm)), STIFF),
-            false => (Means::Series(Series::new(entries, norm)), FAR),
+            false => (Means::Series(Series { entries }), FAR),
         };
         let (next, most) = match norm > 0.0 {
             true => (exponent(FIRST / norm), exponent(most / norm).min(*LENGTHS.end())),
@@ -183,7 +183,7 @@ fn norm(size: usize, entries: &[Entry]) -> f64 {
 }
 
 /// The exponent of the power of 2 next below `length`.
-pub(super) fn exponent(length: f64) -> i32 {
+fn exponent(length: f64) -> i32 {
     const BIAS: i32 = 1023;
     ((length.to_bits() >> 52) & 0x7ff) as i32 - BIAS
 }

@@ -91,6 +91,39 @@ impl Tape {
         }
     }
 
+    /// The same with other outputs, and without the steps that they do not rest on.
+    pub(super) fn only(&self, outputs: Vec<u32>) -> Tape {
+        let first = self.first_result();
+        let mut places: Vec<Option<u32>> = (0..first as u32).map(Some).collect();
+        places.resize(first + self.steps.len(), None);
+        let mut is_needed = vec![false; places.len()];
+        outputs.iter().for_each(|output| is_needed[*output as usize] = true);
+        for (i, step) in self.steps.iter().enumerate().rev() {
+            if is_needed[first + i] {
+                self.operands(step, &mut |register| is_needed[register as usize] = true);
+            }
+        }
+        let mut tape = Tape { constants: self.constants.clone(), inputs: self.inputs, ..Tape::default() };
+        for (i, step) in self.steps.iter().enumerate().filter(|(i, _)| is_needed[first + i]) {
+            // Whatever a step rests on stands before it.
+            let at = |register: u32| places[register as usize].unwrap_or_default();
+            let step = match *step {
+                Step::Unary(op, a) => Step::Unary(op, at(a)),
+                Step::Binary(op, a, b) => Step::Binary(op, at(a), at(b)),
+                Step::Select(c, a, b) => Step::Select(at(c), at(a), at(b)),
+                Step::Sum(from, count) => {
+                    let place = tape.terms.len() as u32;
+                    tape.terms.extend(self.summed(from, count).map(|t| Term { register: at(t.register), ..t }));
+                    Step::Sum(place, count)
+                }
+            };
+            tape.steps.push(step);
+            places[first + i] = Some((first + tape.steps.len() - 1) as u32);
+        }
+        tape.outputs = outputs.iter().map(|output| places[*output as usize].unwrap_or_default()).collect();
+        tape
+    }
+
     /// By output: whether a step that it rests on passes a test.
     pub(super) fn rests_on(&self, test: fn(&Step) -> bool) -> Vec<bool> {
         let mut rests = vec![false; self.first_result()];
