@@ -10,7 +10,6 @@ use nalgebra::Vector6;
 use super::bernstein::{control, halved};
 use super::dense::{POINTS, shares};
 use super::exact::{Exact, Stride, is_linear};
-use super::slopes::Slopes;
 use super::tape::{Step, Tape, Term};
 
 /// A law with more bends is integrated.
@@ -61,7 +60,6 @@ pub(super) struct Bent {
     /// The present one.
     now: usize,
     turns: usize,
-    registers: Vec<f64>,
 }
 
 impl Bent {
@@ -72,18 +70,18 @@ impl Bent {
         if bends.len() > MOST_BENDS || bends.is_empty() && !is_linear(rates) {
             return None;
         }
-        let registers = rates.registers();
-        let mut bent = Bent { bends, met: Vec::new(), now: 0, turns: 0, registers };
+        let mut registers = rates.registers();
         let mut slopes = vec![0.0; values.len()];
-        rates.run(0.0, values, &mut bent.registers);
-        rates.results(&bent.registers, &mut slopes);
+        rates.run(0.0, values, &mut registers);
+        rates.results(&registers, &mut slopes);
         // Who begins at a bend goes to the side that its rates lead to.
         let ahead: Vec<f64> = values.iter().zip(&slopes).map(|(value, slope)| value + slope).collect();
-        let here = differences(&bent.bends, rates, values, &mut bent.registers);
-        let there = differences(&bent.bends, rates, &ahead, &mut bent.registers);
+        let here = differences(&bends, rates, values, &mut registers);
+        let there = differences(&bends, rates, &ahead, &mut registers);
         let less =
             here.iter().zip(&there).map(|((d, noise), (then, _))| if d.abs() > *noise { *d < 0.0 } else { then < d });
         let less = less.collect();
+        let mut bent = Bent { bends, met: Vec::new(), now: 0, turns: 0 };
         bent.turn(rates, less);
         bent.met[0].exact.is_some().then_some(bent)
     }
@@ -120,7 +118,7 @@ impl Bent {
             let outputs = watched.iter().map(|i| self.bends[*i]).flat_map(|bend| std::iter::once(bend.a).chain(bend.b));
             let sides = tape.only(outputs.collect());
             let is_straight = is_linear(&tape) && is_linear(&sides);
-            let exact = is_straight.then(|| Exact::of(&tape, &Slopes::new(&tape, false))).flatten();
+            let exact = is_straight.then(|| Exact::of(&tape));
             let registers = sides.registers();
             self.met.push(Straight { less, watched, sides, registers, exact });
             self.met.len() - 1

@@ -25,6 +25,11 @@ impl Clock {
         self.begin + (self.rest + local)
     }
 
+    /// The lab times of a piece of local time, s.
+    pub(super) fn span(&self, (from, to): (f64, f64)) -> (f64, f64) {
+        (self.lab(from), self.lab(to))
+    }
+
     /// The local time at the lab time `time`, s.
     pub(super) fn local(&self, time: f64) -> f64 {
         (time - self.begin) - self.rest

@@ -87,11 +87,9 @@ pub(super) struct Stride {
 }
 
 impl Exact {
-    /// For a law that is linear by constant coefficients; `slopes` has no hubs.
-    pub(super) fn of(rates: &Tape, slopes: &Slopes) -> Option<Self> {
-        if !is_linear(rates) {
-            return None;
-        }
+    /// For a law that is linear by constant coefficients.
+    pub(super) fn of(rates: &Tape) -> Self {
+        let slopes = Slopes::new(rates, false);
         let mut registers = rates.registers();
         rates.run(0.0, &vec![0.0; rates.inputs], &mut registers);
         let pattern = &slopes.pattern;
@@ -103,7 +101,7 @@ impl Exact {
                 pattern.row(row).map(|at| Entry { row: row as u32, column: pattern.columns[at], value: values[at] });
             entries.extend(of_row.filter(|entry| entry.value != 0.0));
         }
-        Some(Exact::new(rates.inputs, entries))
+        Exact::new(rates.inputs, entries)
     }
 
     fn new(size: usize, mut entries: Vec<Entry>) -> Self {

@@ -176,7 +176,7 @@ impl Switches {
         let curved = curved(&switches.tape);
         switches.straight = (0..switches.list.len()).map(|i| !curved[2 * i] && !curved[2 * i + 1]).collect();
         if switches.straight.contains(&false) {
-            switches.fold(&analysis, &sides, moving);
+            switches.fold();
         }
         switches
     }
@@ -192,12 +192,11 @@ impl Switches {
     }
 
     /// Finds the comparisons that may turn round.
-    fn fold(&mut self, analysis: &Analysis<'_>, sides: &[NodeId], moving: &[u32]) {
+    fn fold(&mut self) {
         let wavy = self.tape.rests_on(is_wave);
         let list: Vec<usize> = (0..self.list.len()).filter(|i| !self.straight[*i]).collect();
         let waves = list.iter().map(|i| wavy[2 * i] || wavy[2 * i + 1]).collect();
-        let sides: Vec<NodeId> = list.iter().flat_map(|i| [sides[2 * i], sides[2 * i + 1]]).collect();
-        let tape = analysis.tape(&sides, moving);
+        let tape = self.tape.only(list.iter().flat_map(|i| [2 * i, 2 * i + 1]).map(|k| self.tape.outputs[k]).collect());
         self.folded = Folded { bounds: tape.intervals(), list, waves, tape };
     }
 
@@ -207,8 +206,7 @@ impl Switches {
 
     /// Left and right of switch `i` after [`Switches::run`].
     fn sides(&self, i: usize) -> (f64, f64) {
-        let at = |k: usize| self.registers[self.tape.outputs[k] as usize];
-        (at(2 * i), at(2 * i + 1))
+        sides(&self.tape, &self.registers, i)
     }
 
     /// The earliest change of any comparison in `piece`, s on `clock`, in which `path`, the moving states, is a polynomial; located to
@@ -263,15 +261,13 @@ impl Switches {
 
     /// Bounds the sides of all comparisons over a piece.
     fn look_over(&mut self, piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
-        self.ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
-        let span = (self.clock.lab(piece.0), self.clock.lab(piece.1));
-        self.tape.enclose(span, hulls(&self.ends), &mut self.bounds);
+        draw(&mut self.ends, piece, path);
+        self.tape.enclose(self.clock.span(piece), hulls(&self.ends), &mut self.bounds);
     }
 
     /// Whether the sides of a comparison are clearly apart throughout the piece that was looked over, as its truth has it.
     fn is_clear(&self, i: usize) -> bool {
-        let side = |k: usize| self.bounds[self.tape.outputs[k] as usize];
-        let ((a, b), (c, d)) = (side(2 * i), side(2 * i + 1));
+        let ((a, b), (c, d)) = sides(&self.tape, &self.bounds, i);
         let sizes = [a, b, c, d].into_iter().map(f64::abs).filter(|size| size.is_finite());
         let gap = CLEAR * sizes.fold(0.0, f64::max);
         self.list[i].stays((a - gap, b + gap), (c, d))
@@ -356,19 +352,15 @@ impl Switches {
 
     /// Bounds the sides of all comparisons that may turn round over a piece.
     fn enclose(&mut self, piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
-        let Folded { tape, bounds, .. } = &mut self.folded;
-        if tape.inputs > 0 {
-            self.ends.iter_mut().zip(POINTS).for_each(|(values, share)| path(instant(piece, share), values));
-        }
-        let span = (self.clock.lab(piece.0), self.clock.lab(piece.1));
-        tape.enclose(span, hulls(&self.ends), bounds);
+        draw(&mut self.ends, piece, path);
+        self.folded.tape.enclose(self.clock.span(piece), hulls(&self.ends), &mut self.folded.bounds);
     }
 
     /// Whether a comparison has the same truth throughout the piece that was enclosed last.
     fn stays(&self, place: usize) -> bool {
         let Folded { list, tape, bounds, .. } = &self.folded;
-        let side = |k: usize| bounds[tape.outputs[k] as usize];
-        self.list[list[place]].stays(side(2 * place), side(2 * place + 1))
+        let (left, right) = sides(tape, bounds, place);
+        self.list[list[place]].stays(left, right)
     }
 
     fn is_changed(&self, i: usize, test: fn(&Switch, f64, f64) -> bool) -> bool {
@@ -412,6 +404,18 @@ impl Switches {
         self.run(later, moving);
         if self.is_changed(i, Switch::changed) { later } else { time }
     }
+}
+
+/// Left and right of a comparison, by what the registers of a tape that computes both sides of each hold.
+fn sides<T: Copy>(tape: &Tape, registers: &[T], i: usize) -> (T, T) {
+    let at = |k: usize| registers[tape.outputs[k] as usize];
+    (at(2 * i), at(2 * i + 1))
+}
+
+/// The moving states, if there are any, at the points of a piece.
+fn draw(ends: &mut [Vec<f64>; POINTS.len()], piece: Interval, path: &mut dyn FnMut(f64, &mut [f64])) {
+    let ends = ends.iter_mut().zip(POINTS).filter(|(values, _)| !values.is_empty());
+    ends.for_each(|(values, share)| path(instant(piece, share), values));
 }
 
 /// Bounds of states that are polynomials through their values at [`POINTS`].

@@ -55,7 +55,7 @@ impl Timed {
         };
         for (i, step) in tape.steps.iter().enumerate() {
             if kinds[first + i] == 3 {
-                operands(tape, step).into_iter().for_each(&mut ask);
+                tape.operands(step, &mut ask);
             }
         }
         tape.outputs.iter().copied().for_each(&mut ask);
@@ -64,7 +64,7 @@ impl Timed {
         }
         outputs.sort_unstable();
         outputs.dedup();
-        Some(Timed { tape: Tape { outputs, ..tape.clone() }, paces })
+        Some(Timed { tape: tape.only(outputs), paces })
     }
 
     /// How far a step from `time`, s, of `length` s may go so that nothing that follows the clock happens unseen within it; none
@@ -155,15 +155,6 @@ pub(super) fn kinds(tape: &Tape, time: u8, state: impl Fn(usize) -> u8) -> Vec<u
         kinds.push(if most == 1 && !is_straight { 2 } else { most });
     }
     kinds
-}
-
-fn operands(tape: &Tape, step: &Step) -> Vec<u32> {
-    match *step {
-        Step::Unary(_, a) => vec![a],
-        Step::Binary(_, a, b) => vec![a, b],
-        Step::Select(c, a, b) => vec![c, a, b],
-        Step::Sum(first, count) => tape.summed(first, count).map(|t| t.register).collect(),
-    }
 }
 
 #[cfg(test)]
