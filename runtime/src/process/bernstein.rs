@@ -11,7 +11,9 @@ pub(super) fn control(sampled: Vector6<f64>) -> Vector6<f64> {
     static FROM_SAMPLES: OnceLock<Matrix6<f64>> = OnceLock::new();
     let matrix = FROM_SAMPLES.get_or_init(|| {
         const CHOICES: [f64; 6] = [1.0, 5.0, 10.0, 10.0, 5.0, 1.0];
-        let shares = |k: usize, j: usize| CHOICES[j] * POINTS[k].powi(j as i32) * (1.0 - POINTS[k]).powi(5 - j as i32);
+        // `powi` rounds as the optimiser likes.
+        let power = |x: f64, n: usize| (0..n).map(|_| x).product::<f64>();
+        let shares = |k: usize, j: usize| CHOICES[j] * power(POINTS[k], j) * power(1.0 - POINTS[k], 5 - j);
         Matrix6::from_fn(shares).try_inverse().unwrap_or_else(Matrix6::zeros)
     });
     matrix * sampled
