@@ -5,8 +5,9 @@
 //! and put back last: a folder that has it is of one performance. Two ways were compared: to exchange whole folders is one step always, but
 //! pulls the folder away under a shell or a viewer that stands in it, and files of others would have to be moved along.
 
-use std::fs;
-use std::io;
+use std::fmt::Display;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -90,6 +91,30 @@ impl Folder {
         Ok(())
     }
 
+    /// Writes a file that is not in its place yet, as it is made; it is put into place when it is said to be [`whole`](Self::whole).
+    pub(super) fn write<E: Display>(
+        &self,
+        name: &str,
+        make: impl FnOnce(&mut Draft) -> Result<(), E>,
+    ) -> Result<(), RecordError> {
+        let failed = |reason: String| RecordError::new(&self.target.join(name), reason);
+        let file = File::create_new(self.staging.join(name)).map_err(|e| failed(e.to_string()))?;
+        let mut draft = Draft { file: BufWriter::new(file), failed: None };
+        let made = make(&mut draft).map_err(|e| e.to_string()).and_then(|()| draft.flush().map_err(|e| e.to_string()));
+        // What libraries say of a full disk is seldom that it is full.
+        made.map_err(|reason| failed(draft.failed.unwrap_or(reason)))
+    }
+
+    /// A file is written and belongs to the performance.
+    pub(super) fn whole(&mut self, name: &'static str) {
+        self.written.push(name);
+    }
+
+    /// Where files are that are not in their place yet.
+    pub(super) fn staging(&self) -> &Path {
+        &self.staging
+    }
+
     /// Puts all files into place; their paths, in the order in which they were written.
     pub fn finish(self) -> Result<Vec<PathBuf>, RecordError> {
         // Held until the end: a process that ends meanwhile lets this be done.
@@ -120,6 +145,41 @@ impl Folder {
             fs::rename(self.staging.join(name), self.target.join(name)).map_err(failed(name))?;
         }
         Ok(())
+    }
+}
+
+/// A file that is being made. It knows what the system said when it could not be written.
+#[derive(Debug)]
+pub(super) struct Draft {
+    file: BufWriter<File>,
+    failed: Option<String>,
+}
+
+impl Draft {
+    fn told<T>(&mut self, done: io::Result<T>) -> io::Result<T> {
+        if let Err(e) = &done {
+            self.failed.get_or_insert_with(|| e.to_string());
+        }
+        done
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let done = self.file.write(bytes);
+        self.told(done)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let done = self.file.flush();
+        self.told(done)
+    }
+}
+
+impl Seek for Draft {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let done = self.file.seek(to);
+        self.told(done)
     }
 }
 
@@ -186,6 +246,20 @@ mod tests {
         }
         folder.finish().expect("in place");
         assert_eq!(names(&dir), ["a", "c", "other"], "a file of an earlier performance stays");
+        fs::remove_dir_all(dir).expect("removed");
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_written_says_what_the_system_said() {
+        let dir = scratch("full");
+        let folder = Folder::begin(&dir.join("out"), OWN).expect("begun");
+        let made = folder.write("a", |draft| {
+            let full = draft.told(Err::<(), _>(io::Error::from(io::ErrorKind::StorageFull)));
+            full.map_err(|_| "the library has no words for it")
+        });
+        assert_eq!(made.expect_err("it is full").reason, "no storage space");
+        drop(folder);
+        assert_eq!(names(&dir), [""; 0]);
         fs::remove_dir_all(dir).expect("removed");
     }
 

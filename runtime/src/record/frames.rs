@@ -1,6 +1,10 @@
 //! Several columns side by side: where any of them has a point.
 
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
 use super::column::Column;
+use super::series::Series;
 
 /// A time at which some columns have points; two of one time where any of them jumps.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,33 +31,77 @@ impl Frame {
     }
 }
 
-/// A point with the place where it is sorted: its time, and how many of its component came before it at that time.
-struct Placed {
+/// A time at which a point has its turn: the time, and how many of its component came before it at that time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Turn {
     time: f64,
     turn: usize,
+}
+
+impl Eq for Turn {}
+
+impl Ord for Turn {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.time.total_cmp(&other.time).then(self.turn.cmp(&other.turn))
+    }
+}
+
+impl PartialOrd for Turn {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// One component of a column, from point to point.
+struct Source<I> {
     column: usize,
     part: usize,
+    rest: I,
+    /// The value of the point whose turn is in the queue.
     value: f64,
+    last: Option<Turn>,
+}
+
+impl<I: Iterator<Item = (f64, f64)>> Source<I> {
+    /// Goes on to the next point; its turn.
+    fn next(&mut self) -> Option<Turn> {
+        let (time, value) = self.rest.next()?;
+        let turn = self.last.filter(|last| last.time == time).map_or(0, |last| last.turn + 1);
+        self.value = value;
+        self.last = Some(Turn { time, turn });
+        self.last
+    }
 }
 
 /// All frames of some columns, in order of time.
-pub(super) fn frames(columns: &[&Column<'_>]) -> Vec<Frame> {
-    let mut placed: Vec<Placed> = Vec::new();
-    for (index, column) in columns.iter().enumerate() {
-        for (part, series) in column.parts.iter().enumerate() {
-            let (mut last, mut turn) = (f64::NAN, 0);
-            for (time, value) in series.points() {
-                turn = if time == last { turn + 1 } else { 0 };
-                last = time;
-                placed.push(Placed { time, turn, column: index, part, value });
-            }
-        }
+pub(super) fn frames<'a>(columns: &'a [&'a Column<'a>]) -> impl Iterator<Item = Frame> + 'a {
+    let parts = columns.iter().enumerate().flat_map(|(column, c)| {
+        let source = move |(part, series): (usize, &&'a Series)| Source {
+            column,
+            part,
+            rest: series.points(),
+            value: f64::NAN,
+            last: None,
+        };
+        c.parts.iter().enumerate().map(source)
+    });
+    let mut sources: Vec<_> = parts.collect();
+    let mut queue = BinaryHeap::new();
+    for (index, source) in sources.iter_mut().enumerate() {
+        queue.extend(source.next().map(|turn| Reverse((turn, index))));
     }
-    placed.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.turn.cmp(&b.turn)));
-    let alike = |a: &Placed, b: &Placed| a.time.to_bits() == b.time.to_bits() && a.turn == b.turn;
-    let frame = |of: &[Placed]| Frame {
-        time: of.first().map_or(0.0, |p| p.time),
-        points: of.iter().map(|p| (p.column, p.part, p.value)).collect(),
-    };
-    placed.chunk_by(alike).map(frame).collect()
+    std::iter::from_fn(move || {
+        let &Reverse((now, _)) = queue.peek()?;
+        let mut frame = Frame { time: now.time, points: Vec::new() };
+        while let Some(&Reverse((turn, index))) = queue.peek() {
+            if turn != now {
+                break;
+            }
+            queue.pop();
+            let Some(source) = sources.get_mut(index) else { continue };
+            frame.points.push((source.column, source.part, source.value));
+            queue.extend(source.next().map(|turn| Reverse((turn, index))));
+        }
+        Some(frame)
+    })
 }

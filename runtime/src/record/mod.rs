@@ -12,6 +12,7 @@ mod recording;
 pub(crate) mod run;
 mod sampler;
 mod series;
+mod taken;
 
 pub mod mcap;
 pub mod parquet;
@@ -19,20 +20,17 @@ pub mod plot;
 pub mod report;
 pub mod table;
 
-use std::fmt::Display;
-use std::io::Cursor;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 pub use files::RecordError;
 pub use folder::{Folder, give_up};
-pub use recording::{
-    EventMark, Expectation, Level, LogLine, ProcessMark, ReadingMark, RecordedValue, Recording, StepMark,
-};
+pub use recording::{EventMark, Expectation, Level, LogLine, ProcessMark, ReadingMark, Recording, StepMark};
 pub use report::{REPORT_SCHEMA, Report, human};
 pub use run::{Failure, Place, Run, RunInfo, Status};
 pub use sampler::Sampler;
 pub use series::{ERROR, Series};
+pub use taken::{Record, RecordedValue, Taken};
 
 /// Which files [`write_all`] writes besides `report.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,58 +50,66 @@ impl Outputs {
     pub const ALL: Outputs = Outputs { recording: true, tables: true, csv: true, plot: true };
 }
 
-/// Names of all files that a run may leave behind.
-const NAMES: &[&str] =
-    &["recording.mcap", "states.parquet", "records.parquet", "states.csv", "records.csv", "plot.svg", "report.json"];
+const RECORDING: &str = "recording.mcap";
+const STATES: &str = "states.parquet";
+const RECORDS: &str = "records.parquet";
+const STATES_CSV: &str = "states.csv";
+const RECORDS_CSV: &str = "records.csv";
+const PLOT: &str = "plot.svg";
+const REPORT: &str = "report.json";
+
+/// Names of all files that a run may leave behind; the last one is written last.
+const NAMES: &[&str] = &[RECORDING, STATES, RECORDS, STATES_CSV, RECORDS_CSV, PLOT, REPORT];
 
 /// Writes the files of a run into `dir`, which is made if need be, all or none; gives their paths.
 pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -> Result<Vec<PathBuf>, RecordError> {
     let mut folder = Folder::begin(dir, NAMES)?;
-    let mut put = |name: &'static str, bytes: Result<Vec<u8>, String>| {
-        let bytes = bytes.map_err(|reason| RecordError::new(&dir.join(name), reason))?;
-        folder.put(name, &bytes)
-    };
+    let to = &folder;
     // The recording and the tables are the large ones: they are made side by side.
-    let recording = || outputs.recording.then(|| mcap_bytes(run));
-    let tables = || outputs.tables.then(|| bytes_of(|out| parquet::states(run, out)));
-    let (recording, tables) = thread::scope(|scope| {
-        let beside = thread::Builder::new().spawn_scoped(scope, recording);
-        let tables = tables();
-        // Where there is no thread to be had, this one does the work.
-        let made = beside.ok().and_then(|thread| thread.join().ok());
-        (made.unwrap_or_else(recording), tables)
-    });
-    if let Some(bytes) = recording {
-        put("recording.mcap", bytes)?;
+    let recording = || to.write(RECORDING, |out| mcap::write(run, out, to.staging()));
+    let states = || to.write(STATES, |out| parquet::states(run, out));
+    match (outputs.recording, outputs.tables) {
+        (true, true) => both(recording, states)?,
+        (true, false) => recording()?,
+        (false, true) => states()?,
+        (false, false) => {}
     }
     let is_recorded = !run.recording.values.is_empty();
-    if let Some(bytes) = tables {
-        put("states.parquet", bytes)?;
-        if is_recorded {
-            put("records.parquet", bytes_of(|out| parquet::records(run, out)))?;
-        }
+    if outputs.tables && is_recorded {
+        to.write(RECORDS, |out| parquet::records(run, out))?;
     }
     if outputs.csv {
-        put("states.csv", bytes_of(|out| table::states(run, out)))?;
+        to.write(STATES_CSV, |out| table::states(run, out))?;
         if is_recorded {
-            put("records.csv", bytes_of(|out| table::records(run, out)))?;
+            to.write(RECORDS_CSV, |out| table::records(run, out))?;
         }
     }
     if outputs.plot {
-        put("plot.svg", plot::page(run).map(String::into_bytes).map_err(|e| e.to_string()))?;
+        to.write(PLOT, |out| plot::page(run).map_err(|e| e.to_string()).and_then(|page| put(out, &page)))?;
     }
-    put("report.json", report.json().map(String::into_bytes).map_err(|e| e.to_string()))?;
+    to.write(REPORT, |out| report.json().map_err(|e| e.to_string()).and_then(|json| put(out, &json)))?;
+    let made = [
+        (RECORDING, outputs.recording),
+        (STATES, outputs.tables),
+        (RECORDS, outputs.tables && is_recorded),
+        (STATES_CSV, outputs.csv),
+        (RECORDS_CSV, outputs.csv && is_recorded),
+        (PLOT, outputs.plot),
+        (REPORT, true),
+    ];
+    made.into_iter().filter(|(_, is_made)| *is_made).for_each(|(name, _)| folder.whole(name));
     folder.finish()
 }
 
-fn mcap_bytes(run: &Run<'_>) -> Result<Vec<u8>, String> {
-    let mut out = Cursor::new(Vec::new());
-    mcap::write(run, &mut out).map_err(|e| e.to_string())?;
-    Ok(out.into_inner())
+fn put(out: &mut impl Write, text: &str) -> Result<(), String> {
+    out.write_all(text.as_bytes()).map_err(|e| e.to_string())
 }
 
-fn bytes_of<E: Display>(write: impl FnOnce(&mut Vec<u8>) -> Result<(), E>) -> Result<Vec<u8>, String> {
-    let mut out = Vec::new();
-    write(&mut out).map_err(|e| e.to_string())?;
-    Ok(out)
+/// Does two things side by side; the first error of both.
+fn both<E: Send>(
+    one: impl FnOnce() -> Result<(), E> + Send,
+    other: impl FnOnce() -> Result<(), E> + Send,
+) -> Result<(), E> {
+    let (one, other) = rayon::join(one, other);
+    one.and(other)
 }

@@ -1,5 +1,6 @@
 //! The tables as Parquet, in long form: one row a point of a column, as every column has times of its own.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -17,7 +18,7 @@ use super::table::record_units;
 use matterix_ir::Unit;
 
 /// Rows of a group at most: what a reader must hold at once.
-const ROWS: usize = 1 << 18;
+const ROWS: usize = 1 << 16;
 
 /// Field of both tables that has the time, s.
 const TIME: &str = "time [s]";
@@ -52,23 +53,26 @@ pub fn records<W: Write + Send>(run: &Run<'_>, out: W) -> Result<()> {
         [number(TIME, true), text("record", true), component.build(), number(VALUE, false), text("unit", true)];
     let mut table = Table::new(out, "records", fields, run)?;
     let (units, plain) = (record_units(run), Unit::one());
-    let all = run.recording.values.iter().flat_map(|entry| {
-        let unit = units.get(entry.name.as_str()).copied().unwrap_or(&plain);
-        (1..).zip(&entry.values).map(move |(component, value)| (entry, component, unit.of_si(*value), unit))
-    });
-    let all: Vec<_> = all.collect();
-    for rows in all.chunks(ROWS) {
-        let texts = |of: &dyn Fn(usize) -> String| -> Vec<ByteArray> {
-            (0..rows.len()).map(|i| ByteArray::from(of(i).as_str())).collect()
-        };
-        let mut group = table.writer.next_row_group()?;
-        put::<DoubleType, _>(&mut group, &rows.iter().map(|r| r.0.time).collect::<Vec<_>>(), None)?;
-        put::<ByteArrayType, _>(&mut group, &texts(&|i| rows[i].0.name.clone()), None)?;
-        put::<Int32Type, _>(&mut group, &rows.iter().map(|r| r.1).collect::<Vec<_>>(), None)?;
-        optional::<DoubleType, _>(&mut group, rows.iter().map(|r| Some(r.2).filter(|v| !v.is_nan())))?;
-        put::<ByteArrayType, _>(&mut group, &texts(&|i| rows[i].3.symbol.clone()), None)?;
-        group.close()?;
+    let named: BTreeMap<&str, (ByteArray, &Unit, ByteArray)> = units
+        .iter()
+        .map(|(name, unit)| (*name, (ByteArray::from(*name), *unit, ByteArray::from(unit.symbol.as_str()))))
+        .collect();
+    let mut rows = Records::default();
+    for entry in run.recording.values.iter() {
+        let unknown = || (ByteArray::from(entry.name), &plain, ByteArray::from(""));
+        let (name, unit, symbol) = named.get(entry.name).cloned().unwrap_or_else(unknown);
+        for (component, value) in (1..).zip(entry.values) {
+            rows.times.push(entry.time);
+            rows.names.push(name.clone());
+            rows.components.push(component);
+            rows.values.push(Some(unit.of_si(*value)).filter(|v| !v.is_nan()));
+            rows.units.push(symbol.clone());
+            if rows.times.len() == ROWS {
+                table.records(&std::mem::take(&mut rows))?;
+            }
+        }
     }
+    table.records(&rows)?;
     table.finish()
 }
 
@@ -95,6 +99,16 @@ impl Rows {
         self.values.push(value);
         self.words.push(word.map(ByteArray::from));
     }
+}
+
+/// Recorded numbers that wait to be written, field by field.
+#[derive(Default)]
+struct Records {
+    times: Vec<f64>,
+    names: Vec<ByteArray>,
+    components: Vec<i32>,
+    values: Vec<Option<f64>>,
+    units: Vec<ByteArray>,
 }
 
 /// A file under way.
@@ -127,6 +141,20 @@ impl<W: Write + Send> Table<W> {
         put::<DoubleType, _>(&mut group, &rows.times, None)?;
         optional::<DoubleType, _>(&mut group, rows.values.iter().copied())?;
         optional::<ByteArrayType, _>(&mut group, rows.words.iter().cloned())?;
+        group.close().map(drop)
+    }
+
+    /// A group of recorded numbers.
+    fn records(&mut self, rows: &Records) -> Result<()> {
+        if rows.times.is_empty() {
+            return Ok(());
+        }
+        let mut group = self.writer.next_row_group()?;
+        put::<DoubleType, _>(&mut group, &rows.times, None)?;
+        put::<ByteArrayType, _>(&mut group, &rows.names, None)?;
+        put::<Int32Type, _>(&mut group, &rows.components, None)?;
+        optional::<DoubleType, _>(&mut group, rows.values.iter().copied())?;
+        put::<ByteArrayType, _>(&mut group, &rows.units, None)?;
         group.close().map(drop)
     }
 

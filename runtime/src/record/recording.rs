@@ -6,6 +6,7 @@ use matterix_ir::{Program, Span};
 use serde::Serialize;
 
 use super::series::{ERROR, Series};
+use super::taken::Taken;
 use crate::exec::{Measured, StepState};
 use crate::motion::Moment;
 
@@ -67,17 +68,6 @@ pub struct LogLine {
     pub span: Option<Span>,
 }
 
-/// A value taken by a `record` statement.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecordedValue {
-    /// s.
-    pub time: f64,
-    /// Name of the record.
-    pub name: String,
-    /// SI; several for a tuple.
-    pub values: Vec<f64>,
-}
-
 /// What a device reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingMark {
@@ -128,7 +118,7 @@ pub struct Recording {
     /// In order of occurrence.
     pub log: Vec<LogLine>,
     /// In order of occurrence.
-    pub values: Vec<RecordedValue>,
+    pub values: Taken,
     /// In order of occurrence.
     pub readings: Vec<ReadingMark>,
     /// In order of occurrence.
@@ -140,9 +130,11 @@ pub struct Recording {
 impl Recording {
     /// A robot moves.
     pub fn travels(&mut self, moments: &[Moment]) {
+        // Several robots move at once: what comes may be of before what is there, but not of long before.
+        let Some(first) = moments.iter().map(|m| m.time).min_by(f64::total_cmp) else { return };
+        let known = self.moments.partition_point(|m| m.time <= first);
         self.moments.extend_from_slice(moments);
-        // Several robots move at once.
-        self.moments.sort_by(|a, b| a.time.total_cmp(&b.time));
+        self.moments[known..].sort_by(|a, b| a.time.total_cmp(&b.time));
     }
 
     /// Without anything yet, of curves to the error that files have: [`ERROR`].
@@ -227,15 +219,26 @@ impl Recording {
     }
 
     /// A `record` statement took a value.
-    pub fn value(&mut self, time: f64, name: impl Into<String>, values: &[f64]) {
+    pub fn value(&mut self, time: f64, name: &str, values: &[f64]) {
         self.reach(time);
-        self.values.push(RecordedValue { time, name: name.into(), values: values.to_vec() });
+        self.values.push(time, name, values);
     }
 
     /// A device reported.
     pub fn reading(&mut self, time: f64, reading: usize, value: f64) {
         self.reach(time);
         self.readings.push(ReadingMark { time, reading, value });
+    }
+
+    /// What each reading of a program reported, in order of occurrence.
+    pub(super) fn by_reading(&self, program: &Program) -> Vec<Vec<ReadingMark>> {
+        let mut all = vec![Vec::new(); program.model.readings.len()];
+        for mark in &self.readings {
+            if let Some(of) = all.get_mut(mark.reading) {
+                of.push(*mark);
+            }
+        }
+        all
     }
 
     /// An expectation was judged.

@@ -42,11 +42,11 @@ pub fn records<W: Write>(run: &Run<'_>, out: W) -> io::Result<()> {
     let plain = Unit::one();
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(["time [s]", "record", "component", "value", "unit"])?;
-    for entry in &run.recording.values {
-        let unit = units.get(entry.name.as_str()).copied().unwrap_or(&plain);
+    for entry in run.recording.values.iter() {
+        let unit = units.get(entry.name).copied().unwrap_or(&plain);
         for (i, &value) in entry.values.iter().enumerate() {
             let (time, value) = (exact(entry.time), exact(unit.of_si(value)));
-            writer.write_record([&time, &entry.name, &(i + 1).to_string(), &value, &unit.symbol])?;
+            writer.write_record([time.as_str(), entry.name, &(i + 1).to_string(), &value, &unit.symbol])?;
         }
     }
     writer.flush()

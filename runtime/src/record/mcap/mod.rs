@@ -9,12 +9,14 @@ mod foxglove;
 mod replay;
 mod robots;
 mod schema;
+mod spool;
 mod story;
 mod tables;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
+use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapResult, WriteOptions};
@@ -22,15 +24,17 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::run::{Run, TOOL};
+use spool::{Message, Spool};
 
 /// Uncompressed size at which a chunk is closed, bytes: small enough that a viewer loads what it shows.
 const CHUNK: u64 = 256 * 1024;
 
-/// Writes the whole recording. The same run gives the same bytes.
-pub fn write<W: Write + Seek>(run: &Run<'_>, out: W) -> McapResult<()> {
+/// Writes the whole recording. The same run gives the same bytes. What is more than memory should hold waits for its turn in
+/// `folder`, in files that are gone when this ends.
+pub fn write<W: Write + Seek>(run: &Run<'_>, out: W, folder: &Path) -> McapResult<()> {
     let mut options = WriteOptions::new().compression(Some(Compression::Lz4)).library(TOOL);
     options = options.chunk_size(Some(CHUNK));
-    let mut sink = Sink { writer: options.create(out)?, messages: Vec::new() };
+    let mut sink = Sink { writer: options.create(out)?, messages: Spool::new(folder) };
     sink.metadata(run)?;
     sink.sources(run)?;
     tables::write(run, &mut sink)?;
@@ -39,17 +43,10 @@ pub fn write<W: Write + Seek>(run: &Run<'_>, out: W) -> McapResult<()> {
     sink.finish()
 }
 
-/// A message that waits for its turn.
-struct Message {
-    time: u64,
-    channel: u16,
-    data: Vec<u8>,
-}
-
 /// Collects messages by topic and writes them in order of time.
 struct Sink<W: Write + Seek> {
     writer: mcap::Writer<W>,
-    messages: Vec<Message>,
+    messages: Spool,
 }
 
 impl<W: Write + Seek> Sink<W> {
@@ -68,13 +65,12 @@ impl<W: Write + Seek> Sink<W> {
     /// Adds a message that serde can write.
     fn push(&mut self, channel: u16, time: f64, message: &impl Serialize) -> McapResult<()> {
         let data = serde_json::to_vec(message).map_err(std::io::Error::other)?;
-        self.push_bytes(channel, time, data);
-        Ok(())
+        self.push_bytes(channel, time, data)
     }
 
     /// Adds a message that is JSON already.
-    fn push_bytes(&mut self, channel: u16, time: f64, data: Vec<u8>) {
-        self.messages.push(Message { time: nanoseconds(time), channel, data });
+    fn push_bytes(&mut self, channel: u16, time: f64, data: Vec<u8>) -> McapResult<()> {
+        Ok(self.messages.push(Message { time: nanoseconds(time), channel, data })?)
     }
 
     fn metadata(&mut self, run: &Run<'_>) -> McapResult<()> {
@@ -109,10 +105,10 @@ impl<W: Write + Seek> Sink<W> {
     }
 
     /// Writes all messages, those of one instant in the order in which they were added.
-    fn finish(mut self) -> McapResult<()> {
-        self.messages.sort_by_key(|m| m.time);
+    fn finish(self) -> McapResult<()> {
+        let Sink { mut writer, messages } = self;
         let mut sequences: BTreeMap<u16, u32> = BTreeMap::new();
-        for message in &self.messages {
+        messages.drain(|message| {
             let next = sequences.entry(message.channel).or_default();
             let header = MessageHeader {
                 channel_id: message.channel,
@@ -121,9 +117,9 @@ impl<W: Write + Seek> Sink<W> {
                 publish_time: message.time,
             };
             *next = next.wrapping_add(1);
-            self.writer.write_to_known_channel(&header, &message.data)?;
-        }
-        self.writer.finish().map(|_| ())
+            writer.write_to_known_channel(&header, &message.data)
+        })?;
+        writer.finish().map(|_| ())
     }
 }
 

@@ -12,6 +12,7 @@ use crate::record::column::{Cell, Column, Shown, repeats};
 use crate::record::frames::{Frame, frames};
 use crate::record::run::Run;
 use crate::record::table::record_units;
+use crate::record::taken::Record;
 
 /// A field of a message: a column under a key.
 type Field<'a> = (String, Column<'a>);
@@ -100,15 +101,21 @@ impl Topic<'_> {
     fn write<W: Write + Seek>(&self, run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
         let channel = sink.channel(&self.topic, &self.schema, &self.schema(), &self.units())?;
         let columns: Vec<&Column<'_>> = self.groups.iter().flat_map(|g| &g.fields).map(|(_, c)| c).collect();
-        let mut frames = frames(&columns);
-        if let Some((_, end)) = run.recording.sampled.filter(|(_, end)| frames.last().is_some_and(|f| f.time < *end)) {
-            frames.push(Frame { time: end, points: Vec::new() });
-        }
-        let last = frames.len().saturating_sub(1);
-        for (i, frame) in frames.iter().enumerate() {
-            let is_whole = i == 0 || i == last;
+        let mut frames = frames(&columns).peekable();
+        let end = run.recording.sampled.map(|(_, end)| end);
+        let mut is_first = true;
+        while let Some(frame) = frames.next() {
+            let is_last = frames.peek().is_none();
+            // What rests when the run ends has no point there.
+            let closing = end.filter(|end| is_last && frame.time < *end);
+            let is_whole = is_first || (is_last && closing.is_none());
             let shown = |column: usize| is_whole || frame.has(column);
-            sink.push_bytes(channel, frame.time, self.message(run, &columns, frame, shown));
+            sink.push_bytes(channel, frame.time, self.message(run, &columns, &frame, shown))?;
+            if let Some(time) = closing {
+                let frame = Frame { time, points: Vec::new() };
+                sink.push_bytes(channel, time, self.message(run, &columns, &frame, |_| true))?;
+            }
+            is_first = false;
         }
         Ok(())
     }
@@ -229,12 +236,12 @@ fn split<'a>(run: &Run<'a>, name: &'a str) -> (&'a str, &'a str) {
 }
 
 fn readings<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
-    for (index, reading) in run.program.model.readings.iter().enumerate() {
+    for (reading, marks) in run.program.model.readings.iter().zip(run.recording.by_reading(run.program)) {
         let name = format!("matterix.Reading.{}", reading.name);
         let schema = object(&name, [("value", number(&reading.unit.symbol))]);
         let units = BTreeMap::from([("unit value".to_owned(), reading.unit.symbol.clone())]);
         let channel = sink.channel(&format!("/readings/{}", reading.name), &name, &schema, &units)?;
-        for mark in run.recording.readings.iter().filter(|m| m.reading == index && m.value.is_finite()) {
+        for mark in marks.into_iter().filter(|m| m.value.is_finite()) {
             sink.push(channel, mark.time, &json!({ "value": reading.unit.of_si(mark.value) }))?;
         }
     }
@@ -242,12 +249,13 @@ fn readings<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()
 }
 
 fn records<W: Write + Seek>(run: &Run<'_>, sink: &mut Sink<W>) -> McapResult<()> {
+    let taken = run.recording.values.by_name();
     for (record, unit) in record_units(run) {
         let name = format!("matterix.Record.{record}");
         let schema = object(&name, [("value", list(number(&unit.symbol)))]);
         let units = BTreeMap::from([("unit value".to_owned(), unit.symbol.clone())]);
         let channel = sink.channel(&format!("/records/{record}"), &name, &schema, &units)?;
-        for entry in run.recording.values.iter().filter(|v| v.name == record) {
+        for entry in taken.get(record).into_iter().flat_map(Record::iter) {
             let values: Vec<f64> = entry.values.iter().map(|&v| unit.of_si(v)).collect();
             sink.push(channel, entry.time, &json!({ "value": values }))?;
         }

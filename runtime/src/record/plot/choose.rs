@@ -13,6 +13,7 @@ use crate::record::column::{Column, Shown, repeats};
 use crate::record::history::{self, is_structure};
 use crate::record::run::Run;
 use crate::record::table::record_units;
+use crate::record::taken::RecordedValue;
 
 /// Mixtures with a panel at most.
 const MIXTURES: usize = 12;
@@ -230,10 +231,11 @@ const TOWERING: f64 = 20.0;
 /// What `record` statements took, one panel a unit.
 fn records(run: &Run<'_>) -> Vec<Panel> {
     let mut groups: Vec<(&str, Vec<Series>)> = Vec::new();
+    let records = run.recording.values.by_name();
     for (name, unit) in record_units(run) {
-        let taken: Vec<_> = run.recording.values.iter().filter(|v| v.name == name).collect();
+        let Some(taken) = records.get(name) else { continue };
         for part in 0..taken.iter().map(|v| v.values.len()).max().unwrap_or(0) {
-            let point = |v: &&crate::record::RecordedValue| Some((v.time, unit.of_si(*v.values.get(part)?)));
+            let point = |v: RecordedValue<'_>| Some((v.time, unit.of_si(*v.values.get(part)?)));
             let label = if part > 0 { format!("{name}.{}", part + 1) } else { name.to_owned() };
             let line =
                 Series { name: label, points: taken.iter().filter_map(point).collect(), stepped: false }.thinned();

@@ -160,29 +160,27 @@ fn events(run: &Run<'_>) -> Vec<EventReport> {
 }
 
 fn readings(run: &Run<'_>) -> Vec<ReadingReport> {
-    let row = |(i, reading): (usize, &matterix_ir::model::Reading)| {
-        let marks = run.recording.readings.iter().filter(move |m| m.reading == i);
-        let last = marks.clone().next_back()?;
+    let row = |(reading, marks): (&matterix_ir::model::Reading, Vec<crate::record::ReadingMark>)| {
+        let last = marks.last()?;
         Some(ReadingReport {
             name: reading.name.clone(),
             time: last.time,
             value: reading.unit.of_si(last.value),
             unit: reading.unit.symbol.clone(),
-            count: marks.count(),
+            count: marks.len(),
         })
     };
-    run.program.model.readings.iter().enumerate().filter_map(row).collect()
+    run.program.model.readings.iter().zip(run.recording.by_reading(run.program)).filter_map(row).collect()
 }
 
 fn records(run: &Run<'_>) -> Vec<RecordSummary> {
+    let records = run.recording.values.by_name();
     let row = |(name, unit): (&str, &Unit)| {
-        let mut taken = run.recording.values.iter().filter(|v| v.name == name);
+        let taken = records.get(name)?;
         let show = |values: &[f64]| values.iter().map(|&v| unit.of_si(v)).collect::<Vec<_>>();
-        let count = taken.clone().count();
-        let first = taken.next()?;
-        let last = taken.next_back().unwrap_or(first);
-        let (first, last) = (show(&first.values), show(&last.values));
-        Some(RecordSummary { name: name.to_owned(), unit: unit.symbol.clone(), count, first, last })
+        let (first, last) = (taken.iter().next()?, taken.iter().next_back()?);
+        let (first, last) = (show(first.values), show(last.values));
+        Some(RecordSummary { name: name.to_owned(), unit: unit.symbol.clone(), count: taken.len(), first, last })
     };
     record_units(run).into_iter().filter_map(row).collect()
 }

@@ -9,7 +9,8 @@ use super::fixture::{self, Lab};
 
 fn bytes(lab: &Lab) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
-    matterix_runtime::record::mcap::write(&lab.run(), &mut out).expect("memory takes every byte");
+    matterix_runtime::record::mcap::write(&lab.run(), &mut out, &std::env::temp_dir())
+        .expect("memory takes every byte");
     out.into_inner()
 }
 
