@@ -180,7 +180,7 @@ impl Index {
             Sort::Quantity(dimension, point) => self.described(dimension, *point),
             Sort::Truth => "a truth value".into(),
             Sort::Text => "a text".into(),
-            Sort::Word(words) => format!("one of {}", matterix_lang::eval::words::list(words)),
+            Sort::Word(words) => format!("one of {}", matterix_lang::declare::types::list(words)),
             Sort::Range(inner) => format!("a range of {}", self.sort_words(inner)),
             Sort::Tuple(items) => format!("{} values", items.len()),
             Sort::List(inner) => format!("a list of {}", self.sort_words(inner)),

@@ -3,9 +3,10 @@
 use matterix_ir::{Diagnostic, Sources, Span, codes};
 
 use crate::ast::ItemKind;
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
+use crate::declare::Tables;
 use crate::eval::Scope;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::reach::Reach;
 use crate::lower::Planner;
 use crate::names::{DeclId, item_name};
 use crate::near;

@@ -7,6 +7,7 @@
 mod calibration;
 pub mod check;
 pub mod chem;
+pub mod declare;
 pub mod elaborate;
 mod escapes;
 pub mod eval;
@@ -24,7 +25,6 @@ pub mod points;
 pub mod program;
 pub mod prose;
 pub mod reference;
-pub mod screen;
 mod session;
 mod settle;
 mod share;

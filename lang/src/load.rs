@@ -5,7 +5,7 @@ use std::sync::Arc;
 use matterix_ir::{Diagnostic, FileId, Sources, codes};
 
 use crate::ast::ItemKind;
-use crate::elaborate::units::declare;
+use crate::declare::units::declare;
 use crate::loader::Loader;
 use crate::names::{Module, Names, module_candidates};
 use crate::session::{self, Session};

@@ -13,13 +13,16 @@ use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
 use crate::calibration::{self, Calibration};
 use crate::check as checks;
-use crate::elaborate::choices::Choice;
-use crate::elaborate::geometry::Geometry;
+
+use crate::declare::Tables;
+use crate::declare::Type;
 use crate::elaborate::hazards::dangers;
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, ExtensiveKey, Tables};
 use crate::escapes::unhandled;
-use crate::eval::{Num, Type, Value};
+use crate::eval::lab::choices::Choice;
+use crate::eval::lab::geometry::Geometry;
+use crate::eval::lab::reach::Reach;
+use crate::eval::lab::{Elaborator, ExtensiveKey};
+use crate::eval::{Num, Value};
 use crate::labs;
 use crate::load::load;
 use crate::loader::Loader;
@@ -140,7 +143,7 @@ fn examine(
     let (modules, mut diagnostics) = load(sources, file, loader, session);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (mut tables, found) = Tables::new(&names);
+    let (mut tables, found) = crate::elaborate::declared(&names);
     tables.stop = loader.stop();
     diagnostics.extend(found);
     let root = modules.len() - 1;
@@ -275,7 +278,7 @@ fn compile_and<T>(
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (mut tables, found) = Tables::new(&names);
+    let (mut tables, found) = crate::elaborate::declared(&names);
     tables.stop = loader.stop();
     diagnostics.extend(found);
     diagnostics.extend(checks::declarations(&tables, sources, root));
@@ -343,7 +346,7 @@ pub fn many_runs(
     let set = typed_values(sources, options, &mut diagnostics);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (mut tables, found) = Tables::new(&names);
+    let (mut tables, found) = crate::elaborate::declared(&names);
     tables.stop = loader.stop();
     diagnostics.extend(found);
     diagnostics.extend(checks::declarations(&tables, sources, root));
@@ -379,7 +382,7 @@ pub fn tests(sources: &mut Sources, file: FileId, loader: &dyn Loader, wanted: &
     let root = modules.iter().position(|m| m.file == file).unwrap_or(0);
     let (names, found) = Names::new(&modules);
     diagnostics.extend(found);
-    let (mut tables, found) = Tables::new(&names);
+    let (mut tables, found) = crate::elaborate::declared(&names);
     tables.stop = loader.stop();
     diagnostics.extend(found);
     let mut tests = Vec::new();
@@ -758,7 +761,10 @@ fn build<'a>(
         true => {
             let held = elaborator.instances.iter().flat_map(|i| &i.contents);
             let brought = held.map(|(s, _)| *s).collect();
-            (crate::screen::watched(tables, &mixtures, &brought), dangers(hazards.as_deref().unwrap_or_default()))
+            (
+                crate::declare::compatibility::watched(tables, &mixtures, &brought),
+                dangers(hazards.as_deref().unwrap_or_default()),
+            )
         }
         false => (Vec::new(), Vec::new()),
     };
@@ -794,7 +800,7 @@ fn build<'a>(
     Some(Built { program, wiring, points, noted, findings, starts, uses, many, choices, reach, moved: None })
 }
 
-fn species(s: &crate::elaborate::species::SpeciesDef<'_>) -> matterix_ir::model::Species {
+fn species(s: &crate::declare::species::SpeciesDef<'_>) -> matterix_ir::model::Species {
     matterix_ir::model::Species {
         name: s.name.clone(),
         formula: s.formula.as_ref().map(ToString::to_string).unwrap_or_default(),
@@ -807,7 +813,7 @@ fn species(s: &crate::elaborate::species::SpeciesDef<'_>) -> matterix_ir::model:
 }
 
 /// What an observable is about: an instance and, for a concentration, the species.
-type Observed = (InstanceId, Option<crate::eval::SpeciesId>, Observable);
+type Observed = (InstanceId, Option<crate::declare::SpeciesId>, Observable);
 
 /// Derived quantities that change in the run, and the concentrations of every mixture.
 fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
@@ -848,7 +854,7 @@ fn observables(lab: &mut Elaborator<'_>) -> Vec<Observed> {
 }
 
 /// The library's first concentration of a species: per mass of mixture, or a mass fraction where counted by mass.
-fn concentration(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::eval::SpeciesId) -> Option<Observable> {
+fn concentration(lab: &mut Elaborator<'_>, id: InstanceId, s: crate::declare::SpeciesId) -> Option<Observable> {
     let by_mass = lab.tables.species.get(s).by_mass;
     let views = lab.views(id);
     for (module, _, ty, value, _) in views {

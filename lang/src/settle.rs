@@ -8,9 +8,10 @@ use matterix_ir::model::Event;
 use matterix_ir::plan::Plan;
 use matterix_ir::script::Wiring;
 
+use crate::declare::Tables;
 use crate::elaborate::events::Happenings;
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::reach::Reach;
 use crate::lower::{Planner, Wires};
 use crate::share;
 use crate::task::Task;

@@ -4,7 +4,7 @@
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
 use crate::check::forbidden_on_any_way;
-use crate::elaborate::choices::Choice;
+use crate::eval::lab::choices::Choice;
 
 /// So many other values are judged for one workflow.
 const MOST_VALUES: usize = 16;

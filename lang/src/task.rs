@@ -3,8 +3,8 @@
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Expr, ItemKind, Name, NamedExpr, Stmt, StmtKind};
-use crate::elaborate::Tables;
-use crate::elaborate::choices::Choice;
+use crate::declare::Tables;
+use crate::eval::lab::choices::Choice;
 use crate::names::DeclId;
 use crate::near;
 

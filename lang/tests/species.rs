@@ -1,8 +1,9 @@
 //! What the library says of its species, by its own declared types.
 
 use matterix_ir::Sources;
-use matterix_lang::elaborate::reach::Reach;
-use matterix_lang::elaborate::{Elaborator, Tables};
+use matterix_lang::elaborate::declared;
+use matterix_lang::eval::Elaborator;
+use matterix_lang::eval::lab::reach::Reach;
 use matterix_lang::load;
 use matterix_lang::names::{DeclId, Names};
 use matterix_lang::{LibraryOnly, Session};
@@ -13,7 +14,7 @@ fn found_in(text: &str) -> Vec<String> {
     let file = sources.add("species.mtx", text);
     let (modules, _) = load::load(&mut sources, file, &LibraryOnly, &mut Session::default());
     let (names, _) = Names::new(&modules);
-    let (tables, mut found) = Tables::new(&names);
+    let (tables, mut found) = declared(&names);
     let mut lab = Elaborator::new(&tables, Reach::default());
     for index in 0..names.decls.len() as u32 {
         lab.check_species(DeclId(index));

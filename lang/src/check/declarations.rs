@@ -4,11 +4,13 @@ use matterix_ir::{Diagnostic, Sources, codes};
 
 use super::{ignored, returns};
 use crate::ast::{AssetLine, Field, FieldValue, Grid, Item, ItemKind, MemberKind, Param, Role};
-use crate::elaborate::budget::Budget;
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
-use crate::eval::types::unsupported;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Tables;
+use crate::declare::Type;
+use crate::declare::types::unsupported;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::budget::Budget;
+use crate::eval::lab::reach::Reach;
+use crate::eval::{Scope, Value};
 use crate::lower::{Planner, script};
 use crate::meanings::Seeing;
 use crate::names::{DeclId, verb_text};
@@ -102,7 +104,7 @@ fn declaration<'a>(lab: &mut Elaborator<'a>, sources: &Sources, id: DeclId, modu
         ItemKind::Reaction { name, .. } => {
             for (index, r) in lab.tables.reactions.iter().enumerate() {
                 if r.module == module && r.name.trim_end_matches(".reverse") == name.text {
-                    lab.check_rate(crate::eval::ReactionId(index as u32));
+                    lab.check_rate(crate::declare::ReactionId(index as u32));
                 }
             }
         }

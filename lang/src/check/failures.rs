@@ -8,9 +8,9 @@ use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use crate::ast::{ItemKind, WireKind};
-use crate::elaborate::Elaborator;
 use crate::elaborate::mixtures::changed;
 use crate::escapes::fails;
+use crate::eval::lab::Elaborator;
 use crate::names::verb_text;
 
 /// Steps of a file that nothing gets to, as a `fail` stands before them in their block; each place once.

@@ -4,13 +4,14 @@ use matterix_ir::stock::Count;
 use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, NamedExpr, Role};
-use crate::elaborate::Elaborator;
-use crate::elaborate::failures::BARS;
-use crate::elaborate::given::{GIVEN_BY, INSTEAD, ONLY_WITH, word};
+use crate::declare::Type;
+use crate::declare::failures::BARS;
+use crate::declare::fields::word;
+use crate::declare::tables::{MATTER, is_true};
 use crate::elaborate::lab::SYMMETRIC;
-use crate::elaborate::properties::{GIVES, GIVES_AT};
-use crate::elaborate::tables::{MATTER, is_true};
-use crate::eval::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::given::{GIVEN_BY, INSTEAD, ONLY_WITH};
+use crate::eval::lab::properties::{GIVES, GIVES_AT};
 use crate::near;
 use crate::stock::{COUNTS_AS, count_of};
 

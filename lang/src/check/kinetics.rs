@@ -7,11 +7,13 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::flow::Window;
 use crate::ast::{Expr, ExprKind, Member, MemberKind};
-use crate::elaborate::properties::{GIVES, GIVES_AT};
-use crate::elaborate::reach::Reach;
-use crate::elaborate::tables::{MemberRef, ReactionDef};
-use crate::elaborate::{Elaborator, SpeciesId, Tables};
-use crate::eval::{ReactionId, Scope, Value};
+use crate::declare::ReactionId;
+use crate::declare::tables::{MemberRef, ReactionDef};
+use crate::declare::{SpeciesId, Tables};
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::properties::{GIVES, GIVES_AT};
+use crate::eval::lab::reach::Reach;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 use crate::syntax::moved::Moved;
 
@@ -215,7 +217,7 @@ pub fn rates(lab: &mut Elaborator<'_>) {
     for (index, meet) in meets(lab).into_iter().enumerate() {
         let library = lab.tables.names.modules[lab.tables.reactions[index].module].is_library();
         if !library && meet {
-            lab.check_rate(crate::eval::ReactionId(index as u32));
+            lab.check_rate(crate::declare::ReactionId(index as u32));
         }
     }
 }

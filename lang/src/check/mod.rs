@@ -20,10 +20,11 @@ use matterix_ir::{Diagnostic, NodeId, Sources, Span, codes};
 
 use self::flow::Window;
 pub use self::flow::{After, Known, Seen, forbidden_on_any_way};
+use crate::declare::ReactionId;
+use crate::declare::Tables;
 use crate::elaborate::hazards::Hazard;
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
-use crate::eval::ReactionId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::reach::Reach;
 use crate::meanings::Seeing;
 use crate::names::DeclId;
 use crate::share;

@@ -10,7 +10,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Op, Sources, Span, codes};
 
 use crate::ast::{Item, ItemKind, LabLineKind};
-use crate::elaborate::{Elaborator, Tables};
+use crate::declare::Tables;
+use crate::eval::lab::Elaborator;
 use crate::names::{DeclId, Names, item_name};
 use crate::syntax::moved::Moved;
 

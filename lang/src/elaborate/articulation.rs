@@ -4,11 +4,12 @@ use matterix_ir::robot::{Joint, JointKind, Robot};
 use matterix_ir::scene::{Articulation, InstanceId, Solid};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::Elaborator;
-use super::instances::Setting;
 use super::joints::clothe;
 use crate::ast::{AssetLine, ExprKind, FieldValue};
-use crate::eval::{Type, Value};
+use crate::declare::Type;
+use crate::eval::Value;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::instances::Setting;
 use crate::near::{nearest, question};
 
 impl<'a> Elaborator<'a> {

@@ -6,7 +6,9 @@ use matterix_ir::model::{Balance, Derivative, Domain, Doubt, State};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op, UnaryOp, Unit};
 
-use super::{Contribution, Elaborator, SpeciesId, origin};
+use crate::declare::SpeciesId;
+use crate::eval::lab::origin;
+use crate::eval::lab::{Contribution, Elaborator};
 
 /// What matters of what a process may make or lose, mol or kg.
 const DOUBT_SCALE: f64 = 1e-6;

@@ -2,19 +2,12 @@
 
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 
-use super::held::Held;
-use super::{Elaborator, SpeciesId};
 use crate::ast::{Binary, Expr, ExprKind, Name};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::held::Held;
+use crate::eval::lab::substances::Substance;
 use crate::eval::{Num, Scope, Value};
-use crate::names::DeclId;
-
-/// What a name in a recipe or after `of` stands for.
-pub enum Substance {
-    /// One species.
-    Species(SpeciesId),
-    /// A recipe.
-    Solution(DeclId),
-}
 
 /// What contents are called as a reagent: the substance, or the whole recipe where there are several.
 pub fn origin(e: &Expr) -> String {
@@ -106,24 +99,6 @@ impl<'a> Elaborator<'a> {
                 .help("contents are a sum of quantities with `of`: `10 g of water + 12 mmol of EtOH`"),
             ),
         }
-    }
-
-    /// What a name stands for where contents are given.
-    pub fn substance(&mut self, name: &Name, module: usize) -> Option<Substance> {
-        let names = self.tables.names;
-        let id = names.lookup(module, &name.text);
-        if let Some(s) = id.and_then(|id| self.tables.species.of_decl(id)) {
-            return Some(Substance::Species(s));
-        }
-        let is_solution = |k: &crate::ast::ItemKind| matches!(k, crate::ast::ItemKind::Solution { .. });
-        if let Some(id) = id.filter(|id| is_solution(&names.decl(*id).item.kind)) {
-            return Some(Substance::Solution(id));
-        }
-        let d = names.unknown(module, name, "species or solution", |k| {
-            matches!(k, crate::ast::ItemKind::Species { .. } | crate::ast::ItemKind::Solution { .. })
-        });
-        self.report(d);
-        None
     }
 
     /// A quantity of a substance as amounts of species.

@@ -8,11 +8,12 @@ use matterix_ir::plan::{Condition, Limit, Refusal};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, Unit, codes};
 
-use super::Elaborator;
-use super::failures::PENDING;
 use super::laws::has_calls;
 use crate::ast::{self, Delay, ItemKind, MemberKind};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::declare::failures::PENDING;
+use crate::eval::lab::Elaborator;
+use crate::eval::{Scope, Value};
 
 /// What happens by itself, and what must hold for that.
 #[derive(Default)]

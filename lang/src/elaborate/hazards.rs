@@ -8,9 +8,11 @@ use matterix_ir::plan::{Said, Term};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, Leaves, NodeId, Op, Severity, Span, codes};
 
-use super::{Elaborator, Tables};
 use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Tables;
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;

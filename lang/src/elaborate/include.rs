@@ -7,9 +7,10 @@ use std::collections::BTreeSet;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::Elaborator;
 use crate::ast::{Expr, Holding, ItemKind, LabLine, LabLineKind, Name, NamedExpr, Param, Path};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::Elaborator;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 use crate::near;
 
@@ -63,49 +64,6 @@ struct Building<'a> {
 }
 
 impl<'a> Elaborator<'a> {
-    /// Does something where the names of a lab are those of an included one.
-    pub fn within_lab<R>(&mut self, within: &str, does: impl FnOnce(&mut Self) -> R) -> R {
-        let outer = std::mem::replace(&mut self.within, within.to_string());
-        let result = does(self);
-        self.within = outer;
-        result
-    }
-
-    /// Where the names in a field of an instance are looked up: in its lab for a field that stands there.
-    pub fn within_of(&self, id: InstanceId, lab: bool) -> String {
-        if lab { self.instances[id.0 as usize].within.clone() } else { self.within.clone() }
-    }
-
-    /// The instance or the included lab that a name of the lab stands for.
-    pub fn lab_name_of(&self, full: &str) -> Option<Value> {
-        if let Some(id) = self.find_instance(full) {
-            return Some(Value::Instance(id));
-        }
-        self.included.contains(full).then(|| Value::Included(full.to_string()))
-    }
-
-    /// `left.table`.
-    pub fn included_member(&mut self, lab: &str, name: &Name) -> Value {
-        let full = format!("{lab}.{}", name.text);
-        if let Some(value) = self.lab_name_of(&full) {
-            return value;
-        }
-        let inner = |n: &str| n.strip_prefix(lab).and_then(|n| n.strip_prefix('.')).map(str::to_string);
-        let known: Vec<String> = self
-            .instances
-            .iter()
-            .filter(|i| i.owner.is_none())
-            .filter_map(|i| inner(&i.name))
-            .chain(self.included.iter().filter_map(|n| inner(n)))
-            .collect();
-        let near = near::nearest(&name.text, known);
-        let headline = format!("`{lab}` holds no `{}`", name.text);
-        let mut d = Diagnostic::error(codes::UNKNOWN_MEMBER, name.span, headline, "not in this lab");
-        d = near::proposed(d, &near, name.span);
-        self.report(d);
-        Value::Error
-    }
-
     /// Opens a lab with everything it includes: settings and instances, the included labs first. What each holds and
     /// where it stands is not looked at yet.
     pub fn open_labs(&mut self, id: DeclId) -> Vec<Bench<'a>> {
@@ -286,7 +244,9 @@ impl<'a> Elaborator<'a> {
     /// Moves what an included lab holds to where the lab stands: all that stands on nothing in it.
     pub fn place_labs(&mut self) {
         for (within, relations, outer, module) in std::mem::take(&mut self.places) {
-            let own = |i: &super::Instance<'a>| i.owner.is_none() && i.name.starts_with(&within) && i.placed.is_empty();
+            let own = |i: &crate::eval::lab::Instance<'a>| {
+                i.owner.is_none() && i.name.starts_with(&within) && i.placed.is_empty()
+            };
             let free: Vec<usize> = (0..self.instances.len()).filter(|i| own(&self.instances[*i])).collect();
             // Where a lab stands that has no place of its own, is open to the one that includes it.
             let stands = relations.iter().any(|(label, _)| label.text != "with");

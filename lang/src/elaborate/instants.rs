@@ -9,9 +9,9 @@ use matterix_ir::model::{Action, Domain, State};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, codes};
 
-use super::Elaborator;
 use super::laws::Lines;
 use crate::ast::{AssignOp, Law, LawKind};
+use crate::eval::lab::Elaborator;
 use crate::eval::{Num, Scope, Value};
 
 /// The lines of an event.

@@ -4,10 +4,11 @@ use matterix_ir::robot::{Joint, JointKind, JointLimits, Link, Piece, Robot, Soli
 use matterix_ir::scene::{Follow, Frame, InstanceId, Pose, Shape, Solid};
 use matterix_ir::{Diagnostic, NodeId, codes};
 
-use super::Elaborator;
-use super::geometry::Geometry;
-use crate::ast::{AssetLine, At, Expr, ExprKind, FieldValue, Jointed, Name};
-use crate::eval::{Scope, Type, Value};
+use crate::ast::{AssetLine, At, Expr, ExprKind, FieldValue, Name};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::geometry::Geometry;
+use crate::eval::{Scope, Value};
 use crate::near::{nearest, question};
 
 /// The joints of an asset's lines do not move by themselves: the states that they follow have the limits.
@@ -15,38 +16,6 @@ const FREE: JointLimits =
     JointLimits { lower: f64::MIN, upper: f64::MAX, velocity: f64::MAX, effort: 0.0, acceleration: None, jerk: None };
 
 impl<'a> Elaborator<'a> {
-    /// The joints that an asset's lines name, with the module of each.
-    fn jointed(&self, id: InstanceId) -> Vec<(usize, &'a Jointed)> {
-        let joint = |(module, line): (usize, &'a AssetLine)| match line {
-            AssetLine::Joint(joint) => Some((module, &**joint)),
-            _ => None,
-        };
-        self.lines(id).into_iter().filter_map(joint).collect()
-    }
-
-    /// The description of an asset's links that a file gives.
-    fn described(&self, id: InstanceId) -> Option<&'a Robot> {
-        self.lines(id).into_iter().find_map(|(_, line)| match line {
-            AssetLine::Robot(robot, _) => Some(&**robot),
-            _ => None,
-        })
-    }
-
-    /// Names of an asset's links by index; the first one is the asset itself.
-    pub(super) fn links(&self, id: InstanceId) -> Vec<&'a str> {
-        if let Some(robot) = self.described(id) {
-            return robot.links.iter().map(|l| l.name.as_str()).collect();
-        }
-        let own = self.jointed(id).into_iter().filter(|(_, j)| j.way.is_some()).map(|(_, j)| j.name.text.as_str());
-        std::iter::once("").chain(own).collect()
-    }
-
-    /// The moving link that a place is given in, by index.
-    pub(super) fn link_of(&self, id: InstanceId, from: &Name) -> Option<u32> {
-        let found = self.links(id).iter().position(|name| *name == from.text)?;
-        (found > 0).then_some(found as u32)
-    }
-
     /// The moving link that a frame of an asset is on, by index.
     pub fn rides_on(&self, id: InstanceId, frame: &str) -> Option<u32> {
         let mut name = frame;

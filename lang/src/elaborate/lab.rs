@@ -5,19 +5,16 @@ use std::collections::BTreeMap;
 use matterix_ir::scene::{InstanceId, Pose};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::instances::Setting;
-use super::tables::Kind;
-use super::{Elaborator, Pair};
 use crate::ast::{
-    self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name, Path,
+    self, AssetLine, AssetLiteral, Contents, Expr, Field, FieldValue, Holding, ItemKind, LabLineKind, Name,
 };
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::declare::tables::Kind;
+use crate::eval::lab::instances::Setting;
+use crate::eval::lab::{Elaborator, Pair};
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 use crate::near;
-
-/// Fields every asset may have beside the members of its capabilities: geometry, and what follows from it.
-pub(crate) const GEOMETRY: &[&str] =
-    &["shape", "room", "tip", "base", "home", "mounted", "mesh", "collision", "inertia"];
 
 impl<'a> Elaborator<'a> {
     /// Builds the instances of a lab, then their states.
@@ -126,42 +123,6 @@ impl<'a> Elaborator<'a> {
         Some(self.instantiate(full, vec![kind], settings, None, name.span))
     }
 
-    /// The capability or asset a path names.
-    pub fn kind_named(&mut self, path: &Path, module: usize) -> Option<DeclId> {
-        let name = path.segments.last()?;
-        let is_kind = |k: &ItemKind| matches!(k, ItemKind::Capability { .. } | ItemKind::Asset { .. });
-        let found = self.tables.names.lookup(module, &name.text).filter(|id| self.tables.kinds.contains_key(id));
-        if found.is_none() {
-            let d = self.tables.names.unknown(module, name, "asset", is_kind);
-            self.report(d);
-        }
-        found
-    }
-
-    /// Reports fields of a thing that are no member of its kind, or that follow from others.
-    pub fn check_fields(&mut self, kind: DeclId, fields: &'a [Field]) {
-        self.check_fields_of(kind, fields, false);
-    }
-
-    /// The same; `own` for the lines of the asset's declaration.
-    pub fn check_fields_of(&mut self, kind: DeclId, fields: &'a [Field], own: bool) {
-        let Some(info) = self.tables.kinds.get(&kind) else { return };
-        let mut known: Vec<String> =
-            info.members.iter().filter_map(|m| super::tables::member_name(m.member)).map(|n| n.text.clone()).collect();
-        known.extend(GEOMETRY.iter().map(|s| (*s).to_string()));
-        known.extend(info.lines.iter().filter_map(|(_, l)| match l {
-            AssetLine::Part { name, .. } | AssetLine::Grid(ast::Grid { name, .. }) => Some(name.text.clone()),
-            _ => None,
-        }));
-        let keys: Vec<&str> = known.iter().map(String::as_str).collect();
-        let mut found = Vec::new();
-        super::fields::unknown_fields(fields, &keys, &format!("`{}`", info.name), &mut found);
-        for d in found {
-            self.report(d);
-        }
-        self.check_settable(&[kind], fields, own);
-    }
-
     fn place(&mut self, id: InstanceId, relations: &'a [(Name, Expr)], module: usize) {
         for (label, operand) in relations {
             if label.text == "with" {
@@ -204,27 +165,6 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-    }
-
-    /// Two or three lengths, m.
-    pub fn position(&mut self, items: &[Value], at: &Expr) -> Option<[f64; 3]> {
-        let length = self.tables.units.named("Length");
-        let mut out = [0.0; 3];
-        if items.len() < 2 || items.len() > 3 {
-            self.report(Diagnostic::error(
-                codes::TYPE_MISMATCH,
-                at.span,
-                format!("a position has two or three coordinates, not {}", items.len()),
-                "not a position",
-            ));
-            return None;
-        }
-        for (slot, item) in out.iter_mut().zip(items) {
-            let ty = Type::Quantity { dimension: length.clone(), point: false, optional: false };
-            let Value::Num(n) = self.coerce(item.clone(), &ty, at.span, "at") else { return None };
-            *slot = self.known(n.node)?;
-        }
-        Some(out)
     }
 
     fn hold(&mut self, id: InstanceId, holding: &'a Holding, module: usize) {
@@ -391,7 +331,7 @@ impl<'a> Elaborator<'a> {
         match &self.tables.names.decl(id).item.kind {
             ItemKind::Relation { symmetric, .. } => *symmetric,
             ItemKind::Fn { options, .. } => {
-                options.iter().any(|o| o.name.text == SYMMETRIC && super::tables::is_true(&o.value))
+                options.iter().any(|o| o.name.text == SYMMETRIC && crate::declare::tables::is_true(&o.value))
             }
             _ => false,
         }

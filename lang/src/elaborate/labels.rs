@@ -3,10 +3,11 @@
 use matterix_ir::quantity::show_number;
 use matterix_ir::{Diagnostic, Severity, Span, Unit, codes};
 
-use super::contents::Substance;
 use super::mended::Amount;
-use super::{Elaborator, SpeciesId};
 use crate::ast::{Expr, ExprKind, ItemKind, Labelled};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::substances::Substance;
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 use crate::units::Dimension;

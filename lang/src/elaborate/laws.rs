@@ -6,11 +6,12 @@ use matterix_ir::model::Action;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 
-use super::tables::MemberRef;
 use super::tuples::Tuples;
-use super::{Contribution, Elaborator, ProcessInstance};
 use crate::ast::{self, Arg, AssignOp, Expr, ExprKind, ItemKind, Law, LawKind, MemberKind, Name, Param, Role};
-use crate::eval::{Num, ReactionId, Scope, Type, Value};
+use crate::declare::tables::MemberRef;
+use crate::declare::{ReactionId, Type};
+use crate::eval::lab::{Contribution, Elaborator, ProcessInstance};
+use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 
 /// A law waiting to be written out for its instances.
@@ -367,43 +368,6 @@ impl<'a> Elaborator<'a> {
         matches!(&m.member.kind, MemberKind::Value { role: Role::Flow, .. }).then_some((id, m))
     }
 
-    /// The sum of all contributions to a flow, each zero while its process rests.
-    pub fn read_flow(&mut self, id: InstanceId, m: MemberRef<'a>, _: Span) -> Value {
-        let MemberKind::Value { name, ty, .. } = &m.member.kind else { return Value::Error };
-        self.touched_flow = true;
-        let ty = self.resolve_type(ty, m.module);
-        let Type::Quantity { dimension, .. } = ty else { return Value::Error };
-        let key = (id, m.owner, name.text.clone());
-        let parts = self.flows.get(&key).cloned().unwrap_or_default();
-        let node = self.gated_sum(&parts);
-        if self.flows_sealed {
-            self.flows_read.insert(key, node);
-            self.flow_sums.insert(node, parts);
-        }
-        self.num(node, dimension)
-    }
-
-    /// The sum of contributions, each zero while its process rests.
-    pub fn gated_sum(&mut self, parts: &[Contribution]) -> NodeId {
-        let mut sum = self.graph.number(0.0);
-        for c in parts {
-            let node = self.gated(c);
-            sum = self.plus(sum, node);
-        }
-        sum
-    }
-
-    /// A contribution, zero while its process rests.
-    pub fn gated(&mut self, c: &Contribution) -> NodeId {
-        match self.processes[c.process].guard {
-            Some(guard) => {
-                let zero = self.graph.number(0.0);
-                self.graph.select(guard, c.node, zero)
-            }
-            None => c.node,
-        }
-    }
-
     /// `move(q, from: a, to: b)` as a flow of everything: the fraction per second of each extensive quantity.
     fn law_move(
         &mut self,
@@ -428,7 +392,7 @@ impl<'a> Elaborator<'a> {
             let flow = self.times(state, rate);
             let less = self.graph.unary(UnaryOp::Neg, flow);
             out.push((Target::Derivative(index), less, call.span));
-            let there = super::ExtensiveKey { instance: to, ..key };
+            let there = crate::eval::lab::ExtensiveKey { instance: to, ..key };
             match self.extensive.get(&there) {
                 Some(target) => out.push((Target::Derivative(*target), flow, call.span)),
                 None => self.warn_of_loss(from, to, &there.member, call.span),
@@ -605,7 +569,7 @@ impl<'a> Elaborator<'a> {
                 let mut share = self.graph.binary(BinaryOp::Div, q.node, size.node);
                 self.note_place(share, call.span);
                 // A law whose rate follows what is left takes nothing of nothing.
-                let left = |(key, _): &(&super::ExtensiveKey, &u32)| key.instance == from;
+                let left = |(key, _): &(&crate::eval::lab::ExtensiveKey, &u32)| key.instance == from;
                 let left: BTreeSet<u32> = self.extensive.iter().filter(left).map(|(_, state)| *state).collect();
                 if rate && self.graph.depends(q.node, |op| matches!(op, Op::State(s) if left.contains(s))) {
                     let zero = self.graph.number(0.0);

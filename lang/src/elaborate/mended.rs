@@ -3,9 +3,10 @@
 use matterix_ir::Span;
 use matterix_ir::quantity::show_number;
 
-use super::contents::Substance;
-use super::{Elaborator, SpeciesId};
 use crate::ast::{ExprKind, Field, FieldValue, ItemKind};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::substances::Substance;
 use crate::units::Dimension;
 
 /// How many times more or less of a line is looked for.

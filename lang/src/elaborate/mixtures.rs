@@ -7,7 +7,7 @@ use matterix_ir::plan::Operation;
 use matterix_ir::scene::InstanceId;
 use rustc_hash::FxHashMap;
 
-use super::{Elaborator, ExtensiveKey};
+use crate::eval::lab::{Elaborator, ExtensiveKey};
 
 impl Elaborator<'_> {
     /// The extensive states of each mixture, by its index in the model.

@@ -2,7 +2,7 @@
 
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
-use super::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// What is known of a truth value.
 #[derive(Clone, Copy, PartialEq, Eq)]

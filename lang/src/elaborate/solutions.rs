@@ -2,9 +2,10 @@
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::contents::Substance;
-use super::{Elaborator, SpeciesId};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::substances::Substance;
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 
@@ -84,7 +85,7 @@ impl<'a> Elaborator<'a> {
 
     fn recipe_lines(&mut self, fields: &'a [Field], module: usize) -> Option<Vec<Line<'a>>> {
         let mut twice = Vec::new();
-        super::fields::repeated(fields, &mut twice);
+        crate::declare::fields::repeated(fields, &mut twice);
         let mut good = twice.is_empty();
         twice.into_iter().for_each(|d| self.report(d));
         let mut lines: Vec<Line<'a>> = Vec::new();

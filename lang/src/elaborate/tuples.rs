@@ -4,8 +4,9 @@ use std::collections::BTreeSet;
 
 use matterix_ir::scene::InstanceId;
 
-use super::{Elaborator, SpeciesId};
 use crate::ast::{Expr, Name, Param};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
 use crate::eval::{Scope, Value};
 
 /// The combinations that are still to come, the last parameter varying fastest.

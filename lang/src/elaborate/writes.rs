@@ -3,8 +3,9 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Graph, NodeId, Op, UnaryOp};
 
-use super::{Elaborator, SpeciesId};
 use crate::ast::{Expr, ExprKind};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
 use crate::eval::{Scope, Value};
 
 impl<'a> Elaborator<'a> {

@@ -4,8 +4,8 @@ use matterix_ir::{BinaryOp, Diagnostic, Span, UnaryOp, codes};
 
 use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr};
-use crate::elaborate::Elaborator;
-use crate::elaborate::units::exponent;
+use crate::declare::units::exponent;
+use crate::eval::lab::Elaborator;
 use crate::units::Dimension;
 
 impl<'a> Elaborator<'a> {

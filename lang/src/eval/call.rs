@@ -3,9 +3,10 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 
-use super::{Num, ReactionId, Scope, SpeciesId, Type, Value};
+use super::{Num, Scope, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
-use crate::elaborate::{Elaborator, Pair};
+use crate::declare::{ReactionId, SpeciesId, Type};
+use crate::eval::lab::{Elaborator, Pair};
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -350,7 +351,7 @@ impl<'a> Elaborator<'a> {
                 match self.known(n.node) {
                     Some(number) => self.grid_call(id, grid, name, number, at),
                     None => {
-                        self.report(super::types::unsupported(at, "places known only when running"));
+                        self.report(crate::declare::types::unsupported(at, "places known only when running"));
                         Value::Error
                     }
                 }
@@ -398,7 +399,7 @@ impl<'a> Elaborator<'a> {
             },
             Type::Species => {
                 if self.tables.species.iter().next().is_some() {
-                    Value::Species(super::SpeciesId(0))
+                    Value::Species(crate::declare::SpeciesId(0))
                 } else {
                     Value::Error
                 }

@@ -2,8 +2,9 @@
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::{Num, Type, Value};
-use crate::elaborate::Elaborator;
+use super::{Num, Value};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
 use crate::near;
 
 impl Elaborator<'_> {
@@ -77,7 +78,7 @@ impl Elaborator<'_> {
                 let expected = self.tables.type_name(ty);
                 let found = match &other {
                     Value::Num(n) => self.describe(n),
-                    Value::Enum(_, words) => format!("one of {}", super::words::list(words)),
+                    Value::Enum(_, words) => format!("one of {}", crate::declare::types::list(words)),
                     v => v.what().to_string(),
                 };
                 self.report(Diagnostic::error(

@@ -5,8 +5,8 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Span, UnaryOp, Unit, cod
 
 use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, UnitText};
-use crate::elaborate::units::unit_error;
-use crate::elaborate::{Compared, Elaborator};
+use crate::declare::units::unit_error;
+use crate::eval::lab::{Compared, Elaborator};
 
 impl<'a> Elaborator<'a> {
     /// A truth value's node, or a report.
@@ -300,7 +300,7 @@ impl<'a> Elaborator<'a> {
             (Value::Error, _) => return Value::Error,
             (Value::Instance(i) | Value::Qualified(i, _), ExprKind::Name(word)) => (*i, word),
             _ => {
-                self.report(super::types::unsupported(b.span, "`is` conditions on this value"));
+                self.report(crate::declare::types::unsupported(b.span, "`is` conditions on this value"));
                 return Value::Error;
             }
         };

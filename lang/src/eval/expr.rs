@@ -4,10 +4,11 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, UnaryOp, codes};
 use rustc_hash::FxHashMap;
 
-use super::{Num, ReactionId, Scope, Value};
+use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
-use crate::elaborate::units::unit_error;
-use crate::elaborate::{Asked, Elaborator};
+use crate::declare::ReactionId;
+use crate::declare::units::unit_error;
+use crate::eval::lab::{Asked, Elaborator};
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -291,7 +292,7 @@ impl<'a> Elaborator<'a> {
             ItemKind::Reaction { name, .. } => {
                 let position =
                     self.tables.reactions.iter().position(|r| r.name == name.text && r.module == decl.module);
-                position.map_or(Value::Error, |i| Value::Reaction(super::ReactionId(i as u32)))
+                position.map_or(Value::Error, |i| Value::Reaction(crate::declare::ReactionId(i as u32)))
             }
             ItemKind::Solution { .. } => Value::Solution(id),
             ItemKind::Material { .. } => Value::Material(id),

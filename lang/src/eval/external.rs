@@ -6,9 +6,10 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::study::Keep;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, UnaryOp, codes};
 
-use super::{Num, Scope, SpeciesId, Type, Value};
+use super::{Num, Scope, Value};
 use crate::ast::ItemKind;
-use crate::elaborate::Elaborator;
+use crate::declare::{SpeciesId, Type};
+use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
 use crate::units::Dimension;
 
@@ -162,7 +163,7 @@ impl Elaborator<'_> {
                 let states = |v: &Value| match v {
                     Value::Species(s) => {
                         let fields = self.tables.species.get(*s).fields;
-                        crate::elaborate::species::field(fields, property).is_some()
+                        crate::declare::species::field(fields, property).is_some()
                     }
                     _ => false,
                 };

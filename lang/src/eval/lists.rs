@@ -4,7 +4,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 
 use super::Value;
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 impl Elaborator<'_> {
     /// The n-th of a list of instances, counted from 1; `nothing` beyond its ends.

@@ -7,8 +7,9 @@ use matterix_ir::pose::Pose;
 use matterix_ir::scene::{InstanceId, frame};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::{Type, Value};
-use crate::elaborate::Elaborator;
+use super::Value;
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
 
 /// What can be measured.
 const MEASURES: &[&str] = &["grasp", "offer", "height", "foot", "top", "rise", "centre", "tilt"];

@@ -7,13 +7,15 @@ use matterix_ir::plan::Term;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, Leaves, Op, Span, codes};
 
-use super::{Num, Scope, SpeciesId, Type, Value};
+use super::{Num, Scope, Value};
 use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
-use crate::elaborate::grids::Place;
-use crate::elaborate::instances::Setting;
-use crate::elaborate::lab::GEOMETRY;
-use crate::elaborate::tables::MemberRef;
-use crate::elaborate::{Elaborator, MemberKey, Tables};
+use crate::declare::Tables;
+use crate::declare::tables::MemberRef;
+use crate::declare::{SpeciesId, Type};
+use crate::eval::lab::grids::Place;
+use crate::eval::lab::instances::Setting;
+use crate::eval::lab::written::GEOMETRY;
+use crate::eval::lab::{Elaborator, MemberKey};
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -38,7 +40,10 @@ impl<'a> Elaborator<'a> {
                 _ => self.no_member(&Value::Range(low, high), name, vec!["min".into(), "max".into()]),
             },
             Value::InstanceNode(_) => {
-                self.report(super::types::unsupported(name.span, "members of an instance known only when running"));
+                self.report(crate::declare::types::unsupported(
+                    name.span,
+                    "members of an instance known only when running",
+                ));
                 Value::Error
             }
             Value::Grid(id, grid) => match self.grid_member(id, grid, &name.text) {
@@ -233,7 +238,7 @@ impl<'a> Elaborator<'a> {
             names.extend(
                 info.members
                     .iter()
-                    .filter_map(|m| crate::elaborate::tables::member_name(m.member))
+                    .filter_map(|m| crate::declare::tables::member_name(m.member))
                     .map(|n| n.text.clone()),
             );
         }

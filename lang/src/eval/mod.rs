@@ -9,13 +9,14 @@ pub mod coerce;
 pub mod compare;
 pub mod expr;
 pub mod external;
+pub mod lab;
 pub mod lists;
 mod measures;
 pub mod member;
+mod notes;
 pub mod reaction;
 mod table;
 mod texts;
-pub mod types;
 pub mod value;
 pub mod words;
 
@@ -23,8 +24,8 @@ use std::cell::Cell;
 
 use matterix_ir::scene::InstanceId;
 
-pub use types::Type;
-pub use value::{Num, ReactionId, SpeciesId, Value};
+pub use lab::Elaborator;
+pub use value::{Num, Value};
 
 /// What names mean at one place of the text.
 #[derive(Clone, Debug, Default)]
@@ -55,7 +56,7 @@ impl Scope {
     }
 
     /// The names seen by the text of a member of an instance.
-    pub fn of_member(this: InstanceId, member: crate::elaborate::tables::MemberRef<'_>) -> Self {
+    pub fn of_member(this: InstanceId, member: crate::declare::tables::MemberRef<'_>) -> Self {
         Scope { owner: Some(member.owner), ..Scope::of(this, member.module) }
     }
 

@@ -2,10 +2,11 @@
 
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::{Num, ReactionId, Scope, SpeciesId, Type, Value};
+use super::{Num, Scope, Value};
 use crate::ast::{Field, FieldValue, MemberKind, Name, Role};
-use crate::elaborate::Elaborator;
-use crate::elaborate::species::field;
+use crate::declare::species::field;
+use crate::declare::{ReactionId, SpeciesId, Type};
+use crate::eval::lab::Elaborator;
 use crate::units::{Dimension, Rational};
 
 impl<'a> Elaborator<'a> {

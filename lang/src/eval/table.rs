@@ -3,7 +3,7 @@
 use matterix_ir::{BinaryOp, Diagnostic, Graph, NodeId, Span, codes};
 
 use super::{Num, Value};
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// A point of a table: where, and the value there.
 type Point = (f64, NodeId);

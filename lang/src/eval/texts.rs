@@ -5,7 +5,7 @@ use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 
 use super::{Scope, Value};
 use crate::ast;
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 impl<'a> Elaborator<'a> {
     /// What is said where a condition holds to beware of: of each that `any` asks about, with what is bound there.

@@ -4,18 +4,10 @@ use std::sync::Arc;
 
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Unit};
-use serde::{Deserialize, Serialize};
 
+use crate::declare::{ReactionId, SpeciesId};
 use crate::names::DeclId;
 use crate::units::Dimension;
-
-/// A species, by its index in the species table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct SpeciesId(pub u32);
-
-/// A reaction (or the reverse of one), by its index in the reaction table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ReactionId(pub u32);
 
 /// A number with its dimension.
 #[derive(Clone, Debug, PartialEq)]

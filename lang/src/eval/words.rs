@@ -5,9 +5,11 @@ use std::sync::Arc;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Span, codes};
 
-use super::{Scope, Type, Value};
+use super::{Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, MemberKind, Name};
-use crate::elaborate::Elaborator;
+use crate::declare::Type;
+use crate::declare::types::list;
+use crate::eval::lab::Elaborator;
 use crate::near;
 
 impl<'a> Elaborator<'a> {
@@ -147,9 +149,4 @@ impl<'a> Elaborator<'a> {
         self.report(d);
         Some(Value::Error)
     }
-}
-
-/// Words for a message: `a`, `b`, `c`.
-pub fn list(words: &[String]) -> String {
-    words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", ")
 }

@@ -120,7 +120,7 @@ impl Definition {
             return Err("it has no wells".into());
         }
         for (name, well) in &self.wells {
-            if crate::elaborate::grids::Place::parse(name).is_none() {
+            if crate::eval::lab::grids::Place::parse(name).is_none() {
                 return Err(format!("`{name}` is not a place such as `A1`"));
             }
             let open = match well.opening {

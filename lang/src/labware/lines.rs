@@ -6,7 +6,7 @@ use matterix_ir::Span;
 
 use super::definition::{Definition, Opening, Well};
 use crate::ast::{Arg, AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, Grid, Name, Path, UnitText};
-use crate::elaborate::grids::Place;
+use crate::eval::lab::grids::Place;
 
 /// Unevenness below which places are evenly spaced, mm: definitions are rounded to hundredths.
 const EVEN: f64 = 0.02;

@@ -13,8 +13,8 @@ use matterix_ir::{Op, UnaryOp};
 
 use super::Planner;
 use crate::ast::MemberKind;
-use crate::elaborate::failures::BARS;
-use crate::elaborate::given::word;
+use crate::declare::failures::BARS;
+use crate::declare::fields::word;
 
 impl Planner<'_, '_> {
     /// Asks of every operation that uses what another one of the plan may bar that it is not barred.

@@ -10,8 +10,9 @@ use super::{Planner, ResultSlot};
 use crate::ast::{
     Block, Call, Clause, ClauseKind, Expr, ExprKind, Handlers, ItemKind, MemberKind, Name, NamedExpr, Param, Sig,
 };
-use crate::elaborate::verbs::Verb;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::verbs::Verb;
+use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 use crate::near;
 use crate::syntax::{STEP_WORDS, is_step};

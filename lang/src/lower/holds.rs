@@ -8,8 +8,8 @@ use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 
 use super::Planner;
 use crate::ast::{Call, Expr, ExprKind, Name};
-use crate::elaborate::SpeciesId;
-use crate::elaborate::contents::Substance;
+use crate::declare::SpeciesId;
+use crate::eval::lab::substances::Substance;
 use crate::eval::{Scope, Value};
 
 /// The argument that says where something is taken from.

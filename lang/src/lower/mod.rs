@@ -14,7 +14,7 @@ mod stmt;
 mod text;
 pub mod wires;
 
-pub use crate::elaborate::failures::FAILURES;
+pub use crate::declare::failures::FAILURES;
 pub use wires::Wires;
 
 use std::cell::RefCell;
@@ -28,10 +28,11 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use self::clauses::Clauses;
 use crate::ast::{Block, Clause, Handlers, ItemKind};
-use crate::elaborate::Elaborator;
-use crate::elaborate::choices::Choice;
-use crate::elaborate::verbs::Verb;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::choices::Choice;
+use crate::eval::lab::verbs::Verb;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 use crate::task::{self, Given, Task};
 

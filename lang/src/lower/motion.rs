@@ -6,7 +6,8 @@ use matterix_ir::{Diagnostic, NodeId, Span, codes};
 
 use super::Planner;
 use crate::ast::{ClauseKind, Expr, Goal, Manner};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Scope, Value};
 
 impl<'a> Planner<'a, '_> {
     /// The motion of a clause; none where it has a mistake, which is reported.

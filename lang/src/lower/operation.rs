@@ -11,9 +11,10 @@ use super::Planner;
 use super::call::Bound;
 use super::clauses::Outcome;
 use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, Expr, MemberKind, Sig};
-use crate::elaborate::tables::MemberRef;
+use crate::declare::Type;
+use crate::declare::tables::MemberRef;
 use crate::escapes::undeclared;
-use crate::eval::{Scope, Type, Value};
+use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
 impl<'a> Planner<'a, '_> {
@@ -353,11 +354,11 @@ impl<'a> Planner<'a, '_> {
         let (target, value) = match effect {
             Effect::Assign(target, value) => (target, value),
             Effect::Call(e) => {
-                self.lab.report(crate::eval::types::unsupported(e.span, "promised transfers"));
+                self.lab.report(crate::declare::types::unsupported(e.span, "promised transfers"));
                 return None;
             }
             Effect::Each { set, .. } => {
-                self.lab.report(crate::eval::types::unsupported(set.span, "promises of each of a set"));
+                self.lab.report(crate::declare::types::unsupported(set.span, "promises of each of a set"));
                 return None;
             }
         };

@@ -5,7 +5,8 @@ use matterix_ir::{Diagnostic, codes};
 
 use super::Planner;
 use crate::ast::{Expr, Param};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
 /// An instance of the lab before a role.

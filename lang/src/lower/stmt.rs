@@ -8,8 +8,9 @@ use matterix_ir::{Diagnostic, Leaves, NodeId, Op, Span, Text, Unit, codes};
 
 use super::Planner;
 use crate::ast::{Binary, Expr, ExprKind, Handlers, Name, Param, Stmt, StmtKind};
-use crate::elaborate::choices::Choice;
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::choices::Choice;
+use crate::eval::{Num, Scope, Value};
 use crate::task::Given;
 
 impl<'a> Planner<'a, '_> {

@@ -8,8 +8,9 @@ use super::Planner;
 use super::call::Bound;
 use super::columns::with_names;
 use crate::ast::{self, Call, Clause, ClauseKind, Expr, Name, Param, Sig};
-use crate::elaborate::Compared;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::Compared;
+use crate::eval::{Scope, Value};
 use crate::names::verb_text;
 use crate::near;
 

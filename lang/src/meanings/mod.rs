@@ -13,13 +13,9 @@ use rustc_hash::FxHashMap;
 pub use noted::Noted;
 pub use sort::Sort;
 
-use crate::ast::{ItemKind, MemberKind};
-use crate::elaborate::tables::{MemberRef, member_name};
-use crate::elaborate::verbs::Verb;
-use crate::elaborate::{Elaborator, Tables};
-use crate::eval::Value;
+use crate::declare::Tables;
 use crate::library;
-use crate::names::{DeclId, item_name};
+use crate::names::DeclId;
 use crate::units::Units;
 
 /// What an expression was found to be.
@@ -88,12 +84,12 @@ impl Around {
 
 impl Meanings {
     /// Whether what stands in a file is noted: the user's own files and the one of the library that is looked at.
-    fn notes(&self, file: FileId) -> bool {
+    pub fn notes(&self, file: FileId) -> bool {
         !library::is_module(file) || self.opened == Some(file)
     }
 
     /// Notes a value; where there is one already, what is not the same in both is forgotten.
-    fn see(&mut self, span: Span, seen: Seen) {
+    pub fn see(&mut self, span: Span, seen: Seen) {
         match self.values.entry(span) {
             std::collections::hash_map::Entry::Vacant(free) => {
                 free.insert(seen);
@@ -106,69 +102,5 @@ impl Meanings {
                 known.sort.join(seen.sort);
             }
         }
-    }
-}
-
-impl<'a> Elaborator<'a> {
-    /// Notes where what a name stands for is declared.
-    pub fn note_name(&mut self, name: Span, declared: impl FnOnce(&Self) -> Option<Span>) {
-        if !self.meanings.as_ref().is_some_and(|m| m.notes(name.file)) {
-            return;
-        }
-        let declared = declared(self);
-        if let (Some(meanings), Some(declared)) = (&mut self.meanings, declared) {
-            meanings.names.entry(name).or_insert(declared);
-        }
-    }
-
-    /// Notes that a name stands for a member.
-    pub fn note_member(&mut self, name: Span, m: MemberRef<'a>) {
-        self.note_name(name, |_| member_name(m.member).map(|n| n.span));
-    }
-
-    /// Notes that a name stands for a declaration.
-    pub fn note_declared(&mut self, name: Span, id: DeclId) {
-        self.note_name(name, |lab| item_name(lab.tables.names.decl(id).item).map(|n| n.1));
-    }
-
-    /// Notes what the verb of a call means.
-    pub fn note_verb(&mut self, verb: Span, meant: &Verb<'a>) {
-        self.note_name(verb, |lab| match meant {
-            Verb::Skill(id) => match &lab.tables.names.decl(*id).item.kind {
-                ItemKind::Skill { sig, .. } => Some(sig.span),
-                _ => None,
-            },
-            Verb::Command(_, m) => match &m.member.kind {
-                MemberKind::Command { sig, .. } => Some(sig.span),
-                _ => None,
-            },
-        });
-    }
-
-    /// Notes what an expression was found to be.
-    pub fn note_value(&mut self, at: Span, value: &Value) {
-        let Some(meanings) = &self.meanings else { return };
-        if !meanings.notes(at.file) {
-            return;
-        }
-        let Some(sort) = self.sort_of(value) else { return };
-        let varies = meanings.values.get(&at).is_some_and(|s| s.value.is_none());
-        let (mut number, mut unit) = (None, None);
-        if let Value::Num(n) = value {
-            number = if varies || self.prototype { self.graph.constant(n.node) } else { self.glance(n.node) };
-            unit = n.unit.as_deref().cloned();
-        }
-        let seen = Seen { sort, value: number.filter(|v| v.is_finite()), unit };
-        if let Some(meanings) = &mut self.meanings {
-            meanings.see(at, seen);
-        }
-    }
-
-    /// Notes everything that is in the lab.
-    pub fn note_things(&mut self, lab: DeclId) {
-        let Some(meanings) = &mut self.meanings else { return };
-        let Some((name, _)) = item_name(self.tables.names.decl(lab).item) else { return };
-        let things = self.instances.iter().map(|i| (i.name.clone(), i.kinds.clone())).collect();
-        meanings.things.insert(name, things);
     }
 }

@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::elaborate::Elaborator;
-use crate::eval::{Type, Value};
+use crate::declare::Type;
 use crate::names::DeclId;
 use crate::units::Dimension;
 
@@ -115,61 +114,5 @@ impl Sort {
             Sort::Tuple(all) => all.iter_mut().flat_map(Sort::declared).collect(),
             _ => Vec::new(),
         }
-    }
-}
-
-impl Elaborator<'_> {
-    /// What kind of value this is; none for a mistake.
-    pub fn sort_of(&self, value: &Value) -> Option<Sort> {
-        let all = |items: &[Value]| items.iter().map(|i| self.sort_of(i).unwrap_or(Sort::Any)).collect::<Vec<_>>();
-        Some(match value {
-            Value::Error => return None,
-            Value::Num(n) => Sort::Quantity(n.dimension.clone(), n.point),
-            Value::Bool(_) => Sort::Truth,
-            Value::Text(_) => Sort::Text,
-            Value::Enum(_, words) => Sort::Word(words.clone()),
-            Value::Range(low, _) => Sort::Range(Box::new(Sort::Quantity(low.dimension.clone(), low.point))),
-            Value::Tuple(items) => Sort::Tuple(all(items)),
-            Value::List(items) => {
-                let first = items.first().and_then(|i| self.sort_of(i)).unwrap_or(Sort::Any);
-                Sort::List(Box::new(unnamed(first)))
-            }
-            Value::Instance(id) | Value::Qualified(id, _) => {
-                let thing = &self.instances[id.0 as usize];
-                let kinds = match value {
-                    Value::Qualified(_, kind) => vec![*kind],
-                    _ => thing.kinds.clone(),
-                };
-                Sort::Thing(kinds, (!self.prototype).then(|| thing.name.clone()))
-            }
-            Value::InstanceNode(_) => Sort::Thing(Vec::new(), None),
-            Value::Nothing => Sort::Nothing,
-            Value::Unlimited => Sort::Unlimited,
-            Value::Grid(id, grid) => {
-                let grid = self.instances[id.0 as usize].grids.get(*grid);
-                let child = grid.and_then(|g| g.children.values().next());
-                let kinds = child.map_or_else(Vec::new, |c| self.instances[c.0 as usize].kinds.clone());
-                Sort::List(Box::new(Sort::Thing(kinds, None)))
-            }
-            Value::Species(_) => Sort::Species,
-            Value::Included(lab) => Sort::Lab(lab.clone()),
-            Value::Reaction(_) => Sort::Reaction,
-            Value::Concentration(..) => Sort::Concentration,
-            Value::Frame(..) => Sort::Frame,
-            Value::Kind(id) => Sort::Kind(*id),
-            Value::Solution(_) => Sort::Solution,
-            Value::Material(_) => Sort::Material,
-            Value::Function(id) => Sort::Function(*id),
-            Value::Step(..) => Sort::Step,
-            Value::Method(..) => Sort::Method,
-        })
-    }
-}
-
-/// A thing of which only the kinds are kept, as it stands for others like it.
-fn unnamed(sort: Sort) -> Sort {
-    match sort {
-        Sort::Thing(kinds, _) => Sort::Thing(kinds, None),
-        other => other,
     }
 }

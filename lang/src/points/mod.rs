@@ -13,7 +13,7 @@ use matterix_ir::{NodeId, Op, Sources, Span, Unit};
 
 use crate::ast::{MemberKind, Role};
 use crate::check::{Known, Seen};
-use crate::elaborate::{Elaborator, MemberKey};
+use crate::eval::lab::{Elaborator, MemberKey};
 use crate::eval::{Num, Value as State};
 
 use units::Written;

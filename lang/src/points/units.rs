@@ -7,7 +7,7 @@ use std::rc::Rc;
 use matterix_ir::plan::{Argument, Condition, Plan, Step};
 use matterix_ir::{Sources, Span, Unit};
 
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// Units by symbol, as written by the user.
 pub struct Written {

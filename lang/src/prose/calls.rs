@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::list::Step;
 use super::{Prose, words};
 use crate::ast::{Binary, Call, Clause, ClauseKind, Expr, ExprKind, ItemKind, MemberKind, Param, Sig, TextPart, Unary};
-use crate::elaborate::verbs::Verb;
 use crate::eval::Value;
+use crate::eval::lab::verbs::Verb;
 use crate::names::verb_text;
 
 /// At most so many rows of a table of wells.

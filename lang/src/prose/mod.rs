@@ -15,8 +15,9 @@ use std::collections::BTreeMap;
 use matterix_ir::{Program, Sources, Span};
 
 use crate::ast::{Block, Handlers, ItemKind};
-use crate::elaborate::reach::Reach;
-use crate::elaborate::{Elaborator, Tables};
+use crate::declare::Tables;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 use crate::names::DeclId;

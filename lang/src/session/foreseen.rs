@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::elaborate::reach::Reach;
+use crate::eval::lab::reach::Reach;
 use crate::names::{self, Names};
 use crate::task::Task;
 

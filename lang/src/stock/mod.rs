@@ -11,8 +11,9 @@ use matterix_ir::stock::{Count, Holding, Stock, Tally};
 use matterix_ir::{BinaryOp, Sources};
 
 use crate::ast::{ExprKind, ItemKind, MemberKind, NamedExpr};
-use crate::elaborate::{Elaborator, SpeciesId};
+use crate::declare::SpeciesId;
 use crate::eval::Value;
+use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
 
 /// The option of a member that says how its value is counted.

@@ -6,8 +6,9 @@ use matterix_ir::Sources;
 use matterix_ir::stock::{Portion, Recipe};
 
 use crate::ast::{FieldValue, ItemKind};
-use crate::elaborate::contents::Substance;
-use crate::elaborate::{Elaborator, SpeciesId};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::substances::Substance;
 use crate::names::DeclId;
 
 /// The recipes, each after those that use it; the species they need are added to `species`.

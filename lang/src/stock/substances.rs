@@ -6,9 +6,10 @@ use matterix_ir::Sources;
 use matterix_ir::stock::Substance;
 
 use crate::ast::{Expr, ExprKind, FieldValue, Unary};
-use crate::elaborate::species::field;
-use crate::elaborate::{Elaborator, SpeciesId};
+use crate::declare::SpeciesId;
+use crate::declare::species::field;
 use crate::eval::Value;
+use crate::eval::lab::Elaborator;
 
 /// The species in the order of their declaration.
 pub(super) fn substances(lab: &mut Elaborator<'_>, sources: &Sources, species: &BTreeSet<SpeciesId>) -> Vec<Substance> {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use matterix_ir::study::{DataRow, Fit};
 use matterix_ir::{Diagnostic, FileId, Sources, Span, Unit, codes, hidden};
 
-use crate::elaborate::Tables;
+use crate::declare::Tables;
 use crate::loader::Loader;
 use crate::near;
 

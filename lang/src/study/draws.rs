@@ -4,9 +4,10 @@ use matterix_ir::study::{Draw, Free, MOST_RUNS};
 use matterix_ir::{Diagnostic, Span, codes};
 
 use crate::ast::{Arg, Expr, Name};
-use crate::elaborate::Elaborator;
-use crate::elaborate::open::Named;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::open::Named;
+use crate::eval::{Scope, Value};
 use crate::near;
 
 /// Ways to draw.

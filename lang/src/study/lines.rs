@@ -6,9 +6,10 @@ use matterix_ir::{Diagnostic, codes};
 use super::Many;
 use super::draws::{count, draw};
 use crate::ast::{Expr, FitLine, ItemKind, Name, StudyLine};
-use crate::elaborate::Elaborator;
-use crate::elaborate::open::Named;
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::open::Named;
+use crate::eval::{Num, Scope, Value};
 use crate::task::Task;
 
 /// Columns of a table of runs that reports may not be called.

@@ -4,9 +4,9 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Op, codes};
 
 use crate::ast::{Expr, ExprKind};
-use crate::elaborate::Elaborator;
-use crate::elaborate::open::Named;
 use crate::eval::Value;
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::open::Named;
 use crate::near;
 
 /// What may vary, for messages.

@@ -5,8 +5,9 @@ use matterix_ir::study::{Keep, Matched, OverTime, Reported};
 use matterix_ir::{Diagnostic, Op, Span, Unit, codes};
 
 use crate::ast::{FitLine, ItemKind, StudyLine};
-use crate::elaborate::Elaborator;
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::Elaborator;
+use crate::eval::{Num, Scope, Value};
 use crate::lower::Planner;
 use crate::task::{self, Task};
 

@@ -1,7 +1,7 @@
 //! Expressions: what each name in them stands for, and what kind of value they have.
 
 use matterix_lang::ast::{Arg, Binary, Expr, ExprKind, Name, Text, TextPart, Unary};
-use matterix_lang::elaborate::grids::Place;
+use matterix_lang::eval::lab::grids::Place;
 use matterix_lang::meanings::Sort;
 
 use super::{Found, Walk};

@@ -63,10 +63,10 @@ pub use self::evolve::Window;
 use self::facts::Facts;
 pub use self::points::{After, Seen};
 pub use self::value::Known;
+use crate::declare::ReactionId;
 use crate::elaborate::hazards::Hazard;
 use crate::elaborate::mixtures::Passages;
-use crate::elaborate::{Elaborator, ExtensiveKey};
-use crate::eval::ReactionId;
+use crate::eval::lab::{Elaborator, ExtensiveKey};
 
 /// Steps followed before the rest of a plan is left to the run.
 const MOST_STEPS: usize = 400_000;

@@ -8,7 +8,7 @@ use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Severity, Span, codes};
 
 use super::value::Known;
 use super::{Flow, forbidden_on_any_way};
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// So many steps are followed for other values; at least [`FEWEST_VALUES`] are tried.
 const MOST_STEPS: usize = 400_000;

@@ -9,9 +9,10 @@ use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
 use super::world::World;
+use crate::declare::SpeciesId;
 use crate::elaborate::hazards::SHARE;
 use crate::elaborate::mixtures::{Passage, Passages};
-use crate::elaborate::{Elaborator, ExtensiveKey, SpeciesId};
+use crate::eval::lab::{Elaborator, ExtensiveKey};
 
 /// Evaluates nodes of the lab at states of the world.
 pub struct Eyes<'l, 'a> {

@@ -10,7 +10,7 @@ use matterix_ir::{NodeId, Span};
 use super::Walk;
 use super::eyes::Eyes;
 use super::world::{Came, Contents, Entry, World};
-use crate::elaborate::SpeciesId;
+use crate::declare::SpeciesId;
 use crate::elaborate::writes::vanishes;
 
 /// An amount that a law writes.

@@ -25,11 +25,13 @@ use matterix_ir::{Diagnostic, FileId, NodeId, Severity, Span};
 
 use super::time::Times;
 use crate::ast::{MemberKind, Role};
+use crate::declare::SpeciesId;
+use crate::declare::Type;
+use crate::declare::compatibility::Consequence;
 use crate::elaborate::hazards::Hazard;
-use crate::elaborate::{Elaborator, SpeciesId};
-use crate::eval::{Type, Value};
+use crate::eval::Value;
+use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
-use crate::screen::Consequence;
 use eyes::Eyes;
 use hazards::Hazards;
 use uses::Uses;

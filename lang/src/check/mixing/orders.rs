@@ -16,7 +16,7 @@ use super::lines::{Edge, Lines, lines};
 use super::world::World;
 use super::{Coming, Pair, Walk};
 use crate::check::time::Times;
-use crate::elaborate::SpeciesId;
+use crate::declare::SpeciesId;
 
 /// Points of all lines, and steps from one joint state to the next, at most; a plan that needs more is told so. Time and memory go with
 /// the steps: a joint state of a hundred lines leads to a hundred others.

@@ -6,7 +6,8 @@ use matterix_ir::Span;
 use matterix_ir::scene::InstanceId;
 
 use super::world::{Came, Entry, World};
-use crate::elaborate::{Elaborator, SpeciesId};
+use crate::declare::SpeciesId;
+use crate::eval::lab::Elaborator;
 
 impl World {
     /// Adds what the reactions of the mixtures can make there, at most as much as their reactants allow.

@@ -5,8 +5,8 @@ use matterix_ir::{Diagnostic, Severity, Span, codes};
 
 use super::world::{Before, Entry, World};
 use super::{Coming, Pending, Walk};
-use crate::elaborate::SpeciesId;
-use crate::screen::{Intended, Match, Party, Presence, intended};
+use crate::declare::SpeciesId;
+use crate::declare::compatibility::{Intended, Match, Party, Presence, intended};
 
 /// What every finding of the screen says of itself.
 const SCREEN: &str = "this is a screen by classes of substances, no safety assessment: what it does not find may be dangerous all the same";

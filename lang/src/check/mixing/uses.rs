@@ -10,8 +10,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{FileId, NodeId, Op, Span, Text, TextPart};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::elaborate::Elaborator;
 use crate::elaborate::hazards::{Hazard, Watched};
+use crate::eval::lab::Elaborator;
 
 /// A flow of a process: its index, and the two mixtures.
 pub(super) type Stream = (usize, InstanceId, InstanceId);

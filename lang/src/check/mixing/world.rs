@@ -9,8 +9,8 @@ use matterix_ir::pages::Pages;
 use matterix_ir::scene::InstanceId;
 
 use super::eyes::Eyes;
-use crate::elaborate::SpeciesId;
-use crate::screen::Presence;
+use crate::declare::SpeciesId;
+use crate::declare::compatibility::Presence;
 
 /// A way that a species took into a mixture.
 #[derive(Clone, Debug, PartialEq)]

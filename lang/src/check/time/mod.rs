@@ -20,7 +20,7 @@ use matterix_timing::network::WHOLE;
 use matterix_timing::walk::Durations;
 use matterix_timing::{Interval, Known, Point, ROUNDING, Scope, Timing, Visit};
 
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// Least times that are kept at most (eight bytes each); when they are full, what is asked for again is searched again.
 const MOST_KEPT: usize = 8_000_000;

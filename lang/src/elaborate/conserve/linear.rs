@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// The conditions under which a term counts, and the term.
 type Key = (Vec<(NodeId, bool)>, NodeId);

@@ -15,7 +15,8 @@ use matterix_ir::quantity::show_number;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, FileId, NodeId, Span, codes};
 
-use super::{Elaborator, SpeciesId};
+use crate::declare::SpeciesId;
+use crate::eval::Elaborator;
 use linear::Linear;
 use sample::{POINTS, Point};
 

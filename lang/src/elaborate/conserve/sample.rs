@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use matterix_ir::model::{Action, Domain};
 use matterix_ir::{NodeId, Op};
 
-use crate::elaborate::Elaborator;
+use crate::eval::lab::Elaborator;
 
 /// How many points a law is tried at.
 pub const POINTS: u64 = 12;
@@ -87,7 +87,7 @@ impl<'l, 'a> Point<'l, 'a> {
         for (key, source) in lab.extensive.iter().filter(|(k, _)| k.instance == *from) {
             let moved = share * self.state(*source);
             self.written.insert(*source, self.state(*source) - moved);
-            let there = crate::elaborate::ExtensiveKey { instance: *to, ..key.clone() };
+            let there = crate::eval::lab::ExtensiveKey { instance: *to, ..key.clone() };
             if let Some(target) = lab.extensive.get(&there) {
                 self.written.insert(*target, self.state(*target) + moved);
             }

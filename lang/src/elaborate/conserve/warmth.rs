@@ -9,8 +9,9 @@ use matterix_ir::{NodeId, Span, codes};
 
 use super::library;
 use crate::ast::{MemberKind, Role};
-use crate::elaborate::{Elaborator, ExtensiveKey};
-use crate::eval::{Num, Type, Value};
+use crate::declare::Type;
+use crate::eval::lab::{Elaborator, ExtensiveKey};
+use crate::eval::{Num, Value};
 
 impl<'a> Elaborator<'a> {
     /// The temperatures that must stay physical, with the laws that may spoil them; none where only the library has laws.

@@ -7,7 +7,7 @@ use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
 
 use super::forms::Speech;
 use crate::ast::{self, ExprKind, Path, TextPart};
-use crate::elaborate::tables::MemberRef;
+use crate::declare::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 use crate::units::Dimension;

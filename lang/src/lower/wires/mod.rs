@@ -28,7 +28,7 @@ use self::served::Arrangement;
 use super::call::Bound;
 use super::{Planner, script};
 use crate::ast::{Expr, ItemKind, Sig, Wire, WireKind};
-use crate::elaborate::tables::MemberRef;
+use crate::declare::tables::MemberRef;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 

@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Span, Unit, codes};
 
 use super::forms::Speech;
 use crate::ast::{self, UnitText};
-use crate::elaborate::units::unit_error;
+use crate::declare::units::unit_error;
 use crate::lower::Planner;
 use crate::units::Dimension;
 

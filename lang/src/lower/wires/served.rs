@@ -7,7 +7,8 @@ use matterix_ir::{Diagnostic, Op, Span, codes};
 
 use super::{Mapped, bind, command_sig};
 use crate::ast::{self, Clause, ItemKind, MemberKind, Name, Sig, WireKind};
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Num, Scope, Value};
 use crate::lower::Planner;
 use crate::lower::call::Bound;
 use crate::names::{DeclId, verb_text};

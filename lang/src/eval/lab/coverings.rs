@@ -40,7 +40,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Judges what a lab gives for its instances; what their assets give is judged where those are declared.
-    pub(super) fn judge_coverings(&mut self) {
+    pub fn judge_coverings(&mut self) {
         const KEYS: [&str; 3] = ["mesh", "collision", "inertia"];
         for index in 0..self.instances.len() as u32 {
             let id = InstanceId(index);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::given::word;
+use super::fields::word;
 use crate::ast::{self, Clause, ClauseKind, ItemKind, MemberKind};
 use crate::names::Names;
 

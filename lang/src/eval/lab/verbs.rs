@@ -1,6 +1,6 @@
 //! What the verb of a call stands for.
 
-use super::tables::MemberRef;
+use crate::declare::tables::MemberRef;
 use crate::names::DeclId;
 
 /// What a verb can mean.

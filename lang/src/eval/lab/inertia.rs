@@ -9,7 +9,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::Elaborator;
 use super::geometry::Geometry;
 use crate::ast::{Expr, FieldValue};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Scope, Value};
 
 /// Members of the library's bodies that a scene carries, with their dimensions.
 const MASS: (&str, &str) = ("mass", "Mass");

@@ -1,4 +1,4 @@
-//! From the declarations to the screen.
+//! From the declarations to what must not meet.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -8,31 +8,41 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::{Consequence, Group, Incompatibility, Least, Party, Screen, in_order};
 use crate::ast::{Expr, ExprKind, Field, FieldValue, ItemKind, Name};
 use crate::chem::Pattern;
-use crate::elaborate::fields::{forms, unknown_fields};
-use crate::elaborate::species::{SpeciesTable, field};
-use crate::elaborate::{Elaborator, SpeciesId};
-use crate::eval::{Scope, Value};
+use crate::declare::SpeciesId;
+use crate::declare::fields::{forms, unknown_fields};
+use crate::declare::species::{SpeciesTable, field};
 use crate::names::{DeclId, Names};
 use crate::near;
+use crate::units::{Dimension, Units};
 
 const GROUP: &[&str] = &["title", "smarts", "unless", "members", "above", "source"];
 const MATERIAL: &[&str] = &["title", "source", "friction"];
 const PAIR: &[&str] = &["consequence", "above", "phase", "source"];
 
+/// The value of a constant expression as a module reads it, SI, with its dimension: not a number where it has none, nothing where a mistake
+/// was found in it.
+pub type Constant<'r, 'a> = dyn FnMut(&'a Expr, usize) -> Option<(Dimension, f64)> + 'r;
+
 /// What reading needs.
 struct Reader<'r, 'a> {
     names: &'a Names<'a>,
-    species: &'a SpeciesTable<'a>,
+    units: &'r Units,
+    species: &'r SpeciesTable<'a>,
     found: &'r mut Vec<Diagnostic>,
-    lab: &'r mut Elaborator<'a>,
+    constant: &'r mut Constant<'r, 'a>,
 }
 
 impl Screen {
     /// Reads every group, material, pair and allowance.
-    pub fn new<'a>(lab: &mut Elaborator<'a>) -> Screen {
+    pub fn new<'a>(
+        names: &'a Names<'a>,
+        units: &Units,
+        species: &SpeciesTable<'a>,
+        constant: &mut Constant<'_, 'a>,
+        found: &mut Vec<Diagnostic>,
+    ) -> Screen {
         let mut screen = Screen::default();
-        let (names, species, mut found) = (lab.tables.names, &lab.tables.species, Vec::new());
-        let mut reader = Reader { names, species, found: &mut found, lab };
+        let mut reader = Reader { names, units, species, found, constant };
         for index in 0..names.decls.len() as u32 {
             let id = DeclId(index);
             match &names.decl(id).item.kind {
@@ -75,7 +85,6 @@ impl Screen {
             }
         }
         screen.seats = species.iter().map(|_| OnceLock::new()).collect();
-        found.into_iter().for_each(|d| lab.report(d));
         screen
     }
 }
@@ -225,18 +234,12 @@ impl<'a> Reader<'_, 'a> {
 
     /// `0.5 mol/kg`, `8 %w/w`.
     fn content(&mut self, e: &'a Expr, module: usize) -> Option<Least> {
-        let value = match self.lab.expr(e, &mut Scope::module(module)) {
-            Value::Error => return None,
-            value => value,
-        };
-        let units = &self.lab.tables.units;
-        if let Value::Num(n) = value
-            && let Some(si) = self.lab.graph.constant(n.node).filter(|v| v.is_finite() && *v >= 0.0)
-        {
-            if n.dimension == units.named("Amount").over(&units.named("Mass")) {
+        let (dimension, si) = (self.constant)(e, module)?;
+        if si.is_finite() && si >= 0.0 {
+            if dimension == self.units.named("Amount").over(&self.units.named("Mass")) {
                 return Some(Least::Amount(si));
             }
-            if n.dimension == units.named("MassFraction") {
+            if dimension == self.units.named("MassFraction") {
                 return Some(Least::Share(si));
             }
         }

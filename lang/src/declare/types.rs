@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use matterix_ir::{Diagnostic, codes};
 
+use super::Tables;
 use crate::ast;
-use crate::elaborate::Tables;
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -151,7 +151,7 @@ impl Tables<'_> {
             Type::Int => "a whole number".into(),
             Type::Bool => "a truth value".into(),
             Type::Text => "a text".into(),
-            Type::Enum(words) => format!("one of {}", super::words::list(words)),
+            Type::Enum(words) => format!("one of {}", list(words)),
             Type::Species => "a species".into(),
             Type::Reaction => "a reaction".into(),
             Type::Material { .. } => "a material".into(),
@@ -182,4 +182,9 @@ fn enumeration(words: &[ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Type {
 pub fn unsupported(span: matterix_ir::Span, what: &str) -> Diagnostic {
     Diagnostic::error(codes::UNSUPPORTED, span, format!("{what} are not supported yet"), "no meaning yet")
         .help("this part of the language is read and formatted, but cannot be checked or run in this version")
+}
+
+/// Words for a message: `a`, `b`, `c`.
+pub fn list(words: &[String]) -> String {
+    words.iter().map(|w| format!("`{w}`")).collect::<Vec<_>>().join(", ")
 }

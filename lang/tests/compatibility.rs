@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::Sources;
-use matterix_lang::elaborate::Tables;
+use matterix_lang::declare::Tables;
+use matterix_lang::declare::compatibility::Party;
+use matterix_lang::elaborate::declared;
 use matterix_lang::load;
 use matterix_lang::names::Names;
-use matterix_lang::screen::Party;
 use matterix_lang::{LibraryOnly, Session};
 
 /// Groups of a species in words.
@@ -25,7 +26,7 @@ fn common_species_belong_to_their_groups() {
     assert_eq!(found, []);
     let (names, found) = Names::new(&modules);
     assert_eq!(found, []);
-    let (tables, found) = Tables::new(&names);
+    let (tables, found) = declared(&names);
     assert_eq!(found, []);
     for (species, expected) in [
         ("water", &[][..]),

@@ -1,20 +1,15 @@
 //! What is known of species. Every property is declared with its type in the language, as a parameter of a capability
 //! `Species`, and a value is typed where it is written.
 
-use std::collections::BTreeMap;
-
 use matterix_ir::{Diagnostic, codes};
 
-use super::kinds::Kinds;
-use super::species::{SpeciesDef, field};
-use super::tables::{Kind, MemberRef, member_name};
-use super::{Elaborator, SpeciesId};
-use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Role};
-use crate::eval::{Num, Scope, Type, Value};
+use super::Elaborator;
+use crate::ast::{Expr, ExprKind, FieldValue, MemberKind};
+use crate::declare::SpeciesId;
+use crate::declare::Type;
+use crate::declare::species::{SpeciesDef, field};
+use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
-
-/// The built-in type whose properties are declared by capabilities of this name.
-const OF: &str = "Species";
 
 /// The option of a property of weak acids and bases that names what they make in water.
 pub const GIVES: &str = "gives";
@@ -23,34 +18,6 @@ pub const GIVES_AT: &str = "gives_at";
 
 /// How far two ways of saying the same may be apart, as a share.
 const SAME: f64 = 1e-3;
-
-/// Declared properties by name.
-pub type Properties<'a> = BTreeMap<&'a str, MemberRef<'a>>;
-
-/// The properties that capabilities `Species` declare; one declared twice is reported.
-pub fn declared<'a>(kinds: &Kinds<'a>, diagnostics: &mut Vec<Diagnostic>) -> Properties<'a> {
-    let mut out: Properties<'a> = BTreeMap::new();
-    let own = |kind: &Kind<'a>| -> Vec<MemberRef<'a>> {
-        kind.members.iter().filter(|m| m.owner == kind.id).copied().collect()
-    };
-    for m in kinds.values().filter(|k| !k.is_asset && k.name == OF).flat_map(own) {
-        let Some(name) = member_name(m.member) else { continue };
-        if !matches!(m.member.kind, MemberKind::Value { role: Role::Param, .. }) {
-            let headline = format!("`{}` is no parameter: a property of species is one", name.text);
-            diagnostics.push(Diagnostic::error(codes::MISPLACED, m.member.span, headline, "not a property"));
-            continue;
-        }
-        match out.get(name.text.as_str()) {
-            Some(first) => {
-                let headline = format!("the property `{}` is declared twice", name.text);
-                let d = Diagnostic::error(codes::DUPLICATE_NAME, name.span, headline, "declared again here");
-                diagnostics.push(d.because(first.member.span, "first declared here"));
-            }
-            None => drop(out.insert(&name.text, m)),
-        }
-    }
-    out
-}
 
 impl<'a> Elaborator<'a> {
     /// A property that a species states; nothing where it does not.

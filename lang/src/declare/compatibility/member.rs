@@ -2,8 +2,8 @@
 
 use super::{Group, Least, Party, Screen};
 use crate::chem::{Element, Formula, Pattern, Rational};
-use crate::elaborate::SpeciesId;
-use crate::elaborate::species::SpeciesTable;
+use crate::declare::SpeciesId;
+use crate::declare::species::SpeciesTable;
 
 /// As what a species takes part in pairs.
 #[derive(Clone, Copy, Debug, PartialEq)]

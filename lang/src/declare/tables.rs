@@ -6,15 +6,14 @@ use std::sync::{Arc, OnceLock, RwLock};
 use matterix_ir::{Diagnostic, Span, Unit, codes};
 use rustc_hash::FxHashMap;
 
+use super::compatibility::Screen;
 use super::failures::{dangers, declared_failures};
 use super::kinds::Kinds;
 use super::properties::{self, Properties};
-use super::reach::Reach;
 use super::species::SpeciesTable;
-use super::{Elaborator, units};
+use super::units;
 use crate::ast::{AssetLine, Expr, ExprKind, Field, ItemKind, Member, MemberKind, Name, Path, Process, Role};
 use crate::names::{DeclId, Names, verb_text};
-use crate::screen::Screen;
 use crate::stop::Stop;
 use crate::units::text::UnitError;
 use crate::units::{Dimension, Resolved, Units};
@@ -121,8 +120,12 @@ pub struct Tables<'a> {
 }
 
 impl<'a> Tables<'a> {
-    /// Builds the tables; findings in declarations are returned beside them.
-    pub fn new(names: &'a Names<'a>) -> (Self, Vec<Diagnostic>) {
+    /// Builds the tables; findings in declarations are returned beside them. What must not meet is read by `compatibility`, since least
+    /// contents have to be evaluated.
+    pub fn new(
+        names: &'a Names<'a>,
+        compatibility: impl FnOnce(&Self, &mut Vec<Diagnostic>) -> Screen,
+    ) -> (Self, Vec<Diagnostic>) {
         let mut diagnostics = Vec::new();
         let units = units::declare(names, &mut diagnostics);
         let mut tables = Tables {
@@ -157,12 +160,7 @@ impl<'a> Tables<'a> {
         }
         tables.properties = properties::declared(&tables.kinds, &mut diagnostics);
         tables.species = SpeciesTable::new(names, &tables.properties, &mut diagnostics);
-        tables.screen = {
-            let mut lab = Elaborator::new(&tables, Reach::default());
-            let screen = Screen::new(&mut lab);
-            diagnostics.append(&mut lab.diagnostics);
-            screen
-        };
+        tables.screen = compatibility(&tables, &mut diagnostics);
         tables.reactions = super::reactions::collect(names, &tables.species, &mut diagnostics);
         (tables, diagnostics)
     }

@@ -6,8 +6,8 @@ use matterix_ir::Severity;
 use matterix_ir::model::{Incompatible, Mixture};
 
 use super::{Intended, Least, Party, Seat, intended};
-use crate::elaborate::species::SpeciesTable;
-use crate::elaborate::{SpeciesId, Tables};
+use crate::declare::species::SpeciesTable;
+use crate::declare::{SpeciesId, Tables};
 
 /// The pairs among what these mixtures may hold, with the contents from which on they count. What was `brought` into the lab counts
 /// as there where its ions are.

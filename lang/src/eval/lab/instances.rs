@@ -10,10 +10,12 @@ use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
 use super::grids::Grid;
-use super::tables::{Kind, MemberRef, Tables, member_name};
-use super::{Elaborator, MemberKey, SpeciesId};
+use super::{Elaborator, MemberKey};
 use crate::ast::{AssetLine, AssetLiteral, Expr, ExprKind, Field, FieldValue, MemberKind, Role};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::SpeciesId;
+use crate::declare::Type;
+use crate::declare::tables::{Kind, MemberRef, Tables, member_name};
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
 /// A field given for an instance: where its names are looked up, and whether it stands in the lab.

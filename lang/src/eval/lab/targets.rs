@@ -12,9 +12,9 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op};
 use rustc_hash::FxHashMap;
 
-use super::tables::MemberRef;
 use super::{Elaborator, MemberKey};
 use crate::ast::{MemberKind, Role};
+use crate::declare::tables::MemberRef;
 use crate::eval::Value;
 
 /// Instances by their numbers; -1 is `nothing`.
@@ -98,7 +98,7 @@ impl Targets {
 
 impl<'a> Elaborator<'a> {
     /// Notes what a state that holds an instance may come to point at.
-    pub(super) fn note_target(&mut self, state: u32, value: NodeId) {
+    pub fn note_target(&mut self, state: u32, value: NodeId) {
         if self.states[state as usize].domain != Domain::Instance {
             return;
         }
@@ -188,7 +188,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Who may point at what by members of a name.
-    pub(super) fn pointing(&mut self, member: &str) -> Arc<Pointing> {
+    pub fn pointing(&mut self, member: &str) -> Arc<Pointing> {
         if let Some(known) = self.targets.pointing.get(member) {
             return Arc::clone(known);
         }
@@ -208,7 +208,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// What a member of an instance may point at, where that is known.
-    pub(super) fn points_at(&mut self, id: InstanceId, m: MemberRef<'a>) -> Option<Numbers> {
+    pub fn points_at(&mut self, id: InstanceId, m: MemberRef<'a>) -> Option<Numbers> {
         let MemberKind::Value { role, .. } = &m.member.kind else { return None };
         match role {
             Role::State => self.targets.known(self.reference(id, m)?).cloned(),

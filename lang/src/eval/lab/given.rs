@@ -5,10 +5,12 @@ use matterix_ir::{Diagnostic, Leaves, codes};
 use rustc_hash::FxHashSet;
 
 use super::Elaborator;
-use super::lab::GEOMETRY;
-use super::tables::{MemberRef, Tables};
 use crate::ast::{AssetLine, Expr, ExprKind, Field, FieldValue, MemberKind, NamedExpr, Role};
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::Type;
+use crate::declare::fields::word;
+use crate::declare::tables::{MemberRef, Tables};
+use crate::eval::lab::written::GEOMETRY;
+use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 
 /// The option of a derived member that says what to give in its place.
@@ -20,14 +22,6 @@ pub const ONLY_WITH: &str = "only_with";
 
 /// How far names in definitions are followed to what can be given.
 const DEEPEST: usize = 4;
-
-/// The value of an option that is a name.
-pub fn word<'o>(options: &'o [NamedExpr], key: &str) -> Option<&'o str> {
-    match &*options.iter().find(|o| o.name.text == key)?.value.kind {
-        ExprKind::Name(name) => Some(&name.text),
-        _ => None,
-    }
-}
 
 /// Whether a member takes what stands after `holding ... at`.
 fn takes_start(m: &MemberRef<'_>) -> bool {

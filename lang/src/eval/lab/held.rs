@@ -3,7 +3,7 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Span};
 
-use super::SpeciesId;
+use crate::declare::SpeciesId;
 use crate::eval::Num;
 use crate::names::DeclId;
 

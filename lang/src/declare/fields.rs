@@ -2,7 +2,7 @@
 
 use matterix_ir::{Diagnostic, codes};
 
-use crate::ast::{ExprKind, Field, FieldValue};
+use crate::ast::{ExprKind, Field, FieldValue, NamedExpr};
 use crate::near;
 
 /// Reports keys given twice.
@@ -57,5 +57,13 @@ pub fn unknown_fields(fields: &[Field], known: &[&str], owner: &str, diagnostics
             d = near::proposed(d, &near, f.key.span);
             diagnostics.push(d);
         }
+    }
+}
+
+/// The value of an option that is a name.
+pub fn word<'o>(options: &'o [NamedExpr], key: &str) -> Option<&'o str> {
+    match &*options.iter().find(|o| o.name.text == key)?.value.kind {
+        ExprKind::Name(name) => Some(&name.text),
+        _ => None,
     }
 }

@@ -6,7 +6,7 @@ use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 use super::{Contribution, Elaborator};
 
 /// Contributions as the run is told them.
-pub(super) fn terms(parts: &[Contribution]) -> Vec<model::Contribution> {
+pub fn terms(parts: &[Contribution]) -> Vec<model::Contribution> {
     let told = |c: &Contribution| model::Contribution { process: c.process as u32, node: c.node, span: c.span };
     parts.iter().map(told).collect()
 }

@@ -4,7 +4,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 
 use super::Elaborator;
 use crate::ast::Expr;
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Scope, Value};
 
 /// The longest that a side, diameter or height may be, m: no laboratory holds more, and what moves among shapes is looked
 /// at in steps of millimetres.

@@ -15,8 +15,8 @@ use std::sync::OnceLock;
 use matterix_ir::{Severity, Span};
 
 use crate::chem::Pattern;
-use crate::elaborate::species::SpeciesTable;
-use crate::elaborate::{SpeciesId, tables::ReactionDef};
+use crate::declare::species::SpeciesTable;
+use crate::declare::{SpeciesId, tables::ReactionDef};
 use crate::names::DeclId;
 
 pub use consequence::Consequence;

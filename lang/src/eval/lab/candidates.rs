@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 
 use matterix_ir::scene::InstanceId;
 
-use super::Elaborator;
 use crate::ast::{Arg, Binary, Expr, ExprKind, ItemKind, Param};
+use crate::eval::lab::Elaborator;
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 

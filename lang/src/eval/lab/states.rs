@@ -7,10 +7,12 @@ use matterix_ir::model::{Domain, State};
 use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
-use super::tables::MemberRef;
-use super::{Elaborator, ExtensiveKey, MemberKey, SpeciesId};
+use super::{Elaborator, ExtensiveKey, MemberKey};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
-use crate::eval::{Num, Scope, Type, Value};
+use crate::declare::SpeciesId;
+use crate::declare::Type;
+use crate::declare::tables::MemberRef;
+use crate::eval::{Num, Scope, Value};
 
 impl<'a> Elaborator<'a> {
     /// Allocates the states of an instance.
@@ -80,7 +82,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Takes in a state of an instance; its number.
-    pub(super) fn add_state(&mut self, owner: InstanceId, state: State) -> u32 {
+    pub fn add_state(&mut self, owner: InstanceId, state: State) -> u32 {
         let index = self.states.len() as u32;
         self.state_owner.push(owner);
         self.states.push(state);

@@ -7,8 +7,9 @@ use std::sync::Arc;
 use matterix_ir::scene::InstanceId;
 use serde::{Deserialize, Serialize};
 
+use super::Elaborator;
 use super::targets::Numbers;
-use super::{Elaborator, SpeciesId, Tables};
+use crate::declare::{SpeciesId, Tables};
 
 /// Species by mixture name.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

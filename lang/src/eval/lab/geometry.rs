@@ -114,7 +114,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// The lines of an asset and of those it builds on.
-    pub(super) fn lines(&self, id: InstanceId) -> Vec<(usize, &'a AssetLine)> {
+    pub fn lines(&self, id: InstanceId) -> Vec<(usize, &'a AssetLine)> {
         let kinds = &self.instances[id.0 as usize].kinds;
         kinds.iter().filter_map(|k| self.tables.kinds.get(k)).flat_map(|k| k.lines.iter().copied()).collect()
     }
@@ -219,7 +219,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// A pose in whatever frame it is given in.
-    pub(super) fn local(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<Pose> {
+    pub fn local(&mut self, at: &'a At, of: &Geometry, scope: &mut Scope) -> Option<Pose> {
         let position = match (&*at.position.kind, &of.shape) {
             (ExprKind::Name(name), shape) if POINTS.contains(&name.text.as_str()) => {
                 let shape = shape.as_ref()?;

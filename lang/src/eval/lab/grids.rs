@@ -9,7 +9,8 @@ use matterix_ir::{Diagnostic, Span, codes};
 use super::Elaborator;
 use super::instances::Setting;
 use crate::ast::{self, AssetLine, Expr, FieldValue, Name};
-use crate::eval::{Scope, Type, Value};
+use crate::declare::Type;
+use crate::eval::{Scope, Value};
 use crate::names::DeclId;
 
 /// More places than any plate has; what is beyond is a slip of the pen.
