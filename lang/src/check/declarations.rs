@@ -8,6 +8,7 @@ use crate::declare::Tables;
 use crate::declare::Type;
 use crate::declare::types::unsupported;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::Mode;
 use crate::eval::lab::budget::Budget;
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
@@ -180,15 +181,12 @@ fn capability<'a>(lab: &mut Elaborator<'a>, id: DeclId, module: usize) {
                 if *role == Role::Flow {
                     continue;
                 }
-                lab.initial_mode = matches!(role, Role::State | Role::Extensive);
-                lab.readings_live = *role == Role::Reading;
-                if *role == Role::Extensive && per.is_some() {
-                    lab.state_value(this, m, &name.text, &ty, value.as_ref());
-                } else {
-                    lab.member_value(this, m, name.span);
-                }
-                lab.initial_mode = false;
-                lab.readings_live = false;
+                let at_start = matches!(role, Role::State | Role::Extensive);
+                let mode = Mode { at_start, reported: *role == Role::Reading };
+                lab.in_mode(mode, |lab| match *role == Role::Extensive && per.is_some() {
+                    true => drop(lab.state_value(this, m, &name.text, &ty, value.as_ref())),
+                    false => drop(lab.member_value(this, m, name.span)),
+                });
                 let state = matches!(role, Role::State | Role::Extensive);
                 if state
                     && !matches!(

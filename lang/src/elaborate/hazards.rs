@@ -12,6 +12,8 @@ use crate::ast::{Arg, Expr, ExprKind, ItemKind, Name, Param, Text};
 use crate::declare::Tables;
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::Mode;
+use crate::eval::lab::observed::{Noting, Observed};
 use crate::eval::{Num, Scope, Value};
 use crate::names::DeclId;
 use crate::near;
@@ -95,9 +97,6 @@ pub fn dangers(hazards: &[Hazard]) -> Vec<Danger> {
     };
     all.map(danger).collect()
 }
-
-/// What is bound wherever a condition asks for any of several, with what it asks there.
-type Bound = Vec<(NodeId, Vec<(String, Value)>)>;
 
 /// A declaration as it is read.
 #[derive(Clone, Copy)]
@@ -280,19 +279,19 @@ impl<'a> Elaborator<'a> {
 
     /// What is dangerous about the things in `scope`; none if it can never come about, or, `at_start`, is not there at the start.
     fn hazard(&mut self, declared: Declared<'a>, at_start: bool, shown: &str, scope: &mut Scope) -> Option<Hazard> {
-        self.initial_mode = at_start;
-        let hazard = if self.enter(declared.name.span) { self.endangered(declared, shown, scope) } else { None };
-        self.leave();
-        self.initial_mode = false;
-        hazard
+        let mode = if at_start { Mode::START } else { Mode::default() };
+        self.in_mode(mode, |lab| {
+            let is_entered = lab.enter(declared.name.span);
+            let hazard = if is_entered { lab.endangered(declared, shown, scope) } else { None };
+            lab.leave();
+            hazard
+        })
     }
 
     fn endangered(&mut self, declared: Declared<'a>, shown: &str, scope: &mut Scope) -> Option<Hazard> {
-        self.terms = Some(Vec::new());
-        let found = self.beware(declared.when, scope);
-        let terms = self.terms.take().unwrap_or_default();
-        let (node, bound) = found?;
-        if self.never(node) || self.initial_mode && self.glance(node) == Some(0.0) {
+        let (node, observed) = self.beware(declared.when, scope);
+        let (node, bound, terms) = (node?, observed.bound, observed.terms);
+        if self.never(node) || self.mode().at_start && self.glance(node) == Some(0.0) {
             return None;
         }
         let said = declared.because.map(|words| self.said_of_danger(node, words, bound, scope));
@@ -311,13 +310,9 @@ impl<'a> Elaborator<'a> {
         Some(Hazard { name, shown, grave, watched, measure: None, about, when: node, states, terms, said, help, span })
     }
 
-    /// A condition to beware of, with what is bound wherever `any` asks it of something in turn.
-    fn beware(&mut self, when: &'a Expr, scope: &mut Scope) -> Option<(NodeId, Bound)> {
-        self.noting_any = true;
-        let node = self.truth(when, scope);
-        self.noting_any = false;
-        let bound = std::mem::take(&mut self.noted);
-        Some((node?, bound))
+    /// A condition to beware of, with what it names and what is bound wherever `any` asks it of something in turn.
+    fn beware(&mut self, when: &'a Expr, scope: &mut Scope) -> (Option<NodeId>, Observed) {
+        self.observe(Noting::Any, |lab| lab.truth(when, scope))
     }
 
     /// Checks the declaration of a hazard on stand-ins for its instances, which `scope` has bound.
@@ -352,9 +347,9 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        let held = self.beware(when, scope);
-        if let (Some((node, bound)), Some(words)) = (held, because) {
-            self.said_of_danger(node, words, bound, scope);
+        let (node, observed) = self.beware(when, scope);
+        if let (Some(node), Some(words)) = (node, because) {
+            self.said_of_danger(node, words, observed.bound, scope);
         }
     }
 

@@ -6,13 +6,14 @@ use matterix_ir::{BinaryOp, Diagnostic, Leaves, NodeId, Op, Span, codes};
 use super::{Num, Scope, Value};
 use crate::ast::{self, Arg, Expr, ExprKind, ItemKind, Param};
 use crate::declare::{ReactionId, SpeciesId, Type};
+use crate::eval::lab::Mode;
 use crate::eval::lab::{Elaborator, Pair};
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
 
 /// A function, what it was called with, how many instances there were, and how members are read.
-pub type KnownCall = (DeclId, Vec<KnownArgument>, usize, bool, bool);
+pub type KnownCall = (DeclId, Vec<KnownArgument>, usize, Mode);
 
 /// An argument that always gives the same value of a function.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -134,9 +135,7 @@ impl<'a> Elaborator<'a> {
         for (p, v) in params.iter().zip(values) {
             inner.bind(p.name.text.clone(), v);
         }
-        let compared = std::mem::take(&mut self.comparisons);
-        let v = self.hinted(body, ty, &mut inner);
-        self.comparisons = compared;
+        let v = self.define(|lab| lab.hinted(body, ty, &mut inner));
         self.open_calls.pop();
         if let Some(key) = key.filter(|_| !self.touched_flow && v != Value::Error) {
             self.known_calls.insert(key, v.clone());
@@ -147,8 +146,9 @@ impl<'a> Elaborator<'a> {
 
     /// Whether a function of instances was called with these in the lab.
     pub fn was_called(&self, id: DeclId, values: &[Value]) -> bool {
-        let Some((id, arguments, count, initial, _)) = self.remembered_call(id, values) else { return true };
-        let known = |live| self.known_calls.contains_key(&(id, arguments.clone(), count, initial, live));
+        let Some((id, arguments, count, mode)) = self.remembered_call(id, values) else { return true };
+        let known =
+            |reported| self.known_calls.contains_key(&(id, arguments.clone(), count, Mode { reported, ..mode }));
         known(false) || known(true)
     }
 
@@ -164,7 +164,7 @@ impl<'a> Elaborator<'a> {
             Some(Value::Num(_)) => values.iter().all(|value| self.steady_number(value, &mut known)),
             _ => !self.prototype && values.iter().all(|value| self.is_steady(value, &mut known)),
         };
-        all.then_some((id, known, self.instances.len(), self.initial_mode, self.readings_live))
+        all.then_some((id, known, self.instances.len(), self.mode()))
     }
 
     /// Notes something that the run does not change; false for anything else.

@@ -85,7 +85,7 @@ impl<'a> Elaborator<'a> {
         let unit = self.unit_between(value, limit);
         let value = value.node;
         let comparison = Comparison { text: String::new(), value, low, high, strict, unit };
-        self.comparisons.push(Compared { span, comparison, each: Vec::new() });
+        self.compared(span, comparison);
         Value::Bool(node)
     }
 
@@ -96,7 +96,13 @@ impl<'a> Elaborator<'a> {
         let unit = self.unit_between(value, limit);
         let (low, high) = (Some(limit.node), Some(limit.node));
         let comparison = Comparison { text: String::new(), value: value.node, low, high, strict: false, unit };
-        self.comparisons.push(Compared { span, comparison, each: Vec::new() });
+        self.compared(span, comparison);
+    }
+
+    fn compared(&mut self, span: Span, comparison: Comparison) {
+        if let Some(observed) = &mut self.observed {
+            observed.compared.push(Compared { span, comparison, each: Vec::new() });
+        }
     }
 
     fn equality(&mut self, op: Binary, node: NodeId, span: Span) -> Value {
@@ -268,20 +274,17 @@ impl<'a> Elaborator<'a> {
                 let (low, high) = (Some(low.node), Some(high.node));
                 let value = value.node;
                 let comparison = Comparison { text: String::new(), value, low, high, strict: false, unit };
-                self.comparisons.push(Compared { span: at_x, comparison, each: Vec::new() });
+                self.compared(at_x, comparison);
                 Value::Bool(self.graph.binary(BinaryOp::And, above, below))
             }
             Value::List(items) => {
                 let mut any = self.graph.number(0.0);
-                let compared = self.comparisons.len();
                 for item in items {
-                    let Value::Bool(one) = self.compare(Binary::Eq, x.clone(), item, at_x, at_set) else {
-                        return Value::Error;
-                    };
+                    // None of them alone is a limit.
+                    let one = self.define(|lab| lab.compare(Binary::Eq, x.clone(), item, at_x, at_set));
+                    let Value::Bool(one) = one else { return Value::Error };
                     any = self.graph.binary(BinaryOp::Or, any, one);
                 }
-                // None of them alone is a limit.
-                self.comparisons.truncate(compared);
                 Value::Bool(any)
             }
             Value::Error => Value::Error,

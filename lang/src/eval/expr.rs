@@ -8,7 +8,8 @@ use super::{Num, Scope, Value};
 use crate::ast::{Binary, Expr, ExprKind, ItemKind, LabLineKind, Name, Unary, UnitText};
 use crate::declare::ReactionId;
 use crate::declare::units::unit_error;
-use crate::eval::lab::{Asked, Elaborator};
+use crate::eval::lab::Elaborator;
+use crate::eval::lab::observed::Noting;
 use crate::names::DeclId;
 use crate::near;
 use crate::units::Dimension;
@@ -431,20 +432,20 @@ impl<'a> Elaborator<'a> {
 
     /// Whether a part of a hazard's condition does not hold: of one that is judged at the start only, as things are given.
     fn is_out(&self, part: NodeId) -> bool {
-        let value = if self.initial_mode { self.glance(part) } else { self.graph.constant(part) };
+        let value = if self.mode().at_start { self.glance(part) } else { self.graph.constant(part) };
         value == Some(0.0)
     }
 
     /// Whether the first part of a condition of a law decides it, and nobody wants to know what the second one names.
     fn is_settled(&self, op: Binary, first: NodeId) -> bool {
         let alone = if op == Binary::And { 0.0 } else { 1.0 };
-        let is_asked = self.prototype || self.terms.is_some() || self.meanings.is_some();
+        let is_asked = self.prototype || self.observed.is_some() || self.meanings.is_some();
         !is_asked && self.graph.constant(first) == Some(alone)
     }
 
     fn binary(&mut self, op: Binary, a: &'a Expr, b: &'a Expr, span: Span, scope: &mut Scope) -> Value {
         match op {
-            Binary::And if self.noting_any => {
+            Binary::And if self.noting() == Noting::Any => {
                 let x = self.truth(a, scope);
                 // There are many mixtures, and what is never so of one need not be written out.
                 if x.is_some_and(|x| self.is_out(x)) && !self.prototype {
@@ -544,54 +545,22 @@ impl<'a> Elaborator<'a> {
         };
         let Some(items) = items else { return Value::Error };
         let mut result: Option<Value> = None;
-        let single =
+        let is_of_each =
             fold.text == "all" && items.len() > 1 && self.open_members.is_empty() && self.open_calls.is_empty();
         for item in items {
-            let of = if single { self.spoken(&item) } else { None };
-            let outer = of.is_some().then(|| {
-                let terms = self.terms.as_mut().map(std::mem::take);
-                (std::mem::take(&mut self.comparisons), terms)
-            });
-            let instance = match &item {
-                Value::Instance(id) | Value::Qualified(id, _) => Some(*id),
-                _ => None,
+            let value = if self.observed.is_some() {
+                let of = if is_of_each { self.spoken(&item) } else { None };
+                let instance = match &item {
+                    Value::Instance(id) | Value::Qualified(id, _) => Some((var.span, *id)),
+                    _ => None,
+                };
+                scope.bind(var.text.clone(), item);
+                self.observe_one(fold, of, instance, |lab| (lab.expr(body, scope), scope.vars.clone()))
+            } else {
+                scope.bind(var.text.clone(), item);
+                self.expr(body, scope)
             };
-            let compared = self.comparisons.len();
-            scope.bind(var.text.clone(), item);
-            let noted = self.noted.len();
-            let value = self.expr(body, scope);
-            if let Some(instance) = instance {
-                let inside = self.comparisons.iter_mut().skip(compared);
-                inside.for_each(|c| c.each.push((var.span, instance)));
-            }
-            // The innermost of several, as all is bound there.
-            let decides = (self.noting && fold.text == "all") || (self.noting_any && fold.text == "any");
-            if decides
-                && self.noted.len() == noted
-                && self.open_calls.is_empty()
-                && self.open_members.is_empty()
-                && let Value::Bool(node) = value
-                && self.graph.constant(node).is_none_or(|v| (v != 0.0) == self.noting_any)
-            {
-                self.noted.push((node, scope.vars.clone()));
-            }
             scope.vars.pop();
-            if let (Some(of), Some((mut compared, mut terms))) = (of, outer) {
-                std::mem::swap(&mut compared, &mut self.comparisons);
-                std::mem::swap(&mut terms, &mut self.terms);
-                self.comparisons.extend(compared.iter().cloned());
-                let terms = terms.unwrap_or_default();
-                if let Some(all) = &mut self.terms {
-                    for term in &terms {
-                        if !all.iter().any(|t| t.node == term.node) {
-                            all.push(term.clone());
-                        }
-                    }
-                }
-                if let Value::Bool(node) = value {
-                    self.asked_of.push(Asked { of, node, compared, terms });
-                }
-            }
             result = Some(match result {
                 None => value,
                 Some(so_far) => match self.fold_two(&fold.text, so_far, value, body.span) {

@@ -12,6 +12,7 @@ use crate::ast::{Expr, ExprKind, FieldValue, MemberKind, Name, NamedExpr, Role};
 use crate::declare::Tables;
 use crate::declare::tables::MemberRef;
 use crate::declare::{SpeciesId, Type};
+use crate::eval::lab::Mode;
 use crate::eval::lab::grids::Place;
 use crate::eval::lab::instances::Setting;
 use crate::eval::lab::written::GEOMETRY;
@@ -279,7 +280,7 @@ impl<'a> Elaborator<'a> {
         if *role == Role::Flow {
             return self.read_flow(id, m, at);
         }
-        let key = MemberKey::of(m, self.initial_mode, self.readings_live);
+        let key = MemberKey::of(m, self.mode());
         if let Some(v) = self.instances[id.0 as usize].values.get(&key) {
             let v = v.clone();
             self.note_term(id, m, &v);
@@ -297,10 +298,7 @@ impl<'a> Elaborator<'a> {
         }
         self.open_members.push(open);
         let flow_before = std::mem::take(&mut self.touched_flow);
-        // What a definition compares inside is no part of what the user's condition compares.
-        let compared = std::mem::take(&mut self.comparisons);
-        let value = self.make_member(id, m);
-        self.comparisons = compared;
+        let value = self.define(|lab| lab.make_member(id, m));
         self.open_members.pop();
         let cache = !self.touched_flow;
         self.touched_flow |= flow_before;
@@ -313,7 +311,7 @@ impl<'a> Elaborator<'a> {
 
     /// Notes a member that a condition names itself, not inside a definition it uses.
     fn note_term(&mut self, id: InstanceId, m: MemberRef<'a>, value: &Value) {
-        let Some(terms) = &self.terms else { return };
+        let Some(observed) = &self.observed else { return };
         if !self.open_members.is_empty() || !self.open_calls.is_empty() {
             return;
         }
@@ -323,7 +321,7 @@ impl<'a> Elaborator<'a> {
         else {
             return;
         };
-        if terms.iter().any(|t| t.node == node) || !self.graph.leaves(node).meets(Leaves::STATE) {
+        if observed.terms.iter().any(|t| t.node == node) || !self.graph.leaves(node).meets(Leaves::STATE) {
             return;
         }
         let domain = match value {
@@ -336,8 +334,8 @@ impl<'a> Elaborator<'a> {
             _ => Domain::Instance,
         };
         let name = format!("{}.{}", self.spoken_name(id), name.text);
-        if let Some(terms) = &mut self.terms {
-            terms.push(Term { name, node, domain });
+        if let Some(observed) = &mut self.observed {
+            observed.terms.push(Term { name, node, domain });
         }
     }
 
@@ -518,7 +516,7 @@ impl<'a> Elaborator<'a> {
         options: &'a [NamedExpr],
     ) -> Value {
         let Some(e) = value else { return Value::Error };
-        let live = std::mem::replace(&mut self.readings_live, false);
+        let outer = self.enter_mode(Mode { reported: false, ..self.mode() });
         let v = self.expr(e, &mut Scope::of_member(id, m));
         let v = self.coerce(v, ty, e.span, name);
         let mut found: [Option<f64>; 3] = [None; 3];
@@ -534,9 +532,9 @@ impl<'a> Elaborator<'a> {
                 found[i] = self.known(n.node);
             }
         }
-        self.readings_live = live;
+        self.enter_mode(outer);
         let Value::Num(n) = v else { return v };
-        if !live {
+        if !outer.reported {
             return Value::Num(n);
         }
         let full = format!("{}.{name}", self.instances[id.0 as usize].name);
@@ -731,11 +729,9 @@ impl<'a> Elaborator<'a> {
             }
             let mut scope = Scope::of(id, module);
             scope.bind(param.name.text.clone(), Value::Species(s));
-            let compared = std::mem::take(&mut self.comparisons);
-            let v = self.expr(value, &mut scope);
-            self.comparisons = compared;
+            let v = self.define(|lab| lab.expr(value, &mut scope));
             let v = self.coerce(v, &ty, value.span, "view");
-            if !self.initial_mode {
+            if !self.mode().at_start {
                 self.view_values.entry((id, s)).or_default().insert(kind, v.clone());
             }
             return Some(v);
@@ -762,7 +758,7 @@ impl<'a> Elaborator<'a> {
         let dimension = dimension.clone();
         let index = self.instances[id.0 as usize].amounts.get(member).and_then(|of| of.get(&s)).copied();
         let node = match index {
-            Some(i) if self.initial_mode => self.states[i as usize].initial,
+            Some(i) if self.mode().at_start => self.states[i as usize].initial,
             Some(i) => self.graph.add(Op::State(i)),
             None if self.is_matter(id, m) || self.prototype => self.graph.number(0.0),
             None => return self.begins_with(id, m, &ty),
@@ -772,8 +768,9 @@ impl<'a> Elaborator<'a> {
 
     /// Notes a species asked for that can never get into this mixture.
     fn note_asked(&mut self, mixture: InstanceId, s: SpeciesId) {
-        if !self.instances[mixture.0 as usize].amounts.values().any(|of| of.contains_key(&s)) {
-            self.absent.push((mixture, s));
+        let can_be = self.instances[mixture.0 as usize].amounts.values().any(|of| of.contains_key(&s));
+        if let Some(observed) = self.observed.as_mut().filter(|_| !can_be) {
+            observed.absent.push((mixture, s));
         }
     }
 

@@ -6,6 +6,7 @@ use matterix_ir::{Diagnostic, NodeId, Span, Text, TextPart, codes};
 use super::{Scope, Value};
 use crate::ast;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::observed::Bindings;
 
 impl<'a> Elaborator<'a> {
     /// What is said where a condition holds to beware of: of each that `any` asks about, with what is bound there.
@@ -13,7 +14,7 @@ impl<'a> Elaborator<'a> {
         &mut self,
         node: NodeId,
         words: &'a ast::Text,
-        mut bound: Vec<(NodeId, Vec<(String, Value)>)>,
+        mut bound: Bindings,
         scope: &mut Scope,
     ) -> Vec<Said> {
         if bound.is_empty() {
@@ -23,12 +24,7 @@ impl<'a> Elaborator<'a> {
     }
 
     /// Words for each that is asked about, with what is bound there.
-    pub fn said_of_each(
-        &mut self,
-        words: &'a ast::Text,
-        bound: Vec<(NodeId, Vec<(String, Value)>)>,
-        scope: &mut Scope,
-    ) -> Vec<Said> {
+    pub fn said_of_each(&mut self, words: &'a ast::Text, bound: Bindings, scope: &mut Scope) -> Vec<Said> {
         let mut out = Vec::new();
         for (node, vars) in bound {
             let outside = std::mem::replace(&mut scope.vars, vars);

@@ -30,6 +30,7 @@ use self::clauses::Clauses;
 use crate::ast::{Block, Clause, Handlers, ItemKind};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
+use crate::eval::lab::Mode;
 use crate::eval::lab::choices::Choice;
 use crate::eval::lab::verbs::Verb;
 use crate::eval::{Scope, Value};
@@ -157,9 +158,10 @@ impl<'a, 'e> Planner<'a, 'e> {
         self.supposed.clone_from(&task.supposed);
         self.begin_wires();
         if self.wires == wires::Wires::Offered {
-            self.lab.readings_live = true;
+            let outer = self.lab.enter_mode(Mode::REPORTED);
             self.begin_offers(task.lab);
             self.offer_skills(decl.module);
+            self.lab.enter_mode(outer);
         }
         let mut arguments = Vec::new();
         let root = match &decl.item.kind {
@@ -167,8 +169,7 @@ impl<'a, 'e> Planner<'a, 'e> {
                 self.add("nothing", Span::default(), Step::Sequence(Vec::new()))
             }
             ItemKind::Test { name, lab: Some(_), body, handlers } => {
-                self.lab.readings_live = true;
-                self.guarded(&name.text, name.span, body, handlers, &mut scope)
+                self.reported(|plan| plan.guarded(&name.text, name.span, body, handlers, &mut scope))
             }
             ItemKind::Test { name, .. } => {
                 let tested = match task::tested(self.lab.tables, task.item) {
@@ -183,14 +184,15 @@ impl<'a, 'e> Planner<'a, 'e> {
                     scope.module = self.lab.tables.names.decl(tested.workflow).module;
                     steps.push(self.workflow(tested.workflow, &task.given, &mut scope, &mut arguments));
                     scope.module = decl.module;
-                    steps.extend(tested.rest.iter().filter_map(|s| self.stmt(s, &mut scope)));
+                    let rest = |plan: &mut Self| tested.rest.iter().filter_map(|s| plan.stmt(s, &mut scope)).collect();
+                    let rest: Vec<StepId> = self.reported(rest);
+                    steps.extend(rest);
                 }
                 self.add(format!("test {}", name.text), name.span, Step::Sequence(steps))
             }
             ItemKind::Study { .. } | ItemKind::Fit { .. } => self.many(task, &mut scope, &mut arguments),
             _ => self.workflow(task.item, &task.given, &mut scope, &mut arguments),
         };
-        self.lab.readings_live = false;
         let item = match &decl.item.kind {
             ItemKind::Study { .. } | ItemKind::Fit { .. } => task::workflow_of(self.lab.tables, task.item).ok(),
             _ => None,
@@ -229,8 +231,15 @@ impl<'a, 'e> Planner<'a, 'e> {
         let first = scope.vars.len();
         *shown = self.workflow_parameters(params, given, scope);
         self.parameters = (first..scope.vars.len()).fold(0, |all, position| all | Scope::read_bit(position));
-        self.lab.readings_live = true;
-        self.guarded(&name.text, name.span, body, handlers, scope)
+        self.reported(|plan| plan.guarded(&name.text, name.span, body, handlers, scope))
+    }
+
+    /// Does something where readings are what devices report.
+    pub fn reported<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> R {
+        let outer = self.lab.enter_mode(Mode::REPORTED);
+        let result = work(self);
+        self.lab.enter_mode(outer);
+        result
     }
 
     /// Whether a draft need not look at a clause or limit: it has seen it elsewhere, which tells it what is asked for.

@@ -14,6 +14,7 @@ use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, Expr, MemberKind, Sig
 use crate::declare::Type;
 use crate::declare::tables::MemberRef;
 use crate::escapes::undeclared;
+use crate::eval::lab::Mode;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -174,11 +175,11 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn catch_up(&mut self) {
         self.lab.targets.close();
         self.lab.targets.settle();
-        self.lab.readings_live = true;
+        let outer = self.lab.enter_mode(Mode::REPORTED);
         for (clause, mut scope) in std::mem::take(&mut self.deferred) {
             self.need(clause, &mut scope);
         }
-        self.lab.readings_live = false;
+        self.lab.enter_mode(outer);
     }
 
     /// What comes of a clause of an operation that says something of it; none where it is wrong.

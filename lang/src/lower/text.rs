@@ -10,6 +10,7 @@ use super::columns::with_names;
 use crate::ast::{self, Call, Clause, ClauseKind, Expr, Name, Param, Sig};
 use crate::declare::Type;
 use crate::eval::lab::Compared;
+use crate::eval::lab::observed::{Bindings, Noting, Observed};
 use crate::eval::{Scope, Value};
 use crate::names::verb_text;
 use crate::near;
@@ -103,24 +104,24 @@ impl<'a> Planner<'a, '_> {
 
     /// A condition with what it compares.
     pub fn condition(&mut self, e: &'a Expr, scope: &mut Scope) -> Option<Condition> {
-        self.condition_with(e, scope, false)
+        self.condition_with(e, scope, false, Noting::Nothing).map(|(condition, _)| condition)
     }
 
     /// A condition with what it compares, the names of parameters replaced by those of the instances given where that is `named`.
-    fn condition_with(&mut self, e: &'a Expr, scope: &mut Scope, named: bool) -> Option<Condition> {
-        self.lab.comparisons.clear();
-        self.lab.terms = Some(Vec::new());
-        self.lab.asked_of.clear();
-        self.lab.absent.clear();
-        let node = self.lab.truth(e, scope);
-        let terms = self.lab.terms.take().unwrap_or_default();
+    /// What is bound where something is asked of one of several things comes with it, where that is noted.
+    fn condition_with(
+        &mut self,
+        e: &'a Expr,
+        scope: &mut Scope,
+        named: bool,
+        noting: Noting,
+    ) -> Option<(Condition, Bindings)> {
+        let (node, observed) = self.lab.observe(noting, |lab| lab.truth(e, scope));
         let node = node?;
-        let absent = std::mem::take(&mut self.lab.absent);
+        let Observed { compared, terms, each, absent, bound, .. } = observed;
         if !absent.is_empty() {
             self.lab.absent_in.insert(e.span, absent);
         }
-        let compared = std::mem::take(&mut self.lab.comparisons);
-        let each = std::mem::take(&mut self.lab.asked_of);
         let given: &[(String, Value)] = if named { &scope.vars } else { &[] };
         let each = each.into_iter().map(|asked| {
             let compared = self.in_words(asked.compared, given);
@@ -129,7 +130,8 @@ impl<'a> Planner<'a, '_> {
         });
         let each = each.collect();
         let compared = self.in_words(compared, given);
-        Some(Condition { node, text: self.text(e.span), span: e.span, compared, terms, refusal: None, each })
+        let text = self.text(e.span);
+        Some((Condition { node, text, span: e.span, compared, terms, refusal: None, each }, bound))
     }
 
     /// A condition on which steps hang. One of a stand-in that has no value is open, so that the steps are looked at all the
@@ -181,23 +183,15 @@ impl<'a> Planner<'a, '_> {
         scope: &mut Scope,
     ) -> Option<Condition> {
         let words = refusal.and_then(|r| r.because.as_ref()).filter(|_| !self.draft);
-        self.lab.noting = words.is_some();
-        let condition = self.condition_with(cond, scope, true);
-        self.lab.noting = false;
-        let (condition, bound) = (condition?, std::mem::take(&mut self.lab.noted));
+        let noting = if words.is_some() { Noting::All } else { Noting::Nothing };
+        let (condition, bound) = self.condition_with(cond, scope, true, noting)?;
         let said = words.map(|words| self.said(words, &condition, bound, scope)).unwrap_or_default();
         let refusal = refusal.map(|r| Refusal { failure: r.failure.text.clone(), help: r.help.clone(), said });
         Some(Condition { refusal, ..condition })
     }
 
     /// Words for each that a condition asks about; for all of it where it asks about nothing in turn.
-    fn said(
-        &mut self,
-        words: &'a ast::Text,
-        condition: &Condition,
-        bound: Vec<(NodeId, Vec<(String, Value)>)>,
-        scope: &mut Scope,
-    ) -> Vec<Said> {
+    fn said(&mut self, words: &'a ast::Text, condition: &Condition, bound: Bindings, scope: &mut Scope) -> Vec<Said> {
         if bound.is_empty() {
             // A list of nothing is asked about in vain, and its elements have no names here.
             let holds = self.lab.graph.constant(condition.node).is_some_and(|v| v != 0.0);

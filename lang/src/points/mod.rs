@@ -13,7 +13,7 @@ use matterix_ir::{NodeId, Op, Sources, Span, Unit};
 
 use crate::ast::{MemberKind, Role};
 use crate::check::{Known, Seen};
-use crate::eval::lab::{Elaborator, MemberKey};
+use crate::eval::lab::{Elaborator, MemberKey, Mode};
 use crate::eval::{Num, Value as State};
 
 use units::Written;
@@ -211,7 +211,7 @@ fn visible_states(lab: &Elaborator<'_>, id: InstanceId) -> Vec<(String, u32)> {
         if options.iter().any(|o| o.name.text == "hidden") {
             continue;
         }
-        let current = lab.instances[id.0 as usize].values.get(&MemberKey::of(m, false, false));
+        let current = lab.instances[id.0 as usize].values.get(&MemberKey::of(m, Mode::default()));
         let Some(State::Num(Num { node, .. }) | State::Bool(node) | State::InstanceNode(node) | State::Enum(node, _)) =
             current
         else {

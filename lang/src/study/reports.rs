@@ -34,8 +34,8 @@ impl<'a> Planner<'a, '_> {
         let first = self.locals.len() as u32;
         self.lab.open.following = Some(first);
         match &decl.item.kind {
-            ItemKind::Study { lines, .. } => self.reports(lines, scope),
-            ItemKind::Fit { lines, .. } => self.matches(lines, scope),
+            ItemKind::Study { lines, .. } => self.reported(|plan| plan.reports(lines, scope)),
+            ItemKind::Fit { lines, .. } => self.reported(|plan| plan.matches(lines, scope)),
             _ => {}
         }
         self.lab.open.following = None;

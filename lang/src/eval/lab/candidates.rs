@@ -41,7 +41,7 @@ enum Side<'a> {
 impl<'a> Elaborator<'a> {
     /// Who a condition can hold for as `variable`; nothing where its form does not say.
     pub(crate) fn candidates(&mut self, condition: &'a Expr, variable: &str, scope: &Scope) -> Option<Candidates> {
-        if self.prototype || self.initial_mode {
+        if self.prototype || self.mode().at_start {
             return None;
         }
         #[cfg(test)]

@@ -15,6 +15,8 @@ pub mod inertia;
 pub mod instances;
 pub mod lineage;
 pub mod links;
+pub mod mode;
+pub mod observed;
 pub mod open;
 pub mod origin;
 pub mod properties;
@@ -45,22 +47,20 @@ use crate::names::DeclId;
 use crate::units::Dimension;
 
 pub use instances::Instance;
+pub use mode::Mode;
 
 /// A member in one way of looking.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MemberKey {
     /// Where its declaration is in memory, which stays there.
     declared: usize,
-    /// Its value when the run begins, not the current one.
-    initial: bool,
-    /// As an instrument reads it, not as it is.
-    read: bool,
+    mode: Mode,
 }
 
 impl MemberKey {
-    /// That of a member, `initial` or current, `read` or true.
-    pub fn of(m: MemberRef<'_>, initial: bool, read: bool) -> Self {
-        MemberKey { declared: std::ptr::from_ref(m.member).addr(), initial, read }
+    /// That of a member as it is looked at in a mode.
+    pub fn of(m: MemberRef<'_>, mode: Mode) -> Self {
+        MemberKey { declared: std::ptr::from_ref(m.member).addr(), mode }
     }
 }
 
@@ -255,30 +255,16 @@ pub struct Elaborator<'a> {
     pub touched_flow: bool,
     /// Concentrations by mixture, species, capability and kind.
     pub view_values: BTreeMap<(InstanceId, SpeciesId), BTreeMap<(DeclId, Dimension), Value>>,
-    /// What the expression evaluated last compared.
-    pub comparisons: Vec<Compared>,
-    /// The members that a condition names, where they are asked for.
-    pub terms: Option<Vec<Term>>,
+    /// What evaluations come upon besides values, where somebody asks: see [`Elaborator::observe`].
+    pub observed: Option<Box<observed::Observed>>,
     /// Where a call says of what it takes something, and its sources are looked into.
     pub looked_into: BTreeSet<Span>,
-    /// What the expression evaluated last asks of each of several things.
-    pub asked_of: Vec<Asked>,
-    /// What is bound wherever a condition is asked of something in turn is noted: it is named in words.
-    pub noting: bool,
-    /// The same wherever a hazard asks whether there is any of several.
-    pub noting_any: bool,
-    /// What was noted: what is asked there, and what is bound.
-    pub noted: Vec<(NodeId, Vec<(String, Value)>)>,
-    /// The species that the expression evaluated last asks for, and that can never get into the mixture asked.
-    pub absent: Vec<(InstanceId, SpeciesId)>,
-    /// The same by the place of the condition.
+    /// The species that a condition asks for, and that can never get into the mixture asked, by the place of the condition.
     pub absent_in: BTreeMap<Span, Vec<(InstanceId, SpeciesId)>>,
     /// Conditions of the workflow's own branches that read its parameters, by their place.
     pub by_parameters: BTreeSet<Span>,
-    /// Values are those at the start of the run.
-    pub initial_mode: bool,
-    /// Readings are what the device reports, not the true values behind them.
-    pub readings_live: bool,
+    /// How values are looked at.
+    mode: Mode,
     /// A declaration is checked by itself, on stand-ins.
     pub prototype: bool,
     /// Only what goes where is asked for: laws that move nothing are left out.
@@ -364,18 +350,11 @@ impl<'a> Elaborator<'a> {
             flows_sealed: false,
             touched_flow: false,
             view_values: BTreeMap::new(),
-            comparisons: Vec::new(),
-            terms: None,
+            observed: None,
             looked_into: BTreeSet::new(),
-            asked_of: Vec::new(),
-            noting: false,
-            noting_any: false,
-            noted: Vec::new(),
-            absent: Vec::new(),
             absent_in: BTreeMap::new(),
             by_parameters: BTreeSet::new(),
-            initial_mode: false,
-            readings_live: false,
+            mode: Mode::default(),
             prototype: false,
             draft: false,
             rate_prefix: None,

@@ -7,6 +7,7 @@ use matterix_ir::model::{Domain, State};
 use matterix_ir::scene::{Carrier, InstanceId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Span, Unit, codes};
 
+use super::Mode;
 use super::{Elaborator, ExtensiveKey, MemberKey};
 use crate::ast::{Expr, ExprKind, MemberKind, NamedExpr, Role};
 use crate::declare::SpeciesId;
@@ -52,11 +53,11 @@ impl<'a> Elaborator<'a> {
         }
     }
 
-    /// The value of a member, now and where `initial` says so at the start.
-    fn keep_value(&mut self, id: InstanceId, m: MemberRef<'a>, initial: &[bool], value: &Value) {
-        for initial in initial {
-            for live in [false, true] {
-                let key = MemberKey::of(m, *initial, live);
+    /// The value of a member now, and at the start, as `at_start` says.
+    fn keep_value(&mut self, id: InstanceId, m: MemberRef<'a>, at_start: &[bool], value: &Value) {
+        for at_start in at_start.iter().copied() {
+            for reported in [false, true] {
+                let key = MemberKey::of(m, Mode { at_start, reported });
                 self.instances[id.0 as usize].values.insert(key, value.clone());
             }
         }
@@ -181,7 +182,7 @@ impl<'a> Elaborator<'a> {
         ty: &Type,
         initial: Option<&'a Expr>,
     ) -> Value {
-        if !self.initial_mode {
+        if !self.mode().at_start {
             // States of an instance are declared before they are read; here is only what could not be.
             return Value::Error;
         }
@@ -243,7 +244,10 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        self.initial_mode = true;
+        self.in_mode(Mode::START, Self::initialise_states);
+    }
+
+    fn initialise_states(&mut self) {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             self.initialise_each_species(id);
@@ -255,7 +259,7 @@ impl<'a> Elaborator<'a> {
                 };
                 self.check_contents_given(id, options);
                 let value = self.member_value(id, m, name.span);
-                let current = self.instances[i as usize].values.get(&MemberKey::of(m, false, false));
+                let current = self.instances[i as usize].values.get(&MemberKey::of(m, Mode::default()));
                 let index = match current {
                     Some(
                         Value::Num(Num { node, .. })
@@ -272,7 +276,6 @@ impl<'a> Elaborator<'a> {
                 self.states[index as usize].initial = node;
             }
         }
-        self.initial_mode = false;
     }
 
     /// Own quantities of each species begin as their declaration, or what is given for them, says; matter is what is held.
@@ -296,10 +299,8 @@ impl<'a> Elaborator<'a> {
     /// The value at the start of a quantity of each species.
     pub fn begins_with(&mut self, id: InstanceId, m: MemberRef<'a>, ty: &Type) -> Value {
         let MemberKind::Value { name, value, .. } = &m.member.kind else { return Value::Error };
-        let before = std::mem::replace(&mut self.initial_mode, true);
-        let found = self.state_value(id, m, &name.text, ty, value.as_ref());
-        self.initial_mode = before;
-        found
+        let mode = Mode { at_start: true, ..self.mode };
+        self.in_mode(mode, |lab| lab.state_value(id, m, &name.text, ty, value.as_ref()))
     }
 
     /// The node of a value that a state can hold.

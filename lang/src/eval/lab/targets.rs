@@ -12,6 +12,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op};
 use rustc_hash::FxHashMap;
 
+use super::Mode;
 use super::{Elaborator, MemberKey};
 use crate::ast::{MemberKind, Role};
 use crate::declare::tables::MemberRef;
@@ -127,7 +128,10 @@ impl<'a> Elaborator<'a> {
 
     /// Notes what states that hold an instance begin with, once all states are declared.
     pub(crate) fn note_first_targets(&mut self) {
-        let before = std::mem::replace(&mut self.initial_mode, true);
+        self.in_mode(Mode { at_start: true, ..self.mode() }, Self::note_first_values);
+    }
+
+    fn note_first_values(&mut self) {
         for i in 0..self.instances.len() as u32 {
             let id = InstanceId(i);
             for m in self.all_members(id).iter().copied() {
@@ -140,12 +144,11 @@ impl<'a> Elaborator<'a> {
                 }
             }
         }
-        self.initial_mode = before;
     }
 
     /// The state of a member that holds an instance.
     fn reference(&self, id: InstanceId, m: MemberRef<'a>) -> Option<u32> {
-        match self.instances[id.0 as usize].values.get(&MemberKey::of(m, false, false))? {
+        match self.instances[id.0 as usize].values.get(&MemberKey::of(m, Mode::default()))? {
             Value::InstanceNode(node) => match self.graph.op(*node) {
                 Op::State(state) => Some(state),
                 _ => None,
@@ -172,7 +175,7 @@ impl<'a> Elaborator<'a> {
 
     /// Whether two nodes that hold instances never hold the same one, as far as is known of what states point at.
     pub(crate) fn never_the_same(&self, a: NodeId, b: NodeId) -> bool {
-        if self.initial_mode {
+        if self.mode().at_start {
             return false;
         }
         let known = |node| match self.graph.op(node) {
@@ -212,7 +215,7 @@ impl<'a> Elaborator<'a> {
         let MemberKind::Value { role, .. } = &m.member.kind else { return None };
         match role {
             Role::State => self.targets.known(self.reference(id, m)?).cloned(),
-            Role::Param => match self.instances[id.0 as usize].values.get(&MemberKey::of(m, false, false))? {
+            Role::Param => match self.instances[id.0 as usize].values.get(&MemberKey::of(m, Mode::default()))? {
                 Value::Instance(i) => Some([i64::from(i.0)].into()),
                 Value::Nothing => Some([-1].into()),
                 _ => None,

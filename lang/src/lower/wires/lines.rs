@@ -8,6 +8,7 @@ use matterix_ir::{Diagnostic, NodeId, Op, Span, Unit, codes};
 use super::forms::Speech;
 use crate::ast::{self, ExprKind, Path, TextPart};
 use crate::declare::tables::MemberRef;
+use crate::eval::lab::Mode;
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 use crate::units::Dimension;
@@ -200,12 +201,10 @@ impl<'a> Planner<'a, '_> {
     ) -> Option<Told> {
         let id = scope.this?;
         let name = path.segments.last()?;
-        let live = std::mem::replace(&mut self.lab.readings_live, true);
-        let mut value = Value::Instance(id);
-        for segment in &path.segments {
-            value = self.lab.member(value, segment);
-        }
-        self.lab.readings_live = live;
+        let mode = Mode { reported: true, ..self.lab.mode() };
+        let value = self.lab.in_mode(mode, |lab| {
+            path.segments.iter().fold(Value::Instance(id), |value, segment| lab.member(value, segment))
+        });
         let (text, bounds) = bounded(&expects.text);
         let bounds = match bounds {
             Some(Err(why)) => {

@@ -13,6 +13,7 @@ use super::{Arrangement, Mapped, SELF};
 use crate::ast::{Clause, ClauseKind, ExprKind, ItemKind, Member, MemberKind, Param, Role, Sig, TextPart, Type as Ty};
 use crate::declare::Type;
 use crate::declare::tables::MemberRef;
+use crate::eval::lab::Mode;
 use crate::eval::{Scope, Value};
 use crate::lower::Planner;
 use crate::lower::call::Bound;
@@ -299,9 +300,8 @@ impl<'a> Planner<'a, '_> {
             return None;
         }
         let ty = self.lab.resolve_type(ty, m.module);
-        let live = std::mem::replace(&mut self.lab.readings_live, true);
-        let value = self.lab.member_value(id, m, name.span);
-        self.lab.readings_live = live;
+        let mode = Mode { reported: true, ..self.lab.mode() };
+        let value = self.lab.in_mode(mode, |lab| lab.member_value(id, m, name.span));
         let (kind, value) = match (value, &ty) {
             (Value::Num(n), Type::Quantity { .. }) => {
                 let unit = self.lab.declared_unit(options, &ty);
