@@ -134,7 +134,10 @@ impl<'p> Underway<'p> {
         out: &mut dyn Listener,
     ) -> Result<Self, Box<Outcome>> {
         let mut screen = Some(Screen::new(program)).filter(|screen| !screen.is_idle());
-        let sim = beside(&mut screen, out, |out| twin(program, prepared, &params, options, out))?;
+        let mut sim = beside(&mut screen, out, |out| twin(program, prepared, &params, options, out))?;
+        if let Some(screen) = &screen {
+            sim.engine().attend(screen.conditions());
+        }
         let progress = exec::Progress::new(&program.plan, sim.now(), options.limits);
         Ok(Underway { program, params, sim, progress, limits: options.limits, screen })
     }

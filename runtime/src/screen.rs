@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use matterix_ir::model::{Action, Danger, Incompatible};
 use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::values::Formulas;
-use matterix_ir::{Diagnostic, Program, Severity, Span, codes};
+use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span, codes};
 use serde::Serialize;
 
 use crate::exec::{Alarm, Listener, OperationState, StepState};
@@ -158,6 +158,11 @@ impl<'p> Screen<'p> {
     /// Whether there is nothing to watch for.
     pub fn is_idle(&self) -> bool {
         self.pairs.is_empty() && self.there.is_empty()
+    }
+
+    /// The conditions of hazards and cautions.
+    pub fn conditions(&self) -> impl Iterator<Item = NodeId> + use<'p> {
+        self.program.model.dangers.iter().map(|danger| danger.when)
     }
 
     /// The warnings, and the errors that came about when nothing went on any more, in order.

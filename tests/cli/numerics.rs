@@ -13,6 +13,19 @@ fn what_lasts_a_moment_is_not_stepped_over() {
 }
 
 #[test]
+fn what_passes_between_two_steps_is_seen() {
+    pass_cases("numerics/passing.mtx", &["meets_a_bell", "meets_a_moment", "adds_up_beside_others"]);
+    let (code, text) = run_case("numerics/passing.mtx", "is_dangerous_for_a_second", &[]);
+    assert!(code == 1 && text.contains("between_two") && text.contains("at 100 s"), "{text}");
+}
+
+#[test]
+fn a_law_that_loses_its_value_is_named_where_its_argument_moves_evenly() {
+    let (code, text) = run_case("numerics/passing.mtx", "loses_its_value", &[]);
+    assert!(code == 1 && text.contains("error[not-a-number]") && text.contains("root(l)"), "{text}");
+}
+
+#[test]
 fn short_waits_add_up_exactly() {
     pass_cases("numerics/moments.mtx", &["adds_up_waits"]);
 }

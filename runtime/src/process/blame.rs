@@ -15,6 +15,9 @@ use crate::ledger::BalanceReport;
 /// So many lines of a law that makes or loses something are shown.
 const MOST_LINES: usize = 4;
 
+/// How far ahead a law is looked at that no step can follow, as shares of the time since the run began.
+const AHEAD: [f64; 3] = [1e-13, 1e-11, 1e-9];
+
 impl<'m> Engine<'m> {
     /// The fault of a state whose rate is not finite: at the line of the innermost law that has no value.
     pub(super) fn no_rate(&self, state: u32) -> Fault {
@@ -154,6 +157,9 @@ impl<'m> Engine<'m> {
         if let Some(fault) = self.run_dry() {
             return fault;
         }
+        if let Some(fault) = self.lost_ahead(moving) {
+            return fault;
+        }
         let rates = self.model.derivatives.iter().filter(|d| moving.contains(&d.state));
         let pace = |d: &Derivative| {
             let (state, value) = (&self.model.states[d.state as usize], self.state(d.state));
@@ -179,6 +185,24 @@ impl<'m> Engine<'m> {
             }
             None => self.with_running(fault(message).at(state.span)),
         }
+    }
+
+    /// The fault of a law that has no value any more a moment further on, if what moves goes on as it does: the root of an amount that
+    /// falls below zero.
+    fn lost_ahead(&self, moving: &[u32]) -> Option<Fault> {
+        let rates: Vec<&Derivative> = self.model.derivatives.iter().filter(|d| moving.contains(&d.state)).collect();
+        let slopes: Vec<(u32, f64)> = rates.iter().map(|d| (d.state, self.eval(d.rate))).collect();
+        if slopes.iter().any(|(_, slope)| !slope.is_finite()) {
+            return None;
+        }
+        AHEAD.into_iter().find_map(|share| {
+            let passed = share * self.time;
+            let mut states = self.states();
+            slopes.iter().for_each(|(state, slope)| states[*state as usize] += slope * passed);
+            let ahead = self.supposed(self.time + passed, states);
+            let lost = rates.iter().find(|d| !ahead.eval(d.rate).is_finite())?;
+            Some(Fault { time: self.time, ..ahead.no_rate(lost.state) })
+        })
     }
 
     /// The fault of a law or condition that follows the clock too fast.

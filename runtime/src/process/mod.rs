@@ -172,6 +172,8 @@ pub struct Engine<'m> {
     due: Due,
     /// The roots of what the caller looks out for.
     watching: BTreeSet<u32>,
+    /// The roots of conditions that an observer looks out for at all times.
+    attended: BTreeSet<u32>,
     /// Comparisons that may have changed at the present instant.
     suspects: Vec<NodeId>,
     /// By state, the largest magnitude since it was last set, as far as a law moved it.
@@ -216,6 +218,7 @@ impl<'m> Engine<'m> {
             course: Course::new(model.states.len(), options.is_shared, options.curves),
             due: Due::default(),
             watching: BTreeSet::new(),
+            attended: BTreeSet::new(),
             suspects: Vec::new(),
             sizes: vec![0.0; model.states.len()],
             cancel: None,
@@ -257,6 +260,14 @@ impl<'m> Engine<'m> {
     /// fired; those that follow go on.
     pub fn heed(&mut self, cancel: Option<&'m AtomicBool>) {
         self.cancel = cancel;
+    }
+
+    /// Shows the instants at which these conditions come true or cease to be from now on: an observer that looks at them sees each.
+    pub fn attend(&mut self, conditions: impl IntoIterator<Item = NodeId>) {
+        let graph = &self.model.graph;
+        self.attended = conditions.into_iter().map(|node| self.index.watch(graph, node)).collect();
+        self.due.law.roots.extend(&self.attended);
+        self.due.law.sights.extend(&self.attended);
     }
 
     /// Reports the processes that run, fires the events that are true and takes the first sample.
@@ -336,6 +347,13 @@ impl<'m> Engine<'m> {
     pub fn eval_with(&self, node: NodeId, states: &[f64]) -> f64 {
         let Engine { time, params, locals, readings, .. } = self;
         self.model.graph.eval(node, Env { time: *time, states, params, locals, readings })
+    }
+
+    /// The model as it would be at another time in other states, where nothing moves.
+    fn supposed(&self, time: f64, states: Vec<f64>) -> Self {
+        let course = Course::new(states.len(), false, false);
+        let memo = RefCell::new(Memo::new(&self.model.graph));
+        Engine { time, states, course, memo, ..self.clone() }
     }
 
     /// The value of `node` now if the values of the plan were these.

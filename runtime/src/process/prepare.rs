@@ -298,7 +298,8 @@ impl Engine<'_> {
         }
         before.lookouts.into_iter().for_each(|id| self.course.drop_lookout(id));
         let (kind, node) = self.index.root(root);
-        if kind == Root::Watch && !self.watching.contains(&root) {
+        let is_attended = self.attended.contains(&root);
+        if kind == Root::Watch && !is_attended && !self.watching.contains(&root) {
             return Vec::new();
         }
         if let (Root::Limit(i), true) = (kind, known.feels(node)) {
@@ -312,7 +313,7 @@ impl Engine<'_> {
                 self.course.noticing(part).insert(root);
             }
             match parts[..] {
-                [part] if kind != Root::Watch => {
+                [part] if kind != Root::Watch || is_attended => {
                     sights.own.extend(nodes.iter().map(|node| (part, *node)));
                     concerned.parts.insert(part);
                 }

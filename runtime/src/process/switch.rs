@@ -25,11 +25,14 @@ const LEAST: f64 = 1e-30;
 /// Changes that last no longer than this are not looked for between two points where nothing has changed, s.
 const NARROW: f64 = 1e-6;
 
+/// The same as a share of what is looked at, where that is short.
+const NARROWEST: f64 = 1e-3;
+
 /// So many pieces of the way between two points are looked at before it is given up where a side is a wave.
 const MOST_PIECES: usize = 20_000;
 
 /// The same where a side only may turn round, as a product: sides that go together are never told apart piece by piece.
-const FEW_PIECES: usize = 200;
+const FEW_PIECES: usize = 1000;
 
 /// Pieces of a polynomial that are looked at.
 const MOST_HALVES: usize = 200;
@@ -308,7 +311,8 @@ impl Switches {
     }
 
     /// Two instants between `low` and `high`: a comparison that may turn round has changed at the second, and not before the first.
-    /// None where its sides stay apart, as far as the pieces that are looked at show it.
+    /// None where its sides stay apart, as far as the pieces that are looked at show it: all those of one length before any shorter
+    /// one, so that what is missed for want of pieces is short wherever it is.
     fn hidden(
         &mut self,
         place: usize,
@@ -318,36 +322,39 @@ impl Switches {
         path: &mut dyn FnMut(f64, &mut [f64]),
     ) -> Result<Option<Interval>, Unseen> {
         let i = self.folded.list[place];
-        let (mut todo, mut cleared, mut seen) = (vec![(low, high)], low, None);
+        let narrow = NARROW.min(NARROWEST * (high - low)).max(64.0 * rounding(high));
+        let (mut level, mut seen) = (vec![(low, high)], None);
         let mut pieces = 0;
-        // From left to right, so that nothing comes before what is found.
-        while let Some((from, to)) = todo.pop() {
-            pieces += 1;
-            match self.folded.waves[place] {
-                true if pieces > MOST_PIECES => return Err(Unseen(self.list[i].node)),
-                false if pieces > FEW_PIECES => break,
-                _ => {}
+        while !level.is_empty() {
+            let mut next = Vec::new();
+            for (from, to) in level {
+                pieces += 1;
+                match self.folded.waves[place] {
+                    true if pieces > MOST_PIECES => return Err(Unseen(self.list[i].node)),
+                    false if pieces > FEW_PIECES => return Ok(seen),
+                    _ => {}
+                }
+                if seen.is_some_and(|(_, instant)| instant == to) {
+                    seen = Some((from, to));
+                }
+                self.enclose((from, to), path);
+                if self.stays(place) || to - from <= narrow {
+                    continue;
+                }
+                let middle = from + 0.5 * (to - from);
+                path(middle, moving);
+                self.run(middle, moving);
+                next.push((from, middle));
+                if self.is_changed(i, Switch::clearly_changed) {
+                    // What comes later does not matter any more.
+                    seen = Some((from, middle));
+                    break;
+                }
+                next.push((middle, to));
             }
-            self.enclose((from, to), path);
-            if self.stays(place) {
-                cleared = to;
-                continue;
-            }
-            if to - from <= NARROW.max(64.0 * rounding(to)) {
-                continue;
-            }
-            let middle = from + 0.5 * (to - from);
-            path(middle, moving);
-            self.run(middle, moving);
-            if self.is_changed(i, Switch::clearly_changed) {
-                // What comes later does not matter any more.
-                (todo, seen) = (Vec::new(), Some(middle));
-            } else {
-                todo.push((middle, to));
-            }
-            todo.push((from, middle));
+            level = next;
         }
-        Ok(seen.map(|seen| (cleared, seen)))
+        Ok(seen)
     }
 
     /// Bounds the sides of all comparisons that may turn round over a piece.

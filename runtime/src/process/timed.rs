@@ -77,6 +77,10 @@ impl Timed {
             self.point(time, probe * length, values, &mut moving, &mut registers);
             for (hull, output) in hulls.iter_mut().zip(&self.tape.outputs) {
                 let value = registers[*output as usize];
+                if value.is_nan() {
+                    // What has no value any more is found out by the step itself, which knows whose law that is.
+                    return Ok(None);
+                }
                 *hull = (hull.0.min(value), hull.1.max(value));
             }
         }

@@ -1,7 +1,7 @@
 //! The course of what moves evenly while time passes: from one change of a condition to the next, each at its moment, with the
 //! events that happen there and the limits that are passed on the way.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, Leaves, NodeId, Op, Severity, UnaryOp};
@@ -22,6 +22,12 @@ const BETWEEN: [f64; 3] = [0.23, 0.5, 0.81];
 
 /// A difference that departs from a straight line by less than this share of what is compared is one.
 const STRAIGHT: f64 = 1e-9;
+
+/// Pieces of a time that are looked at for a turn of what looks straight where points show it.
+const MOST_PIECES: usize = 200;
+
+/// A piece is halved no further than to this share of the time.
+const FINEST: f64 = 1.0 / (1 << 12) as f64;
 
 /// How a course ends.
 pub(super) enum Course {
@@ -204,11 +210,67 @@ impl Flow<'_, '_> {
                 let (between, ..) = self.difference(side, even, share * end, facts)?;
                 bends |= (between - (now + share * (then - now))).abs() > STRAIGHT * size.max(far);
             }
-            if bends && !self.stays_apart(side, even, end, facts) {
+            let is_followed = match bends {
+                true => self.stays_apart(side, even, (0.0, end), facts),
+                // Points show no turn that is over between them.
+                false => self.is_straight(side, even) || self.turns_nowhere(side, even, (end, size.max(far)), facts),
+            };
+            if !is_followed {
                 return None;
             }
         }
         Some(next)
+    }
+
+    /// Whether two sides follow what moves in straight lines, by their form.
+    fn is_straight(&mut self, (a, b): Sides, even: &Even) -> bool {
+        [Some(a), b].into_iter().flatten().all(|node| {
+            let order = self.order(node);
+            let mut degrees: BTreeMap<NodeId, u8> = BTreeMap::new();
+            for node in order.iter().copied() {
+                let op = self.lab.graph.op(node);
+                let of = |node: NodeId| degrees.get(&node).copied().unwrap_or(0);
+                let most = op.operands().map(of).max().unwrap_or(0);
+                let is_kept = match op {
+                    Op::Unary(UnaryOp::Neg, _) | Op::Binary(BinaryOp::Add | BinaryOp::Sub, ..) => true,
+                    Op::Binary(BinaryOp::Mul, a, b) => of(a).min(of(b)) == 0,
+                    Op::Binary(BinaryOp::Div, _, b) => of(b) == 0,
+                    Op::Select(condition, ..) => of(condition) == 0,
+                    _ => false,
+                };
+                let degree = match op {
+                    Op::State(state) => u8::from(even.slopes.iter().any(|(s, ..)| *s == state)),
+                    Op::Time => 1,
+                    _ if most == 1 && !is_kept => 2,
+                    _ => most,
+                };
+                degrees.insert(node, degree);
+            }
+            degrees.get(&node).is_none_or(|degree| *degree < 2)
+        })
+    }
+
+    /// Whether two sides that look straight are apart at all times before an end, but for what is next to it and to the beginning.
+    fn turns_nowhere(&mut self, side: Sides, even: &Even, (end, size): (f64, f64), facts: &Facts) -> bool {
+        let mut todo = vec![(0.0, 1.0)];
+        let mut pieces = 0;
+        while let Some((from, to)) = todo.pop() {
+            pieces += 1;
+            if pieces > MOST_PIECES {
+                return false;
+            }
+            let (low, high) = self.apart_within(side, even, (from * end, to * end), facts);
+            let is_next = (from == 0.0 || to == 1.0) && to - from < FINEST;
+            if low > 0.0 || high < 0.0 || low.abs().max(high.abs()) <= CLOSE * size || is_next {
+                continue;
+            }
+            if to - from < FINEST {
+                return false;
+            }
+            let middle = 0.5 * (from + to);
+            todo.extend([(middle, to), (from, middle)]);
+        }
+        true
     }
 
     /// Whether a side is a wave: it may turn as often as it likes between two moments.
@@ -222,18 +284,24 @@ impl Flow<'_, '_> {
         self.lab.graph.leaves(node).meets(Leaves::READING)
     }
 
-    /// Whether two sides are apart all the time.
-    fn stays_apart(&mut self, (a, b): Sides, even: &Even, time: f64, facts: &Facts) -> bool {
+    /// Whether two sides are apart all the time between two.
+    fn stays_apart(&mut self, side: Sides, even: &Even, times: (f64, f64), facts: &Facts) -> bool {
+        let (low, high) = self.apart_within(side, even, times, facts);
+        low > 0.0 || high < 0.0
+    }
+
+    /// Bounds of the difference of two sides between two times from now.
+    fn apart_within(&mut self, (a, b): Sides, even: &Even, (from, to): (f64, f64), facts: &Facts) -> (f64, f64) {
         let mut within = facts.clone();
         even.open.iter().for_each(|s| within.states[*s as usize] = Known::nothing());
         for (state, value, slope) in &even.slopes {
-            let end = value + slope * time;
-            within.states[*state as usize] = Known::Range(value.min(end), value.max(end), Why::Unknown);
+            let (first, last) = (value + slope * from, value + slope * to);
+            within.states[*state as usize] = Known::Range(first.min(last), first.max(last), Why::Unknown);
         }
-        within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(0.0, time, Why::Unknown));
+        within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(from, to, Why::Unknown));
         let (low, high) = self.eval(a, &within).bounds();
         let (least, most) = b.map_or((0.0, 0.0), |b| self.eval(b, &within).bounds());
-        low > most || high < least
+        (low - most, high - least)
     }
 
     /// The difference of two sides after a time, how fast it changes, and the size of the larger one.

@@ -267,9 +267,10 @@ impl Known {
             BinaryOp::Pow => Known::nothing(),
             BinaryOp::Min => Known::range(a.min(c), b.min(d), why),
             BinaryOp::Max => Known::range(a.max(c), b.max(d), why),
-            BinaryOp::Lt => decided(b < c, a >= d),
-            BinaryOp::Le => decided(b <= c, a > d),
-            BinaryOp::Eq => decided(false, b < c || a > d),
+            // Where it hangs on rounding it is left open, as it is for exact numbers.
+            BinaryOp::Lt => decided(b < c && !are_close(b, c), a >= d && !are_close(a, d)),
+            BinaryOp::Le => decided(b <= c && !are_close(b, c), a > d && !are_close(a, d)),
+            BinaryOp::Eq => decided(false, b < c && !are_close(b, c) || a > d && !are_close(a, d)),
             BinaryOp::And | BinaryOp::Or => {
                 let truth = |low: f64, high: f64| Known::Range(low, high, why).truth();
                 match (op, truth(a, b), truth(c, d)) {
@@ -299,8 +300,13 @@ impl Known {
 /// Whether a comparison is of numbers that are not told apart. Nothing is close to what has no limit.
 #[inline]
 fn hangs_on_rounding(op: BinaryOp, a: f64, b: f64) -> bool {
-    let compares = matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq);
-    compares && a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) && a.is_finite() && b.is_finite()
+    matches!(op, BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq) && are_close(a, b)
+}
+
+/// Whether two numbers differ, but by no more than rounding.
+#[inline]
+fn are_close(a: f64, b: f64) -> bool {
+    a != b && (a - b).abs() <= CLOSE * a.abs().max(b.abs()) && a.is_finite() && b.is_finite()
 }
 
 #[cfg(test)]

@@ -145,7 +145,8 @@ pub fn carry_out(
         Ok(engine) => engine,
         Err(fault) => return Ok(Ending::not_begun(vec![of_fault(&program.plan, fault)])),
     };
-    let twin = Sim::new(engine, &prepared, seed);
+    let mut twin = Sim::new(engine, &prepared, seed);
+    twin.engine().attend(screen.conditions());
     let ended = AtomicBool::new(false);
     let settings = Settings { mode, speed, control, ended: &ended, world, exposed };
     let mut hardware = Hardware::new(program, sources, twin, devices?, settings, journal, trace);
