@@ -1,7 +1,7 @@
 //! What hangs together where laws move matter: each amount is what it was, its base, and a coefficient for each extent to which
 //! something has gone on. Sums of amounts are then known as closely as what has gone on changes them: a mass not at all.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use matterix_ir::BinaryOp;
@@ -123,9 +123,14 @@ impl Bonds {
         self.states.entry(state).or_insert_with(|| Bond { base: known.clone(), known: known.clone() });
     }
 
+    /// The place of what goes on in a direction, if it has one.
+    pub fn known_extent(&self, direction: &Direction) -> Option<usize> {
+        self.extents.iter().position(|e| alike(&e.direction, direction))
+    }
+
     /// The place of what goes on in a direction.
     pub fn extent_of(&mut self, direction: &Direction) -> usize {
-        self.extents.iter().position(|e| alike(&e.direction, direction)).unwrap_or_else(|| {
+        self.known_extent(direction).unwrap_or_else(|| {
             self.extents.push(Extent { direction: direction.clone(), range: (0.0, 0.0) });
             self.extents.len() - 1
         })
@@ -206,6 +211,17 @@ impl Bonds {
         is_amount: impl Fn(u32) -> bool,
         atoms: impl Fn(u32) -> Vec<(Element, f64)>,
     ) -> Vec<(u32, (f64, f64))> {
+        self.tighten_from(None, is_amount, atoms, |_, _| {})
+    }
+
+    /// The same of what hangs together with one extent only, after `open` has opened the ranges of the extents of each part that is looked at.
+    pub fn tighten_from(
+        &mut self,
+        extent: Option<usize>,
+        is_amount: impl Fn(u32) -> bool,
+        atoms: impl Fn(u32) -> Vec<(Element, f64)>,
+        open: impl Fn(usize, &mut (f64, f64)),
+    ) -> Vec<(u32, (f64, f64))> {
         let mut places: BTreeMap<u32, Vec<(usize, f64)>> = BTreeMap::new();
         for (i, extent) in self.extents.iter().enumerate() {
             for (state, c) in extent.direction.iter().filter(|(s, _)| is_amount(*s)) {
@@ -213,7 +229,9 @@ impl Bonds {
             }
         }
         let mut out = Vec::new();
-        for part in parts(self.extents.len(), &places) {
+        let is_meant = |part: &Vec<usize>| extent.is_none_or(|extent| part.binary_search(&extent).is_ok());
+        for part in parts(self.extents.len(), &places).into_iter().filter(is_meant) {
+            part.iter().for_each(|extent| open(*extent, &mut self.extents[*extent].range));
             let mut bounds = self.tighten_part(&part, &places);
             if polytope::is_large(part.len(), bounds.len()) {
                 self.bound_by_atoms(&part, &mut bounds, &atoms);
@@ -261,7 +279,9 @@ impl Bonds {
         let local = |extent: &usize| part.binary_search(extent).ok();
         let mut amounts = Vec::new();
         let mut faces = Vec::new();
-        for (state, terms) in places {
+        let states = part.iter().flat_map(|extent| self.extents[*extent].direction.iter().map(|(state, _)| *state));
+        let states: BTreeSet<u32> = states.collect();
+        for (state, terms) in states.iter().filter_map(|state| Some((state, places.get(state)?))) {
             let terms: Vec<(usize, f64)> = terms.iter().filter_map(|(e, c)| Some((local(e)?, *c))).collect();
             let Some(bond) = self.states.get(state).filter(|_| !terms.is_empty()) else { continue };
             amounts.push((*state, bond.base.bounds()));

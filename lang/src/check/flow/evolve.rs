@@ -502,7 +502,7 @@ impl Flow<'_, '_> {
     fn react(&mut self, derivative: u32, row: &Row, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
         let stoichiometry = self.stoichiometry();
         let still = self.still(self.derivatives[derivative as usize].state, facts);
-        let mut more = false;
+        let mut more = None;
         for (flux, c) in &row.fluxes {
             let (low, high) = self.flux(&stoichiometry.fluxes[*flux], &making.within);
             if !making.active.contains(flux) && (low * c).abs() <= still && (high * c).abs() <= still {
@@ -511,33 +511,36 @@ impl Flow<'_, '_> {
             making.active.insert(*flux);
             let (direction, by) = &stoichiometry.directions[*flux];
             let (low, high) = scaled(*by, (low, high));
-            let mut bonds = making.within.bonds.as_deref().cloned().unwrap_or_default();
-            direction.iter().for_each(|(state, _)| bonds.cover(*state, facts));
-            let (down, up) = making.ways.entry(bonds.extent_of(direction)).or_default();
-            if (low < 0.0 && !*down) || (high > 0.0 && !*up) {
-                (*down, *up) = (*down || low < 0.0, *up || high > 0.0);
-                more = true;
-                making.within.bonds = Some(Rc::new(bonds));
+            let known = making.within.bonds.as_ref().and_then(|bonds| bonds.known_extent(direction));
+            let (down, up) = known.and_then(|extent| making.ways.get(&extent)).copied().unwrap_or_default();
+            if (low < 0.0 && !down) || (high > 0.0 && !up) {
+                let bonds = Rc::make_mut(making.within.bonds.get_or_insert_default());
+                direction.iter().for_each(|(state, _)| bonds.cover(*state, facts));
+                let extent = bonds.extent_of(direction);
+                making.ways.insert(extent, (down || low < 0.0, up || high > 0.0));
+                more = Some(extent);
             }
         }
         if row.fluxes.iter().any(|(flux, _)| making.active.contains(flux)) {
             making.moving.insert(derivative);
         }
-        if more {
-            self.go_further(facts, making, crossed);
+        if let Some(extent) = more {
+            self.go_further(extent, facts, making, crossed);
         }
     }
 
-    /// Bounds extents anew where more of them go on: what one uses up another may give back, as a catalyst.
-    fn go_further(&mut self, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
-        let Some(mut bonds) = making.within.bonds.as_deref().cloned() else { return };
+    /// Bounds extents anew that hang together with one where more of them go on: what one uses up another may give back, as a catalyst.
+    fn go_further(&mut self, extent: usize, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
+        let Some(mut shared) = making.within.bonds.take() else { return };
+        let bonds = Rc::make_mut(&mut shared);
         let before: Vec<(f64, f64)> = bonds.extents.iter().map(|e| e.range).collect();
-        for (extent, (down, up)) in &making.ways {
-            let range = &mut bonds.extents[*extent].range;
-            *range = (if *down { f64::NEG_INFINITY } else { range.0 }, if *up { f64::INFINITY } else { range.1 });
-        }
+        let open = |extent: usize, range: &mut (f64, f64)| {
+            let (down, up) = making.ways.get(&extent).copied().unwrap_or_default();
+            *range = (if down { f64::NEG_INFINITY } else { range.0 }, if up { f64::INFINITY } else { range.1 });
+        };
         let mut changed = BTreeSet::new();
-        for (state, (low, high)) in bonds.tighten(|state| self.is_amount(state), |state| self.atoms(state)) {
+        let amounts = bonds.tighten_from(Some(extent), |state| self.is_amount(state), |state| self.atoms(state), open);
+        for (state, (low, high)) in amounts {
             let known = Known::Range(low, high, Why::Unknown);
             if making.within.states[state as usize] != known {
                 making.within.states[state as usize] = known;
@@ -547,7 +550,7 @@ impl Flow<'_, '_> {
         let further = bonds.extents.iter().zip(&before).filter(|(extent, before)| extent.range != **before);
         changed.extend(further.flat_map(|(extent, _)| extent.direction.iter().map(|(state, _)| *state)));
         bonds.stamp(&making.within);
-        making.within.bonds = Some(Rc::new(bonds));
+        making.within.bonds = Some(shared);
         let stoichiometry = self.stoichiometry();
         for state in changed {
             let of = stoichiometry.of_state.get(&state).copied();
