@@ -59,6 +59,14 @@ pub struct Form {
     pub terms: Vec<(u32, f64)>,
 }
 
+impl Extent {
+    /// Whether it may change one of the states from one to another; those that it changes are in order.
+    fn lies_within(&self, first: u32, last: u32) -> bool {
+        let ends = self.direction.first().zip(self.direction.last());
+        ends.is_some_and(|((low, _), (high, _))| *low <= last && *high >= first)
+    }
+}
+
 /// A direction with its first coefficient 1, and the number it was divided by; none where nothing is left of it.
 pub fn direction(terms: impl IntoIterator<Item = (u32, f64)>) -> Option<(Direction, f64)> {
     let mut sums: BTreeMap<u32, f64> = BTreeMap::new();
@@ -145,18 +153,14 @@ impl Bonds {
         *range = (range.0 + low, range.1 + high);
     }
 
-    fn ranges(&self) -> Vec<(f64, f64)> {
-        self.extents.iter().map(|e| e.range).collect()
-    }
-
     /// What extents add to a state.
     pub fn added(&self, state: u32) -> (f64, f64) {
-        let terms = self
-            .extents
-            .iter()
-            .enumerate()
-            .filter_map(|(i, e)| e.direction.iter().find(|(s, _)| *s == state).map(|(_, c)| (i, *c)));
-        range_of(terms, &self.ranges())
+        let here = self.extents.iter().filter(|e| e.lies_within(state, state));
+        let terms = here.filter_map(|e| {
+            let at = e.direction.binary_search_by_key(&state, |(s, _)| *s).ok()?;
+            Some(scaled(e.direction[at].1, e.range))
+        });
+        terms.fold((0.0, 0.0), |(low, high), (a, b)| (low + a, high + b))
     }
 
     /// Bounds of a state that lie also within its base and what extents add to it.
@@ -326,7 +330,8 @@ impl Bonds {
             sum = Known::binary(BinaryOp::Add, &sum, &Known::binary(BinaryOp::Mul, &Known::Point(*c), known));
         }
         let (mut low, mut high) = (0.0, 0.0);
-        for extent in &self.extents {
+        let (Some((first, _)), Some((last, _))) = (form.terms.first(), form.terms.last()) else { return Some(sum) };
+        for extent in self.extents.iter().filter(|e| e.lies_within(*first, *last)) {
             let (mut total, mut size) = (0.0, 0.0_f64);
             // What goes on changes few states, and a sum may be of many.
             for (state, c) in extent.direction.iter() {
