@@ -1,8 +1,9 @@
 //! The `.mtx` compiler front end: text to a checked [`matterix_ir::Program`]. Pure: no files, no clock, no printing.
 //!
 //! The stages are functions from one representation to the next that return their findings beside the result:
-//! [`syntax`] text to tree, [`names`] modules and scopes, [`elaborate`] the lab's instances and laws as one flat model,
-//! [`lower`] the workflow as a plan, [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
+//! [`syntax`] text to tree, [`names`] modules and scopes, [`declare`] what a package says, for lookups, [`eval`] expressions and the lab
+//! that they ask about, [`elaborate`] what holds over that lab, as one flat model, [`lower`] the workflow as a plan,
+//! [`check`](mod@check) what would go wrong. [`fmt`] writes text in its one style.
 
 mod calibration;
 pub mod check;

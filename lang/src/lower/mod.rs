@@ -158,10 +158,10 @@ impl<'a, 'e> Planner<'a, 'e> {
         self.supposed.clone_from(&task.supposed);
         self.begin_wires();
         if self.wires == wires::Wires::Offered {
-            let outer = self.lab.enter_mode(Mode::REPORTED);
-            self.begin_offers(task.lab);
-            self.offer_skills(decl.module);
-            self.lab.enter_mode(outer);
+            self.reported(|plan| {
+                plan.begin_offers(task.lab);
+                plan.offer_skills(decl.module);
+            });
         }
         let mut arguments = Vec::new();
         let root = match &decl.item.kind {

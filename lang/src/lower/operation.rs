@@ -14,7 +14,6 @@ use crate::ast::{Binary, Call, Clause, ClauseKind, Effect, Expr, MemberKind, Sig
 use crate::declare::Type;
 use crate::declare::tables::MemberRef;
 use crate::escapes::undeclared;
-use crate::eval::lab::Mode;
 use crate::eval::{Scope, Value};
 use crate::names::{DeclId, verb_text};
 
@@ -175,11 +174,12 @@ impl<'a> Planner<'a, '_> {
     pub(super) fn catch_up(&mut self) {
         self.lab.targets.close();
         self.lab.targets.settle();
-        let outer = self.lab.enter_mode(Mode::REPORTED);
-        for (clause, mut scope) in std::mem::take(&mut self.deferred) {
-            self.need(clause, &mut scope);
-        }
-        self.lab.enter_mode(outer);
+        let deferred = std::mem::take(&mut self.deferred);
+        self.reported(|plan| {
+            for (clause, mut scope) in deferred {
+                plan.need(clause, &mut scope);
+            }
+        });
     }
 
     /// What comes of a clause of an operation that says something of it; none where it is wrong.

@@ -9,6 +9,7 @@ use matterix_ir::NodeId;
 use matterix_ir::model::Drained;
 
 use super::course::Who;
+use super::index::Root;
 use super::lookout::Lookout;
 use super::part::Ending;
 use super::switch::Crossing;
@@ -70,7 +71,8 @@ impl Engine<'_> {
     /// Looks out for these conditions from now on, and for no others that the caller asked for.
     fn watch(&mut self, watches: &[Watch]) {
         let graph = &self.model.graph;
-        let watching: BTreeSet<u32> = watches.iter().map(|watch| self.index.watch(graph, watch.node)).collect();
+        let watching: BTreeSet<u32> =
+            watches.iter().map(|watch| self.index.ask(graph, Root::Watch, watch.node)).collect();
         let law = &mut self.due.law;
         law.roots.extend(watching.difference(&self.watching));
         law.sights.extend(self.watching.symmetric_difference(&watching));

@@ -16,7 +16,9 @@ pub(super) enum Root {
     Event(u32),
     /// Whether a limit holds, by its index.
     Limit(u32),
-    /// What only the caller asks for.
+    /// What an observer looks at at all times.
+    Attended,
+    /// What only the caller asks for, for a time.
     Watch,
 }
 
@@ -78,7 +80,7 @@ pub(super) struct Index {
     /// By operation, its roots of the model.
     of_node: Lists<u32>,
     /// The same of those that were asked for later.
-    watched: BTreeMap<NodeId, u32>,
+    asked: BTreeMap<NodeId, Vec<u32>>,
     /// Whether an operation is below a root.
     is_law: Vec<bool>,
     /// By state, the root of its rate.
@@ -126,7 +128,7 @@ impl Index {
             users: users(graph),
             roots,
             of_node,
-            watched: BTreeMap::new(),
+            asked: BTreeMap::new(),
             is_law,
             rate_of,
             states,
@@ -167,14 +169,16 @@ impl Index {
         all[first..].iter().take_while(|(i, _)| *i == index).map(|(_, node)| *node).collect()
     }
 
-    /// The root of a condition that the caller asks for.
-    pub(super) fn watch(&mut self, graph: &Graph, node: NodeId) -> u32 {
-        let next = self.roots.len() as u32;
-        let root = *self.watched.entry(node).or_insert(next);
-        if root == next {
-            self.roots.push((Root::Watch, node));
-            below(graph, vec![node], &mut self.is_law);
+    /// The root of a condition that is asked for later, for `what`.
+    pub(super) fn ask(&mut self, graph: &Graph, what: Root, node: NodeId) -> u32 {
+        let known = self.asked.entry(node).or_default();
+        if let Some(root) = known.iter().find(|root| self.roots[**root as usize].0 == what) {
+            return *root;
         }
+        let root = self.roots.len() as u32;
+        known.push(root);
+        self.roots.push((what, node));
+        below(graph, vec![node], &mut self.is_law);
         root
     }
 
@@ -189,8 +193,8 @@ impl Index {
                 continue;
             }
             visit(node);
-            let watched = self.watched.get(&node);
-            for root in self.of_node.at(at).iter().chain(watched) {
+            let asked = self.asked.get(&node).into_iter().flatten();
+            for root in self.of_node.at(at).iter().chain(asked) {
                 found(*root, self.roots[*root as usize].0);
             }
             todo.extend(self.users.at(at));

@@ -199,7 +199,7 @@ impl Engine<'_> {
         self.index.above(&touches, &mut |_| {}, &mut |_, kind| match kind {
             Root::Event(i) => events.push(i as usize),
             Root::Guard(i) => due.processes.extend([i]),
-            Root::Rate(_) | Root::Limit(_) | Root::Watch => {}
+            Root::Rate(_) | Root::Limit(_) | Root::Attended | Root::Watch => {}
         });
         for i in events {
             self.armed[i] = self.armed[i] && self.truth(self.model.events[i].when);

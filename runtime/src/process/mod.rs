@@ -72,7 +72,7 @@ pub use limits::Keeps;
 
 use analysis::Facts;
 use course::Course;
-use index::Index;
+use index::{Index, Root};
 use limits::Limits;
 use memo::{Leaf, Memo};
 use prepare::Due;
@@ -172,8 +172,6 @@ pub struct Engine<'m> {
     due: Due,
     /// The roots of what the caller looks out for.
     watching: BTreeSet<u32>,
-    /// The roots of conditions that an observer looks out for at all times.
-    attended: BTreeSet<u32>,
     /// Comparisons that may have changed at the present instant.
     suspects: Vec<NodeId>,
     /// By state, the largest magnitude since it was last set, as far as a law moved it.
@@ -218,7 +216,6 @@ impl<'m> Engine<'m> {
             course: Course::new(model.states.len(), options.is_shared, options.curves),
             due: Due::default(),
             watching: BTreeSet::new(),
-            attended: BTreeSet::new(),
             suspects: Vec::new(),
             sizes: vec![0.0; model.states.len()],
             cancel: None,
@@ -264,10 +261,11 @@ impl<'m> Engine<'m> {
 
     /// Shows the instants at which these conditions come true or cease to be from now on: an observer that looks at them sees each.
     pub fn attend(&mut self, conditions: impl IntoIterator<Item = NodeId>) {
-        let graph = &self.model.graph;
-        self.attended = conditions.into_iter().map(|node| self.index.watch(graph, node)).collect();
-        self.due.law.roots.extend(&self.attended);
-        self.due.law.sights.extend(&self.attended);
+        for condition in conditions {
+            let root = self.index.ask(&self.model.graph, Root::Attended, condition);
+            self.due.law.roots.insert(root);
+            self.due.law.sights.insert(root);
+        }
     }
 
     /// Reports the processes that run, fires the events that are true and takes the first sample.

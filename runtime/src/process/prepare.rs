@@ -76,7 +76,7 @@ impl Engine<'_> {
                 Root::Event(i) => due.events.extend([i]),
                 Root::Guard(i) => due.processes.extend([i]),
                 Root::Limit(i) => limits.extend([i]),
-                Root::Rate(_) | Root::Watch => {}
+                Root::Rate(_) | Root::Attended | Root::Watch => {}
             }
         });
         roots
@@ -298,8 +298,7 @@ impl Engine<'_> {
         }
         before.lookouts.into_iter().for_each(|id| self.course.drop_lookout(id));
         let (kind, node) = self.index.root(root);
-        let is_attended = self.attended.contains(&root);
-        if kind == Root::Watch && !is_attended && !self.watching.contains(&root) {
+        if kind == Root::Watch && !self.watching.contains(&root) {
             return Vec::new();
         }
         if let (Root::Limit(i), true) = (kind, known.feels(node)) {
@@ -313,7 +312,7 @@ impl Engine<'_> {
                 self.course.noticing(part).insert(root);
             }
             match parts[..] {
-                [part] if kind != Root::Watch || is_attended => {
+                [part] if kind != Root::Watch => {
                     sights.own.extend(nodes.iter().map(|node| (part, *node)));
                     concerned.parts.insert(part);
                 }

@@ -85,24 +85,33 @@ impl Folder {
 
     /// Writes a file that is not in its place yet.
     pub fn put(&mut self, name: &'static str, bytes: &[u8]) -> Result<(), RecordError> {
-        let failed = |e: io::Error| RecordError::new(&self.target.join(name), e);
-        fs::write(self.staging.join(name), bytes).map_err(failed)?;
-        self.written.push(name);
+        self.add(name, |draft| draft.write_all(bytes))
+    }
+
+    /// The same, as it is made.
+    pub(super) fn add<E: Display>(
+        &mut self,
+        name: &'static str,
+        make: impl FnOnce(&mut Draft) -> Result<(), E>,
+    ) -> Result<(), RecordError> {
+        let name = self.write(name, make)?;
+        self.whole(name);
         Ok(())
     }
 
-    /// Writes a file that is not in its place yet, as it is made; it is put into place when it is said to be [`whole`](Self::whole).
+    /// Writes a file beside others that are being made, and gives its name: it is put into place when it is said to be
+    /// [`whole`](Self::whole).
     pub(super) fn write<E: Display>(
         &self,
-        name: &str,
+        name: &'static str,
         make: impl FnOnce(&mut Draft) -> Result<(), E>,
-    ) -> Result<(), RecordError> {
+    ) -> Result<&'static str, RecordError> {
         let failed = |reason: String| RecordError::new(&self.target.join(name), reason);
         let file = File::create_new(self.staging.join(name)).map_err(|e| failed(e.to_string()))?;
         let mut draft = Draft { file: BufWriter::new(file), failed: None };
         let made = make(&mut draft).map_err(|e| e.to_string()).and_then(|()| draft.flush().map_err(|e| e.to_string()));
         // What libraries say of a full disk is seldom that it is full.
-        made.map_err(|reason| failed(draft.failed.unwrap_or(reason)))
+        made.map(|()| name).map_err(|reason| failed(draft.failed.unwrap_or(reason)))
     }
 
     /// A file is written and belongs to the performance.

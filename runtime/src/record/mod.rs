@@ -66,50 +66,30 @@ pub fn write_all(dir: &Path, run: &Run<'_>, report: &Report, outputs: Outputs) -
     let mut folder = Folder::begin(dir, NAMES)?;
     let to = &folder;
     // The recording and the tables are the large ones: they are made side by side.
-    let recording = || to.write(RECORDING, |out| mcap::write(run, out, to.staging()));
-    let states = || to.write(STATES, |out| parquet::states(run, out));
-    match (outputs.recording, outputs.tables) {
-        (true, true) => both(recording, states)?,
-        (true, false) => recording()?,
-        (false, true) => states()?,
-        (false, false) => {}
+    let recording =
+        || outputs.recording.then(|| to.write(RECORDING, |out| mcap::write(run, out, to.staging()))).transpose();
+    let states = || outputs.tables.then(|| to.write(STATES, |out| parquet::states(run, out))).transpose();
+    let (recording, states) = rayon::join(recording, states);
+    for name in [recording?, states?].into_iter().flatten() {
+        folder.whole(name);
     }
     let is_recorded = !run.recording.values.is_empty();
     if outputs.tables && is_recorded {
-        to.write(RECORDS, |out| parquet::records(run, out))?;
+        folder.add(RECORDS, |out| parquet::records(run, out))?;
     }
     if outputs.csv {
-        to.write(STATES_CSV, |out| table::states(run, out))?;
-        if is_recorded {
-            to.write(RECORDS_CSV, |out| table::records(run, out))?;
-        }
+        folder.add(STATES_CSV, |out| table::states(run, out))?;
+    }
+    if outputs.csv && is_recorded {
+        folder.add(RECORDS_CSV, |out| table::records(run, out))?;
     }
     if outputs.plot {
-        to.write(PLOT, |out| plot::page(run).map_err(|e| e.to_string()).and_then(|page| put(out, &page)))?;
+        folder.add(PLOT, |out| plot::page(run).map_err(|e| e.to_string()).and_then(|page| put(out, &page)))?;
     }
-    to.write(REPORT, |out| report.json().map_err(|e| e.to_string()).and_then(|json| put(out, &json)))?;
-    let made = [
-        (RECORDING, outputs.recording),
-        (STATES, outputs.tables),
-        (RECORDS, outputs.tables && is_recorded),
-        (STATES_CSV, outputs.csv),
-        (RECORDS_CSV, outputs.csv && is_recorded),
-        (PLOT, outputs.plot),
-        (REPORT, true),
-    ];
-    made.into_iter().filter(|(_, is_made)| *is_made).for_each(|(name, _)| folder.whole(name));
+    folder.add(REPORT, |out| report.json().map_err(|e| e.to_string()).and_then(|json| put(out, &json)))?;
     folder.finish()
 }
 
 fn put(out: &mut impl Write, text: &str) -> Result<(), String> {
     out.write_all(text.as_bytes()).map_err(|e| e.to_string())
-}
-
-/// Does two things side by side; the first error of both.
-fn both<E: Send>(
-    one: impl FnOnce() -> Result<(), E> + Send,
-    other: impl FnOnce() -> Result<(), E> + Send,
-) -> Result<(), E> {
-    let (one, other) = rayon::join(one, other);
-    one.and(other)
 }

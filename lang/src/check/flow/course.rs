@@ -48,6 +48,18 @@ struct Passed {
     there: Facts,
 }
 
+impl Even {
+    /// Makes of `within`, which has what is known now but for what moves, what is known at all times between two from now, s.
+    fn between(&self, (from, to): (f64, f64), now: &Facts, within: &mut Facts) {
+        self.open.iter().for_each(|s| within.states[*s as usize] = Known::nothing());
+        for (state, value, slope) in &self.slopes {
+            let (first, last) = (value + slope * from, value + slope * to);
+            within.states[*state as usize] = Known::Range(first.min(last), first.max(last), Why::Unknown);
+        }
+        within.time = Known::binary(BinaryOp::Add, &now.time, &Known::Range(from, to, Why::Unknown));
+    }
+}
+
 impl Flow<'_, '_> {
     /// Follows what moves evenly for at most `longest` s, or until a condition comes to what it is waited for to be.
     pub(super) fn course(&mut self, longest: f64, until: &[(NodeId, bool)], facts: &mut Facts) -> Course {
@@ -253,13 +265,14 @@ impl Flow<'_, '_> {
     /// Whether two sides that look straight are apart at all times before an end, but for what is next to it and to the beginning.
     fn turns_nowhere(&mut self, side: Sides, even: &Even, (end, size): (f64, f64), facts: &Facts) -> bool {
         let mut todo = vec![(0.0, 1.0)];
-        let mut pieces = 0;
+        let (mut pieces, mut within) = (0, facts.clone());
         while let Some((from, to)) = todo.pop() {
             pieces += 1;
             if pieces > MOST_PIECES {
                 return false;
             }
-            let (low, high) = self.apart_within(side, even, (from * end, to * end), facts);
+            even.between((from * end, to * end), facts, &mut within);
+            let (low, high) = self.apart_within(side, &within);
             let is_next = (from == 0.0 || to == 1.0) && to - from < FINEST;
             if low > 0.0 || high < 0.0 || low.abs().max(high.abs()) <= CLOSE * size || is_next {
                 continue;
@@ -286,21 +299,16 @@ impl Flow<'_, '_> {
 
     /// Whether two sides are apart all the time between two.
     fn stays_apart(&mut self, side: Sides, even: &Even, times: (f64, f64), facts: &Facts) -> bool {
-        let (low, high) = self.apart_within(side, even, times, facts);
+        let mut within = facts.clone();
+        even.between(times, facts, &mut within);
+        let (low, high) = self.apart_within(side, &within);
         low > 0.0 || high < 0.0
     }
 
-    /// Bounds of the difference of two sides between two times from now.
-    fn apart_within(&mut self, (a, b): Sides, even: &Even, (from, to): (f64, f64), facts: &Facts) -> (f64, f64) {
-        let mut within = facts.clone();
-        even.open.iter().for_each(|s| within.states[*s as usize] = Known::nothing());
-        for (state, value, slope) in &even.slopes {
-            let (first, last) = (value + slope * from, value + slope * to);
-            within.states[*state as usize] = Known::Range(first.min(last), first.max(last), Why::Unknown);
-        }
-        within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(from, to, Why::Unknown));
-        let (low, high) = self.eval(a, &within).bounds();
-        let (least, most) = b.map_or((0.0, 0.0), |b| self.eval(b, &within).bounds());
+    /// Bounds of the difference of two sides.
+    fn apart_within(&mut self, (a, b): Sides, within: &Facts) -> (f64, f64) {
+        let (low, high) = self.eval(a, within).bounds();
+        let (least, most) = b.map_or((0.0, 0.0), |b| self.eval(b, within).bounds());
         (low - most, high - least)
     }
 
