@@ -26,6 +26,21 @@ fn a_law_that_loses_its_value_is_named_where_its_argument_moves_evenly() {
 }
 
 #[test]
+fn no_run_goes_on_by_a_condition_that_has_lost_its_value() {
+    let file = "numerics/undecided.mtx";
+    pass_cases(file, &["safe", "waits_before"]);
+    for workflow in ["event", "guard", "choice", "waits", "keeps", "keeps_not", "holds"] {
+        let (code, text) = run_case(file, workflow, &[]);
+        let at = text.contains("error[not-a-number]") && text.contains("at 10 s");
+        assert!(code == 1 && at && text.contains("root") | text.contains("logarithm"), "{text}");
+    }
+    for (workflow, at) in [("loops", "at 11 s"), ("branches", "at 15 s")] {
+        let (code, text) = run_case(file, workflow, &[]);
+        assert!(code == 1 && text.contains("error[not-a-number]") && text.contains(at), "{text}");
+    }
+}
+
+#[test]
 fn short_waits_add_up_exactly() {
     pass_cases("numerics/moments.mtx", &["adds_up_waits"]);
 }

@@ -238,3 +238,74 @@ fn findings_point_at_paths_and_cells() {
     }
     assert_eq!(check("vary limit in 1 s .. 2 s by normal(1.5 s, 0.1 s)\n    runs 4"), [] as [&str; 0]);
 }
+
+/// What a study reports of a whole run: of quantities that come and go between two steps of the solver, that jump, that follow the clock.
+const OVER_TIME: &str = r#"mtx 1
+
+capability Moves: Body {
+    state x: Ratio = 0
+    state y: Ratio = 1
+    state kicked: Ratio = 0
+    process even { x' += 1 / 1 s }
+    process decays { y' -= 0.01 * y / 1 s }
+    process pushed while kicked > 0 { y' += 1 / 1 s }
+    event kick when x >= 500 { kicked = 1 }
+    event stop when x >= 510 { kicked = 0 }
+}
+asset Thing: Moves { mass: 1 kg }
+
+lab bench {
+    ambient: 25 degC
+    a = Thing at (0, 0, 0) m
+    b = Thing at (1, 0, 0) m
+}
+
+workflow watch(t: Duration) in bench { wait t }
+
+study s of watch {
+    vary t in 900 s .. 1000 s by grid(2)
+    report bell = max_over_time(exp(-((a.x - 300) / 10) ^ 2))
+    report mean_bell = mean_over_time(exp(-((a.x - 300) / 10) ^ 2))
+    report square = mean_over_time(a.x ^ 2)
+    report product = max_over_time(a.x * (1000 - b.x))
+    report wave = mean_over_time(sin(elapsed / 1 s * 1 rad) ^ 2)
+    report peak = max_over_time(a.y)
+    report least = min_over_time(a.y)
+    report mean_y = mean_over_time(a.y)
+    report share = mean_over_time(choose(a.x > 100, 1, 0))
+    report none = mean_over_time(sqrt(500 - a.x))
+}
+"#;
+
+#[test]
+fn what_is_reported_over_time_is_that_of_the_whole_run() {
+    let dir = folder("over_time");
+    let file = write(&dir, "over_time.mtx", OVER_TIME);
+    let out = dir.join("out");
+    let done = matterixc_in(root(), &["study", &file, "--out", out.to_str().expect("a name")]);
+    assert_eq!(done.code, 0, "{}", done.err);
+    let rows = table(&out.join("study.csv"));
+    let (t, e) = (900.0_f64, f64::exp);
+    // Decays up to 500 s, is pushed for 10 s, and decays again.
+    let (y500, y510) = (e(-5.0), 100.0 + (e(-5.0) - 100.0) * e(-0.1));
+    let total =
+        100.0 * (1.0 - y500) + 1000.0 + 100.0 * (y500 - 100.0) * (1.0 - e(-0.1)) + 100.0 * y510 * (1.0 - e(-3.9));
+    let expected = [
+        ("bell", 1.0),
+        ("mean_bell", 10.0 * std::f64::consts::PI.sqrt() / t),
+        ("square", t * t / 3.0),
+        ("product", 250_000.0),
+        ("wave", 0.5 - (2.0 * t).sin() / (4.0 * t)),
+        ("peak", y510),
+        ("least", y500),
+        ("mean_y", total / t),
+        ("share", 800.0 / 900.0),
+    ];
+    for (name, value) in expected {
+        let column = rows[0].iter().position(|head| head == name).expect("a column");
+        let found: f64 = rows[1][column].parse().expect("a number");
+        assert!((found / value - 1.0).abs() < 1e-7, "{name}: {found} instead of {value}");
+    }
+    let none = rows[0].iter().position(|head| head == "none").expect("a column");
+    assert_eq!(rows[1][none], "", "the root of what falls below zero has no mean");
+}

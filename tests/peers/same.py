@@ -21,8 +21,8 @@ Both builds work in copies of the texts with what lies beside them, so that impo
 of their own. What depends on the machine is not compared: what a search for a schedule had found when the clock cut it off, and
 numbers of threads. A crash or a timeout of both is said and counted; of one, it is a difference.
 
-The exit status is 0 if nothing differs, 1 if something does, 2 for bad usage. Texts that made a difference are kept, for edits
-with what was sent to come to it.
+The exit status is 0 if nothing differs, 1 if something does, 2 for bad usage. Texts that made a difference, or were too much for
+both, are kept, for edits with what was sent to come to it.
 """
 
 import argparse
@@ -589,7 +589,7 @@ def generated(bench, texts, count, seed):
         there = os.path.join(os.path.dirname(path), "same_generated.mtx")
         for side in bench.sides:
             (side.tree / there).write_bytes(text.encode())
-        before, shown = bench.tally.differences, bench.tally.shown
+        before, shown, noted = bench.tally.differences, bench.tally.shown, bench.tally.noted
         what = f"generated {number} with seed {seed}: {path} with {', '.join(made)}"
         ways = [["check", "--no-cache", "--format", "json", "--fidelity", "process"]]
         ways += [["check", "--no-cache", "--format", "json"]] if number % 10 == 0 else []
@@ -599,9 +599,9 @@ def generated(bench, texts, count, seed):
         ways += [["fmt", "--stdout"]] if number % 5 == 4 else []
         for way in ways:
             bench.compare(what, [*way, there], patience=SHORT, only=decided if way[0] == "plan" else lambda out: out)
-        if bench.tally.differences > before:
+        if bench.tally.differences > before or bench.tally.noted > noted:
             kept = bench.tally.keep(f"generated-{number}-{path}", text)
-            if bench.tally.shown > shown:
+            if bench.tally.shown > shown or bench.tally.noted > noted:
                 print(f"  kept as {kept}")
         for side in bench.sides:
             discard(side.tree / there)

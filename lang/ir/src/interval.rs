@@ -52,6 +52,15 @@ pub fn of_binary(op: BinaryOp, (a, b): Interval, (c, d): Interval) -> Interval {
     }
 }
 
+/// Whether a condition holds for all numbers within, or for none.
+pub fn decided(condition: Interval) -> Option<bool> {
+    match (holds(condition), fails(condition)) {
+        (true, _) => Some(true),
+        (_, true) => Some(false),
+        _ => None,
+    }
+}
+
 /// One of two intervals by a condition.
 pub fn of_select(condition: Interval, a: Interval, b: Interval) -> Interval {
     if holds(condition) {

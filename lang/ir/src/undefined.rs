@@ -1,5 +1,7 @@
 //! Numbers that are none: a quotient of nothing, the root of what is below zero.
 
+use std::collections::BTreeSet;
+
 use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp, apply};
 
 /// So many operations are followed where values are not known.
@@ -21,6 +23,96 @@ pub fn why(op: Op) -> &'static str {
         Op::Binary(BinaryOp::Pow, ..) => "a power that no number is",
         Op::Select(..) => "a table is read beyond its first or last point",
         _ => "it is too large, or endless less endless",
+    }
+}
+
+/// The comparisons of a graph whose sides may be no number: a quotient, a root, what a table says. They are neither true nor false then.
+#[derive(Clone, Debug, Default)]
+pub struct Doubts {
+    /// By operation, whether it rests on such a comparison.
+    rests: Vec<bool>,
+}
+
+impl Doubts {
+    /// Those of `graph`.
+    pub fn new(graph: &Graph) -> Doubts {
+        let (mut is_partial, mut rests) = (Vec::new(), Vec::new());
+        for op in graph.ops() {
+            let any = |marks: &[bool]| op.operands().any(|operand| marks[operand.0 as usize]);
+            let below = any(&is_partial);
+            rests.push(any(&rests) || (op.is_comparison() && below));
+            is_partial.push(below || has_gaps(graph, *op));
+        }
+        Doubts { rests }
+    }
+
+    /// Whether `node` may rest on a comparison that is neither true nor false.
+    pub fn concern(&self, node: NodeId) -> bool {
+        self.rests.get(node.0 as usize).copied().unwrap_or_default()
+    }
+
+    /// The operation that leaves a comparison on which `root` rests neither true nor false: it is no number, and its operands are. As
+    /// in [`undefined`] only what decides counts; what is endless is larger or smaller than any number. `value` gives the value of a node.
+    pub fn undecided(&self, graph: &Graph, root: NodeId, value: &dyn Fn(NodeId) -> f64) -> Option<NodeId> {
+        let (mut seen, mut todo) = (BTreeSet::new(), vec![root]);
+        while let Some(node) = todo.pop() {
+            if !self.concern(node) || !seen.insert(node) {
+                continue;
+            }
+            match graph.op(node) {
+                Op::Binary(op @ (BinaryOp::And | BinaryOp::Or), a, b) => {
+                    let alone = op == BinaryOp::Or;
+                    let found = [a, b].map(|part| self.undecided(graph, part, value));
+                    let decides = |part: NodeId| (value(part) != 0.0) == alone;
+                    let is_decided = (found[0].is_none() && decides(a)) || (found[1].is_none() && decides(b));
+                    match found[0].or(found[1]) {
+                        Some(found) if !is_decided => return Some(found),
+                        _ => {}
+                    }
+                }
+                Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq, a, b) => {
+                    if let Some(side) = [a, b].into_iter().find(|side| value(*side).is_nan()) {
+                        return Some(self.first_without(graph, side, value));
+                    }
+                    todo.extend([a, b]);
+                }
+                Op::Select(c, a, b) => match self.undecided(graph, c, value) {
+                    Some(found) => return Some(found),
+                    None => todo.push(if value(c) != 0.0 { a } else { b }),
+                },
+                op => todo.extend(op.operands()),
+            }
+        }
+        None
+    }
+
+    /// The operation below `node` that is no number, as `node` is, though its operands are.
+    fn first_without(&self, graph: &Graph, mut node: NodeId, value: &dyn Fn(NodeId) -> f64) -> NodeId {
+        loop {
+            let below = match graph.op(node) {
+                Op::Select(c, a, b) => {
+                    if let Some(found) = self.undecided(graph, c, value) {
+                        return found;
+                    }
+                    Some(if value(c) != 0.0 { a } else { b }).filter(|taken| !graph.is_gap(*taken))
+                }
+                op => op.operands().find(|operand| value(*operand).is_nan()),
+            };
+            let Some(below) = below else { return node };
+            node = below;
+        }
+    }
+}
+
+/// Whether an operation may be no number though its operands are.
+fn has_gaps(graph: &Graph, op: Op) -> bool {
+    match op {
+        Op::Unary(UnaryOp::Sqrt | UnaryOp::Ln, _) => true,
+        Op::Binary(BinaryOp::Div, a, b) => {
+            !(graph.constant(a).is_some_and(|a| a != 0.0) || graph.constant(b).is_some_and(|b| b != 0.0))
+        }
+        Op::Binary(BinaryOp::Pow, _, b) => graph.constant(b).is_none_or(|b| b.fract() != 0.0),
+        _ => graph.is_table(op),
     }
 }
 
@@ -130,5 +222,69 @@ mod tests {
     fn no_limit_is_a_value() {
         assert_eq!(graph(|_, x| x, f64::INFINITY), None);
         assert!(graph(|g, x| g.add(Op::Unary(UnaryOp::Sqrt, x)), -1.0).is_some());
+    }
+
+    fn undecided(build: impl FnOnce(&mut Graph, NodeId) -> NodeId, x: f64) -> Option<Op> {
+        let mut graph = Graph::default();
+        let state = graph.add(Op::State(0));
+        let root = build(&mut graph, state);
+        let env = Env { time: 0.0, states: &[x], params: &[], locals: &[], readings: &[] };
+        let doubts = Doubts::new(&graph);
+        doubts.undecided(&graph, root, &|n| graph.eval(n, env)).map(|n| graph.op(n))
+    }
+
+    fn root_below(g: &mut Graph, x: NodeId, most: f64) -> NodeId {
+        let (root, most) = (g.unary(UnaryOp::Sqrt, x), g.number(most));
+        g.add(Op::Binary(BinaryOp::Lt, root, most))
+    }
+
+    #[test]
+    fn a_condition_by_the_root_of_a_negative_number_is_not_decided() {
+        let not = |g: &mut Graph, x| {
+            let below = root_below(g, x, 2.0);
+            g.unary(UnaryOp::Not, below)
+        };
+        assert!(matches!(undecided(not, -1.0), Some(Op::Unary(UnaryOp::Sqrt, _))));
+        assert_eq!(undecided(not, 1.0), None);
+        // In a number that a condition picks, which is finite either way.
+        let rate = |g: &mut Graph, x| {
+            let (below, one, two) = (root_below(g, x, 2.0), g.number(1.0), g.number(2.0));
+            let picked = g.select(below, one, two);
+            g.binary(BinaryOp::Add, picked, two)
+        };
+        assert!(undecided(rate, -1.0).is_some());
+        assert_eq!(undecided(rate, 4.0), None);
+    }
+
+    #[test]
+    fn one_part_may_decide_whichever_stands_first() {
+        for is_first in [true, false] {
+            let both = |op, least: f64| {
+                move |g: &mut Graph, x: NodeId| {
+                    let (root, least) = (root_below(g, x, 2.0), g.number(least));
+                    let above = g.add(Op::Binary(BinaryOp::Lt, least, x));
+                    if is_first { g.binary(op, root, above) } else { g.binary(op, above, root) }
+                }
+            };
+            assert_eq!(undecided(both(BinaryOp::And, 0.0), -1.0), None, "false and unknown is false");
+            assert!(undecided(both(BinaryOp::And, -2.0), -1.0).is_some(), "true and unknown is unknown");
+            assert_eq!(undecided(both(BinaryOp::Or, -2.0), -1.0), None, "true or unknown is true");
+            assert!(undecided(both(BinaryOp::Or, 0.0), -1.0).is_some(), "false or unknown is unknown");
+        }
+    }
+
+    #[test]
+    fn what_is_endless_is_larger_than_any_number() {
+        let large = |g: &mut Graph, x| {
+            let (q, three) = (reciprocal(g, x), g.number(3.0));
+            g.add(Op::Binary(BinaryOp::Lt, three, q))
+        };
+        assert_eq!(undecided(large, 0.0), None);
+        let share = |g: &mut Graph, x| {
+            let (q, half) = (g.binary(BinaryOp::Div, x, x), g.number(0.5));
+            g.add(Op::Binary(BinaryOp::Lt, half, q))
+        };
+        assert!(undecided(share, 0.0).is_some());
+        assert_eq!(undecided(share, 1.0), None);
     }
 }

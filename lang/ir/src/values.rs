@@ -3,6 +3,7 @@
 mod lazy;
 
 use crate::graph::{BinaryOp, Graph, NodeId, Op, UnaryOp, binary, unary};
+use crate::interval::{Interval, decided, of_binary, of_select, of_unary};
 
 use lazy::Skip;
 
@@ -44,6 +45,33 @@ impl<L: Fn(Op) -> Option<f64>> Rules for Numbers<L> {
 
     fn truth(&self, condition: f64) -> Option<bool> {
         Some(condition != 0.0)
+    }
+}
+
+/// Bounds of what numbers within bounds give, with those of operations without operands.
+pub struct Bounds<L>(pub L);
+
+impl<L: Fn(Op) -> Interval> Rules for Bounds<L> {
+    type Value = Interval;
+
+    fn leaf(&self, op: Op) -> Option<Interval> {
+        Some(self.0(op))
+    }
+
+    fn unary(&self, op: UnaryOp, a: Interval) -> Option<Interval> {
+        Some(of_unary(op, a))
+    }
+
+    fn binary(&self, op: BinaryOp, a: Interval, b: Interval) -> Option<Interval> {
+        Some(of_binary(op, a, b))
+    }
+
+    fn truth(&self, condition: Interval) -> Option<bool> {
+        decided(condition)
+    }
+
+    fn either(&self, condition: Interval, a: Interval, b: Interval) -> Option<Interval> {
+        Some(of_select(condition, a, b))
     }
 }
 

@@ -332,31 +332,33 @@ impl<'m> Sim<'m> {
         Ok(ticket)
     }
 
-    /// What is worth waiting for, or `None` if the operation is over.
-    fn pending(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Option<Status> {
+    /// What is worth waiting for, or `None` if the operation is over. Fails where what it waits for has no value.
+    fn pending(&mut self, ticket: Ticket, out: &mut dyn Listener) -> Result<Option<Status>, Fault> {
         let now = self.engine.time();
-        let (condition, periods) = match &self.running.get(&ticket)?.ends {
-            Ends::At(at) if now >= *at => return None,
-            Ends::At(at) => return Some(Status::Running { until: Some(*at), watch: None }),
-            Ends::Failed(..) => return None,
-            Ends::Blocked { until, .. } => {
-                return Some(Status::Running { until: Some((now + PATIENCE).min(*until)), watch: None });
+        let until = |time| Ok(Some(Status::Running { until: Some(time), watch: None }));
+        let (condition, periods) = match self.running.get(&ticket).map(|running| &running.ends) {
+            None | Some(Ends::Failed(..)) => return Ok(None),
+            Some(Ends::At(at)) if now >= *at => return Ok(None),
+            Some(Ends::At(at)) => return until(*at),
+            Some(Ends::Blocked { until: at, .. }) => return until((now + PATIENCE).min(*at)),
+            Some(Ends::When(node)) => {
+                self.engine.defined(*node)?;
+                let waits = !self.engine.truth(*node);
+                return Ok(waits.then_some(Status::Running { until: None, watch: Some(*node) }));
             }
-            Ends::When(node) if self.engine.truth(*node) => return None,
-            Ends::When(node) => return Some(Status::Running { until: None, watch: Some(*node) }),
-            Ends::Polled { next, .. } if now < *next => {
-                return Some(Status::Running { until: Some(*next), watch: None });
-            }
-            Ends::Polled { condition, periods, .. } => (*condition, periods.clone()),
+            Some(Ends::Polled { next, .. }) if now < *next => return until(*next),
+            Some(Ends::Polled { condition, periods, .. }) => (*condition, periods.clone()),
         };
-        if self.measure(condition, out) != 0.0 {
-            return None;
+        let value = self.measure(condition, out);
+        self.engine.defined(condition)?;
+        if value != 0.0 {
+            return Ok(None);
         }
         let next = next_report(&periods, now);
         if let Some(running) = self.running.get_mut(&ticket) {
             running.ends = Ends::Polled { condition, periods, next };
         }
-        Some(Status::Running { until: Some(next), watch: None })
+        until(next)
     }
 }
 
@@ -419,7 +421,7 @@ impl Backend for Sim<'_> {
         {
             running.ends = Ends::Failed("collision".to_string(), text);
         }
-        if let Some(status) = self.pending(ticket, out) {
+        if let Some(status) = self.pending(ticket, out)? {
             return Ok(status);
         }
         if let Some(running) = self.running.remove(&ticket) {

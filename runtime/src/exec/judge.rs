@@ -44,7 +44,7 @@ impl Raised {
 impl Executor<'_, '_> {
     /// Whether a condition holds, with readings sampled now; `None` if it cannot be known.
     pub(super) fn holds(&mut self, condition: &Condition) -> Result<Option<bool>, Fault> {
-        let value = self.true_value(condition.node).map_err(|f| at(f, condition.span))?;
+        let value = self.defined_value(condition.node).map_err(|f| at(f, condition.span))?;
         Ok(value.map(truth))
     }
 
@@ -59,13 +59,13 @@ impl Executor<'_, '_> {
 
     /// Whether a followed condition holds now.
     pub(super) fn follower_holds(&mut self, follower: &Follower) -> Result<bool, Fault> {
-        Ok(self.true_value(follower.node())?.is_none_or(truth))
+        Ok(self.defined_value(follower.node())?.is_none_or(truth))
     }
 
-    /// The value of a condition; fails where it holds by a number that is none.
-    fn true_value(&mut self, node: NodeId) -> Result<Option<f64>, Fault> {
+    /// The value of a condition; fails where a number that is none decides.
+    fn defined_value(&mut self, node: NodeId) -> Result<Option<f64>, Fault> {
         let value = self.backend.value(node, self.out)?;
-        if value.is_some_and(truth) {
+        if value.is_some() {
             self.backend.defined(node)?;
         }
         Ok(value)

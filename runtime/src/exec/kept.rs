@@ -14,7 +14,11 @@ impl Executor<'_, '_> {
     pub(super) fn limits_broken(&mut self, limits: &[u32]) {
         for &index in limits {
             let Some(id) = self.in_hand(index) else { continue };
-            self.limit_fails(id, index);
+            let node = self.plan.limits.get(index as usize).map(|limit| limit.condition.node);
+            match node.map_or(Ok(()), |node| self.backend.defined(node)) {
+                Ok(()) => self.limit_fails(id, index),
+                Err(fault) => self.fault(id, fault),
+            }
             self.drain();
         }
     }

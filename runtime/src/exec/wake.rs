@@ -213,6 +213,7 @@ impl Executor<'_, '_> {
         fired: &[NodeId],
     ) -> Result<Option<bool>, Fault> {
         if fired.contains(&follower.node()) {
+            self.backend.defined(follower.node())?;
             return Ok(Some(value));
         }
         if self.state.now < follower.next {

@@ -38,8 +38,7 @@ impl Engine<'_> {
                 self.check_suspects()?;
                 return Ok(Advance::Broken(broken));
             }
-            let held: Vec<usize> =
-                (0..watches.len()).filter(|&i| self.truth(watches[i].node) == watches[i].value).collect();
+            let held: Vec<usize> = (0..watches.len()).filter(|&i| self.ends(watches[i])).collect();
             if !held.is_empty() {
                 self.check_suspects()?;
                 return Ok(Advance::Watch(held));
@@ -66,6 +65,11 @@ impl Engine<'_> {
                 return Ok(Advance::Watch(Vec::new()));
             }
         }
+    }
+
+    /// Whether the caller has to look at what it waits for: it has come about, or cannot be told any more.
+    fn ends(&self, watch: Watch) -> bool {
+        self.truth(watch.node) == watch.value || self.is_undecided(watch.node)
     }
 
     /// Looks out for these conditions from now on, and for no others that the caller asked for.

@@ -5,7 +5,7 @@
 
 use matterix_ir::model::{Balance, Contribution, Derivative, Doubt, Flow};
 use matterix_ir::undefined::{self, undefined};
-use matterix_ir::{NodeId, Op, Span, codes};
+use matterix_ir::{NodeId, Span, codes};
 
 use super::Engine;
 use super::integrator::Stuck;
@@ -76,22 +76,8 @@ impl<'m> Engine<'m> {
         Err(Fault::new(codes::NOT_A_NUMBER, self.time, message))
     }
 
-    /// Fails where what a condition of `law` asks for is read off a table beyond its ends: it is neither true nor false then.
-    pub(super) fn within_tables(&self, condition: NodeId, law: &str, span: Span) -> Result<(), Fault> {
-        if !self.tables.contains(&condition) {
-            return Ok(());
-        }
-        match undefined(&self.model.graph, condition, &mut |n| Some(self.eval(n))) {
-            Some(operation) if matches!(self.model.graph.op(operation), Op::Select(..)) => {
-                let headline = "the condition has no value".to_owned();
-                Err(self.without_value(headline, operation, Some(law), span))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// A fault at `span` whose cause is the operation below `root` that leaves it without a value, which `law` says.
-    fn without_value(&self, headline: String, root: NodeId, law: Option<&str>, span: Span) -> Fault {
+    pub(super) fn without_value(&self, headline: String, root: NodeId, law: Option<&str>, span: Span) -> Fault {
         let within = law.map_or(String::new(), |law| format!(" in `{law}`"));
         let Some(operation) = self.failing(root) else {
             let message = if within.is_empty() { headline } else { format!("{headline}{within}") };

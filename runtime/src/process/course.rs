@@ -166,6 +166,11 @@ impl Course {
         self.parts.get(*self.part_of.get(state as usize)?).filter(|part| !part.is_broken)
     }
 
+    /// The part whose present step a state has followed, even if it was set from outside since.
+    pub(super) fn followed(&self, state: u32) -> Option<&Part> {
+        self.parts.get(*self.part_of.get(state as usize)?)
+    }
+
     /// The roots that look out for something that rests on a part.
     pub(super) fn noticing(&mut self, part: u32) -> &mut BTreeSet<u32> {
         let at = part as usize;

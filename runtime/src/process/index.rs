@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::model::Model;
+use matterix_ir::undefined::Doubts;
 use matterix_ir::{Graph, NodeId, Op};
 
 /// What a part of the graph decides.
@@ -92,6 +93,8 @@ pub(super) struct Index {
     /// Readings with their operations, in order.
     readings: Vec<(u32, NodeId)>,
     walk: Walk,
+    /// The comparisons that may be neither true nor false.
+    pub(super) doubts: Doubts,
 }
 
 impl Index {
@@ -135,6 +138,7 @@ impl Index {
             locals,
             readings,
             walk,
+            doubts: Doubts::new(graph),
         }
     }
 

@@ -54,7 +54,7 @@ impl Engine<'_> {
         self.digest();
         for event in std::mem::take(&mut self.due.events) {
             let of = &self.model.events[event as usize];
-            self.within_tables(of.when, &of.name, of.span)?;
+            self.decided(of.when, &of.name, of.span)?;
             let now = self.truth(of.when);
             if !now {
                 self.armed[event as usize] = false;
@@ -86,7 +86,7 @@ impl Engine<'_> {
         for process in std::mem::take(&mut self.due.processes) {
             let i = process as usize;
             let of = &self.model.processes[i];
-            of.guard.map_or(Ok(()), |guard| self.within_tables(guard, &of.name, of.span))?;
+            of.guard.map_or(Ok(()), |guard| self.decided(guard, &of.name, of.span))?;
             let running = of.guard.is_none_or(|g| self.truth(g));
             if running != self.running[i] {
                 self.running[i] = running;

@@ -149,7 +149,7 @@ impl<'m> Engine<'m> {
         let mut found = Vec::new();
         for i in due {
             let Some(node) = self.limits.all.and_then(|all| all.node(i)) else { continue };
-            let holds = self.truth(node);
+            let holds = self.truth(node) && !self.is_undecided(node);
             let before = std::mem::replace(&mut self.limits.broken[i as usize], !holds);
             if !holds && !before {
                 found.push(i);

@@ -19,6 +19,7 @@
 //! - `suspicion`: what laws and effects may do to sums and temperatures that must not be.
 //! - `blame`, `words`: which law is at fault where a run cannot go on, in words.
 //! - `advance`, `instant`: the loop over what happens, and what happens at one instant.
+//! - `undecided`: conditions that are neither true nor false.
 //! - `memo`: values at one instant.
 
 mod advance;
@@ -54,6 +55,7 @@ mod tape;
 mod tests;
 mod timed;
 mod tolerance;
+mod undecided;
 mod words;
 
 use std::cell::RefCell;
@@ -61,6 +63,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use matterix_ir::graph::Env;
+use matterix_ir::interval::Interval;
 use matterix_ir::model::{Action, Model};
 use matterix_ir::{NodeId, Op};
 
@@ -112,6 +115,8 @@ pub trait Observer {
     /// Within a step of a part, where [`Options::curves`] asks for it: states, ascending, that are on a curve there. Straight lines between
     /// all that is shown of a state lie close to it.
     fn curve(&mut self, _time: f64, _engine: &Engine<'_>, _changed: &[u32]) {}
+    /// What these states, ascending, have followed since they were last shown is looked at no more: [`Engine::leaf_at`] will not know it.
+    fn leaves(&mut self, _time: f64, _engine: &Engine<'_>, _states: &[u32]) {}
     /// An event has fired, by its index in the model.
     fn event(&mut self, time: f64, event: usize);
     /// A process has begun or ceased to run, by its index in the model.
@@ -178,8 +183,6 @@ pub struct Engine<'m> {
     sizes: Vec<f64>,
     /// Set from outside to leave off early, once.
     cancel: Option<&'m AtomicBool>,
-    /// Conditions of events and processes that tables stand in.
-    tables: BTreeSet<NodeId>,
     /// Truth of each event's condition when last looked at.
     armed: Vec<bool>,
     /// Which processes run.
@@ -219,7 +222,6 @@ impl<'m> Engine<'m> {
             suspects: Vec::new(),
             sizes: vec![0.0; model.states.len()],
             cancel: None,
-            tables: with_tables(model),
             armed: vec![false; model.events.len()],
             running: vec![false; model.processes.len()],
             touches: Vec::new(),
@@ -373,6 +375,30 @@ impl<'m> Engine<'m> {
         }
     }
 
+    /// The value of an operation without operands at a time, s, since the states below it were last shown.
+    pub(crate) fn leaf_at(&self, op: Op, time: f64) -> f64 {
+        match op {
+            Op::Time => time,
+            Op::State(state) => {
+                let passed = self.course.followed(state).map(|part| part.value_at(state, time));
+                passed.unwrap_or_else(|| self.leaf(op))
+            }
+            other => self.leaf(other),
+        }
+    }
+
+    /// Its bounds over a piece of that time.
+    pub(crate) fn leaf_over(&self, op: Op, piece: Interval) -> Interval {
+        match op {
+            Op::Time => piece,
+            Op::State(state) => {
+                let passed = self.course.followed(state).map(|part| part.value_over(state, piece));
+                passed.unwrap_or_else(|| (self.leaf(op), self.leaf(op)))
+            }
+            other => (self.leaf(other), self.leaf(other)),
+        }
+    }
+
     /// Whether an equality is true now that is true at this instant only.
     pub(crate) fn is_touching(&self) -> bool {
         !self.touches.is_empty()
@@ -450,15 +476,4 @@ impl<'m> Engine<'m> {
         }
         Ok(())
     }
-}
-
-/// Conditions of events and processes that a table stands in: what it is beyond its ends is not a number.
-fn with_tables(model: &Model) -> BTreeSet<NodeId> {
-    let graph = &model.graph;
-    if !graph.ops().iter().any(|op| graph.is_table(*op)) {
-        return BTreeSet::new();
-    }
-    let guards = model.processes.iter().filter_map(|process| process.guard);
-    let all = model.events.iter().map(|event| event.when).chain(guards);
-    all.filter(|condition| graph.schedule([*condition]).iter().any(|n| graph.is_table(graph.op(*n)))).collect()
 }

@@ -3,8 +3,11 @@
 use std::collections::VecDeque;
 
 use matterix_ir::NodeId;
+use matterix_ir::interval::Interval;
+use nalgebra::Vector6;
 
-use super::dense::Dense;
+use super::bernstein::control;
+use super::dense::{Dense, POINTS};
 use super::integrator::{Integrator, Next, Stuck};
 use super::mode::Piece;
 use super::suspicion::{Scarce, first_drained};
@@ -141,6 +144,20 @@ impl Part {
         let mut value = [0.0];
         self.leg.dense.some(local, &[self.place(state)], &mut value);
         Some(value[0])
+    }
+
+    /// What a state was at the lab time `time`, s, within the present step.
+    pub(super) fn value_at(&self, state: u32, time: f64) -> f64 {
+        let dense = &self.leg.dense;
+        let mut value = [0.0];
+        dense.some(dense.clock.local(time).clamp(dense.start, dense.end), &[self.place(state)], &mut value);
+        value[0]
+    }
+
+    /// Bounds of a state over a piece of lab time, s, within the present step.
+    pub(super) fn value_over(&self, state: u32, (from, to): Interval) -> Interval {
+        let points = control(Vector6::from_fn(|k, _| self.value_at(state, from + POINTS[k] * (to - from))));
+        (points.min(), points.max())
     }
 
     /// Its integration is given up: what states were worth is kept in `sizes`.

@@ -91,7 +91,8 @@ impl Engine<'_> {
         let mut concerned = std::mem::take(&mut self.due.law);
         let mut facts = std::mem::take(&mut self.facts);
         let region = self.look(&mut facts, &concerned.roots);
-        let done = self.rebuild(&facts, &mut concerned, &region);
+        let decided = region.roots.iter().try_for_each(|root| self.decided_at(*root));
+        let done = decided.and_then(|()| self.rebuild(&facts, &mut concerned, &region, observer));
         self.facts = facts;
         done?;
         self.show(observer);
@@ -146,9 +147,19 @@ impl Engine<'_> {
     }
 
     /// Takes what moves apart anew where its law is another one, and looks out for what may end it.
-    fn rebuild(&mut self, facts: &Facts, concerned: &mut Concerned, region: &Region) -> Result<(), Fault> {
+    fn rebuild(
+        &mut self,
+        facts: &Facts,
+        concerned: &mut Concerned,
+        region: &Region,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Fault> {
         let known = facts.of(&self.model.graph);
         let pieces = self.pieces(facts, known, concerned, region);
+        for part in concerned.broken.union(&concerned.parts) {
+            let moving = self.course.parts.get(*part).map_or(&[][..], Part::moving);
+            observer.leaves(self.time, self, moving);
+        }
         for piece in self.retire(pieces, concerned) {
             let part = self.begin(piece)?;
             self.settle_in(part, concerned);

@@ -55,8 +55,10 @@ struct Switch {
 }
 
 impl Switch {
+    /// Whether it has another truth than it had, or none any more.
     fn changed(&self, left: f64, right: f64) -> bool {
         match self.op {
+            _ if left.is_nan() || right.is_nan() => true,
             BinaryOp::Eq if !self.truth => (left - right) * self.side <= 0.0,
             op => (binary(op, left, right) != 0.0) != self.truth,
         }
@@ -84,7 +86,8 @@ impl Switch {
     }
 
     fn clearly_changed(&self, left: f64, right: f64) -> bool {
-        self.changed(left, right) && (left - right).abs() > NOISE * left.abs().max(right.abs())
+        let is_noise = (left - right).abs() <= NOISE * left.abs().max(right.abs());
+        self.changed(left, right) && !is_noise
     }
 }
 
@@ -161,6 +164,10 @@ impl Switches {
         let mut sides = Vec::new();
         for &node in nodes {
             let Op::Binary(op, a, b) = analysis.op(node) else { continue };
+            // It has no truth now. Something else decides, or the run would have ended; and what that is will be seen to change.
+            if now(a).is_nan() || now(b).is_nan() {
+                continue;
+            }
             let side = if op == BinaryOp::Eq { side(now(a), now(b)) } else { 0.0 };
             let switch = Switch { node, op, truth: analysis.now(node) != 0.0, side };
             if moving.is_empty()

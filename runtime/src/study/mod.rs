@@ -3,6 +3,7 @@
 mod design;
 mod human;
 mod pool;
+mod stretch;
 mod summary;
 mod table;
 mod watch;
