@@ -14,7 +14,10 @@ fn what_lasts_a_moment_is_not_stepped_over() {
 
 #[test]
 fn what_passes_between_two_steps_is_seen() {
-    pass_cases("numerics/passing.mtx", &["meets_a_bell", "meets_a_moment", "adds_up_beside_others"]);
+    pass_cases(
+        "numerics/passing.mtx",
+        &["meets_a_bell", "meets_a_moment", "adds_up_beside_others", "meets_beside_others"],
+    );
     let (code, text) = run_case("numerics/passing.mtx", "is_dangerous_for_a_second", &[]);
     assert!(code == 1 && text.contains("between_two") && text.contains("at 100 s"), "{text}");
 }
@@ -38,6 +41,11 @@ fn no_run_goes_on_by_a_condition_that_has_lost_its_value() {
         let (code, text) = run_case(file, workflow, &[]);
         assert!(code == 1 && text.contains("error[not-a-number]") && text.contains(at), "{text}");
     }
+}
+
+#[test]
+fn whole_numbers_of_what_moves_go_up_and_down_in_steps() {
+    pass_cases("numerics/stairs.mtx", &["go"]);
 }
 
 #[test]

@@ -47,6 +47,11 @@ impl UnaryOp {
         [Neg, Not, Exp, Ln, Sqrt, Abs, Sin, Cos, Atan, Floor]
     };
 
+    /// Whether its value goes from one to another in jumps, as a comparison's does.
+    pub fn is_stepwise(self) -> bool {
+        self == UnaryOp::Floor
+    }
+
     /// Whether it may turn as often as it likes while its operand goes one way.
     pub fn is_wave(self) -> bool {
         matches!(self, UnaryOp::Sin | UnaryOp::Cos | UnaryOp::Floor)
@@ -128,6 +133,11 @@ impl Op {
     /// Whether this compares two numbers, so that its value jumps where they cross.
     pub fn is_comparison(&self) -> bool {
         matches!(self, Op::Binary(BinaryOp::Lt | BinaryOp::Le | BinaryOp::Eq, _, _))
+    }
+
+    /// Whether its value goes from one to another in jumps.
+    pub fn is_stepwise(&self) -> bool {
+        self.is_comparison() || matches!(self, Op::Unary(op, _) if op.is_stepwise())
     }
 }
 

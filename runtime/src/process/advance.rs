@@ -249,7 +249,7 @@ impl Engine<'_> {
         }
         let suspects = std::mem::take(&mut self.suspects);
         let known = self.facts.of(&self.model.graph);
-        let changed = |node: &NodeId| self.truth(*node) != (known.now(*node) != 0.0);
+        let changed = |node: &NodeId| self.eval(*node) != known.now(*node);
         let changed: Vec<NodeId> = suspects.into_iter().filter(changed).collect();
         self.due.seeds.extend(changed);
         self.due.seeds.extend(found.iter().map(|crossing| crossing.node));

@@ -1,6 +1,6 @@
 //! What each operation of the graph is between two discontinuities: a constant, or something that varies.
 //!
-//! Between them comparisons keep the truth they had at the first. Whatever follows from them, from parameters and
+//! Between them comparisons keep the truth they had at the first, and whole numbers their value. Whatever follows from them, from parameters and
 //! from states at rest is a constant then; the rest is put on a [`Tape`]. A discontinuity concerns some of the law only: there
 //! facts are looked at anew, all others stand.
 
@@ -49,6 +49,18 @@ impl Fact {
 pub(super) struct Clock {
     pub(super) rate: f64,
     pub(super) offset: f64,
+}
+
+impl Clock {
+    /// One that stands.
+    pub(super) fn standing(offset: f64) -> Clock {
+        Clock { rate: 0.0, offset }
+    }
+
+    /// What it shows at `time`, s.
+    pub(super) fn at(&self, time: f64) -> f64 {
+        self.rate * time + self.offset
+    }
 }
 
 /// The facts about the operations of a graph, as they were last looked at.
@@ -133,7 +145,7 @@ impl Facts {
     }
 
     /// Looks at all that `roots` depend on, once an instant, when the states marked in `moving` change with time. Returns the
-    /// comparisons whose truth is another one than it was.
+    /// comparisons and whole numbers that are others than they were.
     pub(super) fn look(
         &mut self,
         graph: &Graph,
@@ -160,7 +172,7 @@ impl Facts {
             if is_other || was.live != is.live || self.rests_on_altered(graph, node) {
                 self.altered[at] = self.instant;
             }
-            if looked != 0 && is_other && graph.op(node).is_comparison() {
+            if looked != 0 && is_other && graph.op(node).is_stepwise() {
                 flipped.push(node);
             }
         }
@@ -218,7 +230,10 @@ impl Analysis<'_> {
         match op {
             Op::Time => (fact.varies, fact.feels_time) = (true, true),
             Op::State(s) if moving[s as usize] => (fact.varies, fact.feels_state) = (true, true),
-            Op::Unary(_, a) => fact.rest_on(self.fact(a)),
+            Op::Unary(kind, a) => {
+                fact.rest_on(self.fact(a));
+                fact.varies &= !kind.is_stepwise();
+            }
             Op::Binary(kind, a, b) => {
                 let (a, b) = (self.fact(a), self.fact(b));
                 fact.rest_on(a);
@@ -257,7 +272,7 @@ impl Analysis<'_> {
         }
     }
 
-    /// The value when it was last looked at: of what does not vary, and of comparisons, that is its value now.
+    /// The value when it was last looked at: of what does not vary, and of what goes in jumps, that is its value now.
     pub(super) fn now(&self, node: NodeId) -> f64 {
         self.fact(node).now
     }
@@ -286,7 +301,7 @@ impl Analysis<'_> {
         self.fact(node).varies
     }
 
-    /// The comparisons that may change and whose change `roots` would notice, in order.
+    /// The comparisons and whole numbers that may change and whose change `roots` would notice, in order.
     pub(super) fn switches(&self, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
         let scratch = &mut *self.scratch.borrow_mut();
         scratch.begin(self.facts.len());
@@ -297,7 +312,7 @@ impl Analysis<'_> {
             if !(fact.feels_time || fact.feels_state) || !scratch.is_new(node.0 as usize) {
                 continue;
             }
-            found.extend(Some(node).filter(|n| self.graph.op(*n).is_comparison()));
+            found.extend(Some(node).filter(|n| self.graph.op(*n).is_stepwise()));
             todo.extend(self.influences(node));
         }
         found.sort_unstable();
@@ -329,7 +344,7 @@ impl Analysis<'_> {
     /// The number as a clock, if it is one.
     pub(super) fn clock(&self, node: NodeId) -> Option<Clock> {
         if !self.fact(node).varies {
-            return Some(Clock { rate: 0.0, offset: self.now(node) });
+            return Some(Clock::standing(self.now(node)));
         }
         let node = NodeId(self.fact(node).same);
         match self.graph.op(node) {

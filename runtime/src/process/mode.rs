@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::{NodeId, Op};
+use matterix_ir::NodeId;
 use rustc_hash::FxHashMap;
 
 use super::analysis::Analysis;
@@ -163,13 +163,13 @@ impl PartsBelow {
     }
 }
 
-/// The moving states that comparisons rest on, ascending.
+/// The moving states that comparisons and whole numbers rest on, ascending.
 pub(super) fn rested_on(analysis: Analysis<'_>, comparisons: &[NodeId]) -> Vec<u32> {
     let sides: Vec<NodeId> = comparisons.iter().flat_map(|node| analysis.op(*node).operands()).collect();
     analysis.states_below(&sides)
 }
 
-/// Comparisons by the parts that they rest on; those that cannot change as they are now are left out.
+/// Comparisons and whole numbers by the parts that they rest on; those that cannot change as they are now are left out.
 pub(super) fn groups(
     analysis: Analysis<'_>,
     nodes: &[NodeId],
@@ -178,12 +178,12 @@ pub(super) fn groups(
 ) -> Vec<(Vec<u32>, Vec<NodeId>)> {
     let mut found: BTreeMap<Vec<u32>, Vec<NodeId>> = BTreeMap::new();
     for &node in nodes {
-        let Op::Binary(_, a, b) = analysis.op(node) else { continue };
-        if !(analysis.varies(a) || analysis.varies(b)) {
+        let sides = analysis.op(node).operands();
+        if !sides.clone().any(|side| analysis.varies(side)) {
             continue;
         }
-        let [one, other] = [a, b].map(|side| below.of(analysis, side, part_of));
-        let parts = match one.and(other) {
+        let parts = sides.map(|side| below.of(analysis, side, part_of)).fold(Parts::None, Parts::and);
+        let parts = match parts {
             Parts::None => Vec::new(),
             Parts::One(part) => vec![part],
             Parts::Several => {

@@ -1,4 +1,4 @@
-//! Comparisons whose truth may change: watched while a segment is integrated, and located when they do.
+//! Comparisons whose truth may change, and numbers whose whole part may: watched while a segment is integrated, and located when they do.
 
 use matterix_ir::graph::binary;
 use matterix_ir::interval::Interval;
@@ -44,54 +44,96 @@ const FINEST: f64 = 1e-12;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unseen(pub(super) NodeId);
 
-/// A comparison and the truth it has within the segment.
+/// What goes in jumps, and what it is within the segment.
 #[derive(Clone, Debug, PartialEq)]
 struct Switch {
     node: NodeId,
-    op: BinaryOp,
-    truth: bool,
-    /// Of an equality, the sign of left minus right at the start: it is crossed where that changes.
-    side: f64,
+    is: Is,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Is {
+    /// A comparison. Of an equality `side` is the sign of left minus right at the start: it is crossed where that changes.
+    Compared { op: BinaryOp, truth: bool, side: f64 },
+    /// The largest whole number not above left.
+    Whole(f64),
 }
 
 impl Switch {
+    /// Of an operation of these sides; none where it is no such, or has no value now.
+    fn new(analysis: Analysis<'_>, node: NodeId, now: &dyn Fn(NodeId) -> f64) -> Option<(Switch, (NodeId, NodeId))> {
+        let (is, sides) = match analysis.op(node) {
+            Op::Binary(op, a, b) => {
+                let side = if op == BinaryOp::Eq { side(now(a), now(b)) } else { 0.0 };
+                (Is::Compared { op, truth: analysis.now(node) != 0.0, side }, (a, b))
+            }
+            Op::Unary(op, a) if op.is_stepwise() => (Is::Whole(analysis.now(node)), (a, a)),
+            _ => return None,
+        };
+        // Where it has no value something else decides, or the run would have ended; and what that is will be seen to change.
+        let has_value = !now(sides.0).is_nan() && !now(sides.1).is_nan();
+        has_value.then_some((Switch { node, is }, sides))
+    }
+
+    /// Whether it is true for one instant, at which it changes.
+    fn touches(&self) -> bool {
+        matches!(self.is, Is::Compared { op: BinaryOp::Eq, truth: false, .. })
+    }
+
     /// Whether it has another truth than it had, or none any more.
     fn changed(&self, left: f64, right: f64) -> bool {
-        match self.op {
+        match self.is {
             _ if left.is_nan() || right.is_nan() => true,
-            BinaryOp::Eq if !self.truth => (left - right) * self.side <= 0.0,
-            op => (binary(op, left, right) != 0.0) != self.truth,
+            Is::Compared { op: BinaryOp::Eq, truth: false, side } => (left - right) * side <= 0.0,
+            Is::Compared { op, truth, .. } => (binary(op, left, right) != 0.0) != truth,
+            Is::Whole(number) => left.floor() != number,
         }
     }
 
     /// The sign that left minus right has while the comparison keeps its truth; none where it is true at one instant only.
     fn keeps(&self) -> Option<f64> {
-        match self.op {
-            BinaryOp::Lt | BinaryOp::Le => Some(if self.truth { -1.0 } else { 1.0 }),
-            _ if self.truth || self.side == 0.0 => None,
-            _ => Some(self.side),
+        match self.is {
+            Is::Compared { op: BinaryOp::Lt | BinaryOp::Le, truth, .. } => Some(if truth { -1.0 } else { 1.0 }),
+            Is::Compared { truth: false, side, .. } if side != 0.0 => Some(side),
+            Is::Compared { .. } | Is::Whole(_) => None,
         }
     }
 
-    /// Whether it keeps its truth while its sides are within these bounds.
+    /// Whether it stays as it is while its sides are within these bounds.
     fn stays(&self, (a, b): Interval, (c, d): Interval) -> bool {
-        match self.op {
-            BinaryOp::Lt if self.truth => b < c,
-            BinaryOp::Lt => a >= d,
-            BinaryOp::Le if self.truth => b <= c,
-            BinaryOp::Le => a > d,
+        match self.is {
+            Is::Compared { op: BinaryOp::Lt, truth, .. } => {
+                if truth {
+                    b < c
+                } else {
+                    a >= d
+                }
+            }
+            Is::Compared { op: BinaryOp::Le, truth, .. } => {
+                if truth {
+                    b <= c
+                } else {
+                    a > d
+                }
+            }
             // An equality that does not hold is crossed where the sides change places.
-            _ => b < c || a > d,
+            Is::Compared { .. } => b < c || a > d,
+            Is::Whole(number) => number <= a && b < number + 1.0,
         }
     }
 
     fn clearly_changed(&self, left: f64, right: f64) -> bool {
-        let is_noise = (left - right).abs() <= NOISE * left.abs().max(right.abs());
+        let apart = match self.is {
+            Is::Compared { .. } => left - right,
+            Is::Whole(number) if left < number => left - number,
+            Is::Whole(number) => left - (number + 1.0),
+        };
+        let is_noise = apart.abs() <= NOISE * left.abs().max(right.abs());
         self.changed(left, right) && !is_noise
     }
 }
 
-/// Left minus right of a comparison at the points of a piece.
+/// Left minus right of a comparison at the points of a piece, or left minus what it is of a whole number.
 #[derive(Clone, Copy, Debug, Default)]
 struct Apart {
     by: Vector6<f64>,
@@ -163,13 +205,7 @@ impl Switches {
         let mut switches = Switches::none();
         let mut sides = Vec::new();
         for &node in nodes {
-            let Op::Binary(op, a, b) = analysis.op(node) else { continue };
-            // It has no truth now. Something else decides, or the run would have ended; and what that is will be seen to change.
-            if now(a).is_nan() || now(b).is_nan() {
-                continue;
-            }
-            let side = if op == BinaryOp::Eq { side(now(a), now(b)) } else { 0.0 };
-            let switch = Switch { node, op, truth: analysis.now(node) != 0.0, side };
+            let Some((switch, (a, b))) = Switch::new(analysis, node, now) else { continue };
             if moving.is_empty()
                 && let Some(stop) = stop(&analysis, (a, b), &switch, time)
             {
@@ -263,9 +299,8 @@ impl Switches {
         }
         let first = located.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         Ok(first.map(|(time, i)| {
-            let Switch { node, op, truth, .. } = self.list[i];
             let time = self.settled(i, time, to, moving, path);
-            Crossing { time, node, touch: op == BinaryOp::Eq && !truth }
+            Crossing { time, node: self.list[i].node, touch: self.list[i].touches() }
         }))
     }
 
@@ -292,7 +327,10 @@ impl Switches {
             self.tape.run(self.clock.lab(instant(piece, share)), &self.ends[k], &mut self.registers);
             for (i, apart) in apart.iter_mut().enumerate() {
                 let (left, right) = self.sides(i);
-                apart.by[k] = left - right;
+                apart.by[k] = match self.list[i].is {
+                    Is::Compared { .. } => left - right,
+                    Is::Whole(number) => left - number,
+                };
                 apart.noise = apart.noise.max(NOISE * left.abs().max(right.abs()));
                 // What is so at the start has been seen before.
                 apart.changed[k] = k > 0 && self.list[i].clearly_changed(left, right);
@@ -304,11 +342,17 @@ impl Switches {
     /// Where a comparison changes first within the piece that was sampled last, between two shares of it: by the polynomial through the points,
     /// which is exact for sides that follow the states in straight lines; and as the points themselves show it.
     fn sampled_changes(&self, i: usize) -> [Option<(f64, f64)>; 2] {
-        let apart = &self.apart[i];
-        let is_finite = apart.by.iter().all(|v| v.is_finite());
-        let drawn =
-            self.list[i].keeps().filter(|_| is_finite).and_then(|sign| first_below(sign * apart.by, apart.noise));
-        let seen = apart.changed.iter().position(|changed| *changed).map(|k| (POINTS[k - 1], POINTS[k]));
+        let Apart { by, noise, changed } = self.apart[i];
+        let is_finite = by.iter().all(|v| v.is_finite());
+        let below = |apart| if is_finite { first_below(apart, noise) } else { None };
+        let drawn = match self.list[i].is {
+            Is::Compared { .. } => self.list[i].keeps().and_then(|sign| below(sign * by)),
+            Is::Whole(_) => {
+                let ends = [below(by), below(by.map(|left| 1.0 - left))];
+                ends.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))
+            }
+        };
+        let seen = changed.iter().position(|changed| *changed).map(|k| (POINTS[k - 1], POINTS[k]));
         [drawn, seen]
     }
 
@@ -450,14 +494,17 @@ fn rounding(time: f64) -> f64 {
     f64::EPSILON * time.abs().max(LEAST)
 }
 
-/// When a comparison of two clocks changes: not a pair of clocks, never, or at that instant exactly.
+/// When a comparison of two clocks changes, or the whole number of one: not a pair of clocks, never, or at that instant exactly.
 fn stop(analysis: &Analysis<'_>, (a, b): (NodeId, NodeId), switch: &Switch, now: f64) -> Option<Option<f64>> {
-    let (a, b) = (analysis.clock(a)?, analysis.clock(b)?);
+    let (a, mut b) = (analysis.clock(a)?, analysis.clock(b)?);
+    if let Is::Whole(number) = switch.is {
+        b = super::analysis::Clock::standing(if a.rate > 0.0 { number + 1.0 } else { number });
+    }
     let rate = a.rate - b.rate;
     if rate == 0.0 {
         return Some(None);
     }
-    let changed = |t: f64| switch.changed(a.rate * t + a.offset, b.rate * t + b.offset);
+    let changed = |t: f64| switch.changed(a.at(t), b.at(t));
     let mut time = ((b.offset - a.offset) / rate).max(now);
     for _ in 0..8 {
         if time.next_down() > now && changed(time.next_down()) {

@@ -107,7 +107,7 @@ impl<'l> Flow<'l, '_> {
             Course::Left(_) => None,
         };
         if let Some(end) = end.filter(|_| !watched.is_empty()) {
-            reached.extend(self.about_to_come(end, &watched, &mut lines.facts));
+            reached.extend(self.about_to_come(end, &watched, &lines.facts));
         }
         self.quiet -= 1;
         let end = end?;
@@ -121,14 +121,11 @@ impl<'l> Flow<'l, '_> {
         Some(end)
     }
 
-    /// What comes about at this moment, give or take rounding.
-    fn about_to_come(&mut self, now: f64, watched: &[(NodeId, bool)], facts: &mut Facts) -> Vec<NodeId> {
-        let mut near = facts.clone();
-        match self.course(ROUNDING * now.max(1.0), watched, &mut near) {
-            Course::Reached(nodes) => {
-                *facts = near;
-                nodes
-            }
+    /// What comes about at this moment, give or take rounding. What moves stays where it is now: who asks whether it equals what is
+    /// waited for finds that open.
+    fn about_to_come(&mut self, now: f64, watched: &[(NodeId, bool)], facts: &Facts) -> Vec<NodeId> {
+        match self.course(ROUNDING * now.max(1.0), watched, &mut facts.clone()) {
+            Course::Reached(nodes) => nodes,
             _ => Vec::new(),
         }
     }
