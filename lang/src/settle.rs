@@ -16,6 +16,9 @@ use crate::lower::{Planner, Wires};
 use crate::share;
 use crate::task::Task;
 
+/// So often a task is written out for just what the time before moved. A text with mistakes may go on for ever.
+const TURNS: usize = 4;
+
 /// What a task is written out for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Purpose {
@@ -73,16 +76,21 @@ pub(crate) fn settled<'a>(
             }
         }
     };
-    loop {
+    for turn in 0.. {
         if stop() {
-            return None;
+            break;
         }
         let whole = written(tables, sources, task, purpose, Some(&reach), &|| false)?;
-        if whole.reach == reach {
+        if whole.reach == reach || turn >= TURNS && whole.reach.is_within(&reach) {
             return Some(whole);
         }
-        reach = whole.reach;
+        match turn < TURNS {
+            true => reach = whole.reach,
+            // What moves less where more can be moved goes to and fro: with all of it, it comes to rest.
+            false => reach.extend(whole.reach),
+        }
     }
+    None
 }
 
 /// A task written out for what can get where; as a draft where that is not known. Nothing where it is of no use any more.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::json;
 
-use crate::harness::{Ended, folder, matterixc_in, write};
+use crate::harness::{Ended, folder, matterixc_in, root, write};
 use crate::mcp::client::Client;
 
 const BENCH: &str = "use std::glassware::Beaker250mL
@@ -135,4 +135,14 @@ fn a_call_ends_when_its_seconds_are_over_and_says_so() {
     let data = client.data("check", json!({ "text": "mtx 1\nconst a = 1\n" }));
     assert_eq!(data["errors"], 0);
     assert_eq!(client.close(), Some(0));
+}
+
+/// A species without a volume leaves it open what is moved where: each draft of the plan moved something else.
+#[test]
+fn a_text_whose_mistake_leaves_open_what_is_moved_is_written_out_to_an_end() {
+    let text = std::fs::read_to_string(root().join("examples/redox.mtx")).expect("the example");
+    let dir = folder("budget_volume");
+    write(&dir, "text.mtx", text.replacen("molar_volume: 60 mL/mol", "molar_volume: 60 labelled/mol", 1));
+    let ended = matterixc_in(&dir, &["check", "--no-cache", "--fidelity", "process", "text.mtx"]);
+    assert!(ended.code == 1 && ended.out.contains("found `labelled`"), "{}", ended.out);
 }

@@ -54,6 +54,26 @@ impl Reach {
         self.sets.values().flatten().copied().collect()
     }
 
+    /// Whether another one has all of it.
+    pub(crate) fn is_within(&self, other: &Reach) -> bool {
+        let Reach { sets, written, origins, targets } = self;
+        within(sets, &other.sets, BTreeSet::is_subset)
+            && within(written, &other.written, BTreeSet::is_subset)
+            && within(origins, &other.origins, BTreeSet::is_subset)
+            && within(targets, &other.targets, |a, b| a.is_subset(b))
+    }
+
+    /// Takes in all of another one.
+    pub(crate) fn extend(&mut self, other: Reach) {
+        let Reach { sets, written, origins, targets } = other;
+        sets.into_iter().for_each(|(name, set)| self.sets.entry(name).or_default().extend(set));
+        written.into_iter().for_each(|(name, set)| self.written.entry(name).or_default().extend(set));
+        origins.into_iter().for_each(|(name, set)| self.origins.entry(name).or_default().extend(set));
+        for (name, set) in targets {
+            Arc::make_mut(self.targets.entry(name).or_default()).extend(set.iter().copied());
+        }
+    }
+
     /// Closes the initial contents, and what laws and effects write, under transfers, reactions and dissociation.
     pub fn compute(lab: &Elaborator<'_>) -> Reach {
         let mut written = lab.reach.written.clone();
@@ -91,6 +111,15 @@ impl Reach {
             targets: targets(lab),
         }
     }
+}
+
+/// Whether each list of one is a part of the list of that name of another, which need not have empty ones.
+fn within<T: Default>(
+    one: &BTreeMap<String, T>,
+    other: &BTreeMap<String, T>,
+    is_subset: impl Fn(&T, &T) -> bool,
+) -> bool {
+    one.iter().all(|(name, set)| is_subset(set, other.get(name).unwrap_or(&T::default())))
 }
 
 /// What states can point at: what this round began with, and whatever it noted beyond that.
