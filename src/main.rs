@@ -61,12 +61,12 @@ fn main() -> ExitCode {
         }
     };
     // Every pass over a text goes as deep as its brackets; the deepest that are read need more than a thread's usual stack.
-    let worker = std::thread::Builder::new().stack_size(STACK).spawn(move || obey(cli));
+    let worker = std::thread::Builder::new().stack_size(STACK).spawn(move || dispatch(cli));
     match worker.map(std::thread::JoinHandle::join) {
         Ok(Ok(exit)) => match terminal::lost() {
             None => exit.into(),
             Some(why) => {
-                terminal::complain(&format!("cannot write to standard output: {why}"));
+                terminal::print_error(&format!("cannot write to standard output: {why}"));
                 Exit::Usage.into()
             }
         },
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
 /// Bytes; only what is used of it is ever taken.
 const STACK: usize = 512 << 20;
 
-fn obey(cli: Cli) -> Exit {
+fn dispatch(cli: Cli) -> Exit {
     match cli.command {
         Command::Check(args) => command::check(&args, cli.color),
         Command::Fmt(args) => command::fmt(&args, cli.color),

@@ -56,7 +56,7 @@ pub fn pour(bytes: &[u8]) {
 }
 
 /// Writes one `error: ` line to standard error.
-pub fn complain(message: &str) {
+pub fn print_error(message: &str) {
     print(Stream::Err, &format!("error: {message}\n"));
 }
 

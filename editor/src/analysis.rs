@@ -6,7 +6,7 @@ use matterix_ir::points::{Point, Points};
 use matterix_ir::{Diagnostic, FileId, Sources, Span};
 use matterix_lang::names::Module;
 use matterix_lang::program::{self, Examined};
-use matterix_lang::{Gathered, Loader, Session};
+use matterix_lang::{Loader, SemanticIndex, Session};
 use matterix_syntax::ast;
 
 use crate::Index;
@@ -25,7 +25,7 @@ pub struct Analysis {
     /// What is known at the statements of the workflows that could be followed.
     pub points: Vec<Points>,
     /// What names and expressions mean.
-    pub meanings: Arc<Gathered>,
+    pub meanings: Arc<SemanticIndex>,
     /// The index of names, once it was asked for.
     pub index: OnceLock<Arc<Index>>,
 }

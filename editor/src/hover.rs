@@ -2,7 +2,7 @@
 
 use matterix_ir::quantity::show_number;
 use matterix_ir::{FileId, Span, Unit};
-use matterix_lang::meanings::{Seen, Sort};
+use matterix_lang::semantic_index::{Seen, Sort};
 
 use crate::Index;
 use crate::index::{Def, DefId, Kind, Meaning, Use};

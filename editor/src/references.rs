@@ -55,7 +55,7 @@ impl Index {
         let seen = self.at(file, offset).and_then(|u| self.seen(u.span)).map(|s| s.sort.clone());
         let sort = seen.or_else(|| self.def_at(file, offset).map(|d| self.def(d).sort.clone()));
         match sort {
-            Some(matterix_lang::meanings::Sort::Thing(kinds, _)) => {
+            Some(matterix_lang::semantic_index::Sort::Thing(kinds, _)) => {
                 kinds.iter().filter_map(|k| self.of_decl(*k)).map(|d| self.def(d).span).collect()
             }
             _ => Vec::new(),

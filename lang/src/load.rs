@@ -8,8 +8,8 @@ use crate::ast::ItemKind;
 use crate::declare::units::declare;
 use crate::loader::Loader;
 use crate::names::{Module, Names, module_candidates};
+use crate::parallel::STACK;
 use crate::session::{self, Session};
-use crate::share::STACK;
 use crate::{import, library};
 
 /// Parses the root file and everything it imports; the library comes first.

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use matterix_ir::inventory::Inventory;
 use matterix_ir::model::{Content, Mixture, Model, Observable};
 use matterix_ir::points::Points;
 use matterix_ir::program::PROGRAM_VERSION;
 use matterix_ir::scene::{Frame, Instance as SceneInstance, InstanceId, Scene};
 use matterix_ir::script::Wiring;
-use matterix_ir::stock::Stock;
 use matterix_ir::{Diagnostic, FileId, Leaves, Program, Severity, Sources, Span, codes};
 
 use crate::ast::{Expr, Item, ItemKind, MemberKind, Name, Role};
@@ -23,16 +23,16 @@ use crate::eval::lab::geometry::Geometry;
 use crate::eval::lab::reach::Reach;
 use crate::eval::lab::{Elaborator, ExtensiveKey};
 use crate::eval::{Num, Value};
+use crate::fixpoint::{self, Purpose, Settled};
 use crate::labs;
 use crate::load::load;
 use crate::loader::Loader;
 use crate::lower::Wires;
-use crate::meanings::{Around as Declared, Gathered, Noted};
 use crate::names::{DeclId, Module, Names, imports, item_name};
 use crate::near;
-use crate::points::Questions;
-use crate::session::{self, About, Around, Earlier, Package, Session, Verdict, Words};
-use crate::settle::{self, Purpose, Settled};
+use crate::program_points::Questions;
+use crate::semantic_index::{Around as Declared, Resolutions, SemanticIndex};
+use crate::session::{self, CachedAnalysis, Environment, Package, Session, Snapshot, TaskKey, Words};
 use crate::stop::stopped;
 use crate::study::{self, Many};
 use crate::supposed;
@@ -76,7 +76,7 @@ pub struct Examined {
     /// What is known at every statement, where that was asked for: one per workflow that could be followed.
     pub points: Vec<Points>,
     /// What names and expressions mean, where that was asked for.
-    pub meanings: Gathered,
+    pub meanings: SemanticIndex,
 }
 
 /// Checks a file: everything it declares, and every workflow in its lab.
@@ -150,7 +150,7 @@ fn examine(
     let root = modules.iter().position(|m| m.file == file).unwrap_or(root);
     let mut seeing = (wanted == Wanted::Contents).then(Box::default);
     diagnostics.extend(checks::declarations_and(&tables, sources, root, &mut seeing));
-    let mut meanings = Gathered::default();
+    let mut meanings = SemanticIndex::default();
     let items = judged(&names, root);
     let (mut starts, mut uses) = (Vec::new(), Vec::new());
     let mut tasks = Vec::new();
@@ -208,7 +208,7 @@ fn examine(
     }
     let findings = finish(diagnostics, sources);
     if wanted == Wanted::Contents {
-        meanings.pieces.splice(..0, Noted::of(seeing, &names));
+        meanings.pieces.splice(..0, Resolutions::of(seeing, &names));
         meanings.around = Declared::of(&tables);
         drop(tables);
         meanings.around.scopes = names.into_scopes();
@@ -549,7 +549,7 @@ struct Built {
     program: Option<Program>,
     wiring: Option<Wiring>,
     points: Option<Points>,
-    noted: Option<Noted>,
+    noted: Option<Resolutions>,
     findings: Vec<Diagnostic>,
     starts: Option<checks::Starts>,
     uses: Option<checks::Uses>,
@@ -562,18 +562,18 @@ struct Built {
     moved: Option<Vec<Diagnostic>>,
 }
 
-impl From<Verdict> for Built {
-    fn from(known: Verdict) -> Built {
-        let Verdict { findings, points, noted, starts, uses, many, moved } = known;
+impl From<CachedAnalysis> for Built {
+    fn from(known: CachedAnalysis) -> Built {
+        let CachedAnalysis { findings, points, noted, starts, uses, many, moved } = known;
         Built { findings, points, noted, starts, uses, many, moved, ..Built::default() }
     }
 }
 
 impl Built {
     /// What is kept of it.
-    fn verdict(&self) -> Verdict {
+    fn verdict(&self) -> CachedAnalysis {
         let Built { findings, points, noted, starts, uses, many, moved, .. } = self;
-        Verdict {
+        CachedAnalysis {
             findings: findings.clone(),
             points: points.clone(),
             noted: noted.clone(),
@@ -596,11 +596,11 @@ fn judge_anew<'a>(
     (package, beside): (&mut Package, u64),
 ) -> Option<Vec<Built>> {
     let names = tables.names;
-    let of = Around { beside, failures: tables.failures(), moved: asked.wanted == Wanted::Motions };
-    let mut now = Earlier::of(names, sources, root, of);
-    let about: Vec<Option<About>> = tasks.iter().map(|task| about(tables, root, task)).collect();
+    let of = Environment { beside, failures: tables.failures(), moved: asked.wanted == Wanted::Motions };
+    let mut now = Snapshot::of(names, sources, root, of);
+    let about: Vec<Option<TaskKey>> = tasks.iter().map(|task| about(tables, root, task)).collect();
     let matched = package.earlier.as_ref().and_then(|earlier| earlier.matched(&now, file));
-    let known: Vec<Option<(Verdict, Words)>> = about
+    let known: Vec<Option<(CachedAnalysis, Words)>> = about
         .iter()
         .map(|about| {
             let known = matched.as_ref()?.verdict(about.as_ref()?)?;
@@ -608,14 +608,14 @@ fn judge_anew<'a>(
         })
         .collect();
     let open: Vec<&Task<'a>> = tasks.iter().zip(&known).filter(|(_, v)| v.is_none()).map(|(t, _)| t).collect();
-    let anew = |(about, known): (&Option<About>, &Option<_>)| about.clone().filter(|_| known.is_none());
-    let anew: Vec<About> = about.iter().zip(&known).filter_map(anew).collect();
+    let anew = |(about, known): (&Option<TaskKey>, &Option<_>)| about.clone().filter(|_| known.is_none());
+    let anew: Vec<TaskKey> = about.iter().zip(&known).filter_map(anew).collect();
     let mut words = now.words(file, &anew).into_iter();
     // Tasks do not depend on each other, so all processors share them.
     let foreseen = std::mem::take(&mut package.foreseen);
-    let mut judged = crate::share::over(&open, |task| {
+    let mut judged = crate::parallel::map(&open, |task| {
         // A processor that is free for it makes the draft.
-        let free = 2 * open.len() <= crate::share::processors();
+        let free = 2 * open.len() <= crate::parallel::processors();
         let foreseen = foreseen.of(names, task).filter(|reach| free && reach.is_of(tables));
         judge(tables, sources, task, asked, (foreseen, free))
     })
@@ -673,14 +673,14 @@ fn judge<'a>(
 }
 
 /// What the verdict of a task is about; none where it has no place in the root file.
-fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<About> {
+fn about(tables: &Tables<'_>, root: usize, task: &Task<'_>) -> Option<TaskKey> {
     let names = tables.names;
     let runs = task::workflow_of(tables, task.item).ok().filter(|run| *run != task.item);
     // What it runs may stand in another file, where its name leads to it.
     let runs = runs.filter(|run| names.decl(*run).module == root).and_then(|run| session::number(names, run));
     let lab = names.decl(task.lab);
     let (lab_name, _) = item_name(lab.item)?;
-    Some(About { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
+    Some(TaskKey { item: session::number(names, task.item)?, runs, lab: (lab.module, lab_name) })
 }
 
 /// Elaborates the lab, lowers the workflow and checks both. A program comes of it only where it is wanted, nothing where `stop` says that
@@ -701,7 +701,7 @@ fn build<'a>(
     let transport = if let Wanted::Scripted(transport) = wanted { Some(transport) } else { None };
     let purpose = Purpose { to_run, wires, transport, meanings: wanted == Wanted::Contents };
     let lab = task.lab;
-    let settled = settle::settled(tables, sources, task, purpose, foreseen, stop)?;
+    let settled = fixpoint::settled(tables, sources, task, purpose, foreseen, stop)?;
     let Settled { lab: mut elaborator, plan, wiring, events, reach } = settled;
     let (derivatives, balances) = elaborator.close();
     // A look at motions asks for neither what is recorded nor what is used up.
@@ -721,7 +721,7 @@ fn build<'a>(
     let many = study::resolve(&mut elaborator, task);
     elaborator.note_things(lab);
     let choices = std::mem::take(&mut elaborator.choices);
-    let noted = Noted::of(elaborator.meanings.take(), tables.names);
+    let noted = Resolutions::of(elaborator.meanings.take(), tables.names);
     let mut uses = None;
     if !to_run {
         let item = tables.names.decl(task.item).item;
@@ -755,8 +755,11 @@ fn build<'a>(
     let mixtures = mixtures(&elaborator, &observables);
     let scene = scene(&mut elaborator, lab);
     let workflow = task::workflow_of(tables, task.item).unwrap_or(task.item);
-    let stock =
-        if told { crate::stock::stock(&mut elaborator, sources, &mixtures, workflow) } else { Stock::default() };
+    let inventory = if told {
+        crate::inventory::inventory(&mut elaborator, sources, &mixtures, workflow)
+    } else {
+        Inventory::default()
+    };
     let (incompatible, dangers) = match told {
         true => {
             let held = elaborator.instances.iter().flat_map(|i| &i.contents);
@@ -793,7 +796,7 @@ fn build<'a>(
     };
     let files = (0..).map_while(|i| sources.get(FileId(i))).map(|s| s.name.clone()).collect();
     let (drivers, offers) = (elaborator.drivers, elaborator.offers);
-    let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, stock, drivers, offers };
+    let program = Program { version: PROGRAM_VERSION, files, scene, model, plan, inventory, drivers, offers };
     let findings = elaborator.diagnostics;
     let program = Some(program);
     let reach = Some(reach);

@@ -27,7 +27,7 @@ pub(crate) fn found(
         out.push(Diagnostic::warning(codes::NOT_ANALYSED, workflow, headline, said));
     }
     let tried = &others[..others.len().min(MOST_VALUES)];
-    let mut judged = if free { crate::share::over(tried, &judge) } else { Vec::new() }.into_iter();
+    let mut judged = if free { crate::parallel::map(tried, &judge) } else { Vec::new() }.into_iter();
     for other in tried {
         for d in judged.next().unwrap_or_else(|| judge(other))? {
             let known = |f: &Diagnostic| f.code == d.code && f.span() == d.span();

@@ -8,7 +8,7 @@ use matterix_ir::{Diagnostic, Sources};
 use crate::args::{BillArgs, BillFormat, Color};
 use crate::pipeline::{self, Input, Prices};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, complain, paint, print};
+use crate::terminal::{self, Stream, paint, print, print_error};
 use crate::{Exit, cancel, files};
 
 /// Compiles, executes once and prints what that uses up; findings go to standard error.
@@ -39,7 +39,7 @@ fn attempt(args: &BillArgs, color: Color) -> Result<Exit, String> {
     };
     print(Stream::Out, &text);
     if cancel.load(Ordering::SeqCst) && !billed.complete {
-        complain("stopped before the run had ended; the bill above is of what had been done until then");
+        print_error("stopped before the run had ended; the bill above is of what had been done until then");
     }
     Ok(if billed.complete { Exit::Fine } else { Exit::Findings })
 }

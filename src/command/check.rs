@@ -15,7 +15,7 @@ use crate::files;
 use crate::pipeline::{self, Advice, Input, Mended, Mending};
 use crate::report::points::{self, Found as At};
 use crate::report::{Format, Reporter, stricter};
-use crate::terminal::{self, Stream, complain, paint, print};
+use crate::terminal::{self, Stream, paint, print, print_error};
 
 /// Findings, and the texts they are in.
 type Found = (Sources, Vec<Diagnostic>);
@@ -23,7 +23,7 @@ type Found = (Sources, Vec<Diagnostic>);
 /// Reports on every file that can be read; findings go to standard output.
 pub fn check(args: &CheckArgs, color: Color) -> Exit {
     if args.at.is_some() && args.files.len() > 1 {
-        complain("a place is in one file: give one with `--at`");
+        print_error("a place is in one file: give one with `--at`");
         return Exit::Usage;
     }
     if args.watch {
@@ -44,7 +44,7 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
         let (input, left) = match read(path, args, &*cache) {
             Ok(read) => read,
             Err(message) => {
-                complain(&message);
+                print_error(&message);
                 exit = Exit::Usage;
                 continue;
             }
@@ -67,7 +67,7 @@ fn look(args: &CheckArgs, files: &[PathBuf], color: Color) -> (String, Exit) {
             match contents(args, path, &known, &sources) {
                 Ok(text) => out += &text,
                 Err(message) => {
-                    complain(&message);
+                    print_error(&message);
                     exit = Exit::Usage;
                 }
             }

@@ -6,7 +6,7 @@ use matterix_ir::Diagnostic;
 
 use crate::args::{Color, EmitArgs};
 use crate::pipeline::{self, Input};
-use crate::terminal::{self, complain};
+use crate::terminal::{self, print_error};
 
 use super::bill::show;
 use crate::{Exit, cache, cancel, files};
@@ -34,7 +34,7 @@ fn attempt(args: &EmitArgs, color: Color) -> Result<Exit, String> {
     show(&sources, found, color);
     let Some(bytes) = written else {
         if cancel.load(Ordering::SeqCst) {
-            complain("stopped before the workflow had been performed; nothing is written");
+            print_error("stopped before the workflow had been performed; nothing is written");
         }
         return Ok(Exit::Findings);
     };

@@ -8,7 +8,7 @@ use matterix_ir::{Code, codes};
 use crate::Exit;
 use crate::args::ExplainArgs;
 use crate::files;
-use crate::terminal::{Stream, complain, print};
+use crate::terminal::{Stream, print, print_error};
 
 use super::named::named;
 
@@ -30,7 +30,7 @@ pub fn explain(args: &ExplainArgs) -> Exit {
             Exit::Fine
         }
         Err(help) => {
-            complain(&format!("there is no diagnostic code `{}`", args.code.as_deref().unwrap_or_default()));
+            print_error(&format!("there is no diagnostic code `{}`", args.code.as_deref().unwrap_or_default()));
             print(Stream::Err, &format!("help: {help}\n"));
             Exit::Usage
         }

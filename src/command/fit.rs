@@ -5,7 +5,7 @@ use matterix_ir::Diagnostic;
 use crate::args::{Color, FitArgs, RunFormat};
 use crate::pipeline::{self, Asked, Input};
 use crate::progress::Count;
-use crate::terminal::{Stream, complain, print};
+use crate::terminal::{Stream, print, print_error};
 use crate::{Exit, cancel, files};
 
 /// Compiles once, estimates and prints what the data say; findings and progress go to standard error.
@@ -40,7 +40,7 @@ fn attempt(args: &FitArgs, color: Color) -> Result<Exit, String> {
             Ok(if done.is_whole { Exit::Fine } else { Exit::Findings })
         }
         Ok(None) => {
-            complain("stopped before anything was estimated");
+            print_error("stopped before anything was estimated");
             Ok(Exit::Findings)
         }
         Err(found) => {

@@ -7,7 +7,7 @@ use crate::args::{Color, FmtArgs};
 use crate::files;
 use crate::pipeline::{self, Input};
 use crate::report::{Format, Reporter};
-use crate::terminal::{self, Stream, complain, paint, pour, print};
+use crate::terminal::{self, Stream, paint, pour, print, print_error};
 
 /// Rewrites every file that can be read and parsed; the others stay as they are.
 pub fn fmt(args: &FmtArgs, color: Color) -> Exit {
@@ -50,6 +50,6 @@ fn one(path: &Path, args: &FmtArgs, reporter: &mut Reporter) -> Exit {
 }
 
 fn usage(message: &str) -> Exit {
-    complain(message);
+    print_error(message);
     Exit::Usage
 }

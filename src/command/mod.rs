@@ -50,7 +50,7 @@ pub use verify::verify;
 pub use view::view;
 
 use crate::Exit;
-use crate::terminal::{Stream, complain, print};
+use crate::terminal::{Stream, print, print_error};
 
 /// Prints the versions of the command, the language and the compiled program.
 pub fn version() -> Exit {
@@ -62,7 +62,7 @@ pub fn version() -> Exit {
 /// How a command ended; what is wrong with usage or files is said on standard error.
 fn or_complain(ended: Result<Exit, String>) -> Exit {
     ended.unwrap_or_else(|message| {
-        complain(&message);
+        print_error(&message);
         Exit::Usage
     })
 }

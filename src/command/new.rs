@@ -3,7 +3,7 @@
 use crate::Exit;
 use crate::args::NewArgs;
 use crate::files;
-use crate::terminal::{Stream, complain, print};
+use crate::terminal::{Stream, print, print_error};
 
 /// The files of a new project.
 const PROJECT: &[(&str, &str)] = &[
@@ -15,7 +15,7 @@ const PROJECT: &[(&str, &str)] = &[
 /// Creates the project and says what to type next.
 pub fn new(args: &NewArgs) -> Exit {
     if let Err(message) = files::create_folder(&args.dir, PROJECT) {
-        complain(&message);
+        print_error(&message);
         return Exit::Usage;
     }
     let file = args.dir.join("warm.mtx");

@@ -6,7 +6,7 @@ use matterix_ir::Diagnostic;
 
 use crate::args::{Color, PlanArgs, RunFormat};
 use crate::pipeline::{self, Input, Search};
-use crate::terminal::{self, Stream, complain, print};
+use crate::terminal::{self, Stream, print, print_error};
 use crate::{Exit, cancel, files};
 
 use super::run::Findings;
@@ -47,7 +47,7 @@ fn attempt(args: &PlanArgs, color: Color) -> Result<Exit, String> {
         files::write(path, &pipeline::picture(&schedule)?)?;
     }
     if is_cut {
-        complain("stopped before the search had ended; the schedule above is the shortest found until then");
+        print_error("stopped before the search had ended; the schedule above is the shortest found until then");
         return Ok(Exit::Findings);
     }
     Ok(Exit::Fine)

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use matterix_hardware::deploy::{Carrier, unsafe_left};
-use matterix_hardware::link::{Overhear, Trouble};
+use matterix_hardware::link::{DeviceError, WireTap};
 use matterix_hardware::play::{Sheet, Unplayed, play as played};
 use matterix_hardware::{binding, calibration};
 use matterix_ir::{Diagnostic, codes};
@@ -72,13 +72,13 @@ pub fn play(
             print(Stream::Err, "it was stopped\n");
             return Ok(Exit::Findings);
         }
-        Unplayed::Trouble(trouble) => trouble,
+        Unplayed::DeviceError(trouble) => trouble,
     };
     let (headline, code) = match &code {
-        Trouble::Lost(why) | Trouble::Silent(why) => (why.clone(), codes::DEVICE_LOST),
-        Trouble::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
-        Trouble::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
-        Trouble::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
+        DeviceError::Lost(why) | DeviceError::Silent(why) => (why.clone(), codes::DEVICE_LOST),
+        DeviceError::Garbled(why) => (why.clone(), codes::DEVICE_GARBLED),
+        DeviceError::Unsaid(why) => (why.clone(), codes::UNSENDABLE),
+        DeviceError::Refused { failure, text } => (format!("{failure}: {text}"), codes::DEVICE_REFUSED),
     };
     let d = Diagnostic::error(code, *at, format!("`{device}`: {headline}"), "not run to its end");
     show(&sources, std::iter::once(d).chain(left).collect(), color);
@@ -88,7 +88,7 @@ pub fn play(
 /// Nothing of it is shown.
 struct Silent;
 
-impl Overhear for Silent {
+impl WireTap for Silent {
     fn out(&mut self, _: &[u8]) {}
     fn back(&mut self, _: &[u8]) {}
     fn kept(&mut self, _: &str, _: &str) {}

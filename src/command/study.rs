@@ -5,7 +5,7 @@ use matterix_ir::Diagnostic;
 use crate::args::{Color, RunFormat, StudyArgs};
 use crate::pipeline::{self, Asked, Input};
 use crate::progress::Count;
-use crate::terminal::{Stream, complain, print};
+use crate::terminal::{Stream, print, print_error};
 use crate::{Exit, cancel, files};
 
 /// Compiles once, runs many times and prints figures; findings and progress go to standard error.
@@ -37,7 +37,7 @@ fn attempt(args: &StudyArgs, color: Color) -> Result<Exit, String> {
         done.write(dir)?;
     }
     if !done.is_whole {
-        complain("stopped before all runs had ended; what is said above is of those that had");
+        print_error("stopped before all runs had ended; what is said above is of those that had");
         return Ok(Exit::Findings);
     }
     Ok(Exit::Fine)

@@ -10,7 +10,7 @@ use crate::args::{Color, Fidelity, TestArgs, TestFormat};
 use crate::pipeline::{self, Choices, Input, Keep, Test};
 use crate::progress::{Kind, Progress};
 use crate::report::{Format, Look, Reporter};
-use crate::terminal::{self, Stream, complain, paint, print};
+use crate::terminal::{self, Stream, paint, print, print_error};
 use crate::{Exit, cancel, files};
 
 /// Runs every test of the files, a line each, and counts them; what failed is shown below its line.
@@ -18,7 +18,7 @@ pub fn test(args: &TestArgs, color: Color) -> Exit {
     let cancel = match cancel::on_interrupt() {
         Ok(cancel) => cancel,
         Err(message) => {
-            complain(&message);
+            print_error(&message);
             return Exit::Usage;
         }
     };
@@ -34,7 +34,7 @@ pub fn test(args: &TestArgs, color: Color) -> Exit {
     };
     let found = files::with_extension(&args.paths, "mtx");
     for message in &found.missing {
-        complain(message);
+        print_error(message);
         exit = Exit::Usage;
     }
     for path in &found.files {
@@ -42,13 +42,13 @@ pub fn test(args: &TestArgs, color: Color) -> Exit {
             break;
         }
         if let Err(message) = trial.file(path, args.only.as_deref().unwrap_or_default()) {
-            complain(&message);
+            print_error(&message);
             exit = Exit::Usage;
         }
     }
     trial.close(found.files.len());
     if cancel.load(Ordering::Relaxed) {
-        complain("stopped before all tests had run");
+        print_error("stopped before all tests had run");
         return exit.max(Exit::Findings);
     }
     if trial.failed > 0 { exit.max(Exit::Findings) } else { exit }

@@ -107,7 +107,7 @@ fn program() -> (Program, Sources) {
             scene,
             model,
             plan,
-            stock: Default::default(),
+            inventory: Default::default(),
             drivers: Vec::new(),
             offers: Default::default(),
         },

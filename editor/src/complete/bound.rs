@@ -1,7 +1,7 @@
 //! Names that the text around a cursor binds: loops, folds and named steps. Where something is being written, the last analysis does not
 //! know them.
 
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::context::{Context, Token};
 use super::steps::FOLDS;

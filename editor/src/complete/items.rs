@@ -1,6 +1,6 @@
 //! What can be written outside blocks of steps: items, and the lines of labs, assets and capabilities.
 
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::context::{Context, unnamed};
 use super::values::{Place, Wanted};

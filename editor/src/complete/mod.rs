@@ -13,7 +13,7 @@ mod values;
 use std::collections::BTreeSet;
 
 use matterix_ir::FileId;
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 pub use signature::{Signature, signature};
 

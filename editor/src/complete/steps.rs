@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use matterix_lang::lower::FAILURES;
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::DeclId;
+use matterix_lang::semantic_index::Sort;
 
 use super::context::{Context, LABELS};
 use super::values::{Place, Wanted};

@@ -1,6 +1,6 @@
 //! Units after a number.
 
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 use matterix_lang::units::Dimension;
 
 use super::context::{Context, Token};

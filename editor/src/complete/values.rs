@@ -1,7 +1,7 @@
 //! What kind of value a few tokens have, and what is expected at a cursor.
 
 use matterix_ir::FileId;
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::context::{Context, Token, primary, unnamed};
 use crate::index::{DefId, Kind, Meaning};

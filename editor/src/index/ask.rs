@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use matterix_ir::{FileId, Sources, Span};
-use matterix_lang::meanings::Seen;
 use matterix_lang::names::{DeclId, Module};
+use matterix_lang::semantic_index::Seen;
 use matterix_lang::units::Dimension;
 
 use super::{DefId, Index, Kind, Meaning, Part, Region, Use};

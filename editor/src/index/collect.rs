@@ -4,8 +4,8 @@ use matterix_ir::Span;
 use matterix_lang::ast::{
     AssetLine, Clause, ClauseKind, Item, ItemKind, LabLineKind, Member, MemberKind, Name, Param, Refusal, Sig, Type,
 };
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::{Module, item_name, verb_text};
+use matterix_lang::semantic_index::Sort;
 
 use super::{Def, DefId, Index, Kind};
 

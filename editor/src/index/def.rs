@@ -1,7 +1,7 @@
 //! What names stand for.
 
 use matterix_ir::Span;
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 /// A declaration, by its number in an index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

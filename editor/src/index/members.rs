@@ -1,7 +1,7 @@
 //! What can be asked of a value with a dot or in brackets.
 
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::DeclId;
+use matterix_lang::semantic_index::Sort;
 
 use super::{DefId, Index, Kind, Meaning};
 

@@ -1,7 +1,7 @@
 //! The index of names: what every name in a text stands for, and where else it stands.
 //!
 //! Two ways were compared. To resolve names in a tree apart from the evaluator can say something else than what was checked. So
-//! the evaluator notes what it has found (`matterix_lang::meanings`), and the walk here takes that; where a text could not be
+//! the evaluator notes what it has found (`matterix_lang::semantic_index`), and the walk here takes that; where a text could not be
 //! evaluated, it finds names by what is declared, and a test compares both.
 
 mod ask;
@@ -19,7 +19,7 @@ use matterix_ir::{FileId, Sources, Span};
 use matterix_lang::ast::{Item, ItemKind};
 use matterix_lang::names::{DeclId, Module};
 use matterix_lang::units::Dimension;
-use matterix_lang::{Gathered, Meanings};
+use matterix_lang::{Meanings, SemanticIndex};
 
 pub use def::{Def, DefId, Kind, Local, Meaning, Region, Use};
 pub use members::Member;
@@ -67,7 +67,7 @@ pub struct Index {
     modules: Vec<Arc<Module>>,
     sources: Arc<Sources>,
     meanings: Meanings,
-    gathered: Arc<Gathered>,
+    gathered: Arc<SemanticIndex>,
     /// Dimensions in words, as far as they were asked for.
     described: RwLock<HashMap<(Dimension, bool), String>>,
 }
@@ -95,7 +95,7 @@ impl Index {
     /// The index as it is where nothing could be evaluated: from what is declared alone.
     pub fn declared(analysis: &Analysis) -> Index {
         let around = analysis.meanings.around.clone();
-        let meanings = Arc::new(Gathered { around, ..Gathered::default() });
+        let meanings = Arc::new(SemanticIndex { around, ..SemanticIndex::default() });
         Index::of(&Analysis { meanings, ..analysis.clone() })
     }
 

@@ -5,8 +5,8 @@ use matterix_lang::ast::{
     AssetLine, AssetLiteral, Clause, ClauseKind, Expr, ExprKind, Item, ItemKind, LabLineKind, MemberKind, Param, Path,
     Sig, Type,
 };
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::{DeclId, Module};
+use matterix_lang::semantic_index::Sort;
 
 use super::collect::bare;
 use super::{DefId, Index, Kind};

@@ -1,7 +1,7 @@
 //! What a mixture counts its species in.
 
 use matterix_lang::ast::{ItemKind, MemberKind};
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 use matterix_lang::units::Dimension;
 use matterix_syntax::classes::{self, Class};
 

@@ -13,7 +13,7 @@ impl Writer<'_, '_> {
     pub(super) fn gather_liquids(&mut self) {
         let program = self.protocol.subject.program;
         let mut held: BTreeMap<InstanceId, String> = BTreeMap::new();
-        for holding in &program.stock.holdings {
+        for holding in &program.inventory.holdings {
             let mixture = program.model.mixtures.get(holding.mixture as usize).map(|m| m.instance);
             let Some(well) = mixture.and_then(|m| program.scene.get(m).owner) else { continue };
             let name = held.entry(well).or_default();

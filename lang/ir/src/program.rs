@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::inventory::Inventory;
 use crate::model::Model;
 use crate::offer::Offers;
 use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::stock::Stock;
 use crate::wire::Driver;
 
 /// Version of the serialised form; a reader refuses any other.
@@ -27,7 +27,7 @@ pub struct Program {
     pub plan: Plan,
     /// What was brought in, and how to count what becomes of it.
     #[serde(default)]
-    pub stock: Stock,
+    pub inventory: Inventory,
     /// How devices are spoken to, where that was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub drivers: Vec<Driver>,

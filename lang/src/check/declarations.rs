@@ -13,8 +13,8 @@ use crate::eval::lab::budget::Budget;
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
 use crate::lower::{Planner, script};
-use crate::meanings::Seeing;
 use crate::names::{DeclId, verb_text};
+use crate::semantic_index::Seeing;
 
 /// Checks the declarations of one module.
 pub fn declarations(tables: &Tables<'_>, sources: &Sources, module: usize) -> Vec<Diagnostic> {

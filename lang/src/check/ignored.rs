@@ -1,6 +1,6 @@
 //! What would be read and then have no effect: said, so that nothing written is passed over in silence.
 
-use matterix_ir::stock::Count;
+use matterix_ir::inventory::Count;
 use matterix_ir::{Diagnostic, codes};
 
 use crate::ast::{ExprKind, NamedExpr, Role};
@@ -12,8 +12,8 @@ use crate::elaborate::lab::SYMMETRIC;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::given::{GIVEN_BY, INSTEAD, ONLY_WITH};
 use crate::eval::lab::properties::{GIVES, GIVES_AT};
+use crate::inventory::{COUNTS_AS, count_of};
 use crate::near;
-use crate::stock::{COUNTS_AS, count_of};
 
 /// Options of a member that mean nothing for a member of its kind.
 pub fn options(role: Role, given: &[NamedExpr]) -> Vec<Diagnostic> {

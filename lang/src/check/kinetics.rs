@@ -15,7 +15,7 @@ use crate::eval::lab::properties::{GIVES, GIVES_AT};
 use crate::eval::lab::reach::Reach;
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
-use crate::syntax::moved::Moved;
+use crate::syntax::relocate::Relocate;
 
 /// What one workflow's lab says of the reactions: which start, and what there is anywhere.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub struct Starts {
     pub windows: Option<BTreeMap<ReactionId, Window>>,
 }
 
-impl Moved for Starts {
+impl Relocate for Starts {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         self.lab.moved(to);
     }

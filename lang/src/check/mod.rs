@@ -19,15 +19,15 @@ use matterix_ir::plan::Plan;
 use matterix_ir::{Diagnostic, NodeId, Sources, Span, codes};
 
 use self::flow::Window;
-pub use self::flow::{After, Known, Seen, forbidden_on_any_way};
+pub use self::flow::{AbstractValue, After, Seen, forbidden_on_any_way};
 use crate::declare::ReactionId;
 use crate::declare::Tables;
 use crate::elaborate::hazards::Hazard;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::reach::Reach;
-use crate::meanings::Seeing;
 use crate::names::DeclId;
-use crate::share;
+use crate::parallel;
+use crate::semantic_index::Seeing;
 
 pub use consequences::without_consequences;
 pub use declarations::{bind, declarations, declarations_and};
@@ -99,7 +99,7 @@ pub fn plan(
     let dangers = hazards.as_deref().unwrap_or_default();
     let follow = || is_whole.then(|| flow::check(about, sources, plan, (events, derivatives), dangers, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
-        true => share::two(meets, || share::two(takes, follow)),
+        true => parallel::join(meets, || parallel::join(takes, follow)),
         false => (meets(), (takes(), None)),
     };
     met.into_iter().for_each(|d| lab.report(d));

@@ -13,7 +13,7 @@ use crate::ast::{Item, ItemKind, LabLineKind};
 use crate::declare::Tables;
 use crate::eval::lab::Elaborator;
 use crate::names::{DeclId, Names, item_name};
-use crate::syntax::moved::Moved;
+use crate::syntax::relocate::Relocate;
 
 /// What one workflow has to do with the things of its lab.
 #[derive(Clone, Debug)]
@@ -37,7 +37,7 @@ impl Uses {
     }
 }
 
-impl Moved for Uses {
+impl Relocate for Uses {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         self.things = std::mem::take(&mut self.things).into_iter().map(|(span, used)| (to(span), used)).collect();
         let reagents = std::mem::take(&mut self.reagents).into_iter();

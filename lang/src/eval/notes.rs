@@ -8,8 +8,8 @@ use crate::declare::MemberRef;
 use crate::declare::tables::member_name;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::verbs::Verb;
-use crate::meanings::{Seen, Sort};
 use crate::names::{DeclId, item_name};
+use crate::semantic_index::{Seen, Sort};
 
 impl<'a> Elaborator<'a> {
     /// Notes where what a name stands for is declared.

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use matterix_ir::inventory::Substance;
 use matterix_ir::scene::{Instance, InstanceId};
-use matterix_ir::stock::Substance;
 use matterix_ir::{Env, NodeId};
 
 use super::list::{List, Step, table};
@@ -35,7 +35,7 @@ impl Prose<'_, '_> {
 
     /// kg and SI of the written unit, by holding.
     fn held(&self) -> Vec<(f64, f64)> {
-        let stock = &self.program.stock;
+        let stock = &self.program.inventory;
         stock.holdings.iter().map(|h| (self.at_first(h.mass), self.at_first(h.amount))).collect()
     }
 
@@ -86,14 +86,14 @@ impl Prose<'_, '_> {
 
     fn reagents(&self, held: &[(f64, f64)]) -> Option<String> {
         let masses: Vec<f64> = held.iter().map(|h| h.0).collect();
-        let all = self.program.stock.measure_out(&masses);
+        let all = self.program.inventory.measure_out(&masses);
         if all.is_empty() {
             return None;
         }
         let head = ["substance", "for", "mass", "amount", "volume"];
         let mut rows = vec![head.map(str::to_string).to_vec()];
         for m in all {
-            let known = self.program.stock.substance(&m.substance);
+            let known = self.program.inventory.substance(&m.substance);
             let within = m.within.iter().rev().map(|w| words::plain(w)).collect::<Vec<_>>().join(", for ");
             let amount = known.and_then(|s| s.molar_mass).map(|molar| amount(m.mass / molar)).unwrap_or_default();
             let volume = known.and_then(|s| s.density).map(|d| words::volume(m.mass / d)).unwrap_or_default();
@@ -106,7 +106,7 @@ impl Prose<'_, '_> {
 
     /// Hazards of what is brought in and of what can come of it.
     fn safety(&self) -> Option<String> {
-        let stock = &self.program.stock;
+        let stock = &self.program.inventory;
         let masses = vec![0.0; stock.holdings.len()];
         let brought: Vec<String> = stock.measure_out(&masses).into_iter().map(|m| m.substance).collect();
         let mut lines: Vec<String> = Vec::new();
@@ -128,7 +128,7 @@ impl Prose<'_, '_> {
 
     /// Solutions, each after those it is made of.
     fn solutions(&self, held: &[(f64, f64)]) -> List {
-        let stock = &self.program.stock;
+        let stock = &self.program.inventory;
         let mut needed: BTreeMap<&str, f64> = BTreeMap::new();
         for (holding, (mass, _)) in stock.holdings.iter().zip(held) {
             *needed.entry(&holding.substance).or_default() += mass;
@@ -160,7 +160,7 @@ impl Prose<'_, '_> {
 
     /// Recipes in the order of the text, but each after those it needs.
     fn made_in_order(&self) -> Vec<usize> {
-        let recipes = &self.program.stock.recipes;
+        let recipes = &self.program.inventory.recipes;
         let mut open: Vec<usize> = (0..recipes.len()).collect();
         open.sort_by_key(|i| recipes[*i].span);
         let mut out: Vec<usize> = Vec::new();
@@ -175,7 +175,7 @@ impl Prose<'_, '_> {
 
     /// `12 mmol (552.8 mg, 704.2 µL) of EtOH`: an amount of substance with what is measured out for it.
     fn portion(&self, name: &str, written: &str, mass: f64, amount: f64) -> String {
-        let known = self.program.stock.substance(name);
+        let known = self.program.inventory.substance(name);
         let in_mol = |molar: f64| (amount * molar - mass).abs() <= 1e-9 * mass && molar != 1.0;
         let Some(known) = known.filter(|s| s.molar_mass.is_some_and(in_mol)) else {
             return format!("{written} of {}", words::plain(name));
@@ -187,7 +187,7 @@ impl Prose<'_, '_> {
     /// Vessels are filled.
     fn setting_up(&self, held: &[(f64, f64)]) -> List {
         let mut fills: Vec<(Vec<String>, String, String)> = Vec::new();
-        let stock = &self.program.stock;
+        let stock = &self.program.inventory;
         for mixture in 0..self.program.model.mixtures.len() as u32 {
             let terms = stock.holdings.iter().zip(held).filter(|(h, _)| h.mixture == mixture);
             let texts: Vec<String> = terms

@@ -1,10 +1,10 @@
 //! What earlier checks have worked out and may hold for the next one: trees, files that assets come from, verdicts. A check with an empty
 //! session is a check like any other, so that what an editor shows is what the command says.
 
+mod closure;
 mod files;
 mod foreseen;
 mod items;
-mod reach;
 mod verdicts;
 
 use std::collections::BTreeMap;
@@ -18,9 +18,9 @@ use crate::syntax::{self, Memo};
 
 pub use foreseen::Foreseen;
 
+pub(crate) use closure::Words;
 pub(crate) use files::{features, imported};
-pub(crate) use reach::Words;
-pub(crate) use verdicts::{About, Around, Earlier, Verdict, number};
+pub(crate) use verdicts::{CachedAnalysis, Environment, Snapshot, TaskKey, number};
 
 /// How many packages are remembered: those that are worked on at the same time.
 const MOST: usize = 8;
@@ -44,7 +44,7 @@ pub(crate) struct Package {
     /// Texts by their names.
     texts: BTreeMap<String, Text>,
     /// What was judged of it.
-    pub(crate) earlier: Option<Earlier>,
+    pub(crate) earlier: Option<Snapshot>,
     /// What was found to get where.
     pub(crate) foreseen: Foreseen,
 }

@@ -7,23 +7,23 @@ use std::sync::Arc;
 use matterix_ir::points::Points;
 use matterix_ir::{Diagnostic, FileId, Severity, Sources, Span};
 
+use super::closure::{DependencyClosure, Words};
 use super::items::{self, File};
-use super::reach::{Reach, Words};
 use crate::check::{Starts, Uses};
-use crate::meanings::Noted;
 use crate::names::{DeclId, Module, Names};
+use crate::semantic_index::Resolutions;
 use crate::study::Many;
-use crate::syntax::moved::Moved;
+use crate::syntax::relocate::Relocate;
 
 /// What was found of a task.
 #[derive(Clone, Debug)]
-pub(crate) struct Verdict {
+pub(crate) struct CachedAnalysis {
     /// Its findings.
     pub(crate) findings: Vec<Diagnostic>,
     /// What is known at its statements, where that was asked for.
     pub(crate) points: Option<Points>,
     /// What names and expressions mean in it, where that was asked for.
-    pub(crate) noted: Option<Noted>,
+    pub(crate) noted: Option<Resolutions>,
     /// Which reactions start in it.
     pub(crate) starts: Option<Starts>,
     /// Which things it has to do with.
@@ -34,7 +34,7 @@ pub(crate) struct Verdict {
     pub(crate) moved: Option<Vec<Diagnostic>>,
 }
 
-impl Moved for Verdict {
+impl Relocate for CachedAnalysis {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         self.findings.moved(to);
         for point in self.points.iter_mut().flat_map(|points| &mut points.points) {
@@ -50,16 +50,16 @@ impl Moved for Verdict {
 
 /// What was judged of a package, and of which texts.
 #[derive(Debug)]
-pub(crate) struct Earlier {
+pub(crate) struct Snapshot {
     library: Vec<Arc<Module>>,
     files: Vec<File>,
-    around: Around,
+    around: Environment,
     verdicts: Vec<Judged>,
 }
 
 /// What verdicts stand on beside the texts.
 #[derive(Debug, PartialEq)]
-pub(crate) struct Around {
+pub(crate) struct Environment {
     /// A figure of the other files that modules name.
     pub(crate) beside: u64,
     /// Failures that something declares.
@@ -71,15 +71,15 @@ pub(crate) struct Around {
 /// The verdict of an item.
 #[derive(Debug)]
 struct Judged {
-    about: About,
+    about: TaskKey,
     /// On which words it rests.
     words: Words,
-    verdict: Verdict,
+    verdict: CachedAnalysis,
 }
 
 /// What a verdict is about.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct About {
+pub(crate) struct TaskKey {
     /// The item, by its number in the root file.
     pub(crate) item: usize,
     /// The item that it runs, if that is another one of the root file.
@@ -90,7 +90,7 @@ pub(crate) struct About {
 
 /// How an earlier text of a package and this one belong together.
 pub(crate) struct Match<'e> {
-    earlier: &'e Earlier,
+    earlier: &'e Snapshot,
     /// Items of the root file: the number of each that stayed, by its number then.
     stayed: BTreeMap<usize, usize>,
     /// By file: from where on places are further on, and by how much.
@@ -110,21 +110,21 @@ struct Stretch {
     by: i64,
 }
 
-impl Earlier {
+impl Snapshot {
     /// What there is to judge of a package now, without verdicts yet.
-    pub(crate) fn of(names: &Names<'_>, sources: &Sources, root: usize, around: Around) -> Earlier {
+    pub(crate) fn of(names: &Names<'_>, sources: &Sources, root: usize, around: Environment) -> Snapshot {
         let library = names.modules.iter().filter(|m| m.is_library()).cloned().collect();
         let own = names.modules.iter().enumerate().filter(|(_, m)| !m.is_library());
         let files = own.map(|(index, _)| File::of(names, index, sources, index == root)).collect();
-        Earlier { library, files, around, verdicts: Vec::new() }
+        Snapshot { library, files, around, verdicts: Vec::new() }
     }
 
     /// On which words the verdicts of items of the root file rest, in their order.
-    pub(crate) fn words(&self, root: FileId, about: &[About]) -> Vec<Words> {
+    pub(crate) fn words(&self, root: FileId, about: &[TaskKey]) -> Vec<Words> {
         if about.is_empty() {
             return Vec::new();
         }
-        let reach = Reach::of(&self.files);
+        let reach = DependencyClosure::of(&self.files);
         let Some(file) = self.files.iter().find(|file| file.file == root) else { return Vec::new() };
         about
             .iter()
@@ -136,12 +136,12 @@ impl Earlier {
     }
 
     /// Keeps the verdict of an item of the root file.
-    pub(crate) fn keep(&mut self, about: About, words: Words, verdict: Verdict) {
+    pub(crate) fn keep(&mut self, about: TaskKey, words: Words, verdict: CachedAnalysis) {
         self.verdicts.push(Judged { about, words, verdict });
     }
 
     /// How this package belongs to a later state of it; nothing where anything has changed that may mean something for all.
-    pub(crate) fn matched(&self, now: &Earlier, root: FileId) -> Option<Match<'_>> {
+    pub(crate) fn matched(&self, now: &Snapshot, root: FileId) -> Option<Match<'_>> {
         let same_library = self.library.len() == now.library.len()
             && self.library.iter().zip(&now.library).all(|(a, b)| Arc::ptr_eq(a, b));
         let same_around = same_library && self.around == now.around;
@@ -186,7 +186,7 @@ impl<'e> Match<'e> {
 
     /// The verdict of an item of the root file, with its places as they are now, and on which words it rests; nothing where
     /// something that it can mean is not as it was.
-    pub(crate) fn verdict(&self, about: &About) -> Option<(Verdict, Words)> {
+    pub(crate) fn verdict(&self, about: &TaskKey) -> Option<(CachedAnalysis, Words)> {
         let stayed = |judged: &&Judged| {
             let runs = judged.about.runs.map(|runs| self.stayed.get(&runs).copied());
             judged.about.lab == about.lab

@@ -6,7 +6,7 @@ use matterix_ir::{Diagnostic, Span, codes};
 use crate::ast::{Arg, Expr, Name};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
-use crate::eval::lab::open::Named;
+use crate::eval::lab::free::Named;
 use crate::eval::{Scope, Value};
 use crate::near;
 

@@ -8,7 +8,7 @@ use super::draws::{count, draw};
 use crate::ast::{Expr, FitLine, ItemKind, Name, StudyLine};
 use crate::declare::Type;
 use crate::eval::lab::Elaborator;
-use crate::eval::lab::open::Named;
+use crate::eval::lab::free::Named;
 use crate::eval::{Num, Scope, Value};
 use crate::task::Task;
 

@@ -14,7 +14,7 @@ pub use lines::{count_of, resolve};
 use matterix_ir::Span;
 use matterix_ir::study::{Fit, Study};
 
-use crate::syntax::moved::Moved;
+use crate::syntax::relocate::Relocate;
 
 /// What many runs are for.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub enum Many {
     Fit(Fit),
 }
 
-impl Moved for Many {
+impl Relocate for Many {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         match self {
             Many::Study(study) => {

@@ -6,7 +6,7 @@ use matterix_ir::{Diagnostic, Op, codes};
 use crate::ast::{Expr, ExprKind};
 use crate::eval::Value;
 use crate::eval::lab::Elaborator;
-use crate::eval::lab::open::Named;
+use crate::eval::lab::free::Named;
 use crate::near;
 
 /// What may vary, for messages.

@@ -7,8 +7,8 @@ use pest::Parser;
 
 use crate::ast::{File, Item};
 use crate::grammar::{Grammar, Rule};
-use crate::moved::{Moved, shifted};
 use crate::pieces::{self, Piece};
+use crate::relocate::{Relocate, shifted};
 use crate::repair::{self, Change, Offsets};
 use crate::scan::{self, Scan};
 use crate::{MISSING_VALUE, lower, missing_value, unreadable, with_stack};

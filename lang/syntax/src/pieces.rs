@@ -8,8 +8,8 @@ use std::ops::Range;
 use matterix_ir::FileId;
 
 use crate::ast::{Block, ItemKind, Stmt};
-use crate::moved::{Moved, shifted};
 use crate::parts::{Known, Part, once};
+use crate::relocate::{Relocate, shifted};
 use crate::repair::{self, Change, Offsets};
 use crate::scan::{self, Scan, closer, first_word};
 use crate::{SHALLOW, is_name};

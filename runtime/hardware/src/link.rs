@@ -16,7 +16,7 @@ use crate::world::World;
 
 /// Why a device did not do what it was told.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Trouble {
+pub enum DeviceError {
     /// The line is gone.
     Lost(String),
     /// Nothing came in time over a line that stands, as far as is known.
@@ -34,21 +34,21 @@ pub enum Trouble {
     },
 }
 
-impl Trouble {
+impl DeviceError {
     /// In words.
     pub fn text(&self) -> &str {
         match self {
-            Trouble::Lost(text)
-            | Trouble::Silent(text)
-            | Trouble::Garbled(text)
-            | Trouble::Unsaid(text)
-            | Trouble::Refused { text, .. } => text,
+            DeviceError::Lost(text)
+            | DeviceError::Silent(text)
+            | DeviceError::Garbled(text)
+            | DeviceError::Unsaid(text)
+            | DeviceError::Refused { text, .. } => text,
         }
     }
 }
 
 /// Told of all that goes over a line.
-pub trait Overhear {
+pub trait WireTap {
     /// These bytes are about to go out.
     fn out(&mut self, bytes: &[u8]);
     /// These bytes have come in.
@@ -84,8 +84,8 @@ pub trait Line {
         texts: &[String],
         expects: Option<&Pattern>,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble>;
+        ear: &mut dyn WireTap,
+    ) -> Result<Vec<f64>, DeviceError>;
 
     /// Whether the device takes a command, as far as that is known without saying it; why not.
     fn judge(&self, _text: &str) -> Result<(), String> {
@@ -98,20 +98,25 @@ pub trait Line {
     }
 
     /// Asks for a quantity; what the answer says of it, SI.
-    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble>;
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError>;
 
     /// Whether the device is ready.
-    fn is_ready(&mut self, text: &str, until: &Until, driver: &Driver, ear: &mut dyn Overhear)
-    -> Result<bool, Trouble>;
+    fn is_ready(
+        &mut self,
+        text: &str,
+        until: &Until,
+        driver: &Driver,
+        ear: &mut dyn WireTap,
+    ) -> Result<bool, DeviceError>;
 
     /// The newest of what the device says by itself, SI, by its line of the driver; one that is older than the driver waits for
     /// an answer is none, and the next is waited for as long.
-    fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<f64, Trouble> {
-        Err(Trouble::Lost("nothing is heard over this line".to_owned()))
+    fn hear(&mut self, _line: usize, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
+        Err(DeviceError::Lost("nothing is heard over this line".to_owned()))
     }
 
     /// Lets go by what may still come in answer to a question that is given up, before it is put again.
-    fn settle(&mut self, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn settle(&mut self, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         Ok(())
     }
 
@@ -126,7 +131,7 @@ pub trait Line {
     }
 
     /// Lets it hear that.
-    fn hold(&mut self, _driver: &Driver, _ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn hold(&mut self, _driver: &Driver, _ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         Ok(())
     }
 
@@ -150,24 +155,29 @@ pub fn open(
     place: &Place,
     driver: &Driver,
     address: Option<&str>,
-) -> Result<Box<dyn Line>, Trouble> {
+) -> Result<Box<dyn Line>, DeviceError> {
     if let (Place::Sila(server), Transport::Sila { feature, definition }) = (place, &driver.transport) {
         return sila(server, feature, definition.as_deref(), driver.timeout);
     }
     let opened = world.open(place, driver).map_err(|e| place::trouble(place, &e));
-    let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(Trouble::Lost)?;
+    let link = opened.and_then(|port| Link::new(Rc::clone(world), port, driver, address)).map_err(DeviceError::Lost)?;
     Ok(Box::new(link))
 }
 
 #[cfg(feature = "sila")]
-fn sila(server: &SilaServer, feature: &str, definition: Option<&str>, timeout: f64) -> Result<Box<dyn Line>, Trouble> {
+fn sila(
+    server: &SilaServer,
+    feature: &str,
+    definition: Option<&str>,
+    timeout: f64,
+) -> Result<Box<dyn Line>, DeviceError> {
     Ok(Box::new(crate::sila::Server::connect(server, feature, definition, timeout)?))
 }
 
 #[cfg(not(feature = "sila"))]
-fn sila(server: &SilaServer, _: &str, _: Option<&str>, _: f64) -> Result<Box<dyn Line>, Trouble> {
+fn sila(server: &SilaServer, _: &str, _: Option<&str>, _: f64) -> Result<Box<dyn Line>, DeviceError> {
     let why = "this build does not speak SiLA 2: build it with `--features sila`";
-    Err(Trouble::Lost(format!("cannot connect to `{}`: {why}", server.at)))
+    Err(DeviceError::Lost(format!("cannot connect to `{}`: {why}", server.at)))
 }
 
 /// An open line to a device.
@@ -200,7 +210,7 @@ impl Link {
         Ok(Link { world, port, codec, timeout, buffer, owed: 0, heard, texts })
     }
 
-    fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn send(&mut self, frame: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         // What is still there answers nothing that will be asked.
         loop {
             match self.port.receive(self.codec.silence()) {
@@ -209,7 +219,7 @@ impl Link {
                     ear.back(&late);
                     self.buffer.extend(late);
                 }
-                Err(e) => return Err(Trouble::Lost(format!("the line is gone: {e}"))),
+                Err(e) => return Err(DeviceError::Lost(format!("the line is gone: {e}"))),
             }
         }
         if speaks_up(driver) {
@@ -224,10 +234,10 @@ impl Link {
         }
         ear.out(frame);
         self.codec.sent(frame);
-        self.port.send(frame).map_err(|e| Trouble::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
+        self.port.send(frame).map_err(|e| DeviceError::Lost(format!("`{}` could not be sent: {e}", shown(frame))))
     }
 
-    fn reply(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+    fn reply(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<Reply, DeviceError> {
         let begun = self.world.elapsed();
         let mut most = self.timeout;
         let mut hurried = false;
@@ -236,8 +246,9 @@ impl Link {
                 if reply.as_ref().is_ok_and(|reply| self.overheard(reply, driver)) {
                     continue;
                 }
-                return reply
-                    .map_err(|g| Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why)));
+                return reply.map_err(|g| {
+                    DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
+                });
             }
             if let Some(patience) = ear.patience().filter(|_| !hurried) {
                 hurried = true;
@@ -249,9 +260,9 @@ impl Link {
                 return Err(match self.buffer.as_slice() {
                     [] => {
                         self.owed += 1;
-                        Trouble::Silent(format!("it did not answer `{}` within {seconds} s", shown(to)))
+                        DeviceError::Silent(format!("it did not answer `{}` within {seconds} s", shown(to)))
                     }
-                    half => Trouble::Garbled(format!(
+                    half => DeviceError::Garbled(format!(
                         "its answer to `{}` broke off after `{}`: nothing more came within {seconds} s",
                         shown(to),
                         shown(half)
@@ -263,10 +274,10 @@ impl Link {
     }
 
     /// What comes in meanwhile; whether something did.
-    fn listen(&mut self, within: Duration, ear: &mut dyn Overhear) -> Result<bool, Trouble> {
+    fn listen(&mut self, within: Duration, ear: &mut dyn WireTap) -> Result<bool, DeviceError> {
         let bytes = self.port.receive(within).map_err(|e| {
             let why = format!("the line is gone: {e}");
-            if self.port.renews() { Trouble::Silent(why) } else { Trouble::Lost(why) }
+            if self.port.renews() { DeviceError::Silent(why) } else { DeviceError::Lost(why) }
         })?;
         if !bytes.is_empty() {
             ear.back(&bytes);
@@ -277,7 +288,7 @@ impl Link {
     }
 
     /// Waits until nothing has come for a while.
-    fn hush(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn hush(&mut self, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         let begun = self.world.elapsed();
         let mut heard = begun;
         while self.passed(heard) < self.timeout.min(QUIET) && self.passed(begun) < RESTLESS {
@@ -289,13 +300,13 @@ impl Link {
     }
 
     /// The answer to a question. Where the one before was not answered in time, what comes last is: the first may be late.
-    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn Overhear) -> Result<Reply, Trouble> {
+    fn answer(&mut self, to: &[u8], driver: &Driver, ear: &mut dyn WireTap) -> Result<Reply, DeviceError> {
         let mut reply = self.reply(to, driver, ear)?;
         if std::mem::take(&mut self.owed) > 0 {
             self.hush(ear)?;
             while let Some(later) = self.codec.take_reply(&mut self.buffer) {
                 let later = later.map_err(|g| {
-                    Trouble::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
+                    DeviceError::Garbled(format!("its answer to `{}` makes no sense: {}", shown(to), g.why))
                 })?;
                 if !self.overheard(&later, driver) {
                     reply = later;
@@ -330,8 +341,8 @@ impl Link {
         reply: &Reply,
         expects: Option<&Pattern>,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
+        ear: &mut dyn WireTap,
+    ) -> Result<Vec<f64>, DeviceError> {
         if let Some(refused) = self.refusal(driver, reply) {
             return Err(refused);
         }
@@ -339,14 +350,14 @@ impl Link {
         let said = self.codec.said(pattern, &reply.text).ok_or_else(|| {
             let (to, expected) = (shown(frame), written(pattern));
             let is = self.codec.shown_reply(None, &reply.text);
-            Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
+            DeviceError::Garbled(format!("to `{to}` it answered `{is}`, not `{expected}`"))
         })?;
         self.note_texts(said.kept, ear);
         Ok(said.numbers)
     }
 
     /// Tells what an answer said that a journal keeps, where it is new.
-    fn note_texts(&mut self, kept: Vec<(String, String)>, ear: &mut dyn Overhear) {
+    fn note_texts(&mut self, kept: Vec<(String, String)>, ear: &mut dyn WireTap) {
         for (word, text) in kept {
             if self.texts.get(&word) != Some(&text) {
                 ear.kept(&word, &text);
@@ -363,19 +374,19 @@ impl Link {
     }
 
     /// Tells what an answer said that is put in later.
-    fn note_kept(&self, before: &Kept, ear: &mut dyn Overhear) {
+    fn note_kept(&self, before: &Kept, ear: &mut dyn WireTap) {
         for ((_, word), text) in self.kept().iter().filter(|(word, text)| before.get(*word) != Some(*text)) {
             ear.kept(word, text);
         }
     }
 
     /// The failure that an answer means.
-    fn refusal(&mut self, driver: &Driver, reply: &Reply) -> Option<Trouble> {
+    fn refusal(&mut self, driver: &Driver, reply: &Reply) -> Option<DeviceError> {
         let named = driver.refusals.iter().find(|r| self.codec.matched(&r.reply, &reply.text).is_some());
         let text = format!("it answered `{}`", self.codec.shown_reply(named.map(|n| &n.reply), &reply.text));
         match named {
-            Some(named) => Some(Trouble::Refused { failure: named.failure.clone(), text }),
-            None if reply.is_error => Some(Trouble::Refused { failure: "refused".to_owned(), text }),
+            Some(named) => Some(DeviceError::Refused { failure: named.failure.clone(), text }),
+            None if reply.is_error => Some(DeviceError::Refused { failure: "refused".to_owned(), text }),
             None => None,
         }
     }
@@ -387,11 +398,11 @@ impl Line for Link {
         texts: &[String],
         expects: Option<&Pattern>,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
+        ear: &mut dyn WireTap,
+    ) -> Result<Vec<f64>, DeviceError> {
         let mut numbers = Vec::new();
         self.speak_for(driver);
-        for (place, frame) in self.codec.say(texts).map_err(Trouble::Unsaid)?.into_iter().enumerate() {
+        for (place, frame) in self.codec.say(texts).map_err(DeviceError::Unsaid)?.into_iter().enumerate() {
             self.send(&frame, driver, ear)?;
             if expects.is_none() && !self.codec.acknowledges() {
                 continue;
@@ -404,9 +415,9 @@ impl Line for Link {
         Ok(numbers)
     }
 
-    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         self.speak_for(driver);
-        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        let frame = self.codec.ask(text).map_err(DeviceError::Unsaid)?;
         self.send(&frame, driver, ear)?;
         let reply = self.answer(&frame, driver, ear)?;
         if let Some(refused) = self.refusal(driver, &reply) {
@@ -416,13 +427,13 @@ impl Line for Link {
         let found = told.forms().find_map(|(form, shows)| Some((codec.said(form, &reply.text)?, form, shows)));
         let Some((said, form, shows)) = found else {
             let (to, is) = (shown(&frame), self.codec.shown_reply(None, &reply.text));
-            return Err(Trouble::Garbled(format!("to `{to}` it answered `{is}`, not `{}`", forms(told))));
+            return Err(DeviceError::Garbled(format!("to `{to}` it answered `{is}`, not `{}`", forms(told))));
         };
         self.note_texts(said.kept, ear);
         showable(told, &said.numbers, form, shows)
     }
 
-    fn settle(&mut self, driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn settle(&mut self, driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         self.hush(ear)?;
         while let Some(late) = self.codec.take_reply(&mut self.buffer) {
             if let Ok(late) = late {
@@ -438,10 +449,10 @@ impl Line for Link {
         text: &str,
         until: &Until,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<bool, Trouble> {
+        ear: &mut dyn WireTap,
+    ) -> Result<bool, DeviceError> {
         self.speak_for(driver);
-        let frame = self.codec.ask(text).map_err(Trouble::Unsaid)?;
+        let frame = self.codec.ask(text).map_err(DeviceError::Unsaid)?;
         self.send(&frame, driver, ear)?;
         let reply = self.answer(&frame, driver, ear)?;
         // What is waited for may be what else means a failure: that a run is stopped, where it is to stop.
@@ -458,7 +469,7 @@ impl Line for Link {
         }
     }
 
-    fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+    fn hear(&mut self, line: usize, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         let begun = self.world.elapsed();
         loop {
             while let Some(reply) = self.codec.take_reply(&mut self.buffer) {
@@ -474,7 +485,7 @@ impl Line for Link {
             if left.is_zero() {
                 let wanted = driver.told.get(line).map(|told| written(&told.expects)).unwrap_or_default();
                 let why = format!("it did not say anything like `{wanted}` for {} s", self.timeout.as_secs_f64());
-                return Err(Trouble::Silent(why));
+                return Err(DeviceError::Silent(why));
             }
             self.listen(left.min(LOOK), ear)?;
         }
@@ -509,8 +520,13 @@ pub(crate) fn forms(told: &Told) -> String {
 }
 
 /// What is told, where its instrument can show that.
-pub(crate) fn showable(told: &Told, numbers: &[f64], form: &Pattern, shows: Option<[f64; 2]>) -> Result<f64, Trouble> {
-    let value = *numbers.first().ok_or_else(|| Trouble::Garbled("no number was told".to_owned()))?;
+pub(crate) fn showable(
+    told: &Told,
+    numbers: &[f64],
+    form: &Pattern,
+    shows: Option<[f64; 2]>,
+) -> Result<f64, DeviceError> {
+    let value = *numbers.first().ok_or_else(|| DeviceError::Garbled("no number was told".to_owned()))?;
     let Some([least, most]) = shows.filter(|[least, most]| !(*least..=*most).contains(&value)) else {
         return Ok(value);
     };
@@ -524,7 +540,7 @@ pub(crate) fn showable(told: &Told, numbers: &[f64], form: &Pattern, shows: Opti
         (true, false) => format!("{} and more", unit.show(least)),
         _ => format!("at most {}", show_number(unit.of_si(most))),
     };
-    Err(Trouble::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, unit.show(value))))
+    Err(DeviceError::Garbled(format!("`{}` is {} by its answer, and it can show {range}", told.name, unit.show(value))))
 }
 
 /// Whether a device says something by itself.

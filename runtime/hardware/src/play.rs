@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use matterix_ir::wire::{Driver, Exchange, Template};
 use matterix_ir::{NodeId, Program};
 
-use crate::link::{Line, Link, Overhear, SECURING, STOPPING, Trouble};
+use crate::link::{DeviceError, Line, Link, SECURING, STOPPING, WireTap};
 use crate::place::{self, Place};
 use crate::port;
 use crate::template;
@@ -23,7 +23,7 @@ const POLL: Duration = Duration::from_millis(200);
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unplayed {
     /// The device or its line.
-    Trouble(Trouble),
+    DeviceError(DeviceError),
     /// It was ended early, and the device was told.
     Stopped,
 }
@@ -55,13 +55,14 @@ pub fn play(
     place: &Place,
     sheet: Sheet,
     cancel: &AtomicBool,
-    ear: &mut dyn Overhear,
+    ear: &mut dyn WireTap,
 ) -> Result<(), Broken> {
     let opened = port::open(place, driver).and_then(|mut port| {
         port.attach(&sheet.name, sheet.bytes)?;
         Ok(port)
     });
-    let lost = |why: String| Broken { why: Unplayed::Trouble(Trouble::Lost(why)), is_untouched: true, left: None };
+    let lost =
+        |why: String| Broken { why: Unplayed::DeviceError(DeviceError::Lost(why)), is_untouched: true, left: None };
     let port = opened.map_err(|e| lost(place::trouble(place, &e)))?;
     let link = Link::new(Rc::new(Machine::new()), port, driver, None).map_err(lost)?;
     let mut player = Player { program, driver, link, cancel };
@@ -76,12 +77,12 @@ pub fn play(
 
 /// Hears what another one hears, and waits no longer than seconds for each answer once it is to end.
 struct Hasty<'e> {
-    ear: &'e mut dyn Overhear,
+    ear: &'e mut dyn WireTap,
     cancel: &'e AtomicBool,
     securing: bool,
 }
 
-impl Overhear for Hasty<'_> {
+impl WireTap for Hasty<'_> {
     fn out(&mut self, bytes: &[u8]) {
         self.ear.out(bytes);
     }
@@ -109,12 +110,12 @@ struct Player<'p> {
 
 impl Player<'_> {
     #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
-    fn exchange(&mut self, exchange: &Exchange, ear: &mut dyn Overhear) -> Result<(), Unplayed> {
+    fn exchange(&mut self, exchange: &Exchange, ear: &mut dyn WireTap) -> Result<(), Unplayed> {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Unplayed::Stopped);
         }
         let said = self.link.say(&texts(&exchange.sends), exchange.expects.as_ref(), self.driver, ear);
-        said.map_err(Unplayed::Trouble)?;
+        said.map_err(Unplayed::DeviceError)?;
         let Some(until) = &exchange.until else { return Ok(()) };
         let most = Duration::try_from_secs_f64(self.number(until.timeout)).unwrap_or(Duration::MAX);
         let begun = Instant::now();
@@ -123,10 +124,10 @@ impl Player<'_> {
             match self.link.is_ready(&question, until, self.driver, ear) {
                 Ok(true) => return Ok(()),
                 Ok(false) if begun.elapsed() > most => {
-                    return Err(Unplayed::Trouble(Trouble::Lost("it was not ready in time".to_owned())));
+                    return Err(Unplayed::DeviceError(DeviceError::Lost("it was not ready in time".to_owned())));
                 }
                 Ok(false) => {}
-                Err(trouble) => return Err(Unplayed::Trouble(trouble)),
+                Err(trouble) => return Err(Unplayed::DeviceError(trouble)),
             }
             if self.cancel.load(Ordering::Relaxed) {
                 return Err(Unplayed::Stopped);
@@ -137,14 +138,15 @@ impl Player<'_> {
 
     /// Says what makes the device safe; why it may not be. What it tells in the end counts, not whether it took the command.
     #[allow(clippy::disallowed_methods, reason = "devices act by the wall clock")]
-    fn secure(&mut self, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn secure(&mut self, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         for exchange in &self.driver.safe {
             let texts = texts(&exchange.sends);
             if self.link.lacks(self.driver, &texts) {
                 continue;
             }
             let said = self.link.say(&texts, exchange.expects.as_ref(), self.driver, ear).map(|_| ());
-            let Some(until) = exchange.until.as_ref().filter(|_| matches!(said, Ok(()) | Err(Trouble::Refused { .. })))
+            let Some(until) =
+                exchange.until.as_ref().filter(|_| matches!(said, Ok(()) | Err(DeviceError::Refused { .. })))
             else {
                 said?;
                 continue;
@@ -153,7 +155,7 @@ impl Player<'_> {
             let begun = Instant::now();
             while !self.link.is_ready(&question, until, self.driver, ear)? {
                 if begun.elapsed() > SECURED {
-                    return said.and(Err(Trouble::Silent("it did not tell in time that it was safe".to_owned())));
+                    return said.and(Err(DeviceError::Silent("it did not tell in time that it was safe".to_owned())));
                 }
                 std::thread::sleep(POLL);
             }

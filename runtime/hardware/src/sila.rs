@@ -7,7 +7,7 @@ use matterix_sila::form::{difference, form, unpacked};
 use matterix_sila_wire::tls::Trust;
 use matterix_sila_wire::{Access, Client, Failure, Lock, Login, Said, discovery, is_of};
 
-use crate::link::{Line, Overhear, Trouble, forms, showable};
+use crate::link::{DeviceError, Line, WireTap, forms, showable};
 use crate::pattern::{matched, written};
 use crate::place::{SilaServer, SilaTrust, is_uuid};
 use crate::template;
@@ -22,40 +22,40 @@ impl Server {
         feature: &str,
         definition: Option<&str>,
         timeout: f64,
-    ) -> Result<Server, Trouble> {
+    ) -> Result<Server, DeviceError> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .ok()
             .filter(|t| !t.is_zero())
-            .ok_or_else(|| Trouble::Lost("the timeout is no duration".to_owned()))?;
-        let mut access = access(server).map_err(Trouble::Unsaid)?;
+            .ok_or_else(|| DeviceError::Lost("the timeout is no duration".to_owned()))?;
+        let mut access = access(server).map_err(DeviceError::Unsaid)?;
         let mut failed = None;
-        for address in addresses(server, timeout).map_err(Trouble::Lost)? {
+        for address in addresses(server, timeout).map_err(DeviceError::Lost)? {
             access.address = address;
             match Client::connect(&access, feature, timeout) {
                 Ok(mut client) => {
                     client.lacks_nothing().map_err(|failure| match failure {
-                        Failure::Lost(why) => Trouble::Lost(why),
-                        Failure::Garbled(why) => Trouble::Garbled(why),
+                        Failure::Lost(why) => DeviceError::Lost(why),
+                        Failure::Garbled(why) => DeviceError::Garbled(why),
                         Failure::Refused { name, message } => {
-                            Trouble::Garbled(format!("it answered `{name}`: {message}"))
+                            DeviceError::Garbled(format!("it answered `{name}`: {message}"))
                         }
                     })?;
                     let promised = definition.and_then(unpacked).unwrap_or_default();
                     return match difference(&promised, &form(client.feature())) {
                         None => Ok(Server(client)),
-                        Some(how) => Err(Trouble::Garbled(format!("its `{feature}` is another: {how}"))),
+                        Some(how) => Err(DeviceError::Garbled(format!("its `{feature}` is another: {how}"))),
                     };
                 }
                 // It may be reached by another of its addresses.
                 Err(Failure::Lost(why)) => failed = failed.or(Some(why)),
                 Err(Failure::Refused { name, message }) => {
-                    return Err(Trouble::Garbled(format!("it answered `{name}`: {message}")));
+                    return Err(DeviceError::Garbled(format!("it answered `{name}`: {message}")));
                 }
-                Err(Failure::Garbled(why)) => return Err(Trouble::Garbled(why)),
+                Err(Failure::Garbled(why)) => return Err(DeviceError::Garbled(why)),
             }
         }
         let missing = || format!("no server with the UUID `{}` is on the network", server.at);
-        Err(Trouble::Lost(failed.unwrap_or_else(missing)))
+        Err(DeviceError::Lost(failed.unwrap_or_else(missing)))
     }
 }
 
@@ -99,15 +99,15 @@ fn who() -> String {
 }
 
 /// What went wrong as what the driver calls it.
-fn trouble(failure: Failure, driver: &Driver, ear: &mut dyn Overhear) -> Trouble {
+fn trouble(failure: Failure, driver: &Driver, ear: &mut dyn WireTap) -> DeviceError {
     match failure {
-        Failure::Lost(why) => Trouble::Lost(why),
-        Failure::Garbled(why) => Trouble::Garbled(why),
+        Failure::Lost(why) => DeviceError::Lost(why),
+        Failure::Garbled(why) => DeviceError::Garbled(why),
         Failure::Refused { name, message } => {
             ear.back(format!("{name}: {message}").as_bytes());
             let named = driver.refusals.iter().find(|r| matched(&r.reply, &name).is_some());
             let failure = named.map_or_else(|| "refused".to_owned(), |named| named.failure.clone());
-            Trouble::Refused { failure, text: format!("it answered `{name}`: {message}") }
+            DeviceError::Refused { failure, text: format!("it answered `{name}`: {message}") }
         }
     }
 }
@@ -119,9 +119,9 @@ fn goes_on(driver: &Driver, text: &str) -> bool {
     asked.any(|u| is_of(text, &template::written(&u.asks)))
 }
 
-fn understood(asked: &str, reply: &str, expects: &Pattern) -> Result<Vec<f64>, Trouble> {
+fn understood(asked: &str, reply: &str, expects: &Pattern) -> Result<Vec<f64>, DeviceError> {
     matched(expects, reply)
-        .ok_or_else(|| Trouble::Garbled(format!("to `{asked}` it answered `{reply}`, not `{}`", written(expects))))
+        .ok_or_else(|| DeviceError::Garbled(format!("to `{asked}` it answered `{reply}`, not `{}`", written(expects))))
 }
 
 impl Line for Server {
@@ -130,8 +130,8 @@ impl Line for Server {
         texts: &[String],
         expects: Option<&Pattern>,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<Vec<f64>, Trouble> {
+        ear: &mut dyn WireTap,
+    ) -> Result<Vec<f64>, DeviceError> {
         let mut numbers = Vec::new();
         self.0.wait_at_most(ear.patience());
         for (place, text) in texts.iter().enumerate() {
@@ -153,7 +153,7 @@ impl Line for Server {
         self.0.lapses_soon()
     }
 
-    fn hold(&mut self, driver: &Driver, ear: &mut dyn Overhear) -> Result<(), Trouble> {
+    fn hold(&mut self, driver: &Driver, ear: &mut dyn WireTap) -> Result<(), DeviceError> {
         self.0.wait_at_most(ear.patience());
         self.0.hold().map_err(|f| trouble(f, driver, ear))
     }
@@ -169,14 +169,14 @@ impl Line for Server {
         self.0.answers(text)
     }
 
-    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn Overhear) -> Result<f64, Trouble> {
+    fn ask(&mut self, text: &str, told: &Told, driver: &Driver, ear: &mut dyn WireTap) -> Result<f64, DeviceError> {
         self.0.wait_at_most(ear.patience());
         ear.out(text.as_bytes());
         let reply = self.0.ask(text).map_err(|f| trouble(f, driver, ear))?;
         ear.back(reply.as_bytes());
         let found = told.forms().find_map(|(form, shows)| Some((matched(form, &reply)?, form, shows)));
         let Some((numbers, form, shows)) = found else {
-            return Err(Trouble::Garbled(format!("to `{text}` it answered `{reply}`, not `{}`", forms(told))));
+            return Err(DeviceError::Garbled(format!("to `{text}` it answered `{reply}`, not `{}`", forms(told))));
         };
         showable(told, &numbers, form, shows)
     }
@@ -186,8 +186,8 @@ impl Line for Server {
         text: &str,
         until: &Until,
         driver: &Driver,
-        ear: &mut dyn Overhear,
-    ) -> Result<bool, Trouble> {
+        ear: &mut dyn WireTap,
+    ) -> Result<bool, DeviceError> {
         self.0.wait_at_most(ear.patience());
         let Some(expects) = &until.expects else {
             return self.0.is_done(text).map_err(|f| trouble(f, driver, ear));

@@ -3,17 +3,17 @@
 //! It reads the file alone: shapes and joints (`/bodies`), joints over time (`/joints`), frames (`/tf`) and grips
 //! (`/grips`). Kinematics are its own; bodies are those of `matterix-solids`, not the balls that motions are planned with.
 
-mod film;
 mod kinematics;
 mod limits;
 mod standing;
 mod sweep;
+mod trajectory;
 mod verdict;
 
-pub use film::Unreadable;
+pub use trajectory::Unreadable;
 pub use verdict::{Looked, Verdict, Wrong};
 
-use film::Film;
+use trajectory::Trajectory;
 
 /// How far bodies may reach into each other before it counts, m: their dimensions are nominal.
 pub const NOMINAL: f64 = 2e-3;
@@ -26,7 +26,7 @@ pub const GRIP: f64 = 2e-3;
 
 /// Judges a recording.
 pub fn judge(file: &[u8]) -> Result<Verdict, Unreadable> {
-    let film = Film::read(file)?;
+    let film = Trajectory::read(file)?;
     let mut verdict = Verdict::default();
     verdict.wrong.extend(standing::judge(&film));
     for index in 0..film.robots.len() {

@@ -1,7 +1,7 @@
 //! Joints within what they can do, speeds that lead to positions, links where the joints put them.
 
-use crate::film::{Robot, Sample};
 use crate::kinematics;
+use crate::trajectory::{Robot, Sample};
 use crate::verdict::{Looked, Wrong};
 use matterix_ir::robot::{JointKind, JointLimits};
 

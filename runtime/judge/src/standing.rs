@@ -3,8 +3,8 @@
 use matterix_ir::bodies::Standing;
 use matterix_solids::{Body, Isometry, Vector};
 
-use crate::film::Film;
 use crate::kinematics::moved_by;
+use crate::trajectory::Trajectory;
 use crate::{NOMINAL, Wrong};
 
 /// What is thinner than this is none, m: round walls are prisms.
@@ -15,7 +15,7 @@ type Piece<'f> = (&'f Body, Isometry, [[f64; 3]; 2]);
 
 /// Pairs of things with places of their own that are in each other by more than shapes are nominal. What moves of robots is
 /// followed with them.
-pub(crate) fn judge(film: &Film) -> Vec<Wrong> {
+pub(crate) fn judge(film: &Trajectory) -> Vec<Wrong> {
     let mut all: Vec<(&Standing, Vec<Piece<'_>>)> = Vec::new();
     all.extend(film.standing.iter().map(|standing| (standing, pieces(film, &standing.name))));
     let by = |standing: &Standing| {
@@ -45,7 +45,7 @@ pub(crate) fn judge(film: &Film) -> Vec<Wrong> {
 }
 
 /// What does not move by itself of a thing and of its parts, where the run begins.
-fn pieces<'f>(film: &'f Film, name: &str) -> Vec<Piece<'f>> {
+fn pieces<'f>(film: &'f Trajectory, name: &str) -> Vec<Piece<'f>> {
     let placed = |(body, at): (&'f Body, Isometry)| (body, at, body.bounds(&at));
     let things = film.things.iter().filter(|thing| thing.whole == name);
     let mut out: Vec<Piece<'f>> =

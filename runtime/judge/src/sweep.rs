@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use matterix_solids::{Body, Isometry, Touch};
 
-use crate::film::{Film, Grip, Robot};
 use crate::kinematics;
+use crate::trajectory::{Grip, Robot, Trajectory};
 use crate::verdict::{Looked, Wrong};
 use crate::{GRIP, NOMINAL, STEP};
 
@@ -13,7 +13,7 @@ use crate::{GRIP, NOMINAL, STEP};
 const BELOW: f64 = 5e-3;
 
 /// Follows all motions of a robot.
-pub(crate) fn judge(film: &Film, index: usize, looked: &mut Looked, wrong: &mut Vec<Wrong>) {
+pub(crate) fn judge(film: &Trajectory, index: usize, looked: &mut Looked, wrong: &mut Vec<Wrong>) {
     let robot = &film.robots[index];
     let mut sweep = Sweep::new(film, index);
     if let Some(first) = robot.samples.first() {
@@ -47,7 +47,7 @@ pub(crate) fn judge(film: &Film, index: usize, looked: &mut Looked, wrong: &mut 
 const MOST: f64 = 4096.0;
 
 struct Sweep<'f> {
-    film: &'f Film,
+    film: &'f Trajectory,
     index: usize,
     /// Pairs of links that can meet.
     apart: Vec<(usize, usize)>,
@@ -62,7 +62,7 @@ struct Sweep<'f> {
 }
 
 impl<'f> Sweep<'f> {
-    fn new(film: &'f Film, index: usize) -> Self {
+    fn new(film: &'f Trajectory, index: usize) -> Self {
         let robot = &film.robots[index];
         let description = &robot.machine.robot;
         let by = kinematics::moved_by(description);
@@ -212,7 +212,7 @@ impl Robot {
 }
 
 /// The tip must be at a frame of what it grips.
-fn gripped(film: &Film, grip: &Grip, looked: &mut Looked, wrong: &mut Vec<Wrong>) {
+fn gripped(film: &Trajectory, grip: &Grip, looked: &mut Looked, wrong: &mut Vec<Wrong>) {
     let Some((item, inner)) = grip.items.first() else { return };
     looked.grips += 1;
     let thing = &film.things[*item];
@@ -225,7 +225,7 @@ fn gripped(film: &Film, grip: &Grip, looked: &mut Looked, wrong: &mut Vec<Wrong>
 }
 
 /// Something must be below what was let go, or another robot must hold it.
-fn put_down(film: &Film, by: usize, along: &[(usize, Isometry)], time: f64, wrong: &mut Vec<Wrong>) {
+fn put_down(film: &Trajectory, by: usize, along: &[(usize, Isometry)], time: f64, wrong: &mut Vec<Wrong>) {
     let Some(&(item, _)) = along.first() else { return };
     let mut others = film.robots.iter().enumerate().filter(|(i, _)| *i != by);
     if others.any(|(_, robot)| robot.held(time).first().is_some_and(|(held, _)| *held == item)) {
@@ -235,7 +235,7 @@ fn put_down(film: &Film, by: usize, along: &[(usize, Isometry)], time: f64, wron
     let (Some(body), Some(at)) = (thing.body.as_ref(), thing.at(time)) else { return };
     let below =
         film.things.iter().enumerate().filter(|(i, t)| along.iter().all(|(a, _)| a != i) && t.whole != thing.whole);
-    let carries = |(_, other): (usize, &crate::film::Thing)| {
+    let carries = |(_, other): (usize, &crate::trajectory::Thing)| {
         let (Some(theirs), Some(theirs_at)) = (other.body.as_ref(), other.at(time)) else { return false };
         body.touch(&at, theirs, &theirs_at, BELOW).is_some()
     };

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use matterix_ir::inventory::Count;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::stock::Count;
 
 use super::follow::Follower;
 use super::origins::NOTHING;
@@ -18,7 +18,7 @@ const G: f64 = 1e3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     /// Only gives.
-    Stock,
+    Inventory,
     /// A vessel with something else in it.
     Product,
     /// No vessel: a tip, a line.
@@ -46,7 +46,7 @@ impl Follower<'_> {
             status: status.to_owned(),
             duration: outcome.end_time,
             runs,
-            studies: self.program.stock.studies.clone(),
+            studies: self.program.inventory.studies.clone(),
             reagents: maker.reagents(),
             stocks: maker.stocks(),
             weigh_in: maker.weigh_in(),
@@ -61,7 +61,7 @@ impl Follower<'_> {
 
     /// The value at the end of a tally of an instance.
     fn tally(&self, instance: InstanceId, count: Count) -> Option<f64> {
-        let tallies = self.program.stock.tallies.iter().zip(&self.tallies);
+        let tallies = self.program.inventory.tallies.iter().zip(&self.tallies);
         tallies.filter(|(t, _)| t.count == count && t.instance == instance).map(|(_, v)| v.1).next_back()
     }
 
@@ -92,10 +92,10 @@ impl Follower<'_> {
             }
             let row = self.origins.mass.get(i).map_or(&[][..], Vec::as_slice);
             let all: f64 = row.iter().map(|m| m.abs()).sum();
-            let own = |h: usize| self.program.stock.holdings.get(h).is_some_and(|h| h.mixture as usize == i);
+            let own = |h: usize| self.program.inventory.holdings.get(h).is_some_and(|h| h.mixture as usize == i);
             let foreign: f64 = row.iter().enumerate().filter(|(h, _)| !own(*h)).map(|(_, m)| m.abs()).sum();
             let gave = self.origins.gave.get(i).copied().unwrap_or(false);
-            if gave && foreign <= all * NOTHING { Part::Stock } else { Part::Product }
+            if gave && foreign <= all * NOTHING { Part::Inventory } else { Part::Product }
         };
         (0..self.program.model.mixtures.len()).map(part).collect()
     }
@@ -122,7 +122,7 @@ impl Maker<'_, '_> {
     }
 
     fn reagents(&self) -> Vec<ReagentLine> {
-        let holdings = &self.of.program.stock.holdings;
+        let holdings = &self.of.program.inventory.holdings;
         let mut names: Vec<&str> = Vec::new();
         for holding in holdings {
             if !names.contains(&holding.substance.as_str()) {
@@ -133,7 +133,7 @@ impl Maker<'_, '_> {
     }
 
     fn reagent(&self, name: &str) -> ReagentLine {
-        let holdings = &self.of.program.stock.holdings;
+        let holdings = &self.of.program.inventory.holdings;
         let own: Vec<usize> = (0..holdings.len()).filter(|h| holdings[*h].substance == name).collect();
         let held = |h: &usize| self.of.held.get(*h).copied().unwrap_or_default();
         let mass: f64 = own.iter().map(|h| held(h).0).sum();
@@ -149,7 +149,7 @@ impl Maker<'_, '_> {
             let here: f64 = own.iter().filter_map(|h| self.of.origins.mass.get(i)?.get(*h)).sum();
             *at.entry(*part as u8).or_default() += here;
             let put: f64 = own.iter().filter(|h| holdings[**h].mixture as usize == i).map(|h| held(h).0).sum();
-            if *part == Part::Stock {
+            if *part == Part::Inventory {
                 dead += here * self.dead(i);
                 taken += put - here;
             } else {
@@ -164,7 +164,7 @@ impl Maker<'_, '_> {
             mass_all: mass * G * self.runs as f64,
             taken: taken * G,
             in_products: sum(Part::Product),
-            left_over: sum(Part::Stock),
+            left_over: sum(Part::Inventory),
             dead: dead * G,
             in_devices: sum(Part::Device),
             in_waste: sum(Part::Waste),
@@ -173,9 +173,10 @@ impl Maker<'_, '_> {
     }
 
     fn stocks(&self) -> Vec<StockLine> {
-        let stocks = (0..self.parts.len()).filter(|i| self.parts[*i] == Part::Stock);
+        let stocks = (0..self.parts.len()).filter(|i| self.parts[*i] == Part::Inventory);
         let line = |i: usize| {
-            let own = self.of.program.stock.holdings.iter().zip(&self.of.held).filter(|(h, _)| h.mixture as usize == i);
+            let own =
+                self.of.program.inventory.holdings.iter().zip(&self.of.held).filter(|(h, _)| h.mixture as usize == i);
             let (mut held, mut texts) = (0.0, Vec::new());
             for (holding, (mass, amount)) in own {
                 held += mass;
@@ -196,12 +197,12 @@ impl Maker<'_, '_> {
 
     fn weigh_in(&self) -> Vec<WeighLine> {
         let masses: Vec<f64> = self.of.held.iter().map(|h| h.0).collect();
-        let all = self.of.program.stock.measure_out(&masses);
+        let all = self.of.program.inventory.measure_out(&masses);
         all.into_iter().map(|m| self.weigh(m.substance, m.within, m.mass)).collect()
     }
 
     fn weigh(&self, name: String, within: Vec<String>, mass: f64) -> WeighLine {
-        let known = self.of.program.stock.substance(&name);
+        let known = self.of.program.inventory.substance(&name);
         WeighLine {
             formula: known.map(|s| s.formula.clone()).unwrap_or_default(),
             amount: known.and_then(|s| s.molar_mass).map(|m| mass / m * 1e3),
@@ -217,7 +218,7 @@ impl Maker<'_, '_> {
     fn consumables(&self) -> Vec<ConsumableLine> {
         let scene = &self.of.program.scene;
         let mut lines: BTreeMap<(String, String), (BTreeSet<InstanceId>, u64, u64)> = BTreeMap::new();
-        for (tally, (before, after)) in self.of.program.stock.tallies.iter().zip(&self.of.tallies) {
+        for (tally, (before, after)) in self.of.program.inventory.tallies.iter().zip(&self.of.tallies) {
             if tally.count != Count::Used {
                 continue;
             }
@@ -250,7 +251,7 @@ impl Maker<'_, '_> {
                 continue;
             }
             let (used, all) = lines.entry(self.of.root(self.of.holder(i))).or_default();
-            let held = self.of.program.stock.holdings.iter().any(|h| h.mixture as usize == i);
+            let held = self.of.program.inventory.holdings.iter().any(|h| h.mixture as usize == i);
             *used += usize::from(held || self.of.origins.touched.get(i).copied().unwrap_or(false));
             *all += 1;
         }
@@ -271,7 +272,7 @@ impl Maker<'_, '_> {
                 continue;
             }
             let mut reagents: Vec<(String, f64)> = Vec::new();
-            for (holding, mass) in program.stock.holdings.iter().zip(&self.of.origins.mass[i]) {
+            for (holding, mass) in program.inventory.holdings.iter().zip(&self.of.origins.mass[i]) {
                 match reagents.iter_mut().find(|(name, _)| *name == holding.substance) {
                     Some(line) => line.1 += mass * G,
                     None => reagents.push((holding.substance.clone(), mass * G)),
@@ -301,9 +302,10 @@ impl Maker<'_, '_> {
             let vessel = (0..self.parts.len()).any(|i| {
                 !matches!(self.parts[i], Part::Device | Part::Waste) && self.of.root(self.of.holder(i)) == root
             });
-            let pack = program.stock.tallies.iter().any(|t| t.count == Count::Used && self.of.root(t.instance) == root);
+            let pack =
+                program.inventory.tallies.iter().any(|t| t.count == Count::Used && self.of.root(t.instance) == root);
             let running =
-                program.stock.tallies.iter().any(|t| t.count == Count::Running && self.of.root(t.instance) == root);
+                program.inventory.tallies.iter().any(|t| t.count == Count::Running && self.of.root(t.instance) == root);
             (vessel || pack) && !running
         };
         let mut used: BTreeMap<InstanceId, Vec<(f64, f64)>> = BTreeMap::new();
@@ -311,7 +313,7 @@ impl Maker<'_, '_> {
         for (instance, from, to) in &self.of.uses {
             used.entry(self.of.root(*instance)).or_default().push((*from, *to));
         }
-        for (tally, intervals) in program.stock.tallies.iter().zip(&self.of.running) {
+        for (tally, intervals) in program.inventory.tallies.iter().zip(&self.of.running) {
             if tally.count == Count::Running {
                 running.entry(self.of.root(tally.instance)).or_default().extend(intervals);
             }

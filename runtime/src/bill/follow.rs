@@ -1,9 +1,9 @@
 //! Listens to a run and notes what a bill needs.
 
 use matterix_ir::Program;
+use matterix_ir::inventory::Count;
 use matterix_ir::plan::{Operation, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::stock::Count;
 
 use super::origins::{Origins, mass_of};
 use crate::exec::{Listener, OperationState};
@@ -43,7 +43,7 @@ pub struct Follower<'p> {
 impl<'p> Follower<'p> {
     /// Before the run.
     pub fn new(program: &'p Program) -> Self {
-        let tallies = program.stock.tallies.len();
+        let tallies = program.inventory.tallies.len();
         Follower {
             program,
             origins: Origins::default(),
@@ -67,7 +67,7 @@ impl<'p> Follower<'p> {
     }
 
     fn begin(&mut self, engine: &Engine<'_>) {
-        let stock = &self.program.stock;
+        let stock = &self.program.inventory;
         self.held = stock.holdings.iter().map(|h| (engine.eval(h.mass), engine.eval(h.amount))).collect();
         let masses: Vec<f64> = self.held.iter().map(|h| h.0).collect();
         self.origins = Origins::new(stock, engine.model().mixtures.len(), &masses);
@@ -90,7 +90,7 @@ impl<'p> Follower<'p> {
     /// A tally has this value from now on.
     fn counted(&mut self, index: usize, value: f64, time: f64) {
         self.tallies[index].1 = value;
-        let is_on = self.program.stock.tallies[index].count == Count::Running && value != 0.0;
+        let is_on = self.program.inventory.tallies[index].count == Count::Running && value != 0.0;
         match (self.since[index], is_on) {
             (None, true) => self.since[index] = Some(time),
             (Some(since), false) => {
@@ -112,7 +112,7 @@ impl<'p> Follower<'p> {
 
     /// Follows the streams: all ends of theirs as they are now, also of those that are not shown.
     fn stream(&mut self, engine: &Engine<'_>) {
-        let (model, streams) = (engine.model(), &self.program.stock.streams);
+        let (model, streams) = (engine.model(), &self.program.inventory.streams);
         let mut now = vec![0.0; model.mixtures.len()];
         for mixture in streams.iter().flat_map(|(a, b)| [*a as usize, *b as usize]) {
             if let Some(m) = model.mixtures.get(mixture) {
@@ -138,7 +138,7 @@ impl Observer for Follower<'_> {
         }
         let program = self.program;
         for index in self.watched.0.by(changed) {
-            let value = engine.eval(program.stock.tallies[index as usize].value);
+            let value = engine.eval(program.inventory.tallies[index as usize].value);
             self.counted(index as usize, value, time);
         }
         // Also of one instant: what moves each of two ends may be shown one after the other.

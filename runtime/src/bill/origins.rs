@@ -1,7 +1,7 @@
 //! How much of the mass of every mixture came from which holding.
 
+use matterix_ir::inventory::Inventory;
 use matterix_ir::model::{Mixture, Model};
-use matterix_ir::stock::Stock;
 
 /// Masses below this share of the largest holding are rounding.
 pub(super) const NOTHING: f64 = 1e-12;
@@ -20,7 +20,7 @@ pub(super) struct Origins {
 
 impl Origins {
     /// What the mixtures hold at the start: `masses` by holding, kg.
-    pub(super) fn new(stock: &Stock, mixtures: usize, masses: &[f64]) -> Self {
+    pub(super) fn new(stock: &Inventory, mixtures: usize, masses: &[f64]) -> Self {
         let mut mass = vec![vec![0.0; stock.holdings.len()]; mixtures];
         for (i, holding) in stock.holdings.iter().enumerate() {
             if let Some(slot) = mass.get_mut(holding.mixture as usize).and_then(|row| row.get_mut(i)) {

@@ -66,12 +66,12 @@ pub struct Limits<'c> {
     /// The turns that claiming blocks take, in order; without one, a block takes its turn as it asks.
     pub turns: &'c [Turn],
     /// What is looked at when.
-    pub looks: Looks<'c>,
+    pub looks: Probes<'c>,
 }
 
 /// Quantities that are looked at, at some times.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Looks<'c> {
+pub struct Probes<'c> {
     /// s, ascending; those after the end of the run are left out.
     pub times: &'c [f64],
     /// The quantities.
@@ -81,7 +81,7 @@ pub struct Looks<'c> {
 impl Default for Limits<'_> {
     /// 30 days, a million steps.
     fn default() -> Self {
-        Limits { horizon: LONGEST_RUN, steps_per_instant: 100_000, cancel: None, turns: &[], looks: Looks::default() }
+        Limits { horizon: LONGEST_RUN, steps_per_instant: 100_000, cancel: None, turns: &[], looks: Probes::default() }
     }
 }
 

@@ -8,7 +8,7 @@ use matterix_ir::{NodeId, Program};
 
 use super::solve::Model;
 use crate::backend::Prepared;
-use crate::exec::{Limits, Listener, Looks, RunStatus};
+use crate::exec::{Limits, Listener, Probes, RunStatus};
 use crate::process::{self, Engine, Observer};
 use crate::run::{self, RunOptions};
 
@@ -58,7 +58,7 @@ impl<'p> Runs<'p> {
                 *slot = *value;
             }
         }
-        let looks = Looks { times: &self.times, nodes: &self.nodes };
+        let looks = Probes { times: &self.times, nodes: &self.nodes };
         let limits = Limits { cancel: Some(self.cancel), looks, ..Limits::default() };
         let process = process::Options::of_one_of_many();
         let options = RunOptions { seed: self.seed, limits, process, ..RunOptions::default() };

@@ -37,7 +37,7 @@ impl Lab {
             scene: Scene::default(),
             model: Default::default(),
             plan,
-            stock: Default::default(),
+            inventory: Default::default(),
             drivers: Vec::new(),
             offers: Default::default(),
         };

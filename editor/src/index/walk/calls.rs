@@ -2,8 +2,8 @@
 
 use matterix_ir::Span;
 use matterix_lang::ast::{Call, ExprKind, Name, NamedExpr};
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::verb_text;
+use matterix_lang::semantic_index::Sort;
 
 use super::super::collect::verb_span;
 use super::Walk;

@@ -1,7 +1,7 @@
 //! Drivers: what is said to devices.
 
 use matterix_lang::ast::{Exchange, Expr, ExprKind, Path, Wire, WireKind};
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::{Found, Walk};
 use crate::index::{Kind, Meaning};

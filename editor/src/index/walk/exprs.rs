@@ -2,7 +2,7 @@
 
 use matterix_lang::ast::{Arg, Binary, Expr, ExprKind, Name, Text, TextPart, Unary};
 use matterix_lang::eval::lab::grids::Place;
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::{Found, Walk};
 use crate::index::{DefId, Kind, Meaning};

@@ -2,7 +2,7 @@
 
 use matterix_lang::ast::{Expr, ExprKind, FieldValue, Item, ItemKind, Name, Path, StmtKind};
 use matterix_lang::elaborate::hazards::transfer;
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::{Found, Walk};
 use crate::index::{Kind, Meaning};

@@ -1,7 +1,7 @@
 //! Studies and fits.
 
 use matterix_lang::ast::{Expr, ExprKind, FitLine, Path, StudyLine};
-use matterix_lang::meanings::Sort;
+use matterix_lang::semantic_index::Sort;
 
 use super::{Found, Walk};
 use crate::index::{Kind, Meaning};

@@ -14,8 +14,8 @@ mod types;
 
 use matterix_ir::{FileId, Span};
 use matterix_lang::ast::Name;
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::Module;
+use matterix_lang::semantic_index::Sort;
 
 use super::collect::bare;
 use super::{DefId, Index, Kind, Local, Meaning, Region, Use};

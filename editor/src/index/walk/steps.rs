@@ -43,7 +43,7 @@ impl Walk<'_> {
                 self.bind(Kind::Variable, name, s.span, &Found::of(sort));
             }
             StmtKind::Step { name, body, handlers } => {
-                self.bind(Kind::Step, name, s.span, &Found::of(matterix_lang::meanings::Sort::Step));
+                self.bind(Kind::Step, name, s.span, &Found::of(matterix_lang::semantic_index::Sort::Step));
                 self.guarded(body, handlers);
             }
             StmtKind::Wait { duration } => drop(self.expr(duration)),
@@ -68,7 +68,9 @@ impl Walk<'_> {
                 let set = self.expr(set);
                 let each = match &set.sort {
                     // A grid of a thing is gone through place by place.
-                    matterix_lang::meanings::Sort::Thing(..) => self.index.element_of(&set.sort).unwrap_or(set.sort),
+                    matterix_lang::semantic_index::Sort::Thing(..) => {
+                        self.index.element_of(&set.sort).unwrap_or(set.sort)
+                    }
                     other => self.each(other),
                 };
                 self.inside(body.span, |this| {

@@ -2,8 +2,8 @@
 
 use matterix_ir::Span;
 use matterix_lang::ast::{AssetLine, AssetLiteral, At, ExprKind, Field, FieldValue, Member, MemberKind, NamedExpr};
-use matterix_lang::meanings::Sort;
 use matterix_lang::names::DeclId;
+use matterix_lang::semantic_index::Sort;
 
 use super::{Found, Walk};
 use crate::index::Kind;

@@ -8,12 +8,12 @@ use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Presumption, StepId};
 use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 
-use super::Flow;
+use super::Interpreter;
 use super::bonds::{Bonds, Form};
 use super::cases;
 use super::course::Course;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 use crate::elaborate::mixtures::written;
 
 /// Events that set each other off at one instant before the rest is left to the run.
@@ -44,10 +44,10 @@ pub enum Asked {
     Handled,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Looks at needs. What a failed need that no handler takes looks at counts as unknown from here on, so that one mistake is
     /// one message.
-    pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut Facts) -> Asked {
+    pub fn needs(&mut self, label: &str, needs: &[Arc<Condition>], facts: &mut AbstractState) -> Asked {
         for need in needs {
             let value = self.eval(need.node, facts);
             let truth = value.truth();
@@ -87,7 +87,7 @@ impl Flow<'_, '_> {
     }
 
     /// A condition fails for certain: its failure goes to the handlers. What another branch changes may still make it hold.
-    fn failed(&mut self, condition: &Condition, facts: &mut Facts, taken: bool) -> Asked {
+    fn failed(&mut self, condition: &Condition, facts: &mut AbstractState, taken: bool) -> Asked {
         let shared = self.is_shared(condition.node);
         let mut failed = self.meanwhile_in(facts);
         failed.unsure |= shared;
@@ -101,7 +101,7 @@ impl Flow<'_, '_> {
     }
 
     /// Behind a finding on some ways those on which the condition holds go on, where ways are told apart; else what it looks at is unknown.
-    fn go_on_after(&mut self, condition: &Condition, facts: &mut Facts) {
+    fn go_on_after(&mut self, condition: &Condition, facts: &mut AbstractState) {
         if !self.choose_ways(condition.node, true, facts) {
             let states = self.parts(condition.node).states.clone();
             self.forget(&states, facts);
@@ -109,7 +109,7 @@ impl Flow<'_, '_> {
     }
 
     /// What is known at some moment of the time that passes now.
-    fn meanwhile_in(&self, facts: &Facts) -> Facts {
+    fn meanwhile_in(&self, facts: &AbstractState) -> AbstractState {
         let mut facts = facts.clone();
         if let Some(span) = &self.meanwhile {
             facts.time = span.clone();
@@ -119,7 +119,7 @@ impl Flow<'_, '_> {
 
     /// A condition fails on some ways, or perhaps: where something takes the failure, or what holds there is asked for, it goes there
     /// beside the way on which the condition holds.
-    fn may_fail(&mut self, condition: &Condition, on_some: bool, facts: &Facts) {
+    fn may_fail(&mut self, condition: &Condition, on_some: bool, facts: &AbstractState) {
         let name = condition.failure();
         if !self.is_taken(name) && self.notes.is_none() {
             return;
@@ -134,17 +134,17 @@ impl Flow<'_, '_> {
 
     /// Whether a condition that may hold is false on some way that leads here. Of an `and` one part decides, whatever is
     /// known of the others.
-    fn fails_on_a_way(&mut self, node: NodeId, facts: &Facts) -> bool {
+    fn fails_on_a_way(&mut self, node: NodeId, facts: &AbstractState) -> bool {
         let value = self.eval(node, facts);
         match self.lab.graph.op(node) {
             _ if value.truth().is_some() => false,
             Op::Binary(BinaryOp::And, a, b) => self.fails_on_a_way(a, facts) || self.fails_on_a_way(b, facts),
-            _ => value.why() == Some(Why::Paths),
+            _ => value.why() == Some(Imprecision::Paths),
         }
     }
 
     /// Looks at what a command presumes. Steps that clean up may do so in vain.
-    fn presumptions(&mut self, label: &str, presumes: &[Presumption], facts: &mut Facts) {
+    fn presumptions(&mut self, label: &str, presumes: &[Presumption], facts: &mut AbstractState) {
         if self.cleaning > 0 {
             return;
         }
@@ -159,7 +159,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes which presumed conditions hold, or may hold, after these states have changed.
-    fn note_held(&mut self, states: &[u32], facts: &mut Facts) {
+    fn note_held(&mut self, states: &[u32], facts: &mut AbstractState) {
         let due: BTreeSet<NodeId> = states.iter().filter_map(|s| self.presumed_of.get(s)).flatten().copied().collect();
         for node in due {
             if self.eval(node, facts).truth() != Some(false) {
@@ -174,7 +174,7 @@ impl Flow<'_, '_> {
     }
 
     /// Forgets states, and what depends on them.
-    pub fn forget(&mut self, states: &[u32], facts: &mut Facts) {
+    pub fn forget(&mut self, states: &[u32], facts: &mut AbstractState) {
         facts.forget(states);
         for s in states {
             self.touch(*s, facts);
@@ -183,7 +183,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes that a state has changed.
-    pub(super) fn touch(&self, state: u32, facts: &mut Facts) {
+    pub(super) fn touch(&self, state: u32, facts: &mut AbstractState) {
         facts.reopen(|s| s == state);
         if let Some(rates) = self.rates_of.get(&state) {
             facts.unsettled.extend(rates);
@@ -191,7 +191,7 @@ impl Flow<'_, '_> {
     }
 
     /// Changes states by the statement that is followed now.
-    pub fn write(&mut self, changes: Vec<(u32, Known)>, facts: &mut Facts) -> Vec<u32> {
+    pub fn write(&mut self, changes: Vec<(u32, AbstractValue)>, facts: &mut AbstractState) -> Vec<u32> {
         let changed: Vec<u32> =
             changes.iter().filter(|(s, v)| facts.states[*s as usize] != *v).map(|(s, _)| *s).collect();
         for s in &changed {
@@ -205,7 +205,7 @@ impl Flow<'_, '_> {
     }
 
     /// Performs actions in order, and the events they set off; how the limits of things come out then.
-    pub fn perform(&mut self, actions: &[Action], facts: &mut Facts) -> Asked {
+    pub fn perform(&mut self, actions: &[Action], facts: &mut AbstractState) -> Asked {
         let mut changed = Vec::new();
         for action in actions {
             changed.extend(self.act(action, facts));
@@ -223,14 +223,14 @@ impl Flow<'_, '_> {
     }
 
     /// The limits that are passed already, behind a handler that took that: time that goes by does not break them once more.
-    pub(super) fn passed_before(&mut self, facts: &Facts) -> BTreeSet<u32> {
+    pub(super) fn passed_before(&mut self, facts: &AbstractState) -> BTreeSet<u32> {
         let limits = if self.limit_taken { 0..self.plan.limits.len() as u32 } else { 0..0 };
         let broken = |i: &u32| self.eval(self.plan.limits[*i as usize].condition.node, facts).truth() == Some(false);
         limits.filter(broken).collect()
     }
 
     /// Looks at limits after what they depend on has changed.
-    pub fn limits(&mut self, mut due: Vec<u32>, facts: &mut Facts) -> Asked {
+    pub fn limits(&mut self, mut due: Vec<u32>, facts: &mut AbstractState) -> Asked {
         let mut out = Asked::Met;
         due.sort_unstable();
         due.dedup();
@@ -273,7 +273,7 @@ impl Flow<'_, '_> {
         out
     }
 
-    fn act(&mut self, action: &Action, facts: &mut Facts) -> Vec<u32> {
+    fn act(&mut self, action: &Action, facts: &mut AbstractState) -> Vec<u32> {
         match action {
             Action::Assign { state, value, .. } => {
                 let told = self.by_case(*value, facts);
@@ -308,7 +308,7 @@ impl Flow<'_, '_> {
     /// The shares that a transfer takes of the least and of the most that its source may hold, where the source holds one
     /// mixture of which only the whole amount is not known. Of each species it then takes what lies between the two: a volume
     /// that is drawn is that volume, however much there is.
-    fn shares(&mut self, fraction: NodeId, from: u32, facts: &Facts) -> Option<[f64; 2]> {
+    fn shares(&mut self, fraction: NodeId, from: u32, facts: &AbstractState) -> Option<[f64; 2]> {
         let held: Vec<(u32, [f64; 2])> = self.mixtures[from as usize]
             .iter()
             .filter(|(_, state)| self.amounts.contains(state))
@@ -322,7 +322,7 @@ impl Flow<'_, '_> {
         }
         let mut share = |end: usize| {
             let mut facts = facts.clone();
-            held.iter().for_each(|(state, ends)| facts.states[*state as usize] = Known::Point(ends[end]));
+            held.iter().for_each(|(state, ends)| facts.states[*state as usize] = AbstractValue::Point(ends[end]));
             self.eval(fraction, &facts).exact().map(whole).filter(|share| (0.0..=1.0).contains(share))
         };
         Some([share(0)?, share(1)?])
@@ -330,25 +330,29 @@ impl Flow<'_, '_> {
 
     fn transfer(
         &mut self,
-        fraction: &Known,
+        fraction: &AbstractValue,
         (ends, told): (Option<[f64; 2]>, Option<Vec<f64>>),
         from: u32,
         to: u32,
-        facts: &mut Facts,
+        facts: &mut AbstractState,
     ) -> Vec<u32> {
         let (low, high) = fraction.bounds();
         if low > 1.0 + TOO_MUCH || high < 0.0 {
             self.too_much(from as usize, low, false);
-        } else if high > 1.0 + TOO_MUCH && fraction.why() == Some(Why::Paths) && !self.is_beside(from) {
+        } else if high > 1.0 + TOO_MUCH && fraction.why() == Some(Imprecision::Paths) && !self.is_beside(from) {
             self.too_much(from as usize, high, true);
         }
         let fraction = match fraction.exact() {
-            Some(f) => Known::Point(whole(f.clamp(0.0, 1.0))),
+            Some(f) => AbstractValue::Point(whole(f.clamp(0.0, 1.0))),
             None => match fraction {
-                Known::Few(all, why) if low >= 0.0 && high <= 1.0 + TOO_MUCH => {
-                    Known::of(all.iter().map(|f| whole(*f)).collect(), *why)
+                AbstractValue::Few(all, why) if low >= 0.0 && high <= 1.0 + TOO_MUCH => {
+                    AbstractValue::of(all.iter().map(|f| whole(*f)).collect(), *why)
                 }
-                _ => Known::Range(low.clamp(0.0, 1.0), high.clamp(0.0, 1.0), fraction.why().unwrap_or(Why::Unknown)),
+                _ => AbstractValue::Range(
+                    low.clamp(0.0, 1.0),
+                    high.clamp(0.0, 1.0),
+                    fraction.why().unwrap_or(Imprecision::Unknown),
+                ),
             },
         };
         let told: Option<Vec<f64>> = told.map(|all| all.into_iter().map(|f| whole(f.clamp(0.0, 1.0))).collect());
@@ -365,9 +369,9 @@ impl Flow<'_, '_> {
             let apart = told.as_ref().and_then(|shares| cases::moved(shares, *source, target, facts));
             if let Some([rest, more]) = apart {
                 let ends = [*source, target].map(|state| facts.states[state as usize].why());
-                let why = ends.into_iter().chain([fraction.why()]).flatten().max().unwrap_or(Why::Paths);
+                let why = ends.into_iter().chain([fraction.why()]).flatten().max().unwrap_or(Imprecision::Paths);
                 for (state, values) in [(*source, rest), (target, more)] {
-                    changes.push((state, Known::of(values.clone(), why)));
+                    changes.push((state, AbstractValue::of(values.clone(), why)));
                     by_case.push((state, values));
                 }
                 continue;
@@ -382,13 +386,16 @@ impl Flow<'_, '_> {
                 None => {
                     // A share of what is there leaves the rest: exact where the share is.
                     let kept = match fraction.exact() {
-                        Some(f) => Known::Point(1.0 - f),
-                        None => Known::binary(BinaryOp::Sub, &Known::Point(1.0), &fraction),
+                        Some(f) => AbstractValue::Point(1.0 - f),
+                        None => AbstractValue::binary(BinaryOp::Sub, &AbstractValue::Point(1.0), &fraction),
                     };
-                    (Known::binary(BinaryOp::Mul, &fraction, held), Known::binary(BinaryOp::Mul, &kept, held))
+                    (
+                        AbstractValue::binary(BinaryOp::Mul, &fraction, held),
+                        AbstractValue::binary(BinaryOp::Mul, &kept, held),
+                    )
                 }
             };
-            let more = Known::binary(BinaryOp::Add, &facts.states[target as usize], &moved);
+            let more = AbstractValue::binary(BinaryOp::Add, &facts.states[target as usize], &moved);
             changes.extend([(*source, rest), (target, more)]);
         }
         let bonds = facts.bonds.as_deref().cloned().map(|mut bonds| {
@@ -409,13 +416,13 @@ impl Flow<'_, '_> {
     }
 
     /// A node as a sum of states, where some states hang together.
-    fn form_in(&mut self, node: NodeId, facts: &Facts) -> Option<Rc<Form>> {
+    fn form_in(&mut self, node: NodeId, facts: &AbstractState) -> Option<Rc<Form>> {
         facts.bonds.as_ref()?;
         self.form(node)
     }
 
     /// States hang together so from now on.
-    fn bind(&self, bonds: Option<Bonds>, facts: &mut Facts) {
+    fn bind(&self, bonds: Option<Bonds>, facts: &mut AbstractState) {
         if let Some(mut bonds) = bonds {
             bonds.stamp(facts);
             facts.bonds = Some(Rc::new(bonds)).filter(|bonds| !bonds.is_empty());
@@ -423,7 +430,7 @@ impl Flow<'_, '_> {
     }
 
     /// Fires those of the events that became true, and what they set off, until none does.
-    pub fn fire(&mut self, mut due: Vec<u32>, facts: &mut Facts) {
+    pub fn fire(&mut self, mut due: Vec<u32>, facts: &mut AbstractState) {
         let (mut sure, mut last) = (true, None);
         for round in 0..MOST_AT_ONCE {
             if round >= MOST_EVENTS && !sure {
@@ -445,7 +452,7 @@ impl Flow<'_, '_> {
                 let changed = self.happen(i, facts);
                 if (now, before) != (Some(true), Some(false)) {
                     let happened = facts.clone();
-                    *facts = untouched.join(happened, &untouched, self.site(), Why::Unknown);
+                    *facts = untouched.join(happened, &untouched, self.site(), Imprecision::Unknown);
                 }
                 facts.fired[i as usize] = self.eval(event.when, facts).truth();
                 next.extend(self.events_on(&changed));
@@ -474,7 +481,7 @@ impl Flow<'_, '_> {
     }
 
     /// Does what an event does; the states that are no longer what they were.
-    pub fn happen(&mut self, event: u32, facts: &mut Facts) -> Vec<u32> {
+    pub fn happen(&mut self, event: u32, facts: &mut AbstractState) -> Vec<u32> {
         let events = self.events;
         let after = self.meanwhile.clone().map(|span| std::mem::replace(&mut facts.time, span));
         let changed: Vec<u32> =
@@ -492,7 +499,13 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a command or a primitive skill; nothing where it fails for certain and a handler takes that.
-    pub fn operation(&mut self, id: StepId, label: &str, operation: &Operation, mut facts: Facts) -> Option<Facts> {
+    pub fn operation(
+        &mut self,
+        id: StepId,
+        label: &str,
+        operation: &Operation,
+        mut facts: AbstractState,
+    ) -> Option<AbstractState> {
         self.presumptions(label, &operation.presumes, &mut facts);
         let met = match self.needs(label, &operation.needs, &mut facts) {
             Asked::Handled => return None,
@@ -527,10 +540,10 @@ impl Flow<'_, '_> {
                     if matches!(self.course(f64::INFINITY, &[(node, true)], &mut facts), Course::Reached(_)) {
                         // Others that run meanwhile may end it earlier or later.
                         if self.flows_beside() {
-                            facts.time = Known::Range(begun, f64::INFINITY, Why::Unknown);
+                            facts.time = AbstractValue::Range(begun, f64::INFINITY, Imprecision::Unknown);
                         }
                     } else {
-                        self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut facts);
+                        self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut facts);
                         self.assume(node, true, &mut facts);
                     }
                     self.waits_against_keep(label, until, &facts);

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 
 use matterix_ir::NodeId;
 
-use super::Flow;
-use super::facts::Facts;
-use super::parted::Place;
+use super::Interpreter;
 use super::report::Finding;
+use super::state::AbstractState;
+use super::trace_partitioning::Place;
 
 /// So many meetings before what is open are looked at.
 const NEAR: usize = 4;
@@ -39,7 +39,7 @@ pub(super) struct Meeting {
 }
 
 impl Meeting {
-    pub(super) fn of(ways: &[Facts]) -> Self {
+    pub(super) fn of(ways: &[AbstractState]) -> Self {
         let mut differ = BTreeSet::new();
         for two in ways.windows(2) {
             let pairs = two[0].states.iter().zip(two[1].states.iter()).enumerate();
@@ -55,7 +55,7 @@ impl Meeting {
 }
 
 /// Adds what goes wrong on single ways and was left open where they had met; `begin` gives a flow that was not followed yet.
-pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>) {
+pub(super) fn add_findings<'l, 'a>(flow: &mut Interpreter<'l, 'a>, begin: &impl Fn() -> Interpreter<'l, 'a>) {
     let open = std::mem::take(&mut flow.ways.open);
     if open.is_empty() || flow.findings.iter().any(Finding::is_error) {
         return;
@@ -91,7 +91,7 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() ->
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Notes that a condition may fail at the statement that is followed now, as far as bounds tell.
     pub(super) fn leaves_open(&mut self, node: NodeId, place: Place) {
         if self.quiet > 0

@@ -7,11 +7,11 @@ use matterix_ir::plan::{Step, StepId};
 use matterix_ir::{NodeId, Span};
 use rustc_hash::FxHashMap;
 
-use super::Flow;
-use super::facts::Facts;
+use super::Interpreter;
 use super::jobs::Job;
-use super::points::{Notes, at_least};
-use super::value::Known;
+use super::program_points::{Notes, at_least};
+use super::state::AbstractState;
+use super::value::AbstractValue;
 use crate::elaborate::mixtures::written;
 
 impl Notes {
@@ -23,7 +23,7 @@ impl Notes {
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// The same steps are followed once more, or no longer.
     pub fn once_more(&mut self, more: bool) {
         if let Some(notes) = &mut self.notes {
@@ -68,7 +68,7 @@ impl Flow<'_, '_> {
 
     /// How far the jobs had got that a failure stops, those begun at this depth of handlers, is not known where it is taken; what should
     /// be in order at the end is followed by itself.
-    pub(super) fn stop_short(&mut self, depth: usize, facts: &mut Facts) {
+    pub(super) fn stop_short(&mut self, depth: usize, facts: &mut AbstractState) {
         let stopped = self.jobs.values().filter(|job| job.is_stopped_at(depth, self.in_jobs));
         let changed: BTreeSet<u32> = stopped.flat_map(Job::changes).collect();
         if changed.is_empty() {
@@ -87,7 +87,7 @@ impl Flow<'_, '_> {
 
     /// A loop may go on for more turns than were followed: what its body changes then is not known, unless the turns
     /// are all alike.
-    pub fn more_turns(&mut self, body: StepId, alike: bool, facts: &Facts) {
+    pub fn more_turns(&mut self, body: StepId, alike: bool, facts: &AbstractState) {
         if self.notes.is_none() {
             return;
         }
@@ -101,7 +101,7 @@ impl Flow<'_, '_> {
         for span in spans {
             let Some(note) = self.notes.as_mut().and_then(|n| n.by_span.get_mut(&span)) else { continue };
             note.times = note.times.max(2);
-            note.locals.values_mut().for_each(|known| *known = Known::nothing());
+            note.locals.values_mut().for_each(|known| *known = AbstractValue::top());
             let Some(mut after) = note.last.clone() else { continue };
             after.forget(&states);
             after.time = at_least(&after.time);

@@ -6,9 +6,9 @@ use std::rc::Rc;
 
 use matterix_ir::BinaryOp;
 
-use super::facts::Facts;
 use super::polytope::{self, Face, range_of, scaled};
-use super::value::{Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 use crate::chem::Element;
 
 /// A sum of coefficients below this share of its terms is zero: what goes on does not change it.
@@ -36,9 +36,9 @@ pub struct Extent {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bond {
     /// What it is without what the extents say.
-    pub base: Known,
+    pub base: AbstractValue,
     /// What is known of it by itself; where it is known otherwise now, something else has changed it.
-    pub known: Known,
+    pub known: AbstractValue,
 }
 
 /// What hangs together.
@@ -88,17 +88,17 @@ impl Bonds {
     }
 
     /// Whether what is said of a state still holds.
-    fn holds(&self, state: u32, facts: &Facts) -> bool {
+    fn holds(&self, state: u32, facts: &AbstractState) -> bool {
         self.states.get(&state).is_some_and(|bond| bond.known.is(&facts.states[state as usize]))
     }
 
     /// Whether what is said of all states still holds.
-    pub fn all_hold(&self, facts: &Facts) -> bool {
+    pub fn all_hold(&self, facts: &AbstractState) -> bool {
         self.states.keys().all(|state| self.holds(*state, facts))
     }
 
     /// Forgets what something else has changed.
-    pub fn settle(&mut self, facts: &Facts) {
+    pub fn settle(&mut self, facts: &AbstractState) {
         let gone: Vec<u32> = self.states.keys().copied().filter(|s| !self.holds(*s, facts)).collect();
         self.release(&gone);
     }
@@ -126,7 +126,7 @@ impl Bonds {
     }
 
     /// Takes a state as it is for what nothing has changed yet.
-    pub fn cover(&mut self, state: u32, facts: &Facts) {
+    pub fn cover(&mut self, state: u32, facts: &AbstractState) {
         let known = &facts.states[state as usize];
         self.states.entry(state).or_insert_with(|| Bond { base: known.clone(), known: known.clone() });
     }
@@ -178,7 +178,7 @@ impl Bonds {
 
     /// Takes the extents that alone change one of these states for what each has come to, and adds what they brought to the bases of all
     /// states that they change. The states that nothing else changes, with what they are; none where no extent is known so.
-    pub fn come_to(&mut self, ends: &[(u32, f64)]) -> Option<Vec<(u32, Known)>> {
+    pub fn come_to(&mut self, ends: &[(u32, f64)]) -> Option<Vec<(u32, AbstractValue)>> {
         let mut gone: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
         for (state, end) in ends {
             let Some(base) = self.states.get(state).and_then(|bond| bond.base.exact()) else { continue };
@@ -195,7 +195,11 @@ impl Bonds {
             for (state, c) in self.extents[*extent].direction.clone().iter() {
                 if let Some(bond) = self.states.get_mut(state) {
                     let (low, high) = scaled(*c, *range);
-                    bond.base = Known::binary(BinaryOp::Add, &bond.base, &Known::Range(low, high, Why::Unknown));
+                    bond.base = AbstractValue::binary(
+                        BinaryOp::Add,
+                        &bond.base,
+                        &AbstractValue::Range(low, high, Imprecision::Unknown),
+                    );
                 }
             }
         }
@@ -316,18 +320,22 @@ impl Bonds {
     }
 
     /// What is known of a sum, where some of its states hang together.
-    pub fn sum(&self, form: &Form, facts: &Facts) -> Option<Known> {
+    pub fn sum(&self, form: &Form, facts: &AbstractState) -> Option<AbstractValue> {
         let bound: Vec<bool> = form.terms.iter().map(|(s, _)| self.holds(*s, facts)).collect();
         if bound.iter().filter(|b| **b).count() < 2 {
             return None;
         }
-        let mut sum = Known::Point(form.constant);
+        let mut sum = AbstractValue::Point(form.constant);
         for ((state, c), bound) in form.terms.iter().zip(&bound) {
             let known = match self.states.get(state).filter(|_| *bound) {
                 Some(bond) => &bond.base,
                 None => &facts.states[*state as usize],
             };
-            sum = Known::binary(BinaryOp::Add, &sum, &Known::binary(BinaryOp::Mul, &Known::Point(*c), known));
+            sum = AbstractValue::binary(
+                BinaryOp::Add,
+                &sum,
+                &AbstractValue::binary(BinaryOp::Mul, &AbstractValue::Point(*c), known),
+            );
         }
         let (mut low, mut high) = (0.0, 0.0);
         let (Some((first, _)), Some((last, _))) = (form.terms.first(), form.terms.last()) else { return Some(sum) };
@@ -350,20 +358,26 @@ impl Bonds {
         }
         match (low, high) {
             (0.0, 0.0) => Some(sum),
-            _ => Some(Known::binary(BinaryOp::Add, &sum, &Known::Range(low, high, Why::Unknown))),
+            _ => {
+                Some(AbstractValue::binary(BinaryOp::Add, &sum, &AbstractValue::Range(low, high, Imprecision::Unknown)))
+            }
         }
     }
 
     /// A state becomes a sum of states.
-    pub fn assigned(&mut self, state: u32, form: &Form, facts: &Facts) {
+    pub fn assigned(&mut self, state: u32, form: &Form, facts: &AbstractState) {
         self.settle(facts);
         if !form.terms.iter().any(|(s, _)| self.states.contains_key(s)) {
             return self.release(&[state]);
         }
-        let mut base = Known::Point(form.constant);
+        let mut base = AbstractValue::Point(form.constant);
         for (s, c) in &form.terms {
             let known = self.states.get(s).map_or(&facts.states[*s as usize], |bond| &bond.base);
-            base = Known::binary(BinaryOp::Add, &base, &Known::binary(BinaryOp::Mul, &Known::Point(*c), known));
+            base = AbstractValue::binary(
+                BinaryOp::Add,
+                &base,
+                &AbstractValue::binary(BinaryOp::Mul, &AbstractValue::Point(*c), known),
+            );
         }
         let extents = std::mem::take(&mut self.extents);
         for Extent { direction, range } in extents {
@@ -372,28 +386,32 @@ impl Bonds {
             let others = direction.iter().copied().filter(|(s, _)| *s != state);
             self.add(others.chain([(state, new)]), range);
         }
-        self.states.insert(state, Bond { base, known: Known::nothing() });
+        self.states.insert(state, Bond { base, known: AbstractValue::top() });
         self.forget_still();
     }
 
     /// A share of some states is taken to others.
-    pub fn transferred(&mut self, share: &Known, ways: &[(u32, Option<u32>)], facts: &Facts) {
+    pub fn transferred(&mut self, share: &AbstractValue, ways: &[(u32, Option<u32>)], facts: &AbstractState) {
         self.settle(facts);
         let ends = |s: &u32| ways.iter().any(|(from, to)| from == s || to.as_ref() == Some(s));
         if !self.states.keys().any(ends) {
             return;
         }
-        let rest = Known::binary(BinaryOp::Sub, &Known::Point(1.0), share);
+        let rest = AbstractValue::binary(BinaryOp::Sub, &AbstractValue::Point(1.0), share);
         for (from, to) in ways {
             self.cover(*from, facts);
             let held = self.states[from].base.clone();
             if let Some(bond) = self.states.get_mut(from) {
-                bond.base = Known::binary(BinaryOp::Mul, &rest, &held);
+                bond.base = AbstractValue::binary(BinaryOp::Mul, &rest, &held);
             }
             if let Some(to) = to {
                 self.cover(*to, facts);
                 if let Some(bond) = self.states.get_mut(to) {
-                    bond.base = Known::binary(BinaryOp::Add, &bond.base, &Known::binary(BinaryOp::Mul, share, &held));
+                    bond.base = AbstractValue::binary(
+                        BinaryOp::Add,
+                        &bond.base,
+                        &AbstractValue::binary(BinaryOp::Mul, share, &held),
+                    );
                 }
             }
         }
@@ -413,12 +431,12 @@ impl Bonds {
     }
 
     /// Takes what is known of states by themselves as it is now.
-    pub fn stamp(&mut self, facts: &Facts) {
+    pub fn stamp(&mut self, facts: &AbstractState) {
         self.states.iter_mut().for_each(|(state, bond)| bond.known = facts.states[*state as usize].clone());
     }
 
     /// What hangs together whichever of two ways was taken; `out` is what is known of the states then.
-    pub fn join(a: &Facts, b: &Facts, out: &Facts, why: Why) -> Option<Rc<Bonds>> {
+    pub fn join(a: &AbstractState, b: &AbstractState, out: &AbstractState, why: Imprecision) -> Option<Rc<Bonds>> {
         let [mut one, mut other] = [a, b].map(|facts| {
             let mut bonds = facts.bonds.as_deref().cloned().unwrap_or_default();
             bonds.settle(facts);
@@ -443,7 +461,7 @@ impl Bonds {
 }
 
 /// A range of an extent of which a share is taken.
-fn shared(share: &Known, range: (f64, f64)) -> (f64, f64) {
+fn shared(share: &AbstractValue, range: (f64, f64)) -> (f64, f64) {
     let (low, high) = share.bounds();
     let ((a, b), (c, d)) = (scaled(low, range), scaled(high, range));
     (a.min(c), b.max(d))
@@ -477,8 +495,8 @@ mod tests {
     fn circle(isomers: u32) -> Bonds {
         let mut bonds = Bonds::default();
         for state in 0..isomers {
-            let base = Known::Point(if state == 0 { 3.0 } else { 0.0 });
-            bonds.states.insert(state, Bond { base, known: Known::nothing() });
+            let base = AbstractValue::Point(if state == 0 { 3.0 } else { 0.0 });
+            bonds.states.insert(state, Bond { base, known: AbstractValue::top() });
             let to = (state + 1) % isomers;
             let direction: Direction = Rc::new([(state.min(to), -1.0), (state.max(to), 1.0)]);
             let range = if state < to { (0.0, f64::INFINITY) } else { (f64::NEG_INFINITY, 0.0) };

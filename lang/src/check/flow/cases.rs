@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use matterix_ir::NodeId;
 
-use super::Flow;
+use super::Interpreter;
 use super::eval::{Exact, Supposed};
-use super::facts::Facts;
-use super::value::{Known, ROUNDING, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision, ROUNDING};
 
 /// So many ways are told apart; where more meet, each state is known by itself only.
 const MOST_WAYS: usize = 8;
@@ -21,7 +21,7 @@ const MOST_STATES: usize = 1000;
 #[derive(Clone, Debug, PartialEq)]
 struct Told {
     /// What is known of it; where that is something else now, the values are out of date.
-    known: Known,
+    known: AbstractValue,
     /// Its value on each way.
     values: Vec<f64>,
 }
@@ -37,7 +37,13 @@ pub struct Cases {
 impl Cases {
     /// The ways that lead to where two lines of ways meet; `open` are the states of which no single value is known then. What is known
     /// of these in `out` comes to what the ways say.
-    pub fn join(a: &Facts, b: &Facts, open: &[u32], out: &mut Facts, why: Why) -> Option<Rc<Cases>> {
+    pub fn join(
+        a: &AbstractState,
+        b: &AbstractState,
+        open: &[u32],
+        out: &mut AbstractState,
+        why: Imprecision,
+    ) -> Option<Rc<Cases>> {
         let (of_a, of_b) = (a.ways(), b.ways());
         // Where branches were stopped partway, values of several ways may have come together.
         if a.blurred.is_some() || b.blurred.is_some() {
@@ -72,7 +78,7 @@ impl Cases {
         for (state, values) in states {
             let values: Vec<f64> = kept.iter().map(|way| values[*way]).collect();
             let why = out.states[state as usize].why().unwrap_or(why);
-            let known = Known::of(values.clone(), why);
+            let known = AbstractValue::of(values.clone(), why);
             if !known.is(&out.states[state as usize]) {
                 out.states[state as usize] = known.clone();
             }
@@ -84,7 +90,7 @@ impl Cases {
     }
 }
 
-impl Facts {
+impl AbstractState {
     /// How many ways are told apart.
     fn ways(&self) -> usize {
         self.cases.as_ref().map_or(1, |cases| cases.ways)
@@ -133,10 +139,10 @@ impl Facts {
             if !told.known.is(now) {
                 continue;
             }
-            let why = now.why().unwrap_or(Why::Paths);
+            let why = now.why().unwrap_or(Imprecision::Paths);
             let values: Vec<f64> =
                 told.values.iter().zip(stays).filter(|(_, stays)| **stays).map(|(v, _)| *v).collect();
-            let known = Known::of(values.clone(), why);
+            let known = AbstractValue::of(values.clone(), why);
             self.narrow(state, known.clone());
             if known.exact().is_none() {
                 of.states.insert(state, Told { known, values });
@@ -146,14 +152,14 @@ impl Facts {
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// The value of a node on each way, as far as it is known exactly, where all that is not known is told apart; and why the way is
     /// not known.
-    fn on_each_way(&mut self, node: NodeId, facts: &Facts) -> Option<(Vec<Option<f64>>, Why)> {
+    fn on_each_way(&mut self, node: NodeId, facts: &AbstractState) -> Option<(Vec<Option<f64>>, Imprecision)> {
         let ways = facts.cases.as_ref()?.ways;
         let parts = self.parts(node);
         let mut open: Vec<(u32, &[f64])> = Vec::new();
-        let mut why = Why::Paths;
+        let mut why = Imprecision::Paths;
         for state in &parts.states {
             if let Some(because) = facts.states[*state as usize].why() {
                 open.push((*state, facts.told(*state)?));
@@ -174,14 +180,14 @@ impl Flow<'_, '_> {
     }
 
     /// The value of a node on each way, where it is known exactly on all and rests on what is told apart; and what is known of it.
-    pub(super) fn by_case(&mut self, node: NodeId, facts: &Facts) -> Option<(Vec<f64>, Known)> {
+    pub(super) fn by_case(&mut self, node: NodeId, facts: &AbstractState) -> Option<(Vec<f64>, AbstractValue)> {
         let (values, why) = self.on_each_way(node, facts)?;
         let values: Vec<f64> = values.into_iter().collect::<Option<_>>()?;
-        Some((values.clone(), Known::of(values, why)))
+        Some((values.clone(), AbstractValue::of(values, why)))
     }
 
     /// Takes a condition for true or false: ways on which it comes out otherwise do not lead here. Whether there are any.
-    pub(super) fn choose_ways(&mut self, node: NodeId, holds: bool, facts: &mut Facts) -> bool {
+    pub(super) fn choose_ways(&mut self, node: NodeId, holds: bool, facts: &mut AbstractState) -> bool {
         if facts.cases.is_none() || self.is_shared(node) {
             return false;
         }
@@ -195,7 +201,12 @@ impl Flow<'_, '_> {
     }
 
     /// The share that a transfer takes on each way, where ways are told apart.
-    pub(super) fn share_by_case(&mut self, fraction: NodeId, share: &Known, facts: &Facts) -> Option<Vec<f64>> {
+    pub(super) fn share_by_case(
+        &mut self,
+        fraction: NodeId,
+        share: &AbstractValue,
+        facts: &AbstractState,
+    ) -> Option<Vec<f64>> {
         let ways = facts.cases.as_ref()?.ways;
         match share.exact() {
             Some(share) => Some(vec![share; ways]),
@@ -205,7 +216,7 @@ impl Flow<'_, '_> {
 }
 
 /// What a share of a state leaves and brings to another one, on each way; none where one of them is not known.
-pub(super) fn moved(shares: &[f64], source: u32, target: u32, facts: &Facts) -> Option<[Vec<f64>; 2]> {
+pub(super) fn moved(shares: &[f64], source: u32, target: u32, facts: &AbstractState) -> Option<[Vec<f64>; 2]> {
     let (held, there) = (facts.values_of(source, shares.len())?, facts.values_of(target, shares.len())?);
     let rest = shares.iter().zip(&held).map(|(share, held)| (1.0 - share) * held).collect();
     let more = shares.iter().zip(&held).zip(&there).map(|((share, held), there)| there + share * held).collect();
@@ -219,14 +230,18 @@ mod tests {
 
     use super::*;
 
-    fn facts(states: &[f64]) -> Facts {
-        Facts::new(states.iter().map(|v| Known::Point(*v)).collect(), Vec::new(), Known::Point(0.0))
+    fn facts(states: &[f64]) -> AbstractState {
+        AbstractState::new(
+            states.iter().map(|v| AbstractValue::Point(*v)).collect(),
+            Vec::new(),
+            AbstractValue::Point(0.0),
+        )
     }
 
-    fn met(ways: &[&[f64]]) -> Facts {
+    fn met(ways: &[&[f64]]) -> AbstractState {
         let base = facts(ways[0]);
         let all = ways.iter().map(|way| facts(way));
-        all.reduce(|a, b| base.join(a, &b, Span::default(), Why::Paths)).expect("there are ways")
+        all.reduce(|a, b| base.join(a, &b, Span::default(), Imprecision::Paths)).expect("there are ways")
     }
 
     #[test]
@@ -252,11 +267,11 @@ mod tests {
     #[test]
     fn what_is_written_is_told_apart_no_more() {
         let mut facts = met(&[&[1.0, 10.0], &[2.0, 20.0]]);
-        facts.write(Span::default(), vec![(1, Known::nothing())]);
+        facts.write(Span::default(), vec![(1, AbstractValue::top())]);
         assert_eq!(facts.told(1), None);
         assert_eq!(facts.told(0), Some([1.0, 2.0].as_slice()));
         // The same numbers again say nothing of which goes with which.
-        facts.write(Span::default(), vec![(1, Known::of(vec![10.0, 20.0], Why::Paths))]);
+        facts.write(Span::default(), vec![(1, AbstractValue::of(vec![10.0, 20.0], Imprecision::Paths))]);
         assert_eq!(facts.told(1), None);
     }
 

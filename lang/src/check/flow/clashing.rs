@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::scene::InstanceId;
 
-use super::Flow;
-use super::facts::Facts;
-use super::points::at_least;
+use super::Interpreter;
+use super::program_points::at_least;
+use super::state::AbstractState;
 
 /// The failure of two steps that use one thing.
 pub(super) const CLAIMED: &str = "claimed";
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// What is known where a body that was followed may have failed because it uses what something beside it uses.
-    pub(super) fn clashed(&mut self, body: StepId, facts: &Facts) -> Option<Facts> {
+    pub(super) fn clashed(&mut self, body: StepId, facts: &AbstractState) -> Option<AbstractState> {
         if !self.may_clash(body) {
             return None;
         }

@@ -6,13 +6,13 @@ use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, Leaves, NodeId, Op, Severity, UnaryOp};
 
-use super::Flow;
+use super::Interpreter;
 use super::dual::{Along, Dual};
 use super::eval::Exact;
 use super::even::{Even, Tracks};
-use super::facts::{Facts, same_history};
+use super::state::{AbstractState, same_history};
 use super::timers::{Timers, comes_before};
-use super::value::{CLOSE, Known, Why};
+use super::value::{AbstractValue, CLOSE, Imprecision};
 
 /// Changes of conditions within one step before the rest of it is followed in bounds.
 const MOST_CHANGES: usize = 1000;
@@ -45,24 +45,26 @@ type Sides = (NodeId, Option<NodeId>);
 /// A limit that was passed on the way, with what was known there.
 struct Passed {
     limit: u32,
-    there: Facts,
+    there: AbstractState,
 }
 
 impl Even {
     /// Makes of `within`, which has what is known now but for what moves, what is known at all times between two from now, s.
-    fn between(&self, (from, to): (f64, f64), now: &Facts, within: &mut Facts) {
-        self.open.iter().for_each(|s| within.states[*s as usize] = Known::nothing());
+    fn between(&self, (from, to): (f64, f64), now: &AbstractState, within: &mut AbstractState) {
+        self.open.iter().for_each(|s| within.states[*s as usize] = AbstractValue::top());
         for (state, value, slope) in &self.slopes {
             let (first, last) = (value + slope * from, value + slope * to);
-            within.states[*state as usize] = Known::Range(first.min(last), first.max(last), Why::Unknown);
+            within.states[*state as usize] =
+                AbstractValue::Range(first.min(last), first.max(last), Imprecision::Unknown);
         }
-        within.time = Known::binary(BinaryOp::Add, &now.time, &Known::Range(from, to, Why::Unknown));
+        within.time =
+            AbstractValue::binary(BinaryOp::Add, &now.time, &AbstractValue::Range(from, to, Imprecision::Unknown));
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Follows what moves evenly for at most `longest` s, or until a condition comes to what it is waited for to be.
-    pub(super) fn course(&mut self, longest: f64, until: &[(NodeId, bool)], facts: &mut Facts) -> Course {
+    pub(super) fn course(&mut self, longest: f64, until: &[(NodeId, bool)], facts: &mut AbstractState) -> Course {
         let tracks = self.tracks();
         if tracks.list.is_empty() && self.timed.is_empty() {
             return Course::Left(longest);
@@ -84,7 +86,7 @@ impl Flow<'_, '_> {
         tracks: &Tracks,
         longest: f64,
         until: &[(NodeId, bool)],
-        facts: &mut Facts,
+        facts: &mut AbstractState,
         passed: &mut Vec<Passed>,
     ) -> Course {
         let mut left = longest;
@@ -130,7 +132,7 @@ impl Flow<'_, '_> {
             self.go_along(step, &even, &timers, &sides, facts);
             left -= step;
             if let (Some(to), Some(end)) = (to, end) {
-                facts.time = Known::Point(to);
+                facts.time = AbstractValue::Point(to);
                 left = end - to;
             }
             if dry.is_some_and(|dry| dry <= step) {
@@ -191,7 +193,7 @@ impl Flow<'_, '_> {
 
     /// How long it is until the first of these differences changes its sign, s; none where one of them may do so that is not
     /// followed.
-    fn next_change(&mut self, sides: &[Sides], even: &Even, left: f64, facts: &Facts) -> Option<f64> {
+    fn next_change(&mut self, sides: &[Sides], even: &Even, left: f64, facts: &AbstractState) -> Option<f64> {
         let mut next = f64::INFINITY;
         let mut followed = Vec::new();
         for side in sides {
@@ -263,7 +265,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether two sides that look straight are apart at all times before an end, but for what is next to it and to the beginning.
-    fn turns_nowhere(&mut self, side: Sides, even: &Even, (end, size): (f64, f64), facts: &Facts) -> bool {
+    fn turns_nowhere(&mut self, side: Sides, even: &Even, (end, size): (f64, f64), facts: &AbstractState) -> bool {
         let mut todo = vec![(0.0, 1.0)];
         let (mut pieces, mut within) = (0, facts.clone());
         while let Some((from, to)) = todo.pop() {
@@ -298,7 +300,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether two sides are apart all the time between two.
-    fn stays_apart(&mut self, side: Sides, even: &Even, times: (f64, f64), facts: &Facts) -> bool {
+    fn stays_apart(&mut self, side: Sides, even: &Even, times: (f64, f64), facts: &AbstractState) -> bool {
         let mut within = facts.clone();
         even.between(times, facts, &mut within);
         let (low, high) = self.apart_within(side, &within);
@@ -306,7 +308,7 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds of the difference of two sides.
-    fn apart_within(&mut self, (a, b): Sides, within: &Facts) -> (f64, f64) {
+    fn apart_within(&mut self, (a, b): Sides, within: &AbstractState) -> (f64, f64) {
         let (low, high) = self.eval(a, within).bounds();
         let (least, most) = b.map_or((0.0, 0.0), |b| self.eval(b, within).bounds());
         (low - most, high - least)
@@ -318,7 +320,7 @@ impl Flow<'_, '_> {
         (a, b): Sides,
         even: &Even,
         time: f64,
-        facts: &Facts,
+        facts: &AbstractState,
     ) -> Option<(f64, f64, f64)> {
         let a = self.along_at(a, even, time, facts)?;
         let b = b.map_or(Some(Dual::default()), |b| self.along_at(b, even, time, facts))?;
@@ -326,19 +328,19 @@ impl Flow<'_, '_> {
         Some((known(a.value - b.value), known(a.slope - b.slope), a.value.abs().max(b.value.abs())))
     }
 
-    pub(super) fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &Facts) -> Option<Dual> {
+    pub(super) fn along_at(&mut self, node: NodeId, even: &Even, time: f64, facts: &AbstractState) -> Option<Dual> {
         let along = Along { exact: Exact { params: &self.params, facts }, even, time };
         self.nodes.formulas.of(&self.lab.graph, node).value(&along, &mut self.duals)
     }
 
     /// Whether a condition holds from now on while states move so, even where what it compares has just become equal.
-    pub(super) fn truth_beyond(&mut self, node: NodeId, even: &Even, facts: &Facts) -> Option<bool> {
+    pub(super) fn truth_beyond(&mut self, node: NodeId, even: &Even, facts: &AbstractState) -> Option<bool> {
         let by_motion = self.along_at(node, even, 0.0, facts).map(|dual| dual.value != 0.0);
         by_motion.or_else(|| self.eval(node, facts).truth())
     }
 
     /// Lets time pass in which what moves evenly does so; what else moves is known in bounds.
-    fn go_along(&mut self, step: f64, even: &Even, timers: &Timers, sides: &[Sides], facts: &mut Facts) {
+    fn go_along(&mut self, step: f64, even: &Even, timers: &Timers, sides: &[Sides], facts: &mut AbstractState) {
         let before = facts.clone();
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let mut events = self.events_on(&followed);
@@ -350,7 +352,7 @@ impl Flow<'_, '_> {
                 self.at_moments.push(*event);
             }
         }
-        self.unheard(|flow| flow.drift(&Known::Point(step), facts));
+        self.unheard(|flow| flow.drift(&AbstractValue::Point(step), facts));
         self.at_moments.clear();
         // What the events that are followed do is done at their moment.
         let set: BTreeSet<u32> =
@@ -359,15 +361,15 @@ impl Flow<'_, '_> {
         let kept: Vec<u32> =
             kept.chain(self.tracks().list.iter().map(|t| t.state).filter(|s| !even.open.contains(s))).collect();
         self.narrow_by_streams(step, even, facts);
-        let back: Vec<(u32, Known)> = kept.iter().map(|s| (*s, before.states[*s as usize].clone())).collect();
+        let back: Vec<(u32, AbstractValue)> = kept.iter().map(|s| (*s, before.states[*s as usize].clone())).collect();
         facts.rebind(|bonds, _| bonds.release(&kept));
         back.into_iter().for_each(|(s, known)| facts.states[s as usize] = known);
         for i in events {
             facts.fired[i as usize] = before.fired[i as usize];
         }
         facts.history = before.history;
-        let mut changes: Vec<(u32, Known)> =
-            even.slopes.iter().map(|(s, value, slope)| (*s, Known::point(value + slope * step))).collect();
+        let mut changes: Vec<(u32, AbstractValue)> =
+            even.slopes.iter().map(|(s, value, slope)| (*s, AbstractValue::point(value + slope * step))).collect();
         for (a, b) in sides {
             self.snap(*a, *b, &mut changes, facts);
         }
@@ -376,14 +378,14 @@ impl Flow<'_, '_> {
     }
 
     /// Whether all that an event asks for is known at every moment while states move so: it comes about between two steps of them only.
-    fn comes_at_its_moment(&mut self, event: u32, even: &Even, facts: &Facts) -> bool {
+    fn comes_at_its_moment(&mut self, event: u32, even: &Even, facts: &AbstractState) -> bool {
         let parts = self.parts(self.events[event as usize].when);
         let known = |s: &u32| !even.open.contains(s) && facts.states[*s as usize].exact().is_some();
         !parts.timed && parts.states.iter().all(known)
     }
 
     /// Events of states that are known to stay as they are where flows balance each other: they do not come about.
-    fn events_at_rest(&mut self, even: &Even, facts: &Facts) -> Vec<u32> {
+    fn events_at_rest(&mut self, even: &Even, facts: &AbstractState) -> Vec<u32> {
         let rest = |s: u32| !even.moves(s) && !even.open.contains(&s) && facts.states[s as usize].exact().is_some();
         let tracks = self.tracks();
         let resting: Vec<u32> = tracks.list.iter().map(|t| t.state).filter(|s| rest(*s)).collect();
@@ -397,7 +399,7 @@ impl Flow<'_, '_> {
 
     /// Brings in how far streams have gone by what they have taken evenly, and with it the amounts where they end: of a reagent no more
     /// reacts than was dosed.
-    fn narrow_by_streams(&mut self, step: f64, even: &Even, facts: &mut Facts) {
+    fn narrow_by_streams(&mut self, step: f64, even: &Even, facts: &mut AbstractState) {
         let Some(mut bonds) = facts.bonds.as_deref().cloned() else { return };
         bonds.settle(facts);
         let ends: Vec<(u32, f64)> = even.slopes.iter().map(|(s, value, slope)| (*s, value + slope * step)).collect();
@@ -408,7 +410,7 @@ impl Flow<'_, '_> {
             let (least, most) = facts.states[state as usize].bounds();
             let (low, high) = (low.max(least), high.min(most));
             if low <= high {
-                facts.states[state as usize] = Known::Range(low, high, Why::Unknown);
+                facts.states[state as usize] = AbstractValue::Range(low, high, Imprecision::Unknown);
             }
         }
         bonds.stamp(facts);
@@ -416,7 +418,7 @@ impl Flow<'_, '_> {
     }
 
     /// A state that has come to a number, give or take rounding, is that number.
-    fn snap(&mut self, a: NodeId, b: Option<NodeId>, changes: &mut [(u32, Known)], facts: &Facts) {
+    fn snap(&mut self, a: NodeId, b: Option<NodeId>, changes: &mut [(u32, AbstractValue)], facts: &AbstractState) {
         let Some(b) = b else { return };
         for (moving, still) in [(a, b), (b, a)] {
             let Op::State(state) = self.lab.graph.op(moving) else { continue };
@@ -426,14 +428,14 @@ impl Flow<'_, '_> {
             }
             for (_, known) in changes.iter_mut().filter(|(s, _)| *s == state) {
                 if known.exact().is_some_and(|v| (v - goal).abs() <= 1e-12 * goal.abs()) {
-                    *known = Known::Point(goal);
+                    *known = AbstractValue::Point(goal);
                 }
             }
         }
     }
 
     /// Events that what moved evenly and the time bring about now, each time the first of the text, as in a run.
-    fn events_along(&mut self, even: &Even, timers: &Timers, facts: &mut Facts) {
+    fn events_along(&mut self, even: &Even, timers: &Timers, facts: &mut AbstractState) {
         let followed: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
         let mut due = self.events_on(&followed);
         due.extend(&timers.events);
@@ -468,7 +470,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes the limits that hold no longer.
-    fn limits_passed(&mut self, even: &Even, before: &Facts, facts: &Facts, passed: &mut Vec<Passed>) {
+    fn limits_passed(&mut self, even: &Even, before: &AbstractState, facts: &AbstractState, passed: &mut Vec<Passed>) {
         let changed = (0..self.lab.states.len() as u32)
             .filter(|s| even.moves(*s) || before.states[*s as usize] != facts.states[*s as usize]);
         let due: BTreeSet<u32> = changed.filter_map(|s| self.limits_of.get(&s)).flatten().copied().collect();
@@ -485,7 +487,7 @@ impl Flow<'_, '_> {
     }
 
     /// Reports a limit that was passed on the way: by what it comes to in the end, where it still does not hold then.
-    fn pass_limit(&mut self, index: u32, there: Facts, facts: &mut Facts) {
+    fn pass_limit(&mut self, index: u32, there: AbstractState, facts: &mut AbstractState) {
         let limit = &self.plan.limits[index as usize];
         let name = limit.condition.failure();
         if !self.is_taken(name) {
@@ -504,7 +506,7 @@ impl Flow<'_, '_> {
     }
 
     /// A stream takes more than there is, which is reported where the run comes to it.
-    fn runs_dry(&mut self, even: &Even, step: f64, comes: bool, facts: &mut Facts) {
+    fn runs_dry(&mut self, even: &Even, step: f64, comes: bool, facts: &mut AbstractState) {
         let empty = even.slopes.iter().filter(|(s, value, slope)| {
             self.amounts.contains(s) && *slope < 0.0 && value + slope * step <= STRAIGHT * value
         });

@@ -5,10 +5,10 @@ use matterix_ir::quantity::show_number;
 use matterix_ir::undefined::{undefined, why};
 use matterix_ir::{BinaryOp, Code, NodeId, Op, Span, codes};
 
-use super::Flow;
+use super::Interpreter;
 use super::actions::Asked;
-use super::facts::Facts;
 use super::report::shown;
+use super::state::AbstractState;
 
 /// Steps that a run takes at one moment, and no more.
 const MOST_AT_ONCE: f64 = 100_000.0;
@@ -16,9 +16,9 @@ const MOST_AT_ONCE: f64 = 100_000.0;
 /// A moment behind another one, as a share of the time or of 1 s.
 const BEHIND: f64 = 1e-6;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Conditions that are asked for all the time and hold now: they end the step that is followed where they break.
-    pub(super) fn may_break_here(&mut self, facts: &Facts) -> Vec<(NodeId, bool)> {
+    pub(super) fn may_break_here(&mut self, facts: &AbstractState) -> Vec<(NodeId, bool)> {
         // What is followed aside, or more closely, is no step that goes on.
         if self.unbroken.is_empty() || self.refinements > 0 || self.guards.is_empty() {
             return Vec::new();
@@ -30,7 +30,7 @@ impl Flow<'_, '_> {
 
     /// Some of these are broken now: where a handler takes that, the step goes no further. Otherwise it ends just behind that moment,
     /// where what asks for them is found broken.
-    pub(super) fn ends_broken(&mut self, broken: &[NodeId], facts: &mut Facts) {
+    pub(super) fn ends_broken(&mut self, broken: &[NodeId], facts: &mut AbstractState) {
         if self.is_taken("broken") {
             // Handlers within the body do not take it; for those around it counts as broken at any time.
             let open = self.guards.len();
@@ -47,7 +47,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks whether what is kept still holds after an operation.
-    pub(super) fn still_kept(&mut self, label: &str, facts: &Facts) {
+    pub(super) fn still_kept(&mut self, label: &str, facts: &AbstractState) {
         for condition in self.kept.clone() {
             if self.fails(condition, "broken", facts) {
                 let label = self.called(label);
@@ -59,7 +59,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks whether what a command or skill asks for all the time still holds after some time. What is reported is unknown from then on.
-    pub(super) fn still_goes_on(&mut self, label: &str, facts: &mut Facts) {
+    pub(super) fn still_goes_on(&mut self, label: &str, facts: &mut AbstractState) {
         for condition in self.during.clone() {
             if self.fails(condition, "broken", facts) {
                 let label = self.called(label);
@@ -74,7 +74,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks whether what a skill asks for all the time holds when it begins.
-    pub(super) fn begins_under(&mut self, label: &str, invariants: &[Condition], facts: &mut Facts) -> Asked {
+    pub(super) fn begins_under(&mut self, label: &str, invariants: &[Condition], facts: &mut AbstractState) -> Asked {
         for condition in invariants {
             if self.eval(condition.node, facts).truth() != Some(false) || self.is_shared(condition.node) {
                 continue;
@@ -93,7 +93,7 @@ impl Flow<'_, '_> {
     }
 
     /// Reports a wait for something that cannot be while what is kept around it holds.
-    pub(super) fn waits_against_keep(&mut self, label: &str, awaited: &Condition, facts: &Facts) {
+    pub(super) fn waits_against_keep(&mut self, label: &str, awaited: &Condition, facts: &AbstractState) {
         for condition in self.kept.clone() {
             let open = self.is_taken("broken") || self.is_shared(condition.node) || self.is_shared(awaited.node);
             if open || !self.excludes(awaited.node, condition.node, facts) {
@@ -110,7 +110,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether two conditions cannot hold at the same time: they set limits to one value that leave nothing between them.
-    fn excludes(&mut self, one: NodeId, other: NodeId, facts: &Facts) -> bool {
+    fn excludes(&mut self, one: NodeId, other: NodeId, facts: &AbstractState) -> bool {
         let (mut these, mut those) = (Vec::new(), Vec::new());
         self.limits_set(one, facts, &mut these);
         self.limits_set(other, facts, &mut those);
@@ -120,7 +120,7 @@ impl Flow<'_, '_> {
     }
 
     /// The limits that a condition sets to values: value, least, most.
-    fn limits_set(&mut self, node: NodeId, facts: &Facts, out: &mut Vec<(NodeId, f64, f64)>) {
+    fn limits_set(&mut self, node: NodeId, facts: &AbstractState, out: &mut Vec<(NodeId, f64, f64)>) {
         match self.lab.graph.op(node) {
             Op::Binary(BinaryOp::And, a, b) => {
                 self.limits_set(a, facts, out);
@@ -140,7 +140,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks whether a skill has done what it promises.
-    pub(super) fn promised(&mut self, label: &str, promises: &[Condition], facts: &Facts) {
+    pub(super) fn promised(&mut self, label: &str, promises: &[Condition], facts: &AbstractState) {
         for promise in promises {
             if self.fails(promise, "promise", facts) {
                 let label = self.called(label);
@@ -157,7 +157,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a number that the plan asks for is none, as something is divided by 0; reported.
-    pub(super) fn without_value(&mut self, node: NodeId, span: Span, facts: &Facts) -> bool {
+    pub(super) fn without_value(&mut self, node: NodeId, span: Span, facts: &AbstractState) -> bool {
         if self.is_shared(node) {
             return false;
         }
@@ -172,7 +172,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether neither the steps of a loop nor what goes on by itself change what a condition asks for.
-    pub(super) fn stays_so(&mut self, condition: &Condition, body: StepId, facts: &Facts) -> bool {
+    pub(super) fn stays_so(&mut self, condition: &Condition, body: StepId, facts: &AbstractState) -> bool {
         let parts = self.parts(condition.node);
         if parts.timed || self.lab.graph.depends(condition.node, |op| matches!(op, Op::Local(_))) {
             return false;
@@ -184,7 +184,7 @@ impl Flow<'_, '_> {
     }
 
     /// A loop that goes on at its last turn.
-    pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &Facts) {
+    pub(super) fn runs_out(&mut self, condition: &Condition, most: f64, facts: &AbstractState) {
         if self.fails_not(condition, "max", facts) {
             let turns = if most == 1.0 { "1 turn".to_string() } else { format!("{} turns", show_number(most)) };
             let headline = format!("`{}` still holds after {turns}, and the loop fails with `max`", condition.text);
@@ -199,7 +199,7 @@ impl Flow<'_, '_> {
     }
 
     /// A loop of which each turn leaves all as it was.
-    pub(super) fn turns_alike(&mut self, condition: &Condition, most: f64, timeless: bool, facts: &Facts) {
+    pub(super) fn turns_alike(&mut self, condition: &Condition, most: f64, timeless: bool, facts: &AbstractState) {
         if !timeless || most <= MOST_AT_ONCE {
             return self.runs_out(condition, most, facts);
         }
@@ -213,14 +213,14 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a condition does not hold, nobody else may see to it, and nothing takes the failure that follows.
-    fn fails(&mut self, condition: &Condition, failure: &str, facts: &Facts) -> bool {
+    fn fails(&mut self, condition: &Condition, failure: &str, facts: &AbstractState) -> bool {
         self.eval(condition.node, facts).truth() == Some(false)
             && !self.is_taken(failure)
             && !self.is_shared(condition.node)
     }
 
     /// The same of a condition that holds.
-    fn fails_not(&mut self, condition: &Condition, failure: &str, facts: &Facts) -> bool {
+    fn fails_not(&mut self, condition: &Condition, failure: &str, facts: &AbstractState) -> bool {
         self.eval(condition.node, facts).truth() == Some(true)
             && !self.is_taken(failure)
             && !self.is_shared(condition.node)
@@ -237,7 +237,7 @@ impl Flow<'_, '_> {
         headline: String,
         condition: &Condition,
         about: Option<(Span, &str)>,
-        facts: &Facts,
+        facts: &AbstractState,
     ) {
         let measured = self.measured(condition, facts);
         let said = if measured.is_empty() { "not so here".to_string() } else { measured.join(", ") };

@@ -7,7 +7,7 @@ use matterix_ir::{BinaryOp, Op, UnaryOp};
 
 use super::eval::Exact;
 use super::even::Even;
-use super::value::Known;
+use super::value::AbstractValue;
 
 /// A number and its rate, per second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -105,9 +105,9 @@ impl Rules for Along<'_> {
 /// A comparison: as it comes out, or from now on where only rounding parts its sides.
 fn compare(op: BinaryOp, a: Dual, b: Dual) -> Option<Dual> {
     let slope = a.slope - b.slope;
-    let close = a.value == b.value || Known::exactly(op, a.value, b.value).is_none();
+    let close = a.value == b.value || AbstractValue::exactly(op, a.value, b.value).is_none();
     if !close || slope == 0.0 {
-        return Known::exactly(op, a.value, b.value).map(Dual::still);
+        return AbstractValue::exactly(op, a.value, b.value).map(Dual::still);
     }
     Some(Dual::of_truth(match op {
         BinaryOp::Eq => false,

@@ -9,9 +9,9 @@ use matterix_ir::{BinaryOp, NodeId, Op, Span, UnaryOp};
 use rustc_hash::FxHashSet;
 
 use super::bonds::Bonds;
-use super::facts::{Decided, Facts};
-use super::value::{Known, Why};
-use super::{Flow, Raised};
+use super::state::{AbstractState, Decided};
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, Raised};
 
 /// So many cases are told apart.
 const MOST_CASES: usize = 16;
@@ -29,10 +29,10 @@ pub struct Parts {
 }
 
 /// Numbers, as long as all are known exactly and no comparison hangs on rounding; what comes of them is what
-/// [`Known`] makes of points.
+/// [`AbstractValue`] makes of points.
 pub(super) struct Exact<'f> {
-    pub params: &'f [Known],
-    pub facts: &'f Facts,
+    pub params: &'f [AbstractValue],
+    pub facts: &'f AbstractState,
 }
 
 impl Rules for Exact<'_> {
@@ -56,7 +56,7 @@ impl Rules for Exact<'_> {
 
     #[inline]
     fn binary(&self, op: BinaryOp, a: f64, b: f64) -> Option<f64> {
-        Known::exactly(op, a, b)
+        AbstractValue::exactly(op, a, b)
     }
 
     fn truth(&self, condition: f64) -> Option<bool> {
@@ -115,7 +115,7 @@ fn alike(one: &Option<Rc<Bonds>>, other: &Option<Rc<Bonds>>) -> bool {
 /// The last value of an operation.
 #[derive(Clone, Debug)]
 struct Slot {
-    known: Known,
+    known: AbstractValue,
     /// When it was done last; 0 for never.
     done: u64,
     /// When it has become another one.
@@ -134,11 +134,14 @@ pub struct Values {
 impl Values {
     /// None yet, of so many operations.
     pub fn new(count: usize) -> Self {
-        Values { slots: vec![Slot { known: Known::Point(0.0), done: 0, changed: 0, settled: 0 }; count], now: 0 }
+        Values {
+            slots: vec![Slot { known: AbstractValue::Point(0.0), done: 0, changed: 0, settled: 0 }; count],
+            now: 0,
+        }
     }
 
     /// The last value of an operation.
-    pub fn of(&self, node: NodeId) -> &Known {
+    pub fn of(&self, node: NodeId) -> &AbstractValue {
         &self.slots[node.0 as usize].known
     }
 
@@ -163,7 +166,7 @@ impl Values {
     }
 
     /// Takes in what an operation without operands is.
-    fn leaf(&mut self, node: NodeId, value: &Known) {
+    fn leaf(&mut self, node: NodeId, value: &AbstractValue) {
         let slot = &self.slots[node.0 as usize];
         if slot.done == 0 || !slot.known.is(value) {
             self.set(node, value.clone());
@@ -177,7 +180,7 @@ impl Values {
     }
 
     /// Takes in the value of an operation that was done again.
-    fn redo(&mut self, node: NodeId, value: Known) {
+    fn redo(&mut self, node: NodeId, value: AbstractValue) {
         let slot = &mut self.slots[node.0 as usize];
         if slot.done != 0 && slot.known.is(&value) {
             self.now += 1;
@@ -187,14 +190,14 @@ impl Values {
         }
     }
 
-    fn set(&mut self, node: NodeId, value: Known) {
+    fn set(&mut self, node: NodeId, value: AbstractValue) {
         self.now += 1;
         let slot = &mut self.slots[node.0 as usize];
         (slot.known, slot.done, slot.changed) = (value, self.now, self.now);
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// What a node depends on; found once.
     pub fn parts(&mut self, node: NodeId) -> Rc<Parts> {
         if let Some(parts) = &self.nodes.parts[node.0 as usize] {
@@ -228,14 +231,14 @@ impl Flow<'_, '_> {
     }
 
     /// The value of a node: where all that it rests on is known exactly, by numbers alone.
-    pub fn eval(&mut self, node: NodeId, facts: &Facts) -> Known {
+    pub fn eval(&mut self, node: NodeId, facts: &AbstractState) -> AbstractValue {
         if let Op::State(state) = self.lab.graph.op(node) {
             return facts.states[state as usize].clone();
         }
         let formula = self.nodes.formulas.of(&self.lab.graph, node);
         let exact = Exact { params: &self.params, facts };
         match formula.value(&exact, &mut self.numbers) {
-            Some(value) => Known::Point(value),
+            Some(value) => AbstractValue::Point(value),
             None => {
                 let told = self.by_case(node, facts).map(|(_, known)| known);
                 let told = told.or_else(|| self.case_by_case(node, facts));
@@ -246,16 +249,16 @@ impl Flow<'_, '_> {
 
     /// The value of a node that rests on one or two states which are one of a few numbers each, and else on what is known
     /// exactly: that of each case. What a state decides at several places of an expression it decides alike at all of them.
-    fn case_by_case(&mut self, node: NodeId, facts: &Facts) -> Option<Known> {
+    fn case_by_case(&mut self, node: NodeId, facts: &AbstractState) -> Option<AbstractValue> {
         let parts = self.parts(node);
         let open: Vec<u32> =
             parts.states.iter().copied().filter(|s| facts.states[*s as usize].exact().is_none()).take(3).collect();
         let few = |state: &u32| match &facts.states[*state as usize] {
-            Known::Few(all, why) => Some((all.clone(), *why)),
+            AbstractValue::Few(all, why) => Some((all.clone(), *why)),
             _ => None,
         };
         let mut cases: Vec<Vec<(u32, f64)>> = vec![Vec::new()];
-        let mut why = Why::Paths;
+        let mut why = Imprecision::Paths;
         for state in open.iter().filter(|_| open.len() < 3) {
             let (all, because) = few(state)?;
             why = why.max(because);
@@ -271,12 +274,12 @@ impl Flow<'_, '_> {
             let exact = Exact { params: &self.params, facts };
             values.push(formula.value(&Supposed { exact, states }, &mut self.numbers)?);
         }
-        Some(Known::of(values, why))
+        Some(AbstractValue::of(values, why))
     }
 
     /// The value of a node with those of all that it rests on, which stay in `values`. Of its operations those are done again
     /// whose operands are no longer what they were.
-    pub fn enclose(&mut self, node: NodeId, facts: &Facts) -> Known {
+    pub fn enclose(&mut self, node: NodeId, facts: &AbstractState) -> AbstractValue {
         self.bring_up_to_date(node, facts);
         let known = self.values.of(node).clone();
         if facts.bonds.is_some() && matches!(self.lab.graph.op(node), Op::Binary(BinaryOp::Add | BinaryOp::Sub, ..)) {
@@ -286,7 +289,7 @@ impl Flow<'_, '_> {
     }
 
     /// Does those operations of a node again that rest on something that has changed since they were done.
-    fn bring_up_to_date(&mut self, node: NodeId, facts: &Facts) {
+    fn bring_up_to_date(&mut self, node: NodeId, facts: &AbstractState) {
         let inputs = self.inputs(node);
         inputs.leaves.iter().for_each(|leaf| self.take(*leaf, facts));
         let since = self.values.settled(node);
@@ -364,7 +367,7 @@ impl Flow<'_, '_> {
     }
 
     /// The value of a node that was enclosed just before, now that of what is known one state alone has changed.
-    pub fn enclose_again(&mut self, node: NodeId, state: u32, facts: &Facts) -> Known {
+    pub fn enclose_again(&mut self, node: NodeId, state: u32, facts: &AbstractState) -> AbstractValue {
         let order = self.parts_on(node, state);
         for n in order.iter().take_while(|n| self.lab.graph.op(**n).operands().next().is_none()) {
             self.take(*n, facts);
@@ -399,7 +402,7 @@ impl Flow<'_, '_> {
     }
 
     /// Does operations again of which an operand has changed; those without operands are taken in already.
-    fn work_out(&mut self, order: &[NodeId], facts: &Facts) {
+    fn work_out(&mut self, order: &[NodeId], facts: &AbstractState) {
         for n in order {
             let op = self.lab.graph.op(*n);
             let stale = match op {
@@ -422,20 +425,20 @@ impl Flow<'_, '_> {
     }
 
     /// An operation by the last values of its operands.
-    fn done_again(&self, op: Op) -> Known {
+    fn done_again(&self, op: Op) -> AbstractValue {
         let of = |n| self.values.of(n);
         match op {
-            Op::Const(v) => Known::point(v),
-            Op::Unary(op, a) => Known::unary(op, of(a)),
-            Op::Binary(BinaryOp::Eq, a, b) if a == b => Known::Point(1.0),
-            Op::Binary(op, a, b) => Known::binary(op, of(a), of(b)),
-            Op::Select(c, a, b) => Known::select(of(c), of(a), of(b)),
-            Op::Time | Op::State(_) | Op::Param(_) | Op::Local(_) | Op::Reading(_) => Known::nothing(),
+            Op::Const(v) => AbstractValue::point(v),
+            Op::Unary(op, a) => AbstractValue::unary(op, of(a)),
+            Op::Binary(BinaryOp::Eq, a, b) if a == b => AbstractValue::Point(1.0),
+            Op::Binary(op, a, b) => AbstractValue::binary(op, of(a), of(b)),
+            Op::Select(c, a, b) => AbstractValue::select(of(c), of(a), of(b)),
+            Op::Time | Op::State(_) | Op::Param(_) | Op::Local(_) | Op::Reading(_) => AbstractValue::top(),
         }
     }
 
     /// Takes in the value of an operation without operands; a number never changes.
-    fn take(&mut self, leaf: NodeId, facts: &Facts) {
+    fn take(&mut self, leaf: NodeId, facts: &AbstractState) {
         match self.lab.graph.op(leaf) {
             Op::Time => self.values.leaf(leaf, &facts.time),
             Op::State(i) => self.values.leaf(leaf, &facts.states[i as usize]),
@@ -450,20 +453,20 @@ impl Flow<'_, '_> {
     }
 
     /// Does a sum of states that may hang together if one of them or how they hang together has changed since.
-    fn outer_sum(&mut self, node: NodeId, op: BinaryOp, [a, b]: [NodeId; 2], facts: &Facts) {
+    fn outer_sum(&mut self, node: NodeId, op: BinaryOp, [a, b]: [NodeId; 2], facts: &AbstractState) {
         let inputs = self.inputs(node);
         let is_same = self.sums.get(&node).is_some_and(|bonds| alike(bonds, &facts.bonds));
         if is_same && !self.values.is_stale(node, &inputs.leaves) {
             return;
         }
-        let apart = Known::binary(op, self.values.of(a), self.values.of(b));
+        let apart = AbstractValue::binary(op, self.values.of(a), self.values.of(b));
         let value = self.together(node, apart, facts);
         self.values.redo(node, value);
         self.sums.insert(node, facts.bonds.clone());
     }
 
     /// What a device shows: the true value, give or take its imperfection.
-    fn reading(&mut self, index: u32, facts: &Facts) -> Known {
+    fn reading(&mut self, index: u32, facts: &AbstractState) -> AbstractValue {
         let reading = &self.lab.readings[index as usize];
         let (resolution, noise) = (reading.resolution.unwrap_or(0.0), reading.noise.unwrap_or(0.0));
         // A node's value depends on what is known alone: to evaluate it in between disturbs nothing.
@@ -473,11 +476,11 @@ impl Flow<'_, '_> {
             return value;
         }
         let (low, high) = value.bounds();
-        Known::Range(low - slack, high + slack, Why::Unknown)
+        AbstractValue::Range(low - slack, high + slack, Imprecision::Unknown)
     }
 
     /// How a condition comes out: by what is known, or as it came out before on this way.
-    pub fn truth(&mut self, node: NodeId, facts: &Facts) -> Option<bool> {
+    pub fn truth(&mut self, node: NodeId, facts: &AbstractState) -> Option<bool> {
         let known = self.eval(node, facts).truth();
         if known.is_some() || facts.decided.is_empty() {
             return known;
@@ -502,7 +505,7 @@ impl Flow<'_, '_> {
     }
 
     /// Takes a branch: its condition is decided on this way until something it depends on changes.
-    pub fn decide(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+    pub fn decide(&mut self, node: NodeId, holds: bool, facts: &mut AbstractState) {
         if self.truth(node, facts).is_none() && !self.is_shared(node) {
             let graph = &self.lab.graph;
             let order = graph.schedule([node]);
@@ -518,7 +521,7 @@ impl Flow<'_, '_> {
     }
 
     /// Takes a condition for true or false, as far as that says something of single states.
-    pub fn assume(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+    pub fn assume(&mut self, node: NodeId, holds: bool, facts: &mut AbstractState) {
         self.choose_ways(node, holds, facts);
         match self.lab.graph.op(node) {
             Op::Unary(UnaryOp::Not, a) => self.assume(a, !holds, facts),
@@ -532,10 +535,12 @@ impl Flow<'_, '_> {
             }
             Op::Local(i) => {
                 if let Some(slot) = facts.locals.get_mut(i as usize).filter(|known| known.bounds() == (0.0, 1.0)) {
-                    *slot = Known::Point(f64::from(u8::from(holds)));
+                    *slot = AbstractValue::Point(f64::from(u8::from(holds)));
                 }
             }
-            Op::State(s) if self.is_truth(s) => facts.states[s as usize] = Known::Point(f64::from(u8::from(holds))),
+            Op::State(s) if self.is_truth(s) => {
+                facts.states[s as usize] = AbstractValue::Point(f64::from(u8::from(holds)))
+            }
             Op::Binary(op @ (BinaryOp::Eq | BinaryOp::Lt | BinaryOp::Le), a, b) => {
                 self.assume_compared(op, (a, b), holds, facts);
                 self.sift(node, holds, facts);
@@ -545,7 +550,7 @@ impl Flow<'_, '_> {
     }
 
     /// Takes a comparison of a state with a number for true or false.
-    fn assume_compared(&self, op: BinaryOp, (a, b): (NodeId, NodeId), holds: bool, facts: &mut Facts) {
+    fn assume_compared(&self, op: BinaryOp, (a, b): (NodeId, NodeId), holds: bool, facts: &mut AbstractState) {
         let graph = &self.lab.graph;
         let number = |n: NodeId| match graph.op(n) {
             Op::Const(v) => Some(v),
@@ -564,23 +569,23 @@ impl Flow<'_, '_> {
     }
 
     /// Of states that are one of a few numbers each, those numbers stay with which a condition may come out so.
-    fn sift(&mut self, node: NodeId, holds: bool, facts: &mut Facts) {
+    fn sift(&mut self, node: NodeId, holds: bool, facts: &mut AbstractState) {
         let parts = self.parts(node);
-        let few = |s: &u32| matches!(facts.states[*s as usize], Known::Few(..)) && !facts.hangs(*s);
+        let few = |s: &u32| matches!(facts.states[*s as usize], AbstractValue::Few(..)) && !facts.hangs(*s);
         let open: Vec<u32> = parts.states.iter().copied().filter(few).take(MOST_SIFTED).collect();
         if open.is_empty() || self.is_shared(node) {
             return;
         }
         for state in open {
-            let Known::Few(all, why) = facts.states[state as usize].clone() else { continue };
+            let AbstractValue::Few(all, why) = facts.states[state as usize].clone() else { continue };
             let mut supposed = facts.clone();
             let mut may = |value: &f64| {
-                supposed.states[state as usize] = Known::Point(*value);
+                supposed.states[state as usize] = AbstractValue::Point(*value);
                 self.eval(node, &supposed).truth() != Some(!holds)
             };
             let stay: Vec<f64> = all.iter().copied().filter(|value| may(value)).collect();
             if !stay.is_empty() && stay.len() < all.len() {
-                facts.narrow(state, Known::of(stay, why));
+                facts.narrow(state, AbstractValue::of(stay, why));
             }
         }
     }
@@ -590,7 +595,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes a failure that the text writes at a place of the user's.
-    pub fn raise_written(&mut self, name: &str, span: Span, mut facts: Facts) {
+    pub fn raise_written(&mut self, name: &str, span: Span, mut facts: AbstractState) {
         // Not where only what a device reports, or what goes on beside, leads there.
         facts.written = Some(span).filter(|span| !facts.unsure && !self.in_library(*span));
         for (name, facts) in self.stop_jobs(vec![(name.to_owned(), facts)], self.guards.len()) {
@@ -599,7 +604,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes a failure for the handlers around.
-    pub fn raise(&mut self, name: &str, mut facts: Facts) {
+    pub fn raise(&mut self, name: &str, mut facts: AbstractState) {
         if !self.jobs.is_empty() {
             self.stop_short(self.guards.len(), &mut facts);
         }
@@ -611,26 +616,26 @@ impl Flow<'_, '_> {
 }
 
 /// Cuts what is known of `x` by `x op v` (or `v op x` where it is the right operand) being true or false.
-fn cut(x: &mut Known, op: BinaryOp, v: f64, holds: bool, left: bool) {
+fn cut(x: &mut AbstractValue, op: BinaryOp, v: f64, holds: bool, left: bool) {
     if op == BinaryOp::Eq {
         match (holds, &*x) {
-            (true, _) => *x = Known::Point(v),
-            (false, Known::Few(all, why)) => {
+            (true, _) => *x = AbstractValue::Point(v),
+            (false, AbstractValue::Few(all, why)) => {
                 let rest: Vec<f64> = all.iter().copied().filter(|o| *o != v).collect();
                 *x = match rest.as_slice() {
-                    [] => Known::nothing(),
-                    [one] => Known::Point(*one),
-                    _ => Known::Few(rest.into(), *why),
+                    [] => AbstractValue::top(),
+                    [one] => AbstractValue::Point(*one),
+                    _ => AbstractValue::Few(rest.into(), *why),
                 };
             }
             _ => {}
         }
         return;
     }
-    let Known::Range(low, high, why) = *x else { return };
+    let AbstractValue::Range(low, high, why) = *x else { return };
     let below = holds == left;
     let (low, high) = if below { (low, high.min(v)) } else { (low.max(v), high) };
     if low <= high {
-        *x = Known::Range(low, high, why);
+        *x = AbstractValue::Range(low, high, why);
     }
 }

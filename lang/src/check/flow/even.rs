@@ -10,9 +10,9 @@ use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, NodeId, Op};
 
-use super::Flow;
-use super::facts::Facts;
-use super::value::{CLOSE, Known};
+use super::Interpreter;
+use super::state::AbstractState;
+use super::value::{AbstractValue, CLOSE};
 
 /// Rates that differ by less than this share of them are in proportion.
 const ALIKE: f64 = 1e-9;
@@ -87,7 +87,7 @@ impl Even {
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// The states that may move evenly; found once.
     pub(super) fn tracks(&mut self) -> Rc<Tracks> {
         if let Some(known) = &self.nodes.tracks {
@@ -161,14 +161,14 @@ impl Flow<'_, '_> {
     }
 
     /// What moves evenly from here on, where states moved as they `last` did before.
-    pub(super) fn even(&mut self, facts: &Facts, last: &Even) -> Even {
+    pub(super) fn even(&mut self, facts: &AbstractState, last: &Even) -> Even {
         let tracks = self.tracks();
         let mut open: BTreeSet<u32> = tracks.wild.iter().copied().collect();
         let others = self.but_for_others(facts);
         let mut empty = None;
         loop {
             let mut veiled = others.as_ref().unwrap_or(facts).clone();
-            open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
+            open.iter().for_each(|s| veiled.states[*s as usize] = AbstractValue::top());
             let mut found = Vec::new();
             let mut new = BTreeSet::new();
             let mut even = Even::default();
@@ -199,7 +199,13 @@ impl Flow<'_, '_> {
     }
 
     /// The value and rate of a state, with the terms that go on; none where one of them is not known.
-    fn slope(&mut self, track: &Track, last: &Even, veiled: &Facts, even: &mut Even) -> Option<(f64, f64, Vec<usize>)> {
+    fn slope(
+        &mut self,
+        track: &Track,
+        last: &Even,
+        veiled: &AbstractState,
+        even: &mut Even,
+    ) -> Option<(f64, f64, Vec<usize>)> {
         let (mut slope, mut most) = (0.0, 0.0_f64);
         let mut on = Vec::new();
         for (i, term) in track.terms.iter().enumerate() {
@@ -254,7 +260,7 @@ impl Flow<'_, '_> {
     }
 
     /// How a condition comes out from now on. What stands at its threshold and rests there comes out as it did when it came to it.
-    fn comes_out(&mut self, node: NodeId, last: &Even, facts: &Facts) -> Option<bool> {
+    fn comes_out(&mut self, node: NodeId, last: &Even, facts: &AbstractState) -> Option<bool> {
         match last.truths.get(&node) {
             Some(before) if self.rests_at_threshold(node, last, facts) => Some(*before),
             _ => self.truth_beyond(node, last, facts),
@@ -262,7 +268,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether two sides of a comparison are equal and stay so.
-    fn rests_at_threshold(&mut self, node: NodeId, even: &Even, facts: &Facts) -> bool {
+    fn rests_at_threshold(&mut self, node: NodeId, even: &Even, facts: &AbstractState) -> bool {
         let order = self.order(node);
         order.iter().any(|n| {
             let Op::Binary(BinaryOp::Lt | BinaryOp::Le, a, b) = self.lab.graph.op(*n) else { return false };
@@ -272,13 +278,13 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a condition of a flow stands at its threshold, where only how it came there tells how it comes out.
-    pub(super) fn rests_at_thresholds(&mut self, even: &Even, facts: &Facts) -> bool {
+    pub(super) fn rests_at_thresholds(&mut self, even: &Even, facts: &AbstractState) -> bool {
         even.truths.keys().any(|node| self.rests_at_threshold(*node, even, facts))
     }
 
     /// What moves evenly from here on, where the conditions it goes by come out as it moves; none where they change each other, as that
     /// of a flow that empties what fills only while it does not go on.
-    pub(super) fn settled(&mut self, facts: &Facts, last: &Even) -> Option<Even> {
+    pub(super) fn settled(&mut self, facts: &AbstractState, last: &Even) -> Option<Even> {
         let mut even = self.even(facts, last);
         for _ in 0..MOST_TURNS {
             let conditions: Vec<(NodeId, bool)> = even.truths.iter().map(|(node, truth)| (*node, *truth)).collect();
@@ -295,7 +301,7 @@ impl Flow<'_, '_> {
 
     /// Whether a term is what it is now while states that it rests on move so, as what flows between two of the same temperature. What it
     /// may add to its `state` otherwise is rounding.
-    fn is_constant(&mut self, state: u32, node: NodeId, even: &Even, facts: &Facts) -> bool {
+    fn is_constant(&mut self, state: u32, node: NodeId, even: &Even, facts: &AbstractState) -> bool {
         let Some(now) = self.along_at(node, even, 0.0, facts) else { return false };
         let scale = |(_, value, slope): &(u32, f64, f64)| (value / slope).abs();
         let horizon = even.slopes.iter().map(scale).filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min);
@@ -309,7 +315,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a term of the rate of a `state` stays as it is while states move so.
-    fn stays(&mut self, state: u32, term: &Term, even: &Even, open: &BTreeSet<u32>, facts: &Facts) -> bool {
+    fn stays(&mut self, state: u32, term: &Term, even: &Even, open: &BTreeSet<u32>, facts: &AbstractState) -> bool {
         match &term.value {
             Value::Plain(node) => {
                 let (mut at_rest, mut known) = (true, true);
@@ -343,11 +349,11 @@ impl Flow<'_, '_> {
     }
 
     /// States whose rates an event may change that only a run can tell.
-    fn disturbed(&mut self, tracks: &Tracks, even: &Even, veiled: &Facts) -> BTreeSet<u32> {
+    fn disturbed(&mut self, tracks: &Tracks, even: &Even, veiled: &AbstractState) -> BTreeSet<u32> {
         let mut moving = veiled.clone();
         let slopes: Vec<u32> = even.slopes.iter().map(|(s, ..)| *s).collect();
-        slopes.iter().for_each(|s| moving.states[*s as usize] = Known::nothing());
-        moving.time = Known::nothing();
+        slopes.iter().for_each(|s| moving.states[*s as usize] = AbstractValue::top());
+        moving.time = AbstractValue::top();
         let unknown: BTreeSet<u32> =
             (0..self.lab.states.len() as u32).filter(|s| moving.states[*s as usize].exact().is_none()).collect();
         let mut set = BTreeSet::new();

@@ -9,15 +9,15 @@ use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, Op, Severity, UnaryOp};
 
-use super::Flow;
+use super::Interpreter;
 use super::actions::Asked;
 use super::bonds::Bonds;
 use super::bracket::last_outwards;
 use super::course::Course;
-use super::facts::Facts;
 use super::fluxes::Row;
 use super::polytope::scaled;
-use super::value::{Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 use crate::chem::Element;
 
 /// A rate below this share of a state's scale per second is rounding.
@@ -68,7 +68,7 @@ const ROUNDS: usize = 8;
 
 /// Bounds that hold for all time to come, while nothing else changes.
 #[derive(Debug, Default)]
-pub struct Barrier {
+pub struct InvariantBox {
     /// By state.
     states: BTreeMap<u32, (f64, f64)>,
     /// How far what goes on can go, and what states that it changes are without it.
@@ -99,7 +99,7 @@ enum Kind {
 /// A box that is being made.
 pub(super) struct Making {
     /// What is known within it.
-    pub(super) within: Facts,
+    pub(super) within: AbstractState,
     /// Faces of states that fluxes of matter change besides others.
     whole: BTreeMap<u32, (f64, f64)>,
     /// Fluxes that go on.
@@ -114,9 +114,9 @@ pub(super) struct Making {
     pub(super) together: [Vec<Wall>; 2],
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Time passes; what moves is known within bounds from then on.
-    pub fn pass(&mut self, duration: &Known, facts: &mut Facts) {
+    pub fn pass(&mut self, duration: &AbstractValue, facts: &mut AbstractState) {
         let (_, longest) = duration.bounds();
         if longest <= 0.0 {
             return;
@@ -131,25 +131,25 @@ impl Flow<'_, '_> {
         let rest = match course {
             Some(Course::Passed) => return,
             Some(Course::Reached(nodes)) => return self.ends_broken(&nodes, facts),
-            Some(Course::Left(left)) if left < longest => Known::Point(left),
+            Some(Course::Left(left)) if left < longest => AbstractValue::Point(left),
             _ => duration.clone(),
         };
         self.drift(&rest, facts);
     }
 
     /// Time passes; what moves is known within bounds, whether it moves evenly or not.
-    pub(super) fn drift(&mut self, duration: &Known, facts: &mut Facts) {
+    pub(super) fn drift(&mut self, duration: &AbstractValue, facts: &mut AbstractState) {
         let (_, longest) = duration.bounds();
         let before = facts.time.clone();
-        facts.time = Known::binary(BinaryOp::Add, &before, duration);
-        let span = Known::Range(before.bounds().0, facts.time.bounds().1, Why::Unknown);
+        facts.time = AbstractValue::binary(BinaryOp::Add, &before, duration);
+        let span = AbstractValue::Range(before.bounds().0, facts.time.bounds().1, Imprecision::Unknown);
         facts.reopen(|s| self.lab.rates.contains_key(&s));
         self.meanwhile = Some(span.clone());
         self.beside_others(facts, |flow, facts| flow.goes_on(longest, &span, facts));
         self.meanwhile = None;
     }
 
-    fn goes_on(&mut self, longest: f64, span: &Known, facts: &mut Facts) {
+    fn goes_on(&mut self, longest: f64, span: &AbstractValue, facts: &mut AbstractState) {
         let mut timed = self.timed.clone();
         timed.retain(|event| !self.at_moments.contains(event));
         let passed = self.passed_before(facts);
@@ -188,7 +188,7 @@ impl Flow<'_, '_> {
     }
 
     /// Events that time may bring about more than once: what they would change further counts as unknown. Whether there is any.
-    fn recur(&mut self, due: &[u32], span: &Known, facts: &mut Facts) -> bool {
+    fn recur(&mut self, due: &[u32], span: &AbstractValue, facts: &mut AbstractState) -> bool {
         let due: Vec<u32> = due
             .iter()
             .copied()
@@ -206,7 +206,7 @@ impl Flow<'_, '_> {
 
     /// Whether the condition of an event may come true more than once in `span`: it follows the time to and fro, or the event
     /// itself changes what it asks for, as a timer that it sets anew.
-    fn comes_and_goes(&mut self, event: u32, span: &Known, facts: &Facts) -> bool {
+    fn comes_and_goes(&mut self, event: u32, span: &AbstractValue, facts: &AbstractState) -> bool {
         if !self.timed.contains(&event) {
             return false;
         }
@@ -223,7 +223,7 @@ impl Flow<'_, '_> {
     }
 
     /// States that one of these events would change further if it came about once more; none where each of them comes about no more.
-    fn further(&mut self, due: &[u32], moving: &[u32], facts: &Facts) -> Option<Vec<u32>> {
+    fn further(&mut self, due: &[u32], moving: &[u32], facts: &AbstractState) -> Option<Vec<u32>> {
         let changes: Vec<Vec<u32>> = due.iter().map(|event| self.happen(*event, &mut facts.clone())).collect();
         due.iter().enumerate().find_map(|(own, event)| {
             let others = changes.iter().enumerate().filter(|(other, _)| *other != own).flat_map(|(_, states)| states);
@@ -234,7 +234,7 @@ impl Flow<'_, '_> {
 
     /// States that an event would change further if it came about once more; none where nothing that may change by then makes its
     /// condition false and true again.
-    fn changed_again(&mut self, event: u32, others: &[u32], facts: &Facts) -> Option<Vec<u32>> {
+    fn changed_again(&mut self, event: u32, others: &[u32], facts: &AbstractState) -> Option<Vec<u32>> {
         let when = self.events[event as usize].when;
         let mut again = facts.clone();
         if let Some(span) = self.meanwhile.as_ref().filter(|_| self.timed.contains(&event)) {
@@ -257,7 +257,7 @@ impl Flow<'_, '_> {
     }
 
     /// The same while the time itself, which some laws follow, lies within `span`.
-    fn flow_through(&mut self, longest: f64, span: &Known, facts: &mut Facts) -> Vec<u32> {
+    fn flow_through(&mut self, longest: f64, span: &AbstractValue, facts: &mut AbstractState) -> Vec<u32> {
         if self.clocked.is_empty() {
             return self.flow_on(longest, facts);
         }
@@ -271,7 +271,7 @@ impl Flow<'_, '_> {
     }
 
     /// Events of the time that may have come about and be over at the end of `span`.
-    fn fire_between(&mut self, span: &Known, facts: &mut Facts) {
+    fn fire_between(&mut self, span: &AbstractValue, facts: &mut AbstractState) {
         for event in self.timed.clone() {
             let when = self.events[event as usize].when;
             if self.at_moments.contains(&event) || self.eval(when, facts).truth() != Some(false) {
@@ -283,13 +283,13 @@ impl Flow<'_, '_> {
             if within.is_none() {
                 let untouched = facts.clone();
                 self.happen(event, facts);
-                *facts = untouched.clone().join(facts.clone(), &untouched, self.site(), Why::Unknown);
+                *facts = untouched.clone().join(facts.clone(), &untouched, self.site(), Imprecision::Unknown);
             }
         }
     }
 
     /// Lets the laws act for at most `longest` s; the states that are no longer what they were.
-    fn flow_on(&mut self, longest: f64, facts: &mut Facts) -> Vec<u32> {
+    fn flow_on(&mut self, longest: f64, facts: &mut AbstractState) -> Vec<u32> {
         if self.pass_unheeded(facts) {
             return Vec::new();
         }
@@ -310,7 +310,7 @@ impl Flow<'_, '_> {
         }
         let mut within = facts.clone();
         for (state, (low, high)) in &barrier.states {
-            within.states[*state as usize] = Known::Range(*low, *high, Why::Unknown);
+            within.states[*state as usize] = AbstractValue::Range(*low, *high, Imprecision::Unknown);
         }
         within.bonds.clone_from(&barrier.bonds);
         let (bonds, amounts) = self.go_on(longest, &barrier, &within, facts);
@@ -337,12 +337,12 @@ impl Flow<'_, '_> {
     fn moved(
         &mut self,
         longest: f64,
-        barrier: &Barrier,
-        within: &Facts,
-        facts: &Facts,
+        barrier: &InvariantBox,
+        within: &AbstractState,
+        facts: &AbstractState,
         (bonds, amounts): (&Option<Bonds>, &BTreeMap<u32, (f64, f64)>),
-    ) -> Vec<(u32, Known)> {
-        let mut moved: Vec<(u32, Known)> = Vec::new();
+    ) -> Vec<(u32, AbstractValue)> {
+        let mut moved: Vec<(u32, AbstractValue)> = Vec::new();
         for i in facts.moving.clone() {
             let derivative = &self.derivatives[i as usize];
             let state = derivative.state;
@@ -357,8 +357,11 @@ impl Flow<'_, '_> {
                     bonds.as_ref().map_or((low, high), |bonds| bonds.cut(state, (low, high)))
                 }
             };
-            let now =
-                if low.is_nan() || high.is_nan() { Known::nothing() } else { Known::Range(low, high, Why::Unknown) };
+            let now = if low.is_nan() || high.is_nan() {
+                AbstractValue::top()
+            } else {
+                AbstractValue::Range(low, high, Imprecision::Unknown)
+            };
             if facts.states[state as usize] != now {
                 moved.push((state, now));
             }
@@ -367,12 +370,12 @@ impl Flow<'_, '_> {
     }
 
     /// Time passes in small steps, and what moves is bounded more closely.
-    pub(super) fn pass_closely(&mut self, duration: f64, facts: &mut Facts) {
+    pub(super) fn pass_closely(&mut self, duration: f64, facts: &mut AbstractState) {
         self.refinements = REFINEMENTS;
         let step = duration / CLOSE_STEPS as f64;
         for _ in 0..CLOSE_STEPS {
             let before = facts.clone();
-            self.pass(&Known::Point(step), facts);
+            self.pass(&AbstractValue::Point(step), facts);
             self.by_totals(step, &before, facts);
         }
         self.refinements = 0;
@@ -382,9 +385,9 @@ impl Flow<'_, '_> {
     fn go_on(
         &mut self,
         longest: f64,
-        barrier: &Barrier,
-        within: &Facts,
-        facts: &Facts,
+        barrier: &InvariantBox,
+        within: &AbstractState,
+        facts: &AbstractState,
     ) -> (Option<Bonds>, BTreeMap<u32, (f64, f64)>) {
         let Some(all) = &barrier.bonds else { return (None, BTreeMap::new()) };
         let stoichiometry = self.stoichiometry();
@@ -422,7 +425,7 @@ impl Flow<'_, '_> {
                 let (from, to) = bond.base.bounds();
                 let low = low.max(from + scaled(longest, (slowest.min(0.0), 0.0)).0).min(from);
                 let high = high.min(to + scaled(longest, (0.0, fastest.max(0.0))).1).max(to);
-                bond.base = Known::Range(low, high, Why::Unknown);
+                bond.base = AbstractValue::Range(low, high, Imprecision::Unknown);
             }
         }
         let amounts = bonds.tighten(|state| self.is_amount(state), |state| self.atoms(state));
@@ -440,7 +443,7 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds that what moves never leaves.
-    fn barrier(&mut self, facts: &mut Facts) -> Barrier {
+    fn barrier(&mut self, facts: &mut AbstractState) -> InvariantBox {
         let mut due: BTreeSet<u32> = std::mem::take(&mut facts.unsettled);
         due.extend(&facts.moving);
         facts.rebind(Bonds::settle);
@@ -481,7 +484,7 @@ impl Flow<'_, '_> {
             (state, box_.within.states[state as usize].bounds())
         };
         let states = facts.moving.iter().map(bounds).collect();
-        Barrier { states, bonds: box_.within.bonds, veiled: self.veiled.clone() }
+        InvariantBox { states, bonds: box_.within.bonds, veiled: self.veiled.clone() }
     }
 
     /// Whether so many states move that bounding them takes more than a plan may ask for.
@@ -499,7 +502,14 @@ impl Flow<'_, '_> {
     }
 
     /// Lets the fluxes that change an amount go as far as they can.
-    fn react(&mut self, derivative: u32, row: &Row, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
+    fn react(
+        &mut self,
+        derivative: u32,
+        row: &Row,
+        facts: &AbstractState,
+        making: &mut Making,
+        crossed: &mut BTreeSet<u32>,
+    ) {
         let stoichiometry = self.stoichiometry();
         let still = self.still(self.derivatives[derivative as usize].state, facts);
         let mut more = None;
@@ -530,7 +540,7 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds extents anew that hang together with one where more of them go on: what one uses up another may give back, as a catalyst.
-    fn go_further(&mut self, extent: usize, facts: &Facts, making: &mut Making, crossed: &mut BTreeSet<u32>) {
+    fn go_further(&mut self, extent: usize, facts: &AbstractState, making: &mut Making, crossed: &mut BTreeSet<u32>) {
         let Some(mut shared) = making.within.bonds.take() else { return };
         let bonds = Rc::make_mut(&mut shared);
         let before: Vec<(f64, f64)> = bonds.extents.iter().map(|e| e.range).collect();
@@ -541,7 +551,7 @@ impl Flow<'_, '_> {
         let mut changed = BTreeSet::new();
         let amounts = bonds.tighten_from(Some(extent), |state| self.is_amount(state), |state| self.atoms(state), open);
         for (state, (low, high)) in amounts {
-            let known = Known::Range(low, high, Why::Unknown);
+            let known = AbstractValue::Range(low, high, Imprecision::Unknown);
             if making.within.states[state as usize] != known {
                 making.within.states[state as usize] = known;
                 changed.insert(state);
@@ -563,11 +573,11 @@ impl Flow<'_, '_> {
     }
 
     /// What is known of a state that fluxes of matter change besides others: by itself, and without what they bring.
-    fn put(&mut self, derivative: u32, facts: &Facts, making: &mut Making) {
+    fn put(&mut self, derivative: u32, facts: &AbstractState, making: &mut Making) {
         let state = self.derivatives[derivative as usize].state;
         let whole = *making.whole.entry(derivative).or_insert_with(|| facts.states[state as usize].bounds());
         let bounds = making.within.bonds.as_ref().map_or(whole, |bonds| bonds.cut(state, whole));
-        making.within.set(state, Known::Range(bounds.0, bounds.1, Why::Unknown));
+        making.within.set(state, AbstractValue::Range(bounds.0, bounds.1, Imprecision::Unknown));
     }
 
     /// Moves the faces of a state out that are crossed.
@@ -576,7 +586,7 @@ impl Flow<'_, '_> {
         derivative: u32,
         kind: &Kind,
         late: bool,
-        facts: &Facts,
+        facts: &AbstractState,
         making: &mut Making,
         crossed: &mut BTreeSet<u32>,
     ) {
@@ -633,23 +643,23 @@ impl Flow<'_, '_> {
     }
 
     /// What is known of a state without what fluxes of matter bring.
-    fn apart(&self, state: u32, facts: &Facts) -> (f64, f64) {
+    fn apart(&self, state: u32, facts: &AbstractState) -> (f64, f64) {
         let bond = facts.bonds.as_ref().and_then(|bonds| bonds.states.get(&state));
         bond.map_or_else(|| facts.states[state as usize].bounds(), |bond| bond.base.bounds())
     }
 
     /// Where the faces of a wall stand at first.
-    pub(super) fn begins(&self, wall: Wall, facts: &Facts) -> (f64, f64) {
+    pub(super) fn begins(&self, wall: Wall, facts: &AbstractState) -> (f64, f64) {
         match wall {
             Wall::Whole(i) => facts.states[self.derivatives[i as usize].state as usize].bounds(),
             Wall::Apart(i) => self.apart(self.derivatives[i as usize].state, facts),
         }
     }
 
-    pub(super) fn set_faces(&mut self, wall: Wall, faces: (f64, f64), facts: &Facts, making: &mut Making) {
+    pub(super) fn set_faces(&mut self, wall: Wall, faces: (f64, f64), facts: &AbstractState, making: &mut Making) {
         let (Wall::Whole(i) | Wall::Apart(i)) = wall;
         let state = self.derivatives[i as usize].state;
-        let known = Known::Range(faces.0, faces.1, Why::Unknown);
+        let known = AbstractValue::Range(faces.0, faces.1, Imprecision::Unknown);
         match wall {
             Wall::Apart(_) => {
                 making.within.rebind(|bonds, _| {
@@ -726,7 +736,7 @@ impl Flow<'_, '_> {
     }
 
     /// Brings faces back in as far as nothing crosses them.
-    fn narrow(&mut self, facts: &Facts, making: &mut Making) {
+    fn narrow(&mut self, facts: &AbstractState, making: &mut Making) {
         let walls = self.walls(making);
         for _ in 0..NARROWINGS {
             let mut rests = true;
@@ -765,7 +775,7 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds of a derivative.
-    pub(super) fn rate(&mut self, derivative: u32, within: &Facts) -> (f64, f64) {
+    pub(super) fn rate(&mut self, derivative: u32, within: &AbstractState) -> (f64, f64) {
         self.enclose(self.derivatives[derivative as usize].rate, within).bounds()
     }
 
@@ -778,13 +788,13 @@ impl Flow<'_, '_> {
         let hangs = making.whole.contains_key(&i);
         let added = making.within.bonds.as_ref().filter(|_| hangs).map(|bonds| bonds.added(state));
         let there = match (wall, added) {
-            (Wall::Whole(_), None) => Known::Point(at),
+            (Wall::Whole(_), None) => AbstractValue::Point(at),
             (Wall::Whole(_), Some(added)) => {
                 let (low, high) = self.apart(state, &making.within);
                 if at < low + added.0 || at > high + added.1 {
                     return (0.0, 0.0);
                 }
-                Known::Point(at)
+                AbstractValue::Point(at)
             }
             (Wall::Apart(_), added) => {
                 let (added, whole) = (added.unwrap_or_default(), making.whole.get(&i).copied());
@@ -793,7 +803,7 @@ impl Flow<'_, '_> {
                 if low > high {
                     return (0.0, 0.0);
                 }
-                Known::Range(low, high, Why::Unknown)
+                AbstractValue::Range(low, high, Imprecision::Unknown)
             }
         };
         self.rates_asked += 1;
@@ -806,12 +816,12 @@ impl Flow<'_, '_> {
         bounds
     }
 
-    pub(super) fn still(&self, state: u32, facts: &Facts) -> f64 {
+    pub(super) fn still(&self, state: u32, facts: &AbstractState) -> f64 {
         STILL * self.scale(state, facts)
     }
 
     /// The declared scale of a state, else a share of the largest value that it may have; 0 where that is nothing.
-    fn scale(&self, state: u32, facts: &Facts) -> f64 {
+    fn scale(&self, state: u32, facts: &AbstractState) -> f64 {
         self.lab.states[state as usize].scale.unwrap_or_else(|| {
             let (low, high) = facts.states[state as usize].bounds();
             DEPTH * [low, high].iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()))
@@ -831,7 +841,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes which reactions can go on now, and between which bounds their conditions lie.
-    fn note_processes(&mut self, facts: &Facts) {
+    fn note_processes(&mut self, facts: &AbstractState) {
         for i in 0..self.lab.processes.len() {
             let process = &self.lab.processes[i];
             let (Some(reaction), Some(guard)) = (process.reaction, process.guard) else { continue };

@@ -3,13 +3,13 @@
 use matterix_ir::plan::{Comparison, Condition, Step, StepId};
 use matterix_ir::{Diagnostic, Severity, codes};
 
-use super::Flow;
-use super::facts::Facts;
+use super::Interpreter;
 use super::report::shown;
+use super::state::AbstractState;
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// Reports a `fail` to which every run comes that follows the plan to here.
-    pub(super) fn comes_to_fail(&mut self, id: StepId, name: &str, facts: &Facts) {
+    pub(super) fn comes_to_fail(&mut self, id: StepId, name: &str, facts: &AbstractState) {
         let open = self.open > 0 || self.doubt > 0 || self.cleaning > 0 || facts.unsure;
         if open || self.is_taken(name) {
             return;
@@ -22,7 +22,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Reports a `fail` that comes for certain.
-    pub(super) fn fails_for_certain(&mut self, id: StepId, name: &str, condition: &Condition, facts: &Facts) {
+    pub(super) fn fails_for_certain(&mut self, id: StepId, name: &str, condition: &Condition, facts: &AbstractState) {
         let headline = format!("every run that comes here fails with `{name}`");
         let mut d = Diagnostic::error(codes::RUN_FAILED, self.plan.get(id).span, headline, "raised here");
         if self.doubt > 0 {

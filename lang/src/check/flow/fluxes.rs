@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
-use super::Flow;
+use super::Interpreter;
 use super::bonds::{Direction, Form, direction};
-use super::facts::Facts;
-use super::value::Known;
+use super::state::AbstractState;
+use super::value::AbstractValue;
 
 /// Terms of a rate before it is taken as a whole.
 const MOST_TERMS: usize = 256;
@@ -45,7 +45,7 @@ pub struct Stoichiometry {
     outer: Vec<bool>,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// What goes on by the laws; read off them once.
     pub fn stoichiometry(&mut self) -> Rc<Stoichiometry> {
         if let Some(known) = &self.nodes.stoichiometry {
@@ -146,17 +146,17 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a flux may go on.
-    pub(super) fn may_go(&mut self, flux: &Flux, facts: &Facts) -> bool {
+    pub(super) fn may_go(&mut self, flux: &Flux, facts: &AbstractState) -> bool {
         flux.conditions.iter().all(|(condition, holds)| self.eval(*condition, facts).truth() != Some(!holds))
     }
 
     /// Bounds of a flux.
-    pub fn flux(&mut self, flux: &Flux, within: &Facts) -> (f64, f64) {
+    pub fn flux(&mut self, flux: &Flux, within: &AbstractState) -> (f64, f64) {
         self.bounded(flux, |flow, node| flow.enclose(node, within))
     }
 
     /// Bounds of a flux from those of its rate and its conditions.
-    fn bounded(&mut self, flux: &Flux, mut value: impl FnMut(&mut Self, NodeId) -> Known) -> (f64, f64) {
+    fn bounded(&mut self, flux: &Flux, mut value: impl FnMut(&mut Self, NodeId) -> AbstractValue) -> (f64, f64) {
         let mut certain = true;
         for (condition, holds) in &flux.conditions {
             match value(self, *condition).truth() {
@@ -170,16 +170,16 @@ impl Flow<'_, '_> {
     }
 
     /// Bounds of what changes a state besides the fluxes that change matter.
-    pub fn rest(&mut self, row: &Row, within: &Facts) -> (f64, f64) {
+    pub fn rest(&mut self, row: &Row, within: &AbstractState) -> (f64, f64) {
         self.added_up(row, |flow, node| flow.enclose(node, within))
     }
 
     /// The same where the rate was evaluated just before, now that of what is known one state alone has changed.
-    pub fn rest_again(&mut self, row: &Row, state: u32, within: &Facts) -> (f64, f64) {
+    pub fn rest_again(&mut self, row: &Row, state: u32, within: &AbstractState) -> (f64, f64) {
         self.added_up(row, |flow, node| flow.enclose_again(node, state, within))
     }
 
-    fn added_up(&mut self, row: &Row, mut value: impl FnMut(&mut Self, NodeId) -> Known) -> (f64, f64) {
+    fn added_up(&mut self, row: &Row, mut value: impl FnMut(&mut Self, NodeId) -> AbstractValue) -> (f64, f64) {
         row.rest.iter().fold((0.0, 0.0), |(low, high), (flux, c)| {
             let bounds = self.bounded(flux, &mut value);
             let (a, b) = super::polytope::scaled(*c, bounds);
@@ -262,7 +262,7 @@ impl Flow<'_, '_> {
     }
 
     /// What is known of a sum of states that hang together, as far as that is more than its parts say.
-    pub fn together(&mut self, node: NodeId, apart: Known, facts: &Facts) -> Known {
+    pub fn together(&mut self, node: NodeId, apart: AbstractValue, facts: &AbstractState) -> AbstractValue {
         let Some(bonds) = facts.bonds.clone() else { return apart };
         let Some(form) = self.form(node) else { return apart };
         match bonds.sum(&form, facts) {

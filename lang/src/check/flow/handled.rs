@@ -4,9 +4,9 @@ use matterix_ir::plan::{Caught, PlanStep, Step, StepId};
 use matterix_ir::{NodeId, Span};
 
 use super::clashing::CLAIMED;
-use super::facts::Facts;
-use super::value::{Known, Why};
-use super::{Flow, Raised};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, Raised};
 
 /// So many times a body that is begun again is followed; what further turns change is not known.
 const MOST_RETRIES: u32 = 3;
@@ -14,7 +14,7 @@ const MOST_RETRIES: u32 = 3;
 /// A body with handlers.
 struct Guard<'g> {
     id: StepId,
-    base: &'g Facts,
+    base: &'g AbstractState,
     body: StepId,
     handlers: &'g [(Caught, StepId)],
     /// The handlers stand in the library: they are for devices that fail, not for mistakes in the plan.
@@ -24,7 +24,7 @@ struct Guard<'g> {
 /// What comes of a body with handlers that was followed once.
 #[derive(Default)]
 struct Attempt {
-    after: Option<Facts>,
+    after: Option<AbstractState>,
     raised: Vec<Raised>,
     again: Vec<Again>,
 }
@@ -34,21 +34,21 @@ struct Again {
     /// The failures that it has taken.
     names: Vec<String>,
     /// How often it does so.
-    times: Known,
-    facts: Facts,
+    times: AbstractValue,
+    facts: AbstractState,
     /// The `fail` that it has taken, where there was one, with its name.
     fail: Option<(String, Span)>,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     pub(super) fn guarded(
         &mut self,
         id: StepId,
         body: StepId,
         handlers: &[(Caught, StepId)],
         finally: Option<StepId>,
-        facts: Facts,
-    ) -> Option<Facts> {
+        facts: AbstractState,
+    ) -> Option<AbstractState> {
         let library = self.in_library(self.plan.get(id).span);
         let guard = Guard { id, base: &facts, body, handlers, library };
         self.reported.push(Vec::new());
@@ -72,7 +72,7 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a body, then the handlers of what it raises. In its last turn a handler that begins it again takes nothing.
-    fn attempt(&mut self, guard: &Guard<'_>, facts: Facts, last: bool) -> Attempt {
+    fn attempt(&mut self, guard: &Guard<'_>, facts: AbstractState, last: bool) -> Attempt {
         let takes = |(_, handler): &&(Caught, StepId)| !(last && self.retries(*handler));
         let name = |(caught, _): &(Caught, StepId)| match caught {
             Caught::Named(name) => Some(name.clone()),
@@ -143,7 +143,7 @@ impl Flow<'_, '_> {
             let last = most <= f64::from(turn);
             if turn == MOST_RETRIES && !last {
                 self.widen(guard.body, &mut entry);
-                self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut entry);
+                self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut entry);
             }
             let (doubt, quiet) = (usize::from(after.is_some()), usize::from(entry.unsure));
             entry.unsure |= turn == MOST_RETRIES && !last;
@@ -174,7 +174,7 @@ impl Flow<'_, '_> {
     }
 
     /// A handler begins its body again.
-    pub(super) fn begins_again(&mut self, times: NodeId, facts: Facts) {
+    pub(super) fn begins_again(&mut self, times: NodeId, facts: AbstractState) {
         let times = self.eval(times, &facts);
         if let Some(again) = self.again.last_mut() {
             again.push((times, facts));
@@ -182,13 +182,13 @@ impl Flow<'_, '_> {
     }
 
     /// What is known where failures lead to one place.
-    pub(super) fn entry(&mut self, id: StepId, base: &Facts, raised: Vec<Raised>) -> Option<Facts> {
-        let mut ways: Vec<Facts> = raised.into_iter().map(|(_, facts)| facts).collect();
+    pub(super) fn entry(&mut self, id: StepId, base: &AbstractState, raised: Vec<Raised>) -> Option<AbstractState> {
+        let mut ways: Vec<AbstractState> = raised.into_iter().map(|(_, facts)| facts).collect();
         if let Some(way) = self.fork(id, &ways) {
             return Some(ways.swap_remove(way));
         }
         let site = self.site();
-        ways.into_iter().reduce(|a, b| base.join(a, &b, site, Why::Paths))
+        ways.into_iter().reduce(|a, b| base.join(a, &b, site, Imprecision::Paths))
     }
 
     /// What is known behind a `finally`: on the way that goes on, and where failures go on outwards. What goes wrong in it is
@@ -197,10 +197,10 @@ impl Flow<'_, '_> {
         &mut self,
         id: StepId,
         finally: StepId,
-        base: &Facts,
-        after: Option<Facts>,
+        base: &AbstractState,
+        after: Option<AbstractState>,
         raised: Vec<Raised>,
-    ) -> (Option<Facts>, Vec<Raised>) {
+    ) -> (Option<AbstractState>, Vec<Raised>) {
         self.cleaning += 1;
         let mut said = after.is_some();
         let after = after.and_then(|facts| self.walk(finally, facts));

@@ -5,24 +5,30 @@ use matterix_ir::plan::Condition;
 use matterix_ir::quantity::show_duration;
 use matterix_ir::{Code, codes};
 
-use super::Flow;
+use super::Interpreter;
 use super::course::Course;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 
 /// So many times a condition breaks off before the rest is left to the run.
 const MOST_BREAKS: usize = 100;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// After how long, s, a condition that holds now first breaks off, where it never lasts `lasts` s within `left` s.
-    pub(super) fn breaks_off(&mut self, condition: NodeId, lasts: f64, left: f64, facts: &Facts) -> Option<f64> {
+    pub(super) fn breaks_off(
+        &mut self,
+        condition: NodeId,
+        lasts: f64,
+        left: f64,
+        facts: &AbstractState,
+    ) -> Option<f64> {
         let begun = facts.time.exact().filter(|_| !self.is_shared(condition))?;
         let first = self.unheard(|flow| flow.first_break(condition, lasts, begun + left, facts));
         self.stopped = false;
         first.map(|first| first - begun)
     }
 
-    fn first_break(&mut self, condition: NodeId, lasts: f64, end: f64, facts: &Facts) -> Option<f64> {
+    fn first_break(&mut self, condition: NodeId, lasts: f64, end: f64, facts: &AbstractState) -> Option<f64> {
         let mut along = facts.clone();
         let mut first = None;
         for _ in 0..MOST_BREAKS {
@@ -38,7 +44,7 @@ impl Flow<'_, '_> {
                 Course::Reached(_) => {}
                 Course::Passed => return first,
                 Course::Left(left) => {
-                    self.pass(&Known::Range(0.0, left, Why::Unknown), &mut along);
+                    self.pass(&AbstractValue::Range(0.0, left, Imprecision::Unknown), &mut along);
                     return first.filter(|_| self.eval(condition, &along).truth() == Some(false));
                 }
             }

@@ -4,14 +4,14 @@ use matterix_ir::model::{Action, Domain};
 use matterix_ir::plan::{Condition, Step, Term};
 use matterix_ir::{Diagnostic, NodeId, Op, Span};
 
-use super::Flow;
-use super::facts::Facts;
+use super::Interpreter;
 use super::report::STEPS_SHOWN;
-use super::value::Known;
+use super::state::AbstractState;
+use super::value::AbstractValue;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Adds how the members a condition reads came to be what they are, in the order it happened.
-    pub(super) fn with_history(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
+    pub(super) fn with_history(&mut self, d: Diagnostic, condition: &Condition, facts: &AbstractState) -> Diagnostic {
         self.history_of(d, condition, facts, false)
     }
 
@@ -20,7 +20,7 @@ impl Flow<'_, '_> {
         &mut self,
         mut d: Diagnostic,
         condition: &Condition,
-        facts: &Facts,
+        facts: &AbstractState,
         worded: bool,
     ) -> Diagnostic {
         let (node, terms) = (condition.node, condition.terms.as_slice());
@@ -55,7 +55,7 @@ impl Flow<'_, '_> {
     }
 
     /// Which things stand from the start where a member would be something else without them.
-    fn stood(&mut self, term: &Term, facts: &Facts) -> Vec<(Span, String)> {
+    fn stood(&mut self, term: &Term, facts: &AbstractState) -> Vec<(Span, String)> {
         let value = self.eval(term.node, facts);
         let mut without = facts.clone();
         let mut out = Vec::new();
@@ -70,7 +70,7 @@ impl Flow<'_, '_> {
             if self.lab.states[at].domain != Domain::Instance {
                 continue;
             }
-            let there = std::mem::replace(&mut without.states[at], Known::Point(-1.0));
+            let there = std::mem::replace(&mut without.states[at], AbstractValue::Point(-1.0));
             let decides = self.eval(term.node, &without) != value;
             without.states[at] = there;
             if decides && out.len() < STEPS_SHOWN {
@@ -82,7 +82,7 @@ impl Flow<'_, '_> {
     }
 
     /// The changes of states behind a condition that names no member itself, as one that calls a function.
-    fn changes_behind(&mut self, node: NodeId, facts: &Facts) -> Vec<(Span, String)> {
+    fn changes_behind(&mut self, node: NodeId, facts: &AbstractState) -> Vec<(Span, String)> {
         let mut order = self.order(node).to_vec();
         let mut said = Vec::new();
         let mut at = 0;
@@ -139,7 +139,7 @@ impl Flow<'_, '_> {
     }
 
     /// The latest statements that changed a member, latest first, each once.
-    pub(super) fn history(&mut self, term: &Term, facts: &Facts) -> Vec<(Span, String)> {
+    pub(super) fn history(&mut self, term: &Term, facts: &AbstractState) -> Vec<(Span, String)> {
         let states = self.parts(term.node).states.clone();
         let mut then = facts.clone();
         let mut at = facts.history.clone();

@@ -22,10 +22,10 @@ use matterix_ir::{Diagnostic, Severity, Span, codes};
 pub(super) use self::dangers::Dangers;
 pub(super) use self::judged::Judged;
 use super::actions::Asked;
-use super::facts::Facts;
 use super::report::Finding;
-use super::value::Known;
-use super::{Flow, MOST_STEPS, Site, Turns};
+use super::state::AbstractState;
+use super::value::AbstractValue;
+use super::{Interpreter, MOST_STEPS, Site, Turns};
 use crate::elaborate::hazards::Hazard;
 
 /// Moments closer than this share of the time, or of 1 s, are one.
@@ -121,7 +121,7 @@ struct Lines<'p> {
     all: Vec<Line<'p>>,
     /// The latest job of each name.
     jobs: BTreeMap<&'p str, usize>,
-    facts: Facts,
+    facts: AbstractState,
     /// A job goes on before what follows its `start`.
     job_first: bool,
     /// The line in hand lets another one go on.
@@ -198,7 +198,7 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * b.abs().max(1.0)
 }
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// Steps, each with those that go on beside it.
     pub(super) fn side_by_side(&self) -> Vec<(StepId, Vec<StepId>)> {
         let plan = self.plan;
@@ -633,7 +633,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// A line waits for some time.
-    fn waits(&mut self, lines: &mut Lines<'l>, at: usize, time: &Known) {
+    fn waits(&mut self, lines: &mut Lines<'l>, at: usize, time: &AbstractValue) {
         match time.exact() {
             Some(time) if time > 0.0 => lines.all[at].state = State::Until(lines.now() + time),
             Some(_) => {}
@@ -795,7 +795,11 @@ fn grant<'p>(lines: &mut Lines<'p>) -> Option<usize> {
 
 /// Adds what goes wrong where branches and jobs are followed in the order of time, whichever of two comes first at one moment, and drops
 /// what is then known not to; `begin` gives a flow that was not followed yet.
-pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard], begin: &impl Fn() -> Flow<'l, 'a>) {
+pub(super) fn add_findings<'l, 'a>(
+    flow: &mut Interpreter<'l, 'a>,
+    hazards: &'l [Hazard],
+    begin: &impl Fn() -> Interpreter<'l, 'a>,
+) {
     let pairs = flow.side_by_side();
     if pairs.is_empty() {
         return;
@@ -806,7 +810,7 @@ pub(super) fn add_findings<'l, 'a>(flow: &mut Flow<'l, 'a>, hazards: &'l [Hazard
     }
     let errors = flow.findings.iter().any(|f| f.is_error() && !f.is_of_one_order());
     let uncertain = errors || flow.findings.iter().any(|f| f.is_of_one_order() || f.is_by_failure());
-    let follow = |flow: &mut Flow<'l, 'a>, backward| {
+    let follow = |flow: &mut Interpreter<'l, 'a>, backward| {
         let mut follower = begin();
         follower.swap_known(flow);
         follower.judged = Judged::of(&flow.findings);

@@ -8,9 +8,9 @@ use matterix_ir::plan::{Condition, Operation, Step, StepId};
 use matterix_ir::quantity::show_duration;
 use matterix_ir::{Diagnostic, NodeId, Severity, Span, codes};
 
-use super::Flow;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::Interpreter;
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 use crate::elaborate::mixtures::changed;
 
 /// Steps that go on beside others.
@@ -19,7 +19,7 @@ pub(super) struct Rival {
     /// What is done, in order.
     pub steps: Vec<StepId>,
     /// When the first of them begins, s.
-    pub start: Known,
+    pub start: AbstractValue,
     /// Whether they begin after those beside them where both begin at one time; none where that is not known.
     pub later: bool,
 }
@@ -33,9 +33,9 @@ struct Effect<'p> {
     later: bool,
 }
 
-impl<'p> Flow<'p, '_> {
+impl<'p> Interpreter<'p, '_> {
     /// Looks whether something beside keeps from coming what is waited for, for at most `longest` s.
-    pub(super) fn stopped_meanwhile(&mut self, condition: &Condition, longest: f64, facts: &Facts) {
+    pub(super) fn stopped_meanwhile(&mut self, condition: &Condition, longest: f64, facts: &AbstractState) {
         let rivals = self.rivals_now();
         let Some(now) = facts.time.exact().filter(|_| !rivals.is_empty() && self.quiet == 0) else { return };
         let parts = self.parts(condition.node);
@@ -77,7 +77,7 @@ impl<'p> Flow<'p, '_> {
         effects: &[Effect<'p>],
         now: f64,
         longest: f64,
-        facts: &Facts,
+        facts: &AbstractState,
     ) -> bool {
         let mut facts = facts.clone();
         // What the others set is followed here, one by one.
@@ -89,17 +89,17 @@ impl<'p> Flow<'p, '_> {
                 flow.pass_closely(effect.at.0 - at, &mut facts);
                 open &= flow.eval(condition.node, &facts).truth() == Some(false);
                 at = effect.at.0;
-                facts.time = Known::Point(at);
+                facts.time = AbstractValue::Point(at);
                 flow.perform(effect.actions, &mut facts);
             }
-            flow.pass_by_totals(&Known::Range(0.0, longest - (at - now), Why::Unknown), &mut facts);
+            flow.pass_by_totals(&AbstractValue::Range(0.0, longest - (at - now), Imprecision::Unknown), &mut facts);
             open && flow.eval(condition.node, &facts).truth() == Some(false)
         });
         self.contested = contested;
         never
     }
 
-    fn pass_by_totals(&mut self, duration: &Known, facts: &mut Facts) {
+    fn pass_by_totals(&mut self, duration: &AbstractValue, facts: &mut AbstractState) {
         let before = facts.clone();
         self.pass(duration, facts);
         self.by_totals(duration.bounds().1, &before, facts);
@@ -139,7 +139,7 @@ impl<'p> Flow<'p, '_> {
         id: StepId,
         place: (Span, bool),
         time: &mut (f64, f64),
-        facts: &Facts,
+        facts: &AbstractState,
         out: &mut Vec<Effect<'p>>,
     ) {
         let plan = self.plan;
@@ -195,7 +195,7 @@ impl<'p> Flow<'p, '_> {
     }
 
     /// How a condition comes out after these effects, where it is known before them and they do not change it.
-    fn decided_by_now(&mut self, condition: &Condition, facts: &Facts, effects: &[Effect<'p>]) -> Option<bool> {
+    fn decided_by_now(&mut self, condition: &Condition, facts: &AbstractState, effects: &[Effect<'p>]) -> Option<bool> {
         let holds = self.eval(condition.node, facts).truth()?;
         let parts = self.parts(condition.node);
         let actions = effects.iter().flat_map(|effect| effect.actions).cloned().collect::<Vec<Action>>();
@@ -208,7 +208,7 @@ impl<'p> Flow<'p, '_> {
         operation: &'p Operation,
         (span, later): (Span, bool),
         time: &mut (f64, f64),
-        facts: &Facts,
+        facts: &AbstractState,
         out: &mut Vec<Effect<'p>>,
     ) {
         out.push(Effect { at: *time, actions: &operation.at_start, span, later });
@@ -222,7 +222,7 @@ impl<'p> Flow<'p, '_> {
     }
 
     /// How long a step of another branch or job lasts at least and at most, s: open where a step of the plan changes what that follows from.
-    fn lasts_beside(&mut self, duration: NodeId, facts: &Facts) -> (f64, f64) {
+    fn lasts_beside(&mut self, duration: NodeId, facts: &AbstractState) -> (f64, f64) {
         let parts = self.parts(duration);
         let changes = |flow: &Self| {
             let changed = flow.behind_plan();

@@ -7,23 +7,23 @@ use std::rc::Rc;
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::{BinaryOp, codes};
 
-use super::Flow;
-use super::facts::{Facts, changed_by};
+use super::Interpreter;
 use super::interference::Rival;
-use super::points::at_least;
+use super::program_points::at_least;
 use super::report::Finding;
+use super::state::{AbstractState, changed_by};
 use super::stopped::{Beside, Course};
-use super::value::Known;
-use super::{Raised, apart, left, parted};
+use super::value::AbstractValue;
+use super::{Raised, apart, left, trace_partitioning};
 
 /// A job that was started and not waited for yet.
 #[derive(Clone, Debug)]
 pub(super) struct Job {
     body: StepId,
     /// When it began, s.
-    start: Known,
+    start: AbstractValue,
     /// When it ended, s; not yet where its steps are followed when it is waited for.
-    end: Option<Known>,
+    end: Option<AbstractValue>,
     /// The states that it changes.
     writes: BTreeSet<u32>,
     /// The states that hang on when it does something and when others do.
@@ -31,7 +31,7 @@ pub(super) struct Job {
     /// What it changes that should be in order at the end, as far as that was asked for.
     course: Rc<Course>,
     /// What was known when it began.
-    base: Option<Rc<Facts>>,
+    base: Option<Rc<AbstractState>>,
     /// How many bodies with handlers were around its `start`.
     depth: usize,
     /// How many blocks that wait for jobs were around it.
@@ -66,7 +66,7 @@ impl Job {
     }
 
     /// When it began, s.
-    pub(super) fn start(&self) -> &Known {
+    pub(super) fn start(&self) -> &AbstractValue {
         &self.start
     }
 }
@@ -75,8 +75,8 @@ impl Job {
 pub(super) type Jobs = BTreeMap<String, Job>;
 
 /// Follows a plan way by way, and in both orders where it starts jobs; `begin` gives one that was not followed yet.
-pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
-    let mut flow = parted::follow(&begin);
+pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Interpreter<'l, 'a>) -> Interpreter<'l, 'a> {
+    let mut flow = trace_partitioning::follow(&begin);
     apart::add_findings(&mut flow, &begin);
     left::on_some_way(&mut flow, &begin);
     if flow.plan.steps.iter().any(|s| matches!(s.step, Step::Start { .. })) {
@@ -103,9 +103,9 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
     flow
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Starts a job.
-    pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: Facts) -> Option<Facts> {
+    pub(super) fn start_job(&mut self, name: &str, body: StepId, mut facts: AbstractState) -> Option<AbstractState> {
         let (start, writes) = (facts.time.clone(), self.sets_going(self.writes(body)));
         let (depth, blocks) = (self.guards.len(), self.blocks);
         let raced = self.raced_by_job(body);
@@ -115,7 +115,7 @@ impl Flow<'_, '_> {
         let end = match self.late {
             true => {
                 if let Some(base) = &base {
-                    course = self.course_aside(body, Facts::clone(base));
+                    course = self.course_aside(body, AbstractState::clone(base));
                 }
                 None
             }
@@ -158,7 +158,7 @@ impl Flow<'_, '_> {
     }
 
     /// Waits for a job.
-    pub(super) fn await_job(&mut self, name: &str, facts: Facts) -> Option<Facts> {
+    pub(super) fn await_job(&mut self, name: &str, facts: AbstractState) -> Option<AbstractState> {
         match facts.begun.get(name) {
             Some(true) => {}
             begun => {
@@ -175,7 +175,7 @@ impl Flow<'_, '_> {
         self.end_of_job(name, facts)
     }
 
-    fn end_of_job(&mut self, name: &str, mut facts: Facts) -> Option<Facts> {
+    fn end_of_job(&mut self, name: &str, mut facts: AbstractState) -> Option<AbstractState> {
         self.end_job(name);
         let Some(Job { body, start, end, writes, raced, fails, .. }) = self.jobs.remove(name) else {
             return Some(facts);
@@ -204,12 +204,12 @@ impl Flow<'_, '_> {
         self.moves_until(&end, &mut facts);
         let raced: Vec<u32> = raced.into_iter().collect();
         self.forget(&raced, &mut facts);
-        facts.time = Known::binary(BinaryOp::Max, &now, &end);
+        facts.time = AbstractValue::binary(BinaryOp::Max, &now, &end);
         Some(facts)
     }
 
     /// What a job that has failed alone sets stays as it was then until the failure is taken.
-    fn left_by_job(&mut self, body: StepId, raced: &BTreeSet<u32>, failed: &Facts, facts: &mut Facts) {
+    fn left_by_job(&mut self, body: StepId, raced: &BTreeSet<u32>, failed: &AbstractState, facts: &mut AbstractState) {
         let beside: BTreeSet<u32> = self.concurrent(body).into_iter().flat_map(|id| self.writes(id)).collect();
         let beside = self.sets_going(beside);
         let set_by_events =
@@ -227,14 +227,14 @@ impl Flow<'_, '_> {
     }
 
     /// The jobs that nothing waits for: a run ends when they have.
-    pub(super) fn await_all(&mut self, mut facts: Facts) -> Option<Facts> {
+    pub(super) fn await_all(&mut self, mut facts: AbstractState) -> Option<AbstractState> {
         while let Some(name) = self.jobs.keys().next().cloned() {
             facts = self.end_of_job(&name, facts)?;
         }
         Some(facts)
     }
 
-    fn job(&mut self, body: StepId, raced: &BTreeSet<u32>, facts: Facts) -> Option<Facts> {
+    fn job(&mut self, body: StepId, raced: &BTreeSet<u32>, facts: AbstractState) -> Option<AbstractState> {
         let mut noted = self.sets_going(self.beside(body));
         noted.extend(raced);
         let beside = self.concurrent(body);
@@ -264,17 +264,17 @@ impl Flow<'_, '_> {
     }
 
     /// A block ends: it waits for the jobs begun in it, or a failure has stopped them.
-    pub(super) fn end_block(&mut self, after: Option<Facts>) -> Option<Facts> {
+    pub(super) fn end_block(&mut self, after: Option<AbstractState>) -> Option<AbstractState> {
         self.end_block_at(self.guards.len(), after)
     }
 
     /// The same of a body whose handlers still take what its jobs raise.
-    pub(super) fn end_body(&mut self, after: Option<Facts>) -> Option<Facts> {
+    pub(super) fn end_body(&mut self, after: Option<AbstractState>) -> Option<AbstractState> {
         self.end_block_at(self.guards.len().saturating_sub(1), after)
     }
 
     /// The same for jobs begun deeper than so many bodies with handlers.
-    fn end_block_at(&mut self, depth: usize, mut after: Option<Facts>) -> Option<Facts> {
+    fn end_block_at(&mut self, depth: usize, mut after: Option<AbstractState>) -> Option<AbstractState> {
         let blocks = self.blocks;
         while let Some((name, _)) = self.jobs.iter().find(|(_, job)| job.depth > depth || job.blocks > blocks) {
             let name = name.clone();

@@ -6,13 +6,13 @@ use matterix_ir::plan::{LONGEST_RUN, Operation, StepId};
 use matterix_ir::quantity::{show_duration, show_number};
 use matterix_ir::{Code, NodeId, Severity, codes};
 
-use super::facts::Facts;
-use super::value::{Known, Why};
-use super::{Flow, MOST_STEPS};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, MOST_STEPS};
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// A duration as it is when a step is reached, s; reported where it is negative on every way.
-    pub(super) fn duration(&mut self, node: NodeId, facts: &Facts) -> Known {
+    pub(super) fn duration(&mut self, node: NodeId, facts: &AbstractState) -> AbstractValue {
         let time = self.eval(node, facts);
         let (_, longest) = time.bounds();
         if longest < 0.0 {
@@ -20,13 +20,13 @@ impl Flow<'_, '_> {
             let said = format!("would take {}", show_duration(longest));
             self.found_here(codes::TYPE_MISMATCH, wrong, said, "give a duration of 0 s or more");
             // Said already: when it would end is not known.
-            return Known::Range(0.0, f64::INFINITY, Why::Unknown);
+            return AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown);
         }
         time
     }
 
     /// Notes how long an operation lasts that begins now, where that follows from states.
-    pub(super) fn note_duration(&mut self, id: StepId, operation: &Operation, facts: &Facts) {
+    pub(super) fn note_duration(&mut self, id: StepId, operation: &Operation, facts: &AbstractState) {
         let Some(takes) = operation.takes.filter(|t| operation.until.is_none() && t.bounds.is_none()) else { return };
         let parts = self.parts(takes.nominal);
         if parts.states.is_empty() {
@@ -56,7 +56,7 @@ impl Flow<'_, '_> {
     }
 
     /// How often a body is done; reported where that is no whole number, or less than none.
-    pub(super) fn turns(&mut self, node: NodeId, facts: &Facts) -> Known {
+    pub(super) fn turns(&mut self, node: NodeId, facts: &AbstractState) -> AbstractValue {
         let times = self.eval(node, facts);
         if let Some(exact) = times.exact().filter(|n| *n < 0.0 || n.fract() != 0.0) {
             let wrong = format!("`{}` cannot be done: how often is a whole number", self.label());
@@ -67,7 +67,7 @@ impl Flow<'_, '_> {
     }
 
     /// Reports the first statement on a way that cannot end within the longest time a run may take.
-    pub(super) fn outlasts(&mut self, before: f64, after: &Facts) {
+    pub(super) fn outlasts(&mut self, before: f64, after: &AbstractState) {
         let (least, _) = after.time.bounds();
         if before > LONGEST_RUN || least <= LONGEST_RUN {
             return;

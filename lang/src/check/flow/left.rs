@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use matterix_ir::plan::{Limit, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 
-use super::Flow;
-use super::facts::Facts;
+use super::Interpreter;
+use super::state::AbstractState;
 
 /// So many meetings of one way are followed before it is left open.
 const DEEPEST: usize = 12;
@@ -48,14 +48,15 @@ struct Fork {
     sure: bool,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// The way that is followed alone of those that meet here, if they differ in what should hold at the end.
-    pub(super) fn fork(&mut self, id: StepId, ways: &[Facts]) -> Option<usize> {
+    pub(super) fn fork(&mut self, id: StepId, ways: &[AbstractState]) -> Option<usize> {
         let plan = self.plan;
         let mut off = Vec::new();
         for (end, limit) in plan.ends.iter().enumerate() {
             let states = self.parts(limit.condition.node).states.clone();
-            let same = |two: &[Facts]| states.iter().all(|s| two[0].states[*s as usize] == two[1].states[*s as usize]);
+            let same =
+                |two: &[AbstractState]| states.iter().all(|s| two[0].states[*s as usize] == two[1].states[*s as usize]);
             if ways.windows(2).all(same) {
                 continue;
             }
@@ -79,7 +80,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks at what should hold at the end and held at the start.
-    pub(super) fn ends(&mut self, begun: &Facts, ended: &Facts) {
+    pub(super) fn ends(&mut self, begun: &AbstractState, ended: &AbstractState) {
         let plan = self.plan;
         for (index, end) in plan.ends.iter().enumerate() {
             if !self.began_right(end, begun) {
@@ -99,7 +100,7 @@ impl Flow<'_, '_> {
     }
 
     /// Looks at the same where a `fail` or a written timeout that nothing takes ends the workflow.
-    pub(super) fn ends_failed(&mut self, begun: &Facts, raised: &[super::Raised]) {
+    pub(super) fn ends_failed(&mut self, begun: &AbstractState, raised: &[super::Raised]) {
         let plan = self.plan;
         for (name, facts) in raised {
             let Some(span) = facts.written else { continue };
@@ -116,13 +117,13 @@ impl Flow<'_, '_> {
         }
     }
 
-    fn began_right(&mut self, end: &Limit, begun: &Facts) -> bool {
+    fn began_right(&mut self, end: &Limit, begun: &AbstractState) -> bool {
         self.eval(end.condition.node, begun).truth() == Some(true)
     }
 }
 
 /// Finds the ways that leave something as it should not be; `begin` gives a flow that was not followed yet.
-pub(super) fn on_some_way<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>) {
+pub(super) fn on_some_way<'l, 'a>(flow: &mut Interpreter<'l, 'a>, begin: &impl Fn() -> Interpreter<'l, 'a>) {
     let mut search = Search { left: MOST_STEPS, cut: false };
     let mut unsearched: Vec<usize> = Vec::new();
     let mut open = std::mem::take(&mut flow.forks.open);
@@ -152,7 +153,7 @@ pub(super) fn on_some_way<'l, 'a>(flow: &mut Flow<'l, 'a>, begin: &impl Fn() -> 
 }
 
 /// Reports a thing that is left so, with the statements at which the way there parts from others.
-fn tell(flow: &mut Flow<'_, '_>, end: usize, mut d: Diagnostic, way: Vec<Span>) {
+fn tell(flow: &mut Interpreter<'_, '_>, end: usize, mut d: Diagnostic, way: Vec<Span>) {
     let about = flow.plan.ends[end].condition.span;
     d.headline = d.headline.replacen(" ends, and", " can end, and", 1);
     for span in way.into_iter().filter(|span| !flow.in_library(*span)) {
@@ -175,8 +176,8 @@ enum Choices {
 
 /// What is left so on the way that takes, at each meeting, a way on which one of these things is left so.
 fn way_to_all<'l, 'a>(
-    flow: &Flow<'l, 'a>,
-    begin: &impl Fn() -> Flow<'l, 'a>,
+    flow: &Interpreter<'l, 'a>,
+    begin: &impl Fn() -> Interpreter<'l, 'a>,
     ends: &[usize],
     choices: Choices,
     search: &mut Search,
@@ -208,10 +209,10 @@ fn way_to_all<'l, 'a>(
 
 /// A flow that has followed these ways alone.
 fn follow_chosen<'l, 'a>(
-    flow: &Flow<'l, 'a>,
-    begin: &impl Fn() -> Flow<'l, 'a>,
+    flow: &Interpreter<'l, 'a>,
+    begin: &impl Fn() -> Interpreter<'l, 'a>,
     chosen: BTreeMap<usize, usize>,
-) -> Flow<'l, 'a> {
+) -> Interpreter<'l, 'a> {
     let mut one = begin();
     one.notes = None;
     one.late = flow.late;
@@ -230,7 +231,7 @@ struct Search {
 }
 
 /// Says which things may be left so on ways that were not followed.
-fn not_searched(flow: &mut Flow<'_, '_>, unsearched: &[usize]) {
+fn not_searched(flow: &mut Interpreter<'_, '_>, unsearched: &[usize]) {
     let ends = flow.plan.ends.iter().enumerate().filter(|(index, _)| unsearched.contains(index));
     let mut names: Vec<String> = ends.map(|(_, end)| format!("`{}`", flow.lab.spoken_name(end.instance))).collect();
     names.sort();
@@ -248,8 +249,8 @@ fn not_searched(flow: &mut Flow<'_, '_>, unsearched: &[usize]) {
 
 /// A way on which something is left so, with the statements at which it parts from others.
 fn way_to<'l, 'a>(
-    flow: &Flow<'l, 'a>,
-    begin: &impl Fn() -> Flow<'l, 'a>,
+    flow: &Interpreter<'l, 'a>,
+    begin: &impl Fn() -> Interpreter<'l, 'a>,
     end: usize,
     search: &mut Search,
 ) -> Option<(Diagnostic, Vec<Span>)> {

@@ -4,25 +4,25 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-use super::Flow;
+use super::Interpreter;
 use super::even::Even;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 
 /// What moves by itself when concurrent steps begin.
 #[derive(Clone, Debug)]
 pub(super) struct Meantime {
     /// What was known then.
-    begun: Rc<Facts>,
+    begun: Rc<AbstractState>,
     /// States that none of the concurrent steps changes, nor what they set going.
     alone: BTreeSet<u32>,
     /// Other states that move.
     mixed: BTreeSet<u32>,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// States that flows and timers change which go on now, as far as they are followed exactly.
-    fn going_on(&mut self, facts: &Facts) -> BTreeSet<u32> {
+    fn going_on(&mut self, facts: &AbstractState) -> BTreeSet<u32> {
         let tracks = self.tracks();
         if tracks.list.is_empty() && self.timed.is_empty() {
             return BTreeSet::new();
@@ -43,21 +43,25 @@ impl Flow<'_, '_> {
 
     /// What is known but for what concurrent steps may set at any time, such as whether a pump runs; none where there is no such.
     /// What the step that is followed has to itself they do not.
-    pub(super) fn but_for_others(&mut self, facts: &Facts) -> Option<Facts> {
+    pub(super) fn but_for_others(&mut self, facts: &AbstractState) -> Option<AbstractState> {
         let open = self.set_by_others();
         if open.is_empty() {
             return None;
         }
         let mut veiled = facts.clone();
-        open.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
+        open.iter().for_each(|s| veiled.states[*s as usize] = AbstractValue::top());
         Some(veiled)
     }
 
     /// Time passes in which concurrent steps may set states that this line sets too: what moves is bounded whatever these are.
-    pub(super) fn beside_others(&mut self, facts: &mut Facts, pass: impl FnOnce(&mut Self, &mut Facts)) {
+    pub(super) fn beside_others(
+        &mut self,
+        facts: &mut AbstractState,
+        pass: impl FnOnce(&mut Self, &mut AbstractState),
+    ) {
         let mut kept = Vec::new();
         for s in self.set_by_others() {
-            kept.push((s, std::mem::replace(&mut facts.states[s as usize], Known::nothing())));
+            kept.push((s, std::mem::replace(&mut facts.states[s as usize], AbstractValue::top())));
             facts.reopen(|state| state == s);
         }
         let veiled: Vec<u32> = kept.iter().map(|(s, _)| *s).filter(|s| self.rates_of.contains_key(s)).collect();
@@ -101,7 +105,7 @@ impl Flow<'_, '_> {
     }
 
     /// Concurrent steps that change these states begin; nothing where nothing goes on by itself.
-    pub(super) fn meantime(&mut self, written: &BTreeSet<u32>, facts: &Facts) -> Option<Meantime> {
+    pub(super) fn meantime(&mut self, written: &BTreeSet<u32>, facts: &AbstractState) -> Option<Meantime> {
         let moving = self.going_on(facts);
         if moving.is_empty() {
             return None;
@@ -113,7 +117,7 @@ impl Flow<'_, '_> {
 
     /// Another of the concurrent steps begins at the same time: what moves by itself is as it was then, and nothing is known of
     /// what those before have set going, or changed of it.
-    pub(super) fn begin_again(&mut self, meantime: Option<&Meantime>, facts: &mut Facts) {
+    pub(super) fn begin_again(&mut self, meantime: Option<&Meantime>, facts: &mut AbstractState) {
         let mut open = self.going_on(facts);
         if let Some(meantime) = meantime {
             open.extend(&meantime.mixed);
@@ -124,7 +128,7 @@ impl Flow<'_, '_> {
     }
 
     /// What moves by itself is as it is in `other`.
-    fn put_back(&mut self, meantime: &Meantime, other: &Facts, facts: &mut Facts) {
+    fn put_back(&mut self, meantime: &Meantime, other: &AbstractState, facts: &mut AbstractState) {
         let states: Vec<u32> = meantime.alone.iter().copied().collect();
         facts.rebind(|bonds, _| bonds.release(&states));
         for state in &states {
@@ -139,7 +143,12 @@ impl Flow<'_, '_> {
     }
 
     /// The concurrent steps are over: what moves by itself is as the one that ended last left it.
-    pub(super) fn go_on_from(&mut self, meantime: Option<&Meantime>, ends: &[Facts], facts: &mut Facts) {
+    pub(super) fn go_on_from(
+        &mut self,
+        meantime: Option<&Meantime>,
+        ends: &[AbstractState],
+        facts: &mut AbstractState,
+    ) {
         let Some(meantime) = meantime else { return };
         let last = facts.time.exact().and_then(|time| ends.iter().find(|end| end.time.exact() == Some(time)));
         match last {
@@ -150,7 +159,7 @@ impl Flow<'_, '_> {
     }
 
     /// Time goes on from `facts.time` to `end` by what goes on beside a job that changes `written` and ends then.
-    pub(super) fn catch_up(&mut self, end: &Known, written: &BTreeSet<u32>, facts: &mut Facts) {
+    pub(super) fn catch_up(&mut self, end: &AbstractValue, written: &BTreeSet<u32>, facts: &mut AbstractState) {
         if end.bounds().1 <= facts.time.bounds().0 {
             return;
         }
@@ -158,10 +167,10 @@ impl Flow<'_, '_> {
         let mut later = facts.clone();
         if let (Some(now), Some(end)) = (facts.time.exact(), end.exact()) {
             let unbroken = std::mem::take(&mut self.unbroken);
-            self.pass(&Known::Point(end - now), &mut later);
+            self.pass(&AbstractValue::Point(end - now), &mut later);
             self.unbroken = unbroken;
         } else {
-            later.time = Known::nothing();
+            later.time = AbstractValue::top();
         }
         let ends = [later];
         let now = std::mem::replace(&mut facts.time, end.clone());
@@ -170,21 +179,21 @@ impl Flow<'_, '_> {
     }
 
     /// What moves otherwise than evenly goes on while a job is waited for that ends then.
-    pub(super) fn moves_until(&mut self, end: &Known, facts: &mut Facts) {
+    pub(super) fn moves_until(&mut self, end: &AbstractValue, facts: &mut AbstractState) {
         let longest = end.bounds().1 - facts.time.bounds().0;
         if longest <= 0.0 || facts.unsettled.is_empty() && facts.moving.is_empty() {
             return;
         }
         let even: Vec<u32> = self.going_on(facts).into_iter().collect();
-        let kept: Vec<Known> = even.iter().map(|s| facts.states[*s as usize].clone()).collect();
+        let kept: Vec<AbstractValue> = even.iter().map(|s| facts.states[*s as usize].clone()).collect();
         let now = facts.time.clone();
-        self.drift(&Known::Range(0.0, longest, Why::Unknown), facts);
+        self.drift(&AbstractValue::Range(0.0, longest, Imprecision::Unknown), facts);
         facts.time = now;
         even.iter().zip(kept).for_each(|(s, known)| facts.states[*s as usize] = known);
     }
 
     /// What moves by itself is not known while a job that changes `written` is followed behind its time.
-    pub(super) fn look_back(&mut self, written: &BTreeSet<u32>, facts: &mut Facts) -> Option<Meantime> {
+    pub(super) fn look_back(&mut self, written: &BTreeSet<u32>, facts: &mut AbstractState) -> Option<Meantime> {
         let meantime = self.meantime(written, facts)?;
         let moving: Vec<u32> = meantime.alone.union(&meantime.mixed).copied().collect();
         self.forget(&moving, facts);

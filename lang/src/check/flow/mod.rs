@@ -5,6 +5,15 @@
 //! devices do what they are told: failures that only a device can report (`fails`) are looked at beside it, those the
 //! plan itself raises are on it. A need that fails on every way is an error, one that fails on some a warning; what only a
 //! run can tell is left to the run.
+//!
+//! - `value`, `state`, `nodes`, `eval`, `dual`: abstract values, what is known at one point, and the values of nodes there.
+//! - `walk`, `actions`, `demands`, `turns`, `handled`, `failing`, `reported`, `lasting`, `words`: the steps of a plan, construct by construct.
+//! - `evolve`, `bracket`, `together`, `totals`: the passing of time, as a box that the laws never leave.
+//! - `even`, `course`, `timers`, `held`: what moves evenly, and what the clock brings about, at their moments.
+//! - `fluxes`, `bonds`, `polytope`: reactions and streams by their extents.
+//! - `jobs`, `meantime`, `in_time`, `raced`, `clashing`, `interference`, `beside`, `stopped`: branches and jobs side by side.
+//! - `cases`, `apart`, `trace_partitioning`, `otherwise`: where ways meet, and ways followed one by one.
+//! - `history`, `report`, `program_points`, `reached`, `left`: findings with their stories, and what else is told.
 
 mod actions;
 mod apart;
@@ -19,7 +28,6 @@ mod dual;
 mod eval;
 mod even;
 mod evolve;
-mod facts;
 mod failing;
 mod fluxes;
 mod handled;
@@ -33,17 +41,18 @@ mod left;
 mod meantime;
 mod nodes;
 mod otherwise;
-mod parted;
-mod points;
 mod polytope;
+mod program_points;
 mod raced;
 mod reached;
 mod report;
 mod reported;
+mod state;
 mod stopped;
 mod timers;
 mod together;
 mod totals;
+mod trace_partitioning;
 mod turns;
 mod value;
 mod walk;
@@ -60,9 +69,9 @@ use matterix_ir::{Code, Diagnostic, NodeId, Sources, Span, codes};
 use rustc_hash::FxHashMap;
 
 pub use self::evolve::Window;
-use self::facts::Facts;
-pub use self::points::{After, Seen};
-pub use self::value::Known;
+pub use self::program_points::{After, Seen};
+use self::state::AbstractState;
+pub use self::value::AbstractValue;
 use crate::declare::ReactionId;
 use crate::elaborate::hazards::Hazard;
 use crate::elaborate::mixtures::Passages;
@@ -72,7 +81,7 @@ use crate::eval::lab::{Elaborator, ExtensiveKey};
 const MOST_STEPS: usize = 400_000;
 
 /// What a failure is called, and what is known when it is raised.
-type Raised = (String, Facts);
+type Raised = (String, AbstractState);
 
 /// A statement of the user's that is followed now.
 #[derive(Clone)]
@@ -84,7 +93,7 @@ struct Site {
 }
 
 /// Working state of one pass over a plan.
-struct Flow<'l, 'a> {
+struct Interpreter<'l, 'a> {
     lab: &'l Elaborator<'a>,
     sources: &'l Sources,
     plan: &'l Plan,
@@ -94,7 +103,7 @@ struct Flow<'l, 'a> {
     mixtures: Vec<Vec<(ExtensiveKey, u32)>>,
     /// The pairs of states that transfers between two of them change.
     passages: Passages,
-    params: Vec<Known>,
+    params: Vec<AbstractValue>,
     /// What is known of nodes by themselves.
     nodes: nodes::Nodes,
     /// Room for exact values.
@@ -129,7 +138,7 @@ struct Flow<'l, 'a> {
     /// Derivatives that depend on the time itself.
     clocked: Vec<u32>,
     /// While time passes: from when to when. An event comes about somewhere in it.
-    meanwhile: Option<Known>,
+    meanwhile: Option<AbstractValue>,
     /// While time passes: states that rates ask for and concurrent steps may set.
     veiled: Vec<u32>,
     /// A law has broken a limit while time passed, and a handler takes that: the step goes no further.
@@ -154,7 +163,7 @@ struct Flow<'l, 'a> {
     /// Failures that devices may report inside each open body with handlers, innermost last.
     reported: Vec<Vec<Raised>>,
     /// Where handlers that are followed begin their body again: how often, and what is known there; innermost last.
-    again: Vec<Vec<(Known, Facts)>>,
+    again: Vec<Vec<(AbstractValue, AbstractState)>>,
     /// Names of failures that handlers around take; none for every one.
     caught: Vec<Vec<Option<String>>>,
     /// The user's statements around, innermost last.
@@ -196,7 +205,7 @@ struct Flow<'l, 'a> {
     /// Loops of which a turn is followed.
     turning: usize,
     /// Ways that have met.
-    ways: parted::Ways,
+    ways: trace_partitioning::Ways,
     /// Meetings of ways that differ in what should hold at the end.
     forks: left::Forks,
     /// What should be in order at the end by the states it depends on, where that was asked for.
@@ -219,7 +228,7 @@ struct Flow<'l, 'a> {
     reached: Vec<bool>,
     steps: usize,
     /// What is known after each statement, where it is asked for.
-    notes: Option<points::Notes>,
+    notes: Option<program_points::Notes>,
 }
 
 /// What following the plan brings.
@@ -246,7 +255,7 @@ pub fn check(
     hazards: &[Hazard],
     asked: Option<&[NodeId]>,
 ) -> Followed {
-    let begin = || Flow::new(lab, sources, plan, events, derivatives);
+    let begin = || Interpreter::new(lab, sources, plan, events, derivatives);
     let noting = || {
         let mut flow = begin();
         if let Some(asked) = asked {
@@ -265,7 +274,7 @@ pub fn check(
     for other in others {
         let supposing = || {
             let mut flow = begin();
-            flow.params[other.param as usize] = Known::point(other.value);
+            flow.params[other.param as usize] = AbstractValue::point(other.value);
             flow
         };
         let new = otherwise::said_of(lab, &other, jobs::follow(supposing).diagnostics());
@@ -294,7 +303,7 @@ pub fn turns(
     events: &[Event],
     derivatives: &[Derivative],
 ) -> Turns {
-    let follow = |backward| Flow::new(lab, sources, plan, events, derivatives).follow_in_time(backward);
+    let follow = |backward| Interpreter::new(lab, sources, plan, events, derivatives).follow_in_time(backward);
     match follow(false) {
         Turns::Taken if matches!(follow(true), Turns::Taken) => Turns::Taken,
         Turns::Clash([a, b]) => match follow(true) {
@@ -305,7 +314,7 @@ pub fn turns(
     }
 }
 
-impl<'l, 'a> Flow<'l, 'a> {
+impl<'l, 'a> Interpreter<'l, 'a> {
     fn new(
         lab: &'l Elaborator<'a>,
         sources: &'l Sources,
@@ -313,7 +322,7 @@ impl<'l, 'a> Flow<'l, 'a> {
         events: &'l [Event],
         derivatives: &'l [Derivative],
     ) -> Self {
-        let mut flow = Flow {
+        let mut flow = Interpreter {
             lab,
             sources,
             plan,
@@ -321,7 +330,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             derivatives,
             mixtures: lab.extensive_by_mixture(),
             passages: Passages::default(),
-            params: lab.params.iter().map(|p| Known::point(p.value)).collect(),
+            params: lab.params.iter().map(|p| AbstractValue::point(p.value)).collect(),
             nodes: nodes::Nodes::new(lab.graph.ops().len()),
             numbers: Vec::new(),
             duals: Vec::new(),
@@ -372,7 +381,7 @@ impl<'l, 'a> Flow<'l, 'a> {
             late: false,
             needs_jobs: false,
             turning: 0,
-            ways: parted::Ways::default(),
+            ways: trace_partitioning::Ways::default(),
             forks: left::Forks::default(),
             ends_of: None,
             courses: Vec::new(),
@@ -446,10 +455,10 @@ impl<'l, 'a> Flow<'l, 'a> {
     }
 
     /// What is known when the run begins.
-    fn start(&mut self) -> Facts {
-        let nothing = |count: usize| vec![Known::nothing(); count];
+    fn start(&mut self) -> AbstractState {
+        let nothing = |count: usize| vec![AbstractValue::top(); count];
         let states = nothing(self.lab.states.len()).into_iter().collect();
-        let mut facts = Facts::new(states, nothing(self.plan.locals.len()), Known::Point(0.0));
+        let mut facts = AbstractState::new(states, nothing(self.plan.locals.len()), AbstractValue::Point(0.0));
         facts.unsettled = (0..self.derivatives.len() as u32).collect();
         facts.fired = vec![Some(false); self.events.len()];
         let states = &self.lab.states;

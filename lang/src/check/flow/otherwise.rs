@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use matterix_ir::plan::{Plan, Step, StepId};
 use matterix_ir::{BinaryOp, Diagnostic, NodeId, Op, Severity, Span, codes};
 
-use super::value::Known;
-use super::{Flow, forbidden_on_any_way};
+use super::value::AbstractValue;
+use super::{Interpreter, forbidden_on_any_way};
 use crate::eval::lab::Elaborator;
 
 /// So many steps are followed for other values; at least [`FEWEST_VALUES`] are tried.
@@ -25,7 +25,7 @@ pub struct Other {
 }
 
 /// Values of parameters that take the other side of a branch.
-pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<Other> {
+pub fn other_values(flow: &mut Interpreter<'_, '_>) -> Vec<Other> {
     let mut out: Vec<Other> = Vec::new();
     for (node, sides) in branches(flow.plan) {
         let parts = flow.parts(node);
@@ -38,7 +38,7 @@ pub fn other_values(flow: &mut Flow<'_, '_>) -> Vec<Other> {
         for (param, limit) in compared(flow, &order) {
             let default = flow.lab.params[param as usize].value;
             let flips = |value: &f64| {
-                let kept = std::mem::replace(&mut flow.params[param as usize], Known::point(*value));
+                let kept = std::mem::replace(&mut flow.params[param as usize], AbstractValue::point(*value));
                 let truth = flow.eval(node, &facts).truth();
                 flow.params[param as usize] = kept;
                 truth.is_some() && truth != usual
@@ -99,7 +99,7 @@ fn branches(plan: &Plan) -> BTreeMap<NodeId, Vec<Sides>> {
 }
 
 /// The parameters with their defaults among these operations, each with a number it is compared with.
-fn compared(flow: &Flow<'_, '_>, order: &[NodeId]) -> Vec<(u32, f64)> {
+fn compared(flow: &Interpreter<'_, '_>, order: &[NodeId]) -> Vec<(u32, f64)> {
     let graph = &flow.lab.graph;
     let mut out = Vec::new();
     for node in order {

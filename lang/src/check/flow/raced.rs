@@ -8,7 +8,7 @@ use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op};
 
-use super::Flow;
+use super::Interpreter;
 
 /// What steps change.
 struct Doing {
@@ -28,7 +28,7 @@ struct Raced {
     locals: BTreeSet<u32>,
 }
 
-impl<'p> Flow<'p, '_> {
+impl<'p> Interpreter<'p, '_> {
     /// For each branch the states that it changes depending on when the others do something.
     pub(super) fn raced_in_branches(&mut self, branches: &[StepId]) -> Vec<BTreeSet<u32>> {
         let one = |own: usize, flow: &mut Self| {

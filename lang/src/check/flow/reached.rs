@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use matterix_ir::plan::{Step, StepId};
 
-use super::{Flow, MOST_STEPS};
+use super::{Interpreter, MOST_STEPS};
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Notes that a step is followed, and an operation that it is done.
     pub(super) fn come_to(&mut self, id: StepId) {
         if let Some(reached) = self.reached.get_mut(id.0 as usize) {

@@ -7,10 +7,10 @@ use matterix_ir::plan::{Condition, Limit, Step};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Code, Diagnostic, NodeId, Severity, Span, codes};
 
-use super::facts::Facts;
-use super::parted::Place;
-use super::value::{Known, Why};
-use super::{Flow, forbidden_on_any_way, only_advice};
+use super::state::AbstractState;
+use super::trace_partitioning::Place;
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, forbidden_on_any_way, only_advice};
 
 /// A finding, and how often it was made.
 #[derive(Clone)]
@@ -110,7 +110,7 @@ const THINGS_SHOWN: usize = 8;
 /// So many steps of the history are shown for one quantity.
 pub(super) const STEPS_SHOWN: usize = 3;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// All findings; one that was made several times says so.
     pub fn diagnostics(self) -> Vec<Diagnostic> {
         let said = |f: Finding| match f.count {
@@ -156,7 +156,7 @@ impl Flow<'_, '_> {
     }
 
     /// A need that does not hold: on every way, or on some.
-    pub fn unmet(&mut self, label: &str, need: &Condition, facts: &Facts, some: bool) {
+    pub fn unmet(&mut self, label: &str, need: &Condition, facts: &AbstractState, some: bool) {
         // The library's own steps are not what the reader wrote.
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &need.refusal {
@@ -169,7 +169,7 @@ impl Flow<'_, '_> {
     }
 
     /// Something presumed that holds on no way.
-    pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &Facts) {
+    pub fn in_vain(&mut self, label: &str, presumed: &Condition, facts: &AbstractState) {
         let label = self.sites.last().filter(|s| s.calls).map_or(label.to_string(), |s| s.label.clone());
         let what = match &presumed.refusal {
             Some(r) => format!("`{label}` is out of place: {}", r.failure.replace('_', " ")),
@@ -178,7 +178,7 @@ impl Flow<'_, '_> {
         self.demand(what, presumed, facts, false);
     }
 
-    fn demand(&mut self, what: String, need: &Condition, facts: &Facts, some: bool) {
+    fn demand(&mut self, what: String, need: &Condition, facts: &AbstractState, some: bool) {
         let code = need.code();
         let open = some.then(|| self.ways.meetings());
         let some = some || self.doubt > 0;
@@ -240,12 +240,12 @@ impl Flow<'_, '_> {
     }
 
     /// Of several things of which the same is asked, those for which it does not hold, or may not.
-    fn failing<'c>(&mut self, need: &'c Condition, facts: &Facts) -> Vec<&'c Condition> {
+    fn failing<'c>(&mut self, need: &'c Condition, facts: &AbstractState) -> Vec<&'c Condition> {
         need.each.iter().filter(|asked| self.eval(asked.node, facts).truth() != Some(true)).collect()
     }
 
     /// A limit of a thing that is passed by what is done, or from the start.
-    pub fn passed(&mut self, limit: &Limit, facts: &Facts, some: bool) {
+    pub fn passed(&mut self, limit: &Limit, facts: &AbstractState, some: bool) {
         let condition = &limit.condition;
         if let Some(label) = self.sites.last().map(|s| s.label.clone()) {
             return self.unmet(&label, condition, facts, some);
@@ -267,7 +267,7 @@ impl Flow<'_, '_> {
     }
 
     /// Where things stand at the wrong place from the start: the place of the last one without which a limit would hold.
-    fn too_many(&mut self, limit: &Condition, facts: &Facts) -> Option<u32> {
+    fn too_many(&mut self, limit: &Condition, facts: &AbstractState) -> Option<u32> {
         let states = self.parts(limit.node).states.clone();
         let mut facts = facts.clone();
         states.into_iter().rev().find(|s| {
@@ -275,7 +275,7 @@ impl Flow<'_, '_> {
             if self.lab.states[s].domain != Domain::Instance {
                 return false;
             }
-            let there = std::mem::replace(&mut facts.states[s], Known::Point(-1.0));
+            let there = std::mem::replace(&mut facts.states[s], AbstractValue::Point(-1.0));
             let holds = self.eval(limit.node, &facts).truth() == Some(true);
             facts.states[s] = there;
             holds
@@ -283,7 +283,7 @@ impl Flow<'_, '_> {
     }
 
     /// An expectation that cannot hold.
-    pub fn unexpected(&mut self, condition: &Condition, facts: &Facts) {
+    pub fn unexpected(&mut self, condition: &Condition, facts: &AbstractState) {
         let some = self.doubt > 0;
         let ways = if some { ", on some ways through the plan" } else { "" };
         let headline = format!("`{}` does not hold{ways}", condition.text);
@@ -304,7 +304,7 @@ impl Flow<'_, '_> {
     }
 
     /// Something that is not in order at an end of the workflow, with the step that left it so.
-    pub(super) fn unfinished(&mut self, end: &Limit, ended: &Facts, ends: &str) -> Option<Diagnostic> {
+    pub(super) fn unfinished(&mut self, end: &Limit, ended: &AbstractState, ends: &str) -> Option<Diagnostic> {
         let condition = &end.condition;
         let changed: Vec<(Span, String)> = condition.terms.iter().flat_map(|t| self.history(t, ended)).collect();
         let (span, said) = changed.into_iter().next()?;
@@ -329,7 +329,7 @@ impl Flow<'_, '_> {
     }
 
     /// A wait for something that cannot come: at all, or in the time given.
-    pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &Facts, after: &Facts) {
+    pub fn never_comes(&mut self, condition: &Condition, limited: bool, before: &AbstractState, after: &AbstractState) {
         // What is within bounds only is on its way.
         let still = self.eval(condition.node, before) == self.eval(condition.node, after)
             && condition.compared.iter().all(|c| {
@@ -337,7 +337,7 @@ impl Flow<'_, '_> {
                 then.exact().is_some() && then == self.eval(c.value, after)
             });
         let mut ever = before.clone();
-        self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut ever);
+        self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut ever);
         let in_time = limited && self.eval(condition.node, &ever).truth() != Some(false);
         let absent = self.not_made(condition, after);
         let text = &condition.text;
@@ -375,7 +375,7 @@ impl Flow<'_, '_> {
     }
 
     /// Which species a condition wants more of than none, where nothing brings or makes any.
-    fn not_made(&mut self, condition: &Condition, facts: &Facts) -> Option<String> {
+    fn not_made(&mut self, condition: &Condition, facts: &AbstractState) -> Option<String> {
         let (mixture, s) = *self.lab.absent_in.get(&condition.span)?.first()?;
         let none = condition.compared.iter().any(|c| {
             let some = c.low.is_some_and(|n| condition.compared.len() == 1 || self.eval(n, facts).bounds().0 > 0.0);
@@ -386,7 +386,7 @@ impl Flow<'_, '_> {
     }
 
     /// Says where to look for a salt of which nothing is left as it has dissolved.
-    fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &Facts) -> Diagnostic {
+    fn with_ions(&mut self, d: Diagnostic, condition: &Condition, facts: &AbstractState) -> Diagnostic {
         // A value that is not zero rests on the salt in another way, as a concentration on the volume of all.
         let mut zero: Vec<NodeId> = condition.compared.iter().map(|c| c.value).collect();
         zero.retain(|value| self.eval(*value, facts).exact() == Some(0.0));
@@ -466,7 +466,7 @@ impl Flow<'_, '_> {
     }
 
     /// A law takes more of an amount than there is, within the step that is followed now.
-    pub(super) fn used_up(&mut self, amount: u32, facts: &Facts) {
+    pub(super) fn used_up(&mut self, amount: u32, facts: &AbstractState) {
         let name = &self.lab.states[amount as usize].name;
         let label = self.sites.last().map(|s| s.label.clone()).unwrap_or_default();
         let headline = format!("`{name}` is used up during `{label}`, and a law goes on taking it");
@@ -495,8 +495,8 @@ impl Flow<'_, '_> {
 
     /// A transfer takes something along that the mixture where it ends has no place for. Where there may be none of it, that is
     /// left to the run.
-    pub fn no_place(&mut self, state: u32, from: u32, to: u32, share: &Known, facts: &Facts) {
-        let there = |k: &Known| {
+    pub fn no_place(&mut self, state: u32, from: u32, to: u32, share: &AbstractValue, facts: &AbstractState) {
+        let there = |k: &AbstractValue| {
             let (low, high) = k.bounds();
             low > 0.0 || high < 0.0
         };
@@ -524,13 +524,13 @@ impl Flow<'_, '_> {
     }
 
     /// What a condition compares, in numbers: `` `a + b` is 600 uL, at most 360 uL``.
-    pub(super) fn measured(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
+    pub(super) fn measured(&mut self, condition: &Condition, facts: &AbstractState) -> Vec<String> {
         let mut out = Vec::new();
         for c in &condition.compared {
             let value = self.eval(c.value, facts);
             let low = c.low.map(|n| self.eval(n, facts));
             let high = c.high.map(|n| self.eval(n, facts));
-            let show = |k: &Known| shown(k, |v| c.unit.show(v));
+            let show = |k: &AbstractValue| shown(k, |v| c.unit.show(v));
             let limits = match (low, high) {
                 (Some(l), Some(_)) if c.low == c.high => format!("must be {}", show(&l)),
                 (Some(l), Some(h)) => format!("allowed is {} .. {}", show(&l), show(&h)),
@@ -554,7 +554,7 @@ impl Flow<'_, '_> {
         inst.span
     }
 
-    pub(super) fn show(&self, value: &Known, domain: &Domain) -> String {
+    pub(super) fn show(&self, value: &AbstractValue, domain: &Domain) -> String {
         shown(value, |v| match domain {
             Domain::Quantity(unit) => unit.show(v),
             Domain::Bool => (if v == 0.0 { "false" } else { "true" }).to_string(),
@@ -584,19 +584,19 @@ fn severity(code: Code, some: bool) -> Severity {
 }
 
 /// What is known, in words.
-pub(super) fn shown(value: &Known, show: impl Fn(f64) -> String) -> String {
+pub(super) fn shown(value: &AbstractValue, show: impl Fn(f64) -> String) -> String {
     // What is left of a subtraction is not worth telling beside what it was taken from.
     let (low, high) = value.bounds();
     let largest = if high.is_finite() { low.abs().max(high.abs()) } else { low.abs() };
     let show = |v: f64| show(if v.abs() < 1e-9 * largest { 0.0 } else { v });
     match value {
-        Known::Point(v) => show(*v),
-        Known::Few(all, _) => all.iter().map(|v| show(*v)).collect::<Vec<_>>().join(" or "),
-        Known::Range(low, high, _) if low.is_finite() && high.is_finite() => {
+        AbstractValue::Point(v) => show(*v),
+        AbstractValue::Few(all, _) => all.iter().map(|v| show(*v)).collect::<Vec<_>>().join(" or "),
+        AbstractValue::Range(low, high, _) if low.is_finite() && high.is_finite() => {
             format!("between {} and {}", show(*low), show(*high))
         }
-        Known::Range(low, _, _) if low.is_finite() => format!("{} or more", show(*low)),
-        Known::Range(_, high, _) if high.is_finite() => format!("{} or less", show(*high)),
-        Known::Range(..) => "not known".to_string(),
+        AbstractValue::Range(low, _, _) if low.is_finite() => format!("{} or more", show(*low)),
+        AbstractValue::Range(_, high, _) if high.is_finite() => format!("{} or less", show(*high)),
+        AbstractValue::Range(..) => "not known".to_string(),
     }
 }

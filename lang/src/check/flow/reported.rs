@@ -4,13 +4,13 @@
 
 use matterix_ir::plan::{Caught, Operation, Step, StepId};
 
-use super::facts::Facts;
-use super::value::Why;
-use super::{Flow, Raised};
+use super::state::AbstractState;
+use super::value::Imprecision;
+use super::{Interpreter, Raised};
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Notes what is known where a device may report a failure: as before the operation.
-    pub fn may_report(&mut self, operation: &Operation, facts: &Facts) {
+    pub fn may_report(&mut self, operation: &Operation, facts: &AbstractState) {
         let Some(open) = self.reported.last_mut() else { return };
         open.extend(operation.fails.iter().map(|name| (name.clone(), facts.clone())));
         // What must not be may come about at any step: it is followed where somebody has thought of it.
@@ -23,7 +23,7 @@ impl Flow<'_, '_> {
     /// outwards.
     pub fn after_report(
         &mut self,
-        base: &Facts,
+        base: &AbstractState,
         mut reported: Vec<Raised>,
         handlers: &[(Caught, StepId)],
         finally: Option<StepId>,
@@ -75,16 +75,16 @@ impl Flow<'_, '_> {
     }
 
     /// Follows a `finally` without a note of what is known after it: what is told is the way without these failures.
-    pub fn unnoted(&mut self, finally: StepId, facts: Facts) -> Option<Facts> {
+    pub fn unnoted(&mut self, finally: StepId, facts: AbstractState) -> Option<AbstractState> {
         let notes = self.notes.take();
         let end = self.walk(finally, facts);
         self.notes = notes;
         end
     }
 
-    pub fn joined(&self, base: &Facts, raised: &[Raised]) -> Option<Facts> {
+    pub fn joined(&self, base: &AbstractState, raised: &[Raised]) -> Option<AbstractState> {
         let facts = raised.iter().map(|(_, facts)| facts.clone());
-        facts.reduce(|a, b| base.join(a, &b, self.site(), Why::Paths))
+        facts.reduce(|a, b| base.join(a, &b, self.site(), Imprecision::Paths))
     }
 
     /// Whether a handler begins its body again.

@@ -11,9 +11,9 @@ use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Step, StepId};
 use matterix_ir::{BinaryOp, Span};
 
-use super::facts::Facts;
-use super::value::{Known, Why};
-use super::{Flow, Raised};
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, Raised};
 
 /// So many changes of a `keep` are tried for a break after them.
 const MOST_CHANGES: usize = 64;
@@ -30,7 +30,7 @@ struct Change {
     /// Whether it is known not to be in order after that.
     off: bool,
     /// The states that it depends on and those that the step sets, as they are then.
-    states: Vec<(u32, Known)>,
+    states: Vec<(u32, AbstractValue)>,
     /// The step.
     span: Span,
     /// What is done however the blocks around it end, the outermost first.
@@ -63,7 +63,7 @@ impl Course {
 pub(super) struct Beside {
     pub course: Rc<Course>,
     /// What was known before it.
-    pub base: Rc<Facts>,
+    pub base: Rc<AbstractState>,
     /// Whether its steps come first where both do something at one time.
     pub first: bool,
 }
@@ -72,7 +72,7 @@ pub(super) struct Beside {
 #[derive(Default)]
 pub(super) struct Lines(BTreeMap<usize, (Rc<Course>, BTreeSet<usize>)>);
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Whether a written failure may stop what goes on beside it while something is to be in order at the end.
     pub(super) fn is_stopped_by(&self, steps: &[StepId]) -> bool {
         let written = |step: &Step| {
@@ -116,7 +116,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes in the courses kept what an operation that began at `began` has changed.
-    pub(super) fn note_change(&mut self, operation: &Operation, began: &Known, facts: &Facts) {
+    pub(super) fn note_change(&mut self, operation: &Operation, began: &AbstractValue, facts: &AbstractState) {
         if self.courses.is_empty() {
             return;
         }
@@ -131,7 +131,8 @@ impl Flow<'_, '_> {
         for end in ends {
             let node = plan.ends[end].condition.node;
             let states: BTreeSet<u32> = self.parts(node).states.iter().chain(&set).copied().collect();
-            let states: Vec<(u32, Known)> = states.into_iter().map(|s| (s, facts.states[s as usize].clone())).collect();
+            let states: Vec<(u32, AbstractValue)> =
+                states.into_iter().map(|s| (s, facts.states[s as usize].clone())).collect();
             let off = self.eval(node, facts).truth() == Some(false);
             for course in &mut self.courses {
                 if let Some(last) = course.changes.iter_mut().rev().find(|c| c.end == end) {
@@ -148,10 +149,10 @@ impl Flow<'_, '_> {
     pub(super) fn follow_line(
         &mut self,
         branch: usize,
-        facts: Facts,
+        facts: AbstractState,
         body: StepId,
         lines: &mut Lines,
-    ) -> Option<Facts> {
+    ) -> Option<AbstractState> {
         let begun = self.guards.last().map_or(0, Vec::len);
         self.begin_course();
         let after = self.walk(body, facts);
@@ -163,7 +164,7 @@ impl Flow<'_, '_> {
     }
 
     /// Each written failure in a branch finds the others as they are when it stops them.
-    pub(super) fn stop_branches(&mut self, base: &Facts, lines: &Lines) {
+    pub(super) fn stop_branches(&mut self, base: &AbstractState, lines: &Lines) {
         let base = Rc::new(base.clone());
         for (branch, (own, raised)) in &lines.0 {
             let others = lines.0.iter().filter(|(other, _)| *other != branch);
@@ -208,7 +209,12 @@ impl Flow<'_, '_> {
 
     /// What is known when a failure has stopped what goes on beside it, and what may be so besides. What both lines change is left as
     /// it is.
-    fn stopped(&mut self, failed: Facts, own: &Course, beside: &[Beside]) -> (Facts, Option<Facts>) {
+    fn stopped(
+        &mut self,
+        failed: AbstractState,
+        own: &Course,
+        beside: &[Beside],
+    ) -> (AbstractState, Option<AbstractState>) {
         let (low, high) = failed.time.bounds();
         let mut sure = failed;
         let mut open: Vec<Change> = Vec::new();
@@ -237,7 +243,7 @@ impl Flow<'_, '_> {
     }
 
     /// A thing stands as after a change, and what `finally` does about it.
-    fn set(&mut self, change: &Change, facts: &mut Facts) {
+    fn set(&mut self, change: &Change, facts: &mut AbstractState) {
         self.overwrite(change.span, change.states.clone(), facts);
         for finally in change.finally.iter().rev().filter(|_| change.off) {
             // What only waits puts nothing right.
@@ -251,15 +257,15 @@ impl Flow<'_, '_> {
     }
 
     /// A thing stands as before its first change.
-    fn as_before(&mut self, first: Option<&Change>, base: &Facts, facts: &mut Facts) {
+    fn as_before(&mut self, first: Option<&Change>, base: &AbstractState, facts: &mut AbstractState) {
         let Some(first) = first else { return };
         let states = first.states.iter().map(|(s, _)| (*s, base.states[*s as usize].clone())).collect();
         self.overwrite(first.span, states, facts);
     }
 
     /// Sets states by a statement that is not the one followed now.
-    pub(super) fn overwrite(&mut self, span: Span, states: Vec<(u32, Known)>, facts: &mut Facts) {
-        let changes: Vec<(u32, Known)> =
+    pub(super) fn overwrite(&mut self, span: Span, states: Vec<(u32, AbstractValue)>, facts: &mut AbstractState) {
+        let changes: Vec<(u32, AbstractValue)> =
             states.into_iter().filter(|(s, known)| facts.states[*s as usize] != *known).collect();
         let changed: Vec<u32> = changes.iter().map(|(state, _)| *state).collect();
         changed.iter().for_each(|state| self.touch(*state, facts));
@@ -268,7 +274,7 @@ impl Flow<'_, '_> {
     }
 
     /// Follows steps beside the way that is followed: nothing is reported of them, and no failure of theirs leads anywhere.
-    pub(super) fn aside(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
+    pub(super) fn aside(&mut self, body: StepId, facts: AbstractState) -> Option<AbstractState> {
         let (courses, jobs) = (std::mem::take(&mut self.courses), self.jobs.clone());
         let end = self.unheard(|flow| flow.unnoted(body, facts));
         (self.courses, self.jobs) = (courses, jobs);
@@ -286,7 +292,7 @@ impl Flow<'_, '_> {
     }
 
     /// The course of steps from here, followed aside.
-    pub(super) fn course_aside(&mut self, body: StepId, facts: Facts) -> Rc<Course> {
+    pub(super) fn course_aside(&mut self, body: StepId, facts: AbstractState) -> Rc<Course> {
         let (courses, jobs) = (std::mem::take(&mut self.courses), self.jobs.clone());
         self.begin_course();
         self.in_jobs += 1;
@@ -298,7 +304,12 @@ impl Flow<'_, '_> {
     }
 
     /// Follows the body of a `keep` whose break a handler takes.
-    pub(super) fn may_break(&mut self, condition: &Condition, body: StepId, facts: Facts) -> Option<Facts> {
+    pub(super) fn may_break(
+        &mut self,
+        condition: &Condition,
+        body: StepId,
+        facts: AbstractState,
+    ) -> Option<AbstractState> {
         let begun = facts.clone();
         self.begin_course();
         let after = self.walk(body, facts);
@@ -308,19 +319,19 @@ impl Flow<'_, '_> {
     }
 
     /// A `keep` may break while something is not in order that its body has switched on.
-    fn breaks_between(&mut self, condition: &Condition, begun: Facts, course: &Course) {
+    fn breaks_between(&mut self, condition: &Condition, begun: AbstractState, course: &Course) {
         let mut facts = begun;
         let mut seen: BTreeSet<usize> = BTreeSet::new();
         self.quiet += 1;
         let mut broken = Vec::new();
         for change in course.changes.iter().take(MOST_CHANGES) {
             self.overwrite(change.span, change.states.clone(), &mut facts);
-            let rest = Known::Range(0.0, (change.until - change.since.0).max(0.0), Why::Unknown);
+            let rest = AbstractValue::Range(0.0, (change.until - change.since.0).max(0.0), Imprecision::Unknown);
             self.pass(&rest, &mut facts);
             if change.off && !seen.contains(&change.end) && self.eval(condition.node, &facts).truth() != Some(true) {
                 seen.insert(change.end);
                 let mut left = facts.clone();
-                left.time = Known::binary(BinaryOp::Max, &left.time, &Known::Point(change.since.0));
+                left.time = AbstractValue::binary(BinaryOp::Max, &left.time, &AbstractValue::Point(change.since.0));
                 self.set(change, &mut left);
                 broken.push(left);
             }

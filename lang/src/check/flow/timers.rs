@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use matterix_ir::graph::Env;
 use matterix_ir::{BinaryOp, NodeId};
 
-use super::Flow;
+use super::Interpreter;
 use super::even::Even;
-use super::facts::Facts;
-use super::value::{CLOSE, Known, Why};
+use super::state::AbstractState;
+use super::value::{AbstractValue, CLOSE, Imprecision};
 
 /// How many neighbouring numbers are tried for the moment at which a run fires a timer.
 const NEIGHBOURS: usize = 8;
@@ -32,16 +32,17 @@ impl Timers {
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Events of the time that may come about within `left` s while states move so.
-    pub(super) fn timers(&mut self, even: &Even, left: f64, facts: &Facts) -> Timers {
+    pub(super) fn timers(&mut self, even: &Even, left: f64, facts: &AbstractState) -> Timers {
         if self.timed.is_empty() {
             return Timers::default();
         }
         let others = self.but_for_others(facts);
         let facts = others.as_ref().unwrap_or(facts);
         let mut within = self.veiled(even, facts);
-        within.time = Known::binary(BinaryOp::Add, &facts.time, &Known::Range(0.0, left, Why::Unknown));
+        within.time =
+            AbstractValue::binary(BinaryOp::Add, &facts.time, &AbstractValue::Range(0.0, left, Imprecision::Unknown));
         let mut events = Vec::new();
         for i in self.timed.clone() {
             let when = self.events[i as usize].when;
@@ -63,15 +64,15 @@ impl Flow<'_, '_> {
     }
 
     /// What is known while states move so, but for how far they get.
-    fn veiled(&self, even: &Even, facts: &Facts) -> Facts {
+    fn veiled(&self, even: &Even, facts: &AbstractState) -> AbstractState {
         let mut veiled = facts.clone();
         let moving = even.open.iter().copied().chain(even.slopes.iter().map(|(s, ..)| *s));
-        moving.for_each(|s| veiled.states[s as usize] = Known::nothing());
+        moving.for_each(|s| veiled.states[s as usize] = AbstractValue::top());
         veiled
     }
 
     /// Whether an event at a moment that is not known may change what these timers ask for, or what they change.
-    fn disturbs_timers(&mut self, timers: &[u32], even: &Even, facts: &Facts) -> bool {
+    fn disturbs_timers(&mut self, timers: &[u32], even: &Even, facts: &AbstractState) -> bool {
         let events = self.events;
         let mut needed = BTreeSet::new();
         for i in timers {
@@ -80,8 +81,8 @@ impl Flow<'_, '_> {
             needed.extend(self.changed_by(&event.actions).into_iter().filter(|s| !even.open.contains(s)));
         }
         let mut veiled = self.veiled(even, facts);
-        veiled.time = Known::nothing();
-        needed.iter().for_each(|s| veiled.states[*s as usize] = Known::nothing());
+        veiled.time = AbstractValue::top();
+        needed.iter().for_each(|s| veiled.states[*s as usize] = AbstractValue::top());
         let mut open = even.open.clone();
         let mut loose: BTreeSet<u32> = BTreeSet::new();
         loop {
@@ -104,7 +105,7 @@ impl Flow<'_, '_> {
                         return true;
                     }
                     open.insert(state);
-                    veiled.states[state as usize] = Known::nothing();
+                    veiled.states[state as usize] = AbstractValue::top();
                 }
             }
             if loose.len() == before {
@@ -114,7 +115,7 @@ impl Flow<'_, '_> {
     }
 
     /// The moment about `at`, s, at which a run fires the first of these timers: conditions are compared there number by number.
-    pub(super) fn moment(&self, timers: &Timers, at: f64, even: &Even, facts: &Facts) -> f64 {
+    pub(super) fn moment(&self, timers: &Timers, at: f64, even: &Even, facts: &AbstractState) -> f64 {
         let pending: Vec<NodeId> = timers
             .events
             .iter()
@@ -124,7 +125,7 @@ impl Flow<'_, '_> {
         let Some(now) = facts.time.exact().filter(|_| !pending.is_empty()) else { return at };
         let readings = vec![f64::NAN; self.lab.readings.len()];
         let due = |time: f64| {
-            let value = |s: &Known| s.exact().unwrap_or(f64::NAN);
+            let value = |s: &AbstractValue| s.exact().unwrap_or(f64::NAN);
             let mut states: Vec<f64> = facts.states.iter().map(value).collect();
             even.slopes.iter().for_each(|(s, value, slope)| states[*s as usize] = value + slope * (time - now));
             let params: Vec<f64> = self.params.iter().map(value).collect();

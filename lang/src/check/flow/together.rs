@@ -4,10 +4,10 @@
 
 use std::collections::BTreeSet;
 
-use super::Flow;
+use super::Interpreter;
 use super::bracket::last_outwards;
 use super::evolve::{CLOSE_IN, Making, Wall};
-use super::facts::Facts;
+use super::state::AbstractState;
 
 /// So many faces are moved together.
 const MOST: usize = 16;
@@ -21,9 +21,9 @@ const BEYOND: f64 = 0.05;
 /// A rate that is this small a share of what moves a face by its distance points neither way.
 const LEVEL: f64 = 1e-6;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Moves faces that cross each other's way out together; the derivatives that have to be looked at again are added to `due`.
-    pub(super) fn settle_together(&mut self, facts: &Facts, making: &mut Making, due: &mut BTreeSet<u32>) {
+    pub(super) fn settle_together(&mut self, facts: &AbstractState, making: &mut Making, due: &mut BTreeSet<u32>) {
         for upper in [true, false] {
             let walls = self.moved_out(upper, facts, making);
             if !(2..=MOST).contains(&walls.len()) {
@@ -43,7 +43,7 @@ impl Flow<'_, '_> {
     }
 
     /// Brings all faces in that were moved out together, by the same share of their ways, as far as nothing crosses them.
-    pub(super) fn narrow_together(&mut self, facts: &Facts, making: &mut Making) {
+    pub(super) fn narrow_together(&mut self, facts: &AbstractState, making: &mut Making) {
         for upper in [true, false] {
             let walls = std::mem::take(&mut making.together[usize::from(upper)]);
             let ways: Vec<f64> = walls.iter().map(|wall| self.way(*wall, upper, facts, making)).collect();
@@ -60,7 +60,7 @@ impl Flow<'_, '_> {
     }
 
     /// The walls of which the face on one side has moved out, and not without bound.
-    fn moved_out(&mut self, upper: bool, facts: &Facts, making: &Making) -> Vec<Wall> {
+    fn moved_out(&mut self, upper: bool, facts: &AbstractState, making: &Making) -> Vec<Wall> {
         let mut walls = self.walls(making);
         walls.retain(|wall| {
             let way = self.way(*wall, upper, facts, making);
@@ -70,19 +70,27 @@ impl Flow<'_, '_> {
     }
 
     /// How far a face has moved out.
-    fn way(&self, wall: Wall, upper: bool, facts: &Facts, making: &Making) -> f64 {
+    fn way(&self, wall: Wall, upper: bool, facts: &AbstractState, making: &Making) -> f64 {
         let ((low, high), (from, to)) = (self.faces(wall, making), self.begins(wall, facts));
         if upper { high - to } else { from - low }
     }
 
-    fn move_out(&mut self, wall: Wall, upper: bool, by: f64, facts: &Facts, making: &mut Making) {
+    fn move_out(&mut self, wall: Wall, upper: bool, by: f64, facts: &AbstractState, making: &mut Making) {
         let (low, high) = self.faces(wall, making);
         let faces = if upper { (low, high + by) } else { (low - by, high) };
         self.set_faces(wall, faces, facts, making);
     }
 
     /// Puts faces at a share of their ways.
-    fn place(&mut self, walls: &[Wall], ways: &[f64], share: f64, upper: bool, facts: &Facts, making: &mut Making) {
+    fn place(
+        &mut self,
+        walls: &[Wall],
+        ways: &[f64],
+        share: f64,
+        upper: bool,
+        facts: &AbstractState,
+        making: &mut Making,
+    ) {
         for (wall, way) in walls.iter().zip(ways) {
             let by = share * way - self.way(*wall, upper, facts, making);
             self.move_out(*wall, upper, by, facts, making);
@@ -99,7 +107,13 @@ impl Flow<'_, '_> {
 
     /// How far each of these faces has to move out so that nothing crosses any of them, by the slopes of the rates; none where that does
     /// not tell.
-    fn common_step(&mut self, walls: &[Wall], upper: bool, facts: &Facts, making: &mut Making) -> Option<Vec<f64>> {
+    fn common_step(
+        &mut self,
+        walls: &[Wall],
+        upper: bool,
+        facts: &AbstractState,
+        making: &mut Making,
+    ) -> Option<Vec<f64>> {
         let outflows = |flow: &mut Self, making: &mut Making| -> Vec<f64> {
             walls.iter().map(|wall| flow.outflow(*wall, upper, making)).collect()
         };

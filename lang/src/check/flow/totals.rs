@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use super::Flow;
-use super::facts::{Facts, same_history};
+use super::Interpreter;
 use super::fluxes::Flux;
 use super::polytope::scaled;
-use super::value::{Known, Why};
+use super::state::{AbstractState, same_history};
+use super::value::{AbstractValue, Imprecision};
 
 /// A sum of coefficients below this share of its terms is zero.
 const CANCELS: f64 = 1e-12;
@@ -22,10 +22,10 @@ pub(super) type Terms = Option<Rc<BTreeMap<Flux, f64>>>;
 /// States that exchange something, each with its derivative's terms.
 type Group = Vec<(u32, Rc<BTreeMap<Flux, f64>>)>;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Brings in what is known after at most `longest` s by the sums of what moves. Not where an event has changed something
     /// meanwhile.
-    pub(super) fn by_totals(&mut self, longest: f64, before: &Facts, facts: &mut Facts) {
+    pub(super) fn by_totals(&mut self, longest: f64, before: &AbstractState, facts: &mut AbstractState) {
         let untouched = same_history(&before.history, &facts.history);
         if !longest.is_finite() || !untouched {
             return;
@@ -48,7 +48,7 @@ impl Flow<'_, '_> {
     }
 
     /// Extensive states other than amounts that exchange something now.
-    fn groups(&mut self, facts: &Facts) -> Vec<Group> {
+    fn groups(&mut self, facts: &AbstractState) -> Vec<Group> {
         let scalars: BTreeSet<u32> = self.lab.extensive.iter().filter(|(k, _)| !k.matter).map(|(_, s)| *s).collect();
         let stoichiometry = self.stoichiometry();
         let mut rows: Group = Vec::new();
@@ -98,12 +98,14 @@ impl Flow<'_, '_> {
 }
 
 /// Bounds states by what their sum can be after it has changed by `more`.
-fn bound_by(states: &[u32], more: (f64, f64), before: &Facts, facts: &mut Facts) {
-    let apart = |state: u32, facts: &Facts| {
+fn bound_by(states: &[u32], more: (f64, f64), before: &AbstractState, facts: &mut AbstractState) {
+    let apart = |state: u32, facts: &AbstractState| {
         let bond = facts.bonds.as_ref().and_then(|bonds| bonds.states.get(&state));
         bond.map_or_else(|| facts.states[state as usize].bounds(), |bond| bond.base.bounds())
     };
-    let sum = |facts: &Facts| states.iter().map(|s| apart(*s, facts)).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+    let sum = |facts: &AbstractState| {
+        states.iter().map(|s| apart(*s, facts)).fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d))
+    };
     // What extents bring is known only of states that hang together before and after.
     if states.iter().any(|s| before.hangs(*s) != facts.hangs(*s) && added(*s, before) != (0.0, 0.0)) {
         return;
@@ -119,12 +121,12 @@ fn bound_by(states: &[u32], more: (f64, f64), before: &Facts, facts: &mut Facts)
         let (from, to) = facts.states[*state as usize].bounds();
         let (low, high) = (low.max(from), high.min(to));
         if low <= high && (low > from || high < to) {
-            facts.narrow(*state, Known::Range(low, high, Why::Unknown));
+            facts.narrow(*state, AbstractValue::Range(low, high, Imprecision::Unknown));
         }
     }
 }
 
 /// What extents have added to a state.
-fn added(state: u32, facts: &Facts) -> (f64, f64) {
+fn added(state: u32, facts: &AbstractState) -> (f64, f64) {
     facts.bonds.as_ref().filter(|_| facts.hangs(state)).map_or((0.0, 0.0), |bonds| bonds.added(state))
 }

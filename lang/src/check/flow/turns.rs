@@ -6,14 +6,14 @@ use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Condition, Operation, Step, StepId};
 
-use super::Flow;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::Interpreter;
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Whether a further turn changes nothing that is known. Where only how states hang together still changes, that is given up:
     /// what a turn that began without it leads to holds for all further turns.
-    pub(super) fn rests(&mut self, body: StepId, facts: &mut Facts, before: &Facts) -> bool {
+    pub(super) fn rests(&mut self, body: StepId, facts: &mut AbstractState, before: &AbstractState) -> bool {
         if facts.states != before.states {
             return false;
         }
@@ -32,14 +32,14 @@ impl Flow<'_, '_> {
     }
 
     /// Whether a later turn may do something else for the time alone: a timer, a law that follows the clock, a condition.
-    fn time_brings(&mut self, body: StepId, before: &Facts) -> bool {
+    fn time_brings(&mut self, body: StepId, before: &AbstractState) -> bool {
         let (since, until) = before.time.bounds();
         // Where it may be any time, all that it may bring has been followed.
         if until == f64::INFINITY {
             return false;
         }
         let mut ever = before.clone();
-        ever.time = Known::Range(since, f64::INFINITY, Why::Unknown);
+        ever.time = AbstractValue::Range(since, f64::INFINITY, Imprecision::Unknown);
         let events = self.events;
         let timer = self.timed.clone().into_iter().any(|i| match self.eval(events[i as usize].when, &ever).truth() {
             Some(truth) => truth && before.fired[i as usize] != Some(true),
@@ -56,7 +56,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether what a step asks for, or does, may come out otherwise later.
-    fn asks_for_time(&mut self, id: StepId, ever: &Facts) -> bool {
+    fn asks_for_time(&mut self, id: StepId, ever: &AbstractState) -> bool {
         let plan = self.plan;
         let (conditions, values) = match &plan.get(id).step {
             Step::If { condition, .. } | Step::Keep { condition, .. } => (vec![condition], Vec::new()),
@@ -95,21 +95,21 @@ fn asked_by(operation: &Operation) -> (Vec<&Condition>, Vec<NodeId>) {
 
 /// What tells turns of a loop apart that leave all states as they were.
 pub(super) struct Moment {
-    time: Known,
-    locals: Vec<Known>,
+    time: AbstractValue,
+    locals: Vec<AbstractValue>,
 }
 
 impl Moment {
-    pub(super) fn of(facts: &Facts) -> Self {
+    pub(super) fn of(facts: &AbstractState) -> Self {
         Moment { time: facts.time.clone(), locals: facts.locals.clone() }
     }
 }
 
 /// The same after as many more turns as are `left`, where that is known: each takes as long as the last one.
-pub(super) fn after_turns(left: Option<f64>, mut facts: Facts, before: &Moment) -> Facts {
+pub(super) fn after_turns(left: Option<f64>, mut facts: AbstractState, before: &Moment) -> AbstractState {
     match (left, facts.time.exact(), before.time.exact()) {
         (Some(left), Some(now), Some(then)) if left.is_finite() && facts.locals == before.locals => {
-            facts.time = Known::Point(now + left * (now - then));
+            facts.time = AbstractValue::Point(now + left * (now - then));
             facts
         }
         _ => later(facts, before),
@@ -117,11 +117,16 @@ pub(super) fn after_turns(left: Option<f64>, mut facts: Facts, before: &Moment) 
 }
 
 /// The same after more turns, of which only the time is told apart.
-pub(super) fn later(mut facts: Facts, before: &Moment) -> Facts {
+pub(super) fn later(mut facts: AbstractState, before: &Moment) -> AbstractState {
     if facts.time != before.time || facts.locals != before.locals {
         let (since, _) = facts.time.bounds();
-        facts.time = Known::Range(since, f64::INFINITY, Why::Unknown);
-        facts.locals.iter_mut().zip(&before.locals).filter(|(a, b)| a != b).for_each(|(a, _)| *a = Known::nothing());
+        facts.time = AbstractValue::Range(since, f64::INFINITY, Imprecision::Unknown);
+        facts
+            .locals
+            .iter_mut()
+            .zip(&before.locals)
+            .filter(|(a, b)| a != b)
+            .for_each(|(a, _)| *a = AbstractValue::top());
     }
     facts
 }

@@ -9,16 +9,16 @@ use matterix_ir::{BinaryOp, NodeId, Op, Severity};
 use super::actions::Asked;
 use super::clashing::CLAIMED;
 use super::course::Course;
-use super::facts::Facts;
 use super::interference::Rival;
 use super::jobs::in_both;
-use super::parted::MOST_WAYS;
-use super::points::at_least;
+use super::program_points::at_least;
 use super::report::Finding;
+use super::state::AbstractState;
 use super::stopped::Lines;
+use super::trace_partitioning::MOST_WAYS;
 use super::turns::{Moment, after_turns, later};
-use super::value::{Known, Why};
-use super::{Flow, MOST_STEPS, Site};
+use super::value::{AbstractValue, Imprecision};
+use super::{Interpreter, MOST_STEPS, Site};
 use crate::elaborate::mixtures::written;
 
 /// Turns of a loop followed one by one.
@@ -27,9 +27,9 @@ const MOST_TURNS: usize = 2000;
 /// Depth of `parallel` to which every branch is followed both before and after its siblings.
 const MOST_PARALLEL: usize = 3;
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// Follows a step.
-    pub fn walk(&mut self, id: StepId, facts: Facts) -> Option<Facts> {
+    pub fn walk(&mut self, id: StepId, facts: AbstractState) -> Option<AbstractState> {
         self.steps += 1;
         if self.steps > MOST_STEPS {
             let headline =
@@ -73,7 +73,12 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Walks a body all through which conditions must hold.
-    fn walk_during(&mut self, invariants: &'l [Condition], body: StepId, facts: Facts) -> Option<Facts> {
+    fn walk_during(
+        &mut self,
+        invariants: &'l [Condition],
+        body: StepId,
+        facts: AbstractState,
+    ) -> Option<AbstractState> {
         let around = (self.during.len(), self.unbroken.len());
         self.during.extend(invariants);
         let guards = self.guards.len();
@@ -84,7 +89,7 @@ impl<'l> Flow<'l, '_> {
         after
     }
 
-    fn step(&mut self, id: StepId, mut facts: Facts) -> Option<Facts> {
+    fn step(&mut self, id: StepId, mut facts: AbstractState) -> Option<AbstractState> {
         let plan = self.plan;
         let node = plan.get(id);
         match &node.step {
@@ -133,7 +138,7 @@ impl<'l> Flow<'l, '_> {
             }
             Step::Let { local, value } => {
                 let raced = self.is_raced(*value);
-                let known = if raced { Known::nothing() } else { self.eval(*value, &facts) };
+                let known = if raced { AbstractValue::top() } else { self.eval(*value, &facts) };
                 if !raced && !known.exact().is_some_and(f64::is_finite) {
                     self.without_value(*value, node.span, &facts);
                 }
@@ -178,7 +183,7 @@ impl<'l> Flow<'l, '_> {
                 {
                     // Only the way of the handler goes on.
                     if timeout.is_some() && self.is_taken("timeout") {
-                        self.pass(&Known::point(longest - waited(&began, &facts)), &mut facts);
+                        self.pass(&AbstractValue::point(longest - waited(&began, &facts)), &mut facts);
                         self.raise_written("timeout", node.span, facts);
                         return None;
                     }
@@ -198,7 +203,7 @@ impl<'l> Flow<'l, '_> {
                 }
                 let mut broken = facts.clone();
                 self.widen(*body, &mut broken);
-                self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
+                self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut broken);
                 self.raise("broken", broken);
                 if fails && !self.is_shared(condition.node) {
                     self.unexpected(condition, &facts);
@@ -220,7 +225,7 @@ impl<'l> Flow<'l, '_> {
                 // It breaks after any time, with any part of the body done.
                 let mut broken = facts.clone();
                 self.widen(*body, &mut broken);
-                self.pass(&Known::Range(0.0, f64::INFINITY, Why::Unknown), &mut broken);
+                self.pass(&AbstractValue::Range(0.0, f64::INFINITY, Imprecision::Unknown), &mut broken);
                 self.raise("broken", broken);
                 self.walk_during(invariants, *body, facts)
             }
@@ -276,20 +281,20 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Whether a block that must begin within a time of a moment begins later on every way.
-    fn is_too_late(&mut self, since: NodeId, limit: NodeId, facts: &Facts) -> bool {
-        let due = Known::binary(BinaryOp::Add, &self.eval(since, facts), &self.eval(limit, facts));
-        let late = Known::binary(BinaryOp::Lt, &due, &facts.time);
+    fn is_too_late(&mut self, since: NodeId, limit: NodeId, facts: &AbstractState) -> bool {
+        let due = AbstractValue::binary(BinaryOp::Add, &self.eval(since, facts), &self.eval(limit, facts));
+        let late = AbstractValue::binary(BinaryOp::Lt, &due, &facts.time);
         late.truth() == Some(true)
     }
 
     /// Follows the body of a skill that is refused, which was said: of what it would have done nothing is known, and whether it would have
     /// come to an end does not matter.
-    fn refused(&mut self, body: StepId, facts: Facts) -> Facts {
+    fn refused(&mut self, body: StepId, facts: AbstractState) -> AbstractState {
         let before = facts.clone();
         self.quiet += 1;
         let after = self.walk(body, facts).filter(|after| after.time.bounds().0.is_finite());
         self.quiet -= 1;
-        let mut after = after.unwrap_or_else(|| Facts { time: at_least(&before.time), ..before });
+        let mut after = after.unwrap_or_else(|| AbstractState { time: at_least(&before.time), ..before });
         self.widen(body, &mut after);
         after
     }
@@ -299,8 +304,8 @@ impl<'l> Flow<'l, '_> {
         id: StepId,
         condition: &Condition,
         timeout: Option<NodeId>,
-        mut facts: Facts,
-    ) -> Option<Facts> {
+        mut facts: AbstractState,
+    ) -> Option<AbstractState> {
         let value = self.eval(condition.node, &facts);
         if value.truth() == Some(true) {
             return Some(facts);
@@ -312,7 +317,7 @@ impl<'l> Flow<'l, '_> {
             None => f64::INFINITY,
         };
         if let Some(wait) = self.until(condition.node, &facts).filter(|wait| *wait <= longest) {
-            self.pass(&Known::Point(wait), &mut facts);
+            self.pass(&AbstractValue::Point(wait), &mut facts);
             return Some(facts);
         }
         if !(timeout.is_some() && self.is_taken("timeout")) {
@@ -329,14 +334,14 @@ impl<'l> Flow<'l, '_> {
                 return None;
             }
             Course::Passed => {}
-            Course::Left(left) => self.pass(&Known::Range(0.0, left, Why::Unknown), &mut facts),
+            Course::Left(left) => self.pass(&AbstractValue::Range(0.0, left, Imprecision::Unknown), &mut facts),
         }
         if value.truth() == Some(false) && self.eval(condition.node, &facts).truth().is_none() {
             self.by_totals(longest, &before, &mut facts);
         }
         if timeout.is_some() {
             let mut late = facts.clone();
-            late.time = Known::binary(BinaryOp::Add, &before.time, &Known::point(longest));
+            late.time = AbstractValue::binary(BinaryOp::Add, &before.time, &AbstractValue::point(longest));
             self.raise_written("timeout", self.plan.get(id).span, late);
         }
         if value.truth() == Some(false) && !parts.timed && !shared {
@@ -369,7 +374,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Whether a condition that holds goes on doing so for a time, whatever others do.
-    fn goes_on_holding(&mut self, condition: NodeId, time: &Known, facts: &Facts) -> bool {
+    fn goes_on_holding(&mut self, condition: NodeId, time: &AbstractValue, facts: &AbstractState) -> bool {
         if self.is_shared(condition) {
             return false;
         }
@@ -380,7 +385,7 @@ impl<'l> Flow<'l, '_> {
                 Some(Course::Reached(_)) => false,
                 Some(Course::Left(_)) | None => {
                     let mut within = facts.clone();
-                    flow.drift(&Known::Range(0.0, time.bounds().1, Why::Unknown), &mut within);
+                    flow.drift(&AbstractValue::Range(0.0, time.bounds().1, Imprecision::Unknown), &mut within);
                     flow.eval(condition, &within).truth() == Some(true)
                 }
             }
@@ -390,7 +395,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// How long it is until a point in time that a condition waits for, s.
-    fn until(&mut self, condition: NodeId, facts: &Facts) -> Option<f64> {
+    fn until(&mut self, condition: NodeId, facts: &AbstractState) -> Option<f64> {
         let graph = &self.lab.graph;
         let Op::Binary(BinaryOp::Le, due, time) = graph.op(condition) else { return None };
         let clock = graph.op(time) == Op::Time;
@@ -404,12 +409,12 @@ impl<'l> Flow<'l, '_> {
         condition: &Condition,
         then: StepId,
         otherwise: Option<StepId>,
-        facts: Facts,
-    ) -> Option<Facts> {
+        facts: AbstractState,
+    ) -> Option<AbstractState> {
         let truth = self.truth(condition.node, &facts);
         self.note_branch(condition, otherwise.is_some());
         self.open += usize::from(truth.is_none());
-        let mut branch = |holds: bool, facts: &Facts| {
+        let mut branch = |holds: bool, facts: &AbstractState| {
             let mut facts = facts.clone();
             self.decide(condition.node, holds, &mut facts);
             match (holds, otherwise) {
@@ -428,7 +433,13 @@ impl<'l> Flow<'l, '_> {
         }
     }
 
-    fn repeat(&mut self, id: StepId, times: &Known, body: StepId, mut facts: Facts) -> Option<Facts> {
+    fn repeat(
+        &mut self,
+        id: StepId,
+        times: &AbstractValue,
+        body: StepId,
+        mut facts: AbstractState,
+    ) -> Option<AbstractState> {
         let (low, high) = times.bounds();
         let begun = Moment::of(&facts);
         for turn in 0..MOST_TURNS {
@@ -463,12 +474,12 @@ impl<'l> Flow<'l, '_> {
         &mut self,
         id: StepId,
         condition: &Condition,
-        max: &Known,
+        max: &AbstractValue,
         body: StepId,
-        mut facts: Facts,
-    ) -> Option<Facts> {
+        mut facts: AbstractState,
+    ) -> Option<AbstractState> {
         let start = facts.clone();
-        let mut ends: Vec<Facts> = Vec::new();
+        let mut ends: Vec<AbstractState> = Vec::new();
         let (_, most) = max.bounds();
         for turn in 0..MOST_TURNS {
             let holds = self.eval(condition.node, &facts).truth();
@@ -478,7 +489,7 @@ impl<'l> Flow<'l, '_> {
                 // The last ends are told apart, and what many others before them come to.
                 if ends.len() == MOST_WAYS {
                     let early = ends.remove(0);
-                    ends[0] = start.join(early, &ends[0], self.plan.get(id).span, Why::Paths);
+                    ends[0] = start.join(early, &ends[0], self.plan.get(id).span, Imprecision::Paths);
                 }
                 ends.push(out);
             }
@@ -537,7 +548,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// A turn of a loop.
-    fn turn(&mut self, body: StepId, facts: Facts) -> Option<Facts> {
+    fn turn(&mut self, body: StepId, facts: AbstractState) -> Option<AbstractState> {
         self.turning += 1;
         let after = self.walk(body, facts);
         self.turning -= 1;
@@ -545,7 +556,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Forgets what a body changes.
-    pub(super) fn widen(&mut self, body: StepId, facts: &mut Facts) {
+    pub(super) fn widen(&mut self, body: StepId, facts: &mut AbstractState) {
         let states: Vec<u32> = self.sets_going(self.writes(body)).into_iter().collect();
         self.forget(&states, facts);
     }
@@ -566,7 +577,7 @@ impl<'l> Flow<'l, '_> {
 
     /// Branches side by side: followed one after the other, in the order of the text and the other way round. What goes
     /// wrong in one order only may be right in the order of the run.
-    fn parallel(&mut self, branches: &[StepId], facts: Facts) -> Option<Facts> {
+    fn parallel(&mut self, branches: &[StepId], facts: AbstractState) -> Option<AbstractState> {
         let writes: Vec<BTreeSet<u32>> = branches.iter().map(|b| self.sets_going(self.writes(*b))).collect();
         let raced = self.raced_in_branches(branches);
         let forward: Vec<usize> = (0..branches.len()).collect();
@@ -607,7 +618,7 @@ impl<'l> Flow<'l, '_> {
                     !close
                 });
                 let open: Vec<u32> = open.into_iter().collect();
-                let mut both = facts.join(a, &b, self.site(), Why::Unknown);
+                let mut both = facts.join(a, &b, self.site(), Imprecision::Unknown);
                 // A run may have one value of one order and another of the other.
                 both.cases = None;
                 self.forget(&open, &mut both);
@@ -622,9 +633,9 @@ impl<'l> Flow<'l, '_> {
         branches: &[StepId],
         order: &[usize],
         (writes, raced): (&[BTreeSet<u32>], &[BTreeSet<u32>]),
-        mut facts: Facts,
+        mut facts: AbstractState,
         mut lines: Option<&mut Lines>,
-    ) -> Option<Facts> {
+    ) -> Option<AbstractState> {
         let start = facts.time.clone();
         let mut longest = start.clone();
         let all: BTreeSet<u32> = writes.iter().flatten().copied().collect();
@@ -656,7 +667,7 @@ impl<'l> Flow<'l, '_> {
             self.contested.pop();
             self.end_branch();
             facts = after?;
-            longest = Known::binary(BinaryOp::Max, &longest, &facts.time);
+            longest = AbstractValue::binary(BinaryOp::Max, &longest, &facts.time);
             if meantime.is_some() {
                 ends.push(facts.clone());
             }
@@ -684,7 +695,7 @@ impl<'l> Flow<'l, '_> {
 
     /// Follows the alternatives behind the first one, to which only a device's failure leads: how far those before got is not known,
     /// and nothing of it is known afterwards.
-    fn beside_the_way(&mut self, alternatives: &[StepId], mut entry: Facts) {
+    fn beside_the_way(&mut self, alternatives: &[StepId], mut entry: AbstractState) {
         entry.unsure = true;
         self.doubt += 1;
         self.cleaning += 1;
@@ -697,7 +708,7 @@ impl<'l> Flow<'l, '_> {
         self.doubt -= 1;
     }
 
-    fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: Facts) -> Option<Facts> {
+    fn alternatives(&mut self, id: StepId, alternatives: &[StepId], facts: AbstractState) -> Option<AbstractState> {
         let mut ends = Vec::new();
         let mut entry = facts.clone();
         for (i, step) in alternatives.iter().enumerate() {
@@ -722,7 +733,7 @@ impl<'l> Flow<'l, '_> {
                 raised.extend(self.clashed(*step, &entry).map(|facts| (CLAIMED.to_owned(), facts)));
             }
             match self.entry(id, &facts, raised) {
-                Some(next) => entry = Facts { written: None, ..next },
+                Some(next) => entry = AbstractState { written: None, ..next },
                 None if self.meets_others(*step) => {
                     let states: Vec<u32> = self.writes(*step).into_iter().collect();
                     self.forget(&states, &mut entry);
@@ -741,12 +752,12 @@ impl<'l> Flow<'l, '_> {
 }
 
 /// A time that may be longer than it is meant to be, as what it waits for begins anew.
-fn at_most(time: &Known, longest: f64) -> Known {
+fn at_most(time: &AbstractValue, longest: f64) -> AbstractValue {
     let (low, high) = time.bounds();
-    Known::Range(low, high.max(longest), Why::Unknown)
+    AbstractValue::Range(low, high.max(longest), Imprecision::Unknown)
 }
 
 /// How long something has taken at least, s.
-fn waited(began: &Known, facts: &Facts) -> f64 {
+fn waited(began: &AbstractValue, facts: &AbstractState) -> f64 {
     (facts.time.bounds().0 - began.bounds().1).max(0.0)
 }

@@ -6,13 +6,13 @@ use matterix_ir::model::Domain;
 use matterix_ir::plan::{Condition, Said};
 use matterix_ir::{TextPart, Unit};
 
-use super::Flow;
-use super::facts::Facts;
+use super::Interpreter;
 use super::report::shown;
+use super::state::AbstractState;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// What is so where a condition does not hold, in its own words; nothing where it has none.
-    pub(super) fn worded(&mut self, condition: &Condition, facts: &Facts) -> Vec<String> {
+    pub(super) fn worded(&mut self, condition: &Condition, facts: &AbstractState) -> Vec<String> {
         let all = condition.refusal.as_ref().map(|r| r.said.as_slice()).unwrap_or_default();
         let fails = all.iter().find(|said| self.eval(said.node, facts).truth() == Some(false));
         let open = fails.or_else(|| all.iter().find(|said| self.eval(said.node, facts).truth().is_none()));

@@ -9,7 +9,7 @@ use matterix_ir::plan::Operation;
 use matterix_ir::scene::InstanceId;
 
 use super::Walk;
-use super::world::World;
+use super::state::MixtureState;
 
 /// Relative difference from which on a rate is not the same.
 const SAME_RATE: f64 = 1e-9;
@@ -39,7 +39,7 @@ pub(super) struct Dose {
 
 impl Walk<'_, '_> {
     /// The dose of an operation; none where nothing flows, or where time or amount cannot be told.
-    pub(super) fn dose(&self, o: &Operation, world: &World) -> Option<Dose> {
+    pub(super) fn dose(&self, o: &Operation, world: &MixtureState) -> Option<Dose> {
         let lasts = match (&o.takes, &o.until) {
             (Some(takes), _) => Lasts::For(self.eyes.value(takes.nominal, world)),
             (None, Some(until)) => Lasts::Until(until.node),
@@ -53,16 +53,16 @@ impl Walk<'_, '_> {
     }
 
     /// What flows during a wait.
-    pub(super) fn waited(&self, time: f64, world: &World) -> Option<Dose> {
+    pub(super) fn waited(&self, time: f64, world: &MixtureState) -> Option<Dose> {
         self.even_flow(Lasts::For(time), world)
     }
 
     /// Whether something flows already.
-    pub(super) fn is_flowing(&self, world: &World) -> bool {
+    pub(super) fn is_flowing(&self, world: &MixtureState) -> bool {
         !self.eyes.lab.streams.is_empty() && self.flowing(world).is_none_or(|flowing| !flowing.is_empty())
     }
 
-    fn even_flow(&self, lasts: Lasts, world: &World) -> Option<Dose> {
+    fn even_flow(&self, lasts: Lasts, world: &MixtureState) -> Option<Dose> {
         if self.eyes.lab.streams.is_empty() {
             return None;
         }
@@ -112,7 +112,7 @@ impl Walk<'_, '_> {
     }
 
     /// When a condition comes true, with what events set by then; none where it is true at once, or never.
-    fn time_until(&self, node: NodeId, world: &World, after: impl Fn(f64) -> World) -> Option<f64> {
+    fn time_until(&self, node: NodeId, world: &MixtureState, after: impl Fn(f64) -> MixtureState) -> Option<f64> {
         let over = |t: f64| {
             let mut then = after(t);
             for (state, value) in self.set_by_events(world, &then) {
@@ -134,7 +134,7 @@ impl Walk<'_, '_> {
     }
 
     /// Transfers that go on; none where it is not known which.
-    fn flowing(&self, world: &World) -> Option<BTreeSet<(usize, InstanceId, InstanceId)>> {
+    fn flowing(&self, world: &MixtureState) -> Option<BTreeSet<(usize, InstanceId, InstanceId)>> {
         let lab = self.eyes.lab;
         let (mut flowing, mut open) = (BTreeSet::new(), self.by_event.clone());
         for (stream, flows) in &lab.streams {
@@ -156,7 +156,11 @@ impl Walk<'_, '_> {
     }
 
     /// How fast these transfers change the states; none where an amount is among them of which that is not known.
-    fn rates(&self, flowing: &BTreeSet<(usize, InstanceId, InstanceId)>, world: &World) -> Option<Vec<(u32, f64)>> {
+    fn rates(
+        &self,
+        flowing: &BTreeSet<(usize, InstanceId, InstanceId)>,
+        world: &MixtureState,
+    ) -> Option<Vec<(u32, f64)>> {
         let processes: BTreeSet<usize> = flowing.iter().map(|stream| stream.0).collect();
         let mut out = Vec::new();
         for (state, contributions) in &self.eyes.lab.rates {
@@ -174,13 +178,13 @@ impl Walk<'_, '_> {
     }
 
     /// How fast some processes change a state.
-    fn rate(&self, state: u32, world: &World, of: impl Fn(usize) -> bool) -> f64 {
+    fn rate(&self, state: u32, world: &MixtureState, of: impl Fn(usize) -> bool) -> f64 {
         let contributions = self.eyes.lab.rates.get(&state).into_iter().flatten();
         contributions.filter(|c| of(c.process)).map(|c| self.eyes.value(c.node, world)).sum()
     }
 
     /// What events assign that come about between two points, but amounts: a pump that has given its dose stops.
-    fn set_by_events(&self, before: &World, after: &World) -> Vec<(u32, f64)> {
+    fn set_by_events(&self, before: &MixtureState, after: &MixtureState) -> Vec<(u32, f64)> {
         let begins = |when| self.eyes.value(when, before) == 0.0 && self.eyes.value(when, after) != 0.0;
         let come = self.events.iter().filter(|e| begins(e.when));
         let assigned = come.flat_map(|e| &e.actions).filter_map(|action| match action {
@@ -193,14 +197,14 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards of what flows over with a dose.
-    pub(super) fn pours(&mut self, dose: &Dose, world: &mut World) {
+    pub(super) fn pours(&mut self, dose: &Dose, world: &mut MixtureState) {
         for (from, to, share) in &dose.shares {
             self.transfers(*from, *to, *share, world);
         }
     }
 
     /// Puts down what a dose has left.
-    pub(super) fn given_off(&self, dose: &Dose, world: &mut World) {
+    pub(super) fn given_off(&self, dose: &Dose, world: &mut MixtureState) {
         let ends = dose.shares.iter().flat_map(|(from, to, _)| [*from, *to]);
         world.settle_at(self.eyes, &dose.values, ends);
     }

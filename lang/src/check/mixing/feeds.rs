@@ -8,8 +8,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Span};
 
 use super::Walk;
-use super::eyes::Eyes;
-use super::world::{Came, Contents, Entry, World};
+use super::evaluator::NodeEvaluator;
+use super::state::{Came, Contents, Entry, MixtureState};
 use crate::declare::SpeciesId;
 use crate::elaborate::writes::vanishes;
 
@@ -34,7 +34,7 @@ impl Feed {
 }
 
 /// The amounts that processes and events write. What reactions make, and the ions that a species becomes, is known otherwise.
-pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
+pub(super) fn feeds(eyes: &NodeEvaluator<'_, '_>, events: &[Event]) -> Vec<Feed> {
     let lab = eyes.lab;
     let species = &lab.tables.species;
     let is_ion = |m: InstanceId, s: SpeciesId| {
@@ -68,13 +68,13 @@ pub(super) fn feeds(eyes: &Eyes<'_, '_>, events: &[Event]) -> Vec<Feed> {
 }
 
 /// Whether a mixture holds more of a species than a residue.
-fn holds(world: &World, mixture: InstanceId, species: SpeciesId) -> bool {
+fn holds(world: &MixtureState, mixture: InstanceId, species: SpeciesId) -> bool {
     world.held(mixture).get(&species).is_some_and(|e| !e.residue)
 }
 
 impl Walk<'_, '_> {
     /// What laws may have written by now, with what is there, and what streams carry on of it.
-    pub(super) fn fed(&mut self, world: &mut World) {
+    pub(super) fn fed(&mut self, world: &mut MixtureState) {
         for _ in 0..self.feeds.len() {
             let due = |f: &&Feed| self.feeds_now(f, world);
             let due: Vec<(InstanceId, SpeciesId, Span)> =
@@ -90,7 +90,7 @@ impl Walk<'_, '_> {
     }
 
     /// Whether a law may write something now that is not there. Contents that are as they were before have the species as before.
-    fn feeds_now(&self, feed: &Feed, world: &World) -> bool {
+    fn feeds_now(&self, feed: &Feed, world: &MixtureState) -> bool {
         let held = world.held(feed.mixture);
         if feed.idle.borrow().as_ref().is_some_and(|before| Rc::ptr_eq(before, held)) {
             return false;
@@ -103,7 +103,7 @@ impl Walk<'_, '_> {
     }
 
     /// The species that an effect brings into a mixture that has none of it.
-    pub(super) fn effected(&self, action: &Action, world: &World) -> Option<(InstanceId, SpeciesId)> {
+    pub(super) fn effected(&self, action: &Action, world: &MixtureState) -> Option<(InstanceId, SpeciesId)> {
         let Action::Assign { state, value, .. } = action else { return None };
         let (mixture, species) = *self.eyes.amount_of.get(state)?;
         let brings = !self.is_there(mixture, species, world) && self.may_write(None, *value, world);
@@ -111,21 +111,21 @@ impl Walk<'_, '_> {
     }
 
     /// Whether a species is in a mixture, or something that it comes of there.
-    fn is_there(&self, mixture: InstanceId, species: SpeciesId, world: &World) -> bool {
+    fn is_there(&self, mixture: InstanceId, species: SpeciesId, world: &MixtureState) -> bool {
         let splits =
             |have: &SpeciesId| self.eyes.lab.tables.species.get(*have).dissolves.iter().any(|d| d.0 == species);
         holds(world, mixture, species) || world.held(mixture).keys().any(splits)
     }
 
     /// Whether something may be written now.
-    fn may_write(&self, condition: Option<NodeId>, value: NodeId, world: &World) -> bool {
+    fn may_write(&self, condition: Option<NodeId>, value: NodeId, world: &MixtureState) -> bool {
         let absent = |state: u32| self.eyes.amount_of.get(&state).is_some_and(|(m, s)| !holds(world, *m, *s));
         condition.is_none_or(|c| self.eyes.truth(c, world) != Some(false))
             && !vanishes(&self.eyes.lab.graph, value, &|c| self.eyes.lab.never(c), &absent)
     }
 
     /// Puts a species into a mixture and judges what it meets there.
-    pub(super) fn bring(&mut self, mixture: InstanceId, species: SpeciesId, span: Span, world: &mut World) {
+    pub(super) fn bring(&mut self, mixture: InstanceId, species: SpeciesId, span: Span, world: &mut MixtureState) {
         let came = vec![Came { span, into: mixture }];
         let entry = Entry { content: None, certain: false, residue: false, came };
         Rc::make_mut(&mut world.mixtures[mixture.0 as usize]).insert(species, entry);

@@ -10,8 +10,8 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Span};
 
 use super::Walk;
+use super::state::MixtureState;
 use super::uses::Stream;
-use super::world::World;
 use crate::elaborate::hazards::{Hazard, Watched};
 
 /// The hazards of a lab, by the states they depend on.
@@ -43,7 +43,7 @@ impl Hazards {
 
 impl Walk<'_, '_> {
     /// Judges the hazards that are there whatever is done: of things as they are, said once for each declaration.
-    pub(super) fn endangered(&mut self, world: &World) {
+    pub(super) fn endangered(&mut self, world: &MixtureState) {
         let as_it_is = |h: &&Hazard| h.states.is_empty() && h.watched == Watched::Steps;
         for hazard in self.hazards.all.iter().filter(as_it_is) {
             let place = self.declared_at(hazard);
@@ -68,7 +68,7 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards of what the text gives for the start, where it is given.
-    pub(super) fn given(&mut self, world: &World) {
+    pub(super) fn given(&mut self, world: &MixtureState) {
         let all = self.hazards.all.clone();
         for (i, hazard) in all.iter().enumerate() {
             let Watched::Given(span) = hazard.watched else { continue };
@@ -81,7 +81,7 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards of what the lab itself measures out: contents given in the dimension of a watched value.
-    pub(super) fn measured_out(&mut self, world: &World) {
+    pub(super) fn measured_out(&mut self, world: &MixtureState) {
         let lab = self.eyes.lab;
         for held in &lab.held {
             let Some(m) = held.mixture else { continue };
@@ -101,7 +101,7 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards that depend on states that a step changed.
-    pub(super) fn endanger(&mut self, world: &mut World) {
+    pub(super) fn endanger(&mut self, world: &mut MixtureState) {
         let changed = world.take_changed();
         let touched: BTreeSet<usize> =
             changed.iter().filter_map(|s| self.hazards.by_state.get(s)).flatten().copied().collect();
@@ -141,7 +141,7 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards of what a step uses.
-    pub(super) fn used(&mut self, id: StepId, world: &World) {
+    pub(super) fn used(&mut self, id: StepId, world: &MixtureState) {
         let Some(found) = self.uses.by_step.get(&id).cloned() else { return };
         let lasts = matches!(self.plan.get(id).step, Step::Record { .. } | Step::Keep { .. });
         for i in found.iter().copied() {
@@ -154,13 +154,13 @@ impl Walk<'_, '_> {
     }
 
     /// Judges the hazards of a flow that goes on from now on.
-    pub(super) fn flows(&mut self, stream: Stream, world: &World) {
+    pub(super) fn flows(&mut self, stream: Stream, world: &MixtureState) {
         let found = self.uses.by_stream.get(&stream).cloned();
         found.iter().flat_map(|found| found.iter()).for_each(|i| self.used_here(*i, world));
     }
 
     /// Judges the hazards of a transfer that is about to take a share.
-    pub(super) fn transfers(&mut self, from: InstanceId, to: InstanceId, share: f64, world: &mut World) {
+    pub(super) fn transfers(&mut self, from: InstanceId, to: InstanceId, share: f64, world: &mut MixtureState) {
         let Some(found) = self.uses.by_transfer.get(&(from, to)).cloned() else { return };
         world.share = share;
         for i in found {
@@ -179,7 +179,7 @@ impl Walk<'_, '_> {
     }
 
     /// Tells a hazard of a transfer where the value is used that it is about.
-    fn used_after(&mut self, i: usize, world: &World) {
+    fn used_after(&mut self, i: usize, world: &MixtureState) {
         let Some((place, words)) = self.hazards.since.remove(&i) else { return };
         let mut d = self.hazard(&self.hazards.all[i], world, self.place(), "used here");
         if !words.is_empty() {
@@ -189,7 +189,7 @@ impl Walk<'_, '_> {
         self.tell(i, d);
     }
 
-    fn used_here(&mut self, i: usize, world: &World) {
+    fn used_here(&mut self, i: usize, world: &MixtureState) {
         let hazard = &self.hazards.all[i];
         if self.hazards.since.contains_key(&i) {
             return self.used_after(i, world);
@@ -216,7 +216,7 @@ impl Walk<'_, '_> {
     }
 
     /// What is so, in the words of a hazard: of the first that it asks about and that is so.
-    fn worded(&self, hazard: &Hazard, world: &World) -> Option<String> {
+    fn worded(&self, hazard: &Hazard, world: &MixtureState) -> Option<String> {
         let is_so = |said: &&Said| self.eyes.nominal_truth(said.node, world) == Some(true);
         let Said { text, .. } = hazard.said.iter().find(is_so)?;
         let lab = self.eyes.lab;
@@ -228,7 +228,7 @@ impl Walk<'_, '_> {
         text.show(value, instance).ok()
     }
 
-    fn hazard(&self, hazard: &Hazard, world: &World, place: Span, said: &str) -> Diagnostic {
+    fn hazard(&self, hazard: &Hazard, world: &MixtureState, place: Span, said: &str) -> Diagnostic {
         let words = self.worded(hazard, world);
         let in_words = words.is_some();
         let headline = words.unwrap_or_else(|| hazard.headline());

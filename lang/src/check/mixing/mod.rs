@@ -3,17 +3,22 @@
 //! The plan is followed in the order of the text. Branches join; loops are followed turn by turn and then until further turns bring
 //! nothing new. Where steps that run beside each other bring something into one vessel and take it out again, the plan is followed
 //! in every order besides (`orders.rs`). Residues count: what was emptied is still wet.
+//!
+//! - `state`, `evaluator`: what every mixture holds at a point of the plan, and the values of nodes there.
+//! - `lines`, `orders`: the plan as lines of steps beside each other, and the orders in which they may happen.
+//! - `feeds`, `doses`: what brings something in and takes it out.
+//! - `reactions`, `hazards`, `uses`, `report`: what comes of what meets, which values that concerns, and the findings.
 
 mod doses;
-mod eyes;
+mod evaluator;
 mod feeds;
 mod hazards;
 mod lines;
 mod orders;
 mod reactions;
 mod report;
+mod state;
 mod uses;
-mod world;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -32,10 +37,10 @@ use crate::elaborate::hazards::Hazard;
 use crate::eval::Value;
 use crate::eval::lab::Elaborator;
 use crate::names::DeclId;
-use eyes::Eyes;
+use evaluator::NodeEvaluator;
 use hazards::Hazards;
+use state::{Before, MixtureState};
 use uses::Uses;
-use world::{Before, World};
 
 /// Steps after which turns of loops are no longer followed one by one, so that nested loops stay cheap.
 const PATIENCE: usize = 20_000;
@@ -110,7 +115,7 @@ pub fn mixing(
     events: &[Event],
     ready: Ready,
 ) -> Vec<Diagnostic> {
-    let eyes = Eyes::new(lab);
+    let eyes = NodeEvaluator::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
     let uses = Uses::new(lab, plan, events, &ready.hazards.all, &library);
@@ -138,7 +143,7 @@ pub fn mixing(
         found: Vec::new(),
         steps: 0,
     };
-    let mut world = World::initial(&eyes, plan.locals.len());
+    let mut world = MixtureState::initial(&eyes, plan.locals.len());
     walk.begin(&mut world);
     walk.fed(&mut world);
     walk.endangered(&world);
@@ -168,7 +173,7 @@ fn moves_of_plan(plan: &Plan, order: &[InstanceId]) -> BTreeSet<(InstanceId, Ins
 }
 
 /// The transfers that events make between mixtures.
-fn moves_of_events(eyes: &Eyes<'_, '_>, plan: &Plan) -> BTreeSet<(InstanceId, InstanceId)> {
+fn moves_of_events(eyes: &NodeEvaluator<'_, '_>, plan: &Plan) -> BTreeSet<(InstanceId, InstanceId)> {
     let by_plan = moves_of_plan(plan, &eyes.lab.mixtures);
     let by_process: BTreeSet<_> = eyes.lab.streams.keys().map(|(_, from, to)| (*from, *to)).collect();
     eyes.lab.moves.iter().filter(|m| !by_process.contains(m) && !by_plan.contains(m)).copied().collect()
@@ -201,13 +206,13 @@ fn material_of(lab: &mut Elaborator<'_>, id: InstanceId) -> Option<DeclId> {
 /// What the vessels may hold where failures are raised: of a wait that is timed out, and of any step.
 #[derive(Clone, Default)]
 struct Raised {
-    timeout: Option<World>,
-    any: Option<World>,
+    timeout: Option<MixtureState>,
+    any: Option<MixtureState>,
 }
 
 impl Raised {
     /// What the vessels may hold where a handler begins.
-    fn entry(&self, caught: &Caught, before: &World, after: &World) -> World {
+    fn entry(&self, caught: &Caught, before: &MixtureState, after: &MixtureState) -> MixtureState {
         let around = || before.clone().join(after.clone());
         match (caught, &self.timeout, &self.any) {
             (Caught::Named(name), Some(world), _) if name == "timeout" => world.clone(),
@@ -218,7 +223,7 @@ impl Raised {
         }
     }
 
-    fn note(place: &mut Option<World>, world: &World) {
+    fn note(place: &mut Option<MixtureState>, world: &MixtureState) {
         *place = Some(match place.take() {
             Some(known) => known.join(world.clone()),
             None => world.clone(),
@@ -227,7 +232,7 @@ impl Raised {
 }
 
 struct Walk<'w, 'a> {
-    eyes: &'w Eyes<'w, 'a>,
+    eyes: &'w NodeEvaluator<'w, 'a>,
     /// What the wall around each mixture is made of, where that is said.
     materials: BTreeMap<InstanceId, DeclId>,
     hazards: Hazards,
@@ -266,7 +271,7 @@ struct Walk<'w, 'a> {
 
 impl Walk<'_, '_> {
     /// What the vessels hold when the plan begins.
-    fn begin(&mut self, world: &mut World) {
+    fn begin(&mut self, world: &mut MixtureState) {
         for &m in &self.eyes.lab.mixtures {
             let all: Vec<SpeciesId> = world.present(m).map(|p| p.0.0).collect();
             for (i, s) in all.iter().enumerate() {
@@ -283,11 +288,11 @@ impl Walk<'_, '_> {
         self.places.last().copied().unwrap_or_default()
     }
 
-    fn each(&mut self, steps: &[StepId], world: World) -> World {
+    fn each(&mut self, steps: &[StepId], world: MixtureState) -> MixtureState {
         steps.iter().fold(world, |world, s| self.step(*s, world))
     }
 
-    fn step(&mut self, id: StepId, world: World) -> World {
+    fn step(&mut self, id: StepId, world: MixtureState) -> MixtureState {
         self.steps += 1;
         let step = self.plan.get(id);
         let own = !self.library.contains(&step.span.file) && step.span != Span::default();
@@ -305,7 +310,7 @@ impl Walk<'_, '_> {
         world
     }
 
-    fn inside(&mut self, step: &Step, mut world: World) -> World {
+    fn inside(&mut self, step: &Step, mut world: MixtureState) -> MixtureState {
         match step {
             Step::Sequence(list) => self.each(list, world),
             Step::Parallel(list) => {
@@ -382,7 +387,7 @@ impl Walk<'_, '_> {
             }
             Step::Try(list) => {
                 let mut before = world.clone();
-                let mut after: Option<World> = None;
+                let mut after: Option<MixtureState> = None;
                 for s in list {
                     let done = self.step(*s, before.clone());
                     before = before.join(done.clone());
@@ -452,7 +457,7 @@ impl Walk<'_, '_> {
     }
 
     /// So many turns, or an unknown number of them.
-    fn turns(&mut self, times: f64, body: StepId, mut world: World) -> World {
+    fn turns(&mut self, times: f64, body: StepId, mut world: MixtureState) -> MixtureState {
         let followed = if times.is_nan() { 1.0 } else { times.min(TURNS) };
         let mut done = 0.0;
         while done < followed {
@@ -466,7 +471,7 @@ impl Walk<'_, '_> {
     }
 
     /// Any number of turns: until one more brings nothing that was not there, and changes nothing that is known.
-    fn more_turns(&mut self, body: StepId, mut world: World) -> World {
+    fn more_turns(&mut self, body: StepId, mut world: MixtureState) -> MixtureState {
         loop {
             let after = self.step(body, world.clone());
             let joined = world.clone().join(after);
@@ -486,7 +491,7 @@ impl Walk<'_, '_> {
         }
     }
 
-    fn action(&mut self, action: &Action, world: &mut World) {
+    fn action(&mut self, action: &Action, world: &mut MixtureState) {
         let before = match action {
             Action::Move { fraction, from, to, .. } => {
                 let mixtures = &self.eyes.lab.mixtures;
@@ -510,7 +515,7 @@ impl Walk<'_, '_> {
     }
 
     /// Transfers that processes and events make from now on.
-    fn streams(&mut self, world: &mut World) {
+    fn streams(&mut self, world: &mut MixtureState) {
         let lab = self.eyes.lab;
         let mut active = self.by_event.clone();
         for (process, from, to) in lab.streams.keys() {
@@ -524,7 +529,7 @@ impl Walk<'_, '_> {
         for _ in 0..active.len() {
             let mut changed = false;
             for (from, to) in &active {
-                let fresh = |w: &World| w.present(*to).filter(|(_, e)| !e.residue).count();
+                let fresh = |w: &MixtureState| w.present(*to).filter(|(_, e)| !e.residue).count();
                 let (before, count) = (world.before(*from, *to), fresh(world));
                 world.transfer(self.eyes, f64::NAN, *from, *to, self.place(), true);
                 if fresh(world) != count {
@@ -539,7 +544,7 @@ impl Walk<'_, '_> {
     }
 
     /// What streams carry while a time passes, if that is known.
-    fn flow_on(&mut self, time: Option<NodeId>, world: &mut World) {
+    fn flow_on(&mut self, time: Option<NodeId>, world: &mut MixtureState) {
         if !self.is_flowing(world) {
             return;
         }
@@ -561,12 +566,12 @@ impl Walk<'_, '_> {
     }
 
     /// Notes in a world what has met in it for certain.
-    fn note_certain(&mut self, world: &mut World) {
+    fn note_certain(&mut self, world: &mut MixtureState) {
         world.met.extend(self.certain.drain(..));
     }
 
     /// Judges what a transfer brought.
-    fn arrived(&mut self, before: &Before, world: &mut World, to: InstanceId) {
+    fn arrived(&mut self, before: &Before, world: &mut MixtureState, to: InstanceId) {
         let brought: Vec<SpeciesId> = before.source.iter().filter(|(_, e)| !e.residue).map(|p| *p.0).collect();
         let there: Vec<SpeciesId> = before.target.keys().copied().collect();
         for s in &brought {

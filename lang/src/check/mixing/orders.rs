@@ -11,9 +11,9 @@ use matterix_ir::plan::{Operation, Step, StepId};
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, Op, Severity, Span, codes};
 
-use super::eyes::Eyes;
+use super::evaluator::NodeEvaluator;
 use super::lines::{Edge, Lines, lines};
-use super::world::World;
+use super::state::MixtureState;
 use super::{Coming, Pair, Walk};
 use crate::check::time::Times;
 use crate::declare::SpeciesId;
@@ -60,7 +60,7 @@ impl Found {
 
 /// Mixtures as far as streams and events connect them, and what operations do to each of these groups.
 struct Shared<'e, 'l, 'a> {
-    eyes: &'e Eyes<'l, 'a>,
+    eyes: &'e NodeEvaluator<'l, 'a>,
     group: Vec<usize>,
     /// Groups of which the order of operations in different lines matters.
     hot: BTreeSet<usize>,
@@ -75,7 +75,7 @@ struct Effect {
 }
 
 impl<'e, 'l, 'a> Shared<'e, 'l, 'a> {
-    fn new(eyes: &'e Eyes<'l, 'a>, by_event: &BTreeSet<(InstanceId, InstanceId)>) -> Self {
+    fn new(eyes: &'e NodeEvaluator<'l, 'a>, by_event: &BTreeSet<(InstanceId, InstanceId)>) -> Self {
         let mut group: Vec<usize> = (0..eyes.lab.instances.len()).collect();
         let streams = eyes.lab.streams.keys().map(|(_, from, to)| (*from, *to));
         for (from, to) in streams.chain(by_event.iter().copied()) {
@@ -134,7 +134,7 @@ impl<'e, 'l, 'a> Shared<'e, 'l, 'a> {
     }
 }
 
-fn states_of(eyes: &Eyes<'_, '_>, node: NodeId) -> Vec<u32> {
+fn states_of(eyes: &NodeEvaluator<'_, '_>, node: NodeId) -> Vec<u32> {
     let graph = &eyes.lab.graph;
     let states = graph.schedule([node]).into_iter().filter_map(|n| match graph.op(n) {
         Op::State(s) => Some(s),
@@ -144,7 +144,7 @@ fn states_of(eyes: &Eyes<'_, '_>, node: NodeId) -> Vec<u32> {
 }
 
 /// Follows the steps of a plan in every order in which they can run; `times` is asked for only where the order matters.
-pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnOnce() -> Times<'t>) {
+pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &MixtureState, times: impl FnOnce() -> Times<'t>) {
     let plan = walk.plan;
     if !plan.steps.iter().any(|s| matches!(s.step, Step::Parallel(_) | Step::Start { .. })) {
         return;
@@ -181,7 +181,7 @@ pub(super) fn orders<'t>(walk: &mut Walk<'_, '_>, world: &World, times: impl FnO
         return;
     }
     let span = plan.get(plan.root).span;
-    let begin = World::clone(world);
+    let begin = MixtureState::clone(world);
     let eyes = walk.eyes;
     let number = |node: NodeId| eyes.value(node, &begin);
     let Some(lines) = lines(plan, &walk.library, walk.eyes.lab.tables.dangers(), &number, MOST_POINTS) else {
@@ -240,8 +240,8 @@ impl<'s, 'w, 'v, 'a> Search<'s, 'w, 'v, 'a> {
     }
 
     /// Visits every joint state; whether that came to an end.
-    fn run(&mut self, begin: World) -> bool {
-        let mut worlds: BTreeMap<State, World> = BTreeMap::new();
+    fn run(&mut self, begin: MixtureState) -> bool {
+        let mut worlds: BTreeMap<State, MixtureState> = BTreeMap::new();
         let mut due: BTreeSet<(usize, State)> = BTreeSet::new();
         let first = vec![self.lines.begin];
         due.insert((0, first.clone()));
@@ -286,7 +286,7 @@ impl<'s, 'w, 'v, 'a> Search<'s, 'w, 'v, 'a> {
     }
 
     /// Where a joint state leads, and what the vessels hold then.
-    fn successors(&mut self, state: &State, world: &World) -> Vec<(State, World)> {
+    fn successors(&mut self, state: &State, world: &MixtureState) -> Vec<(State, MixtureState)> {
         let lines = self.lines;
         // A line whose next steps concern no other one goes first, alone.
         let alone = state.iter().position(|p| {
@@ -384,7 +384,7 @@ impl<'s, 'w, 'v, 'a> Search<'s, 'w, 'v, 'a> {
     }
 
     /// What the vessels hold after a step; nothing where it cannot be done.
-    fn follow(&mut self, edge: &Edge, world: &World) -> Option<World> {
+    fn follow(&mut self, edge: &Edge, world: &MixtureState) -> Option<MixtureState> {
         let mut world = world.clone();
         let eyes = self.walk.eyes;
         match edge {

@@ -5,11 +5,11 @@ use std::rc::Rc;
 use matterix_ir::Span;
 use matterix_ir::scene::InstanceId;
 
-use super::world::{Came, Entry, World};
+use super::state::{Came, Entry, MixtureState};
 use crate::declare::SpeciesId;
 use crate::eval::lab::Elaborator;
 
-impl World {
+impl MixtureState {
     /// Adds what the reactions of the mixtures can make there, at most as much as their reactants allow.
     pub fn react(&mut self, lab: &Elaborator<'_>, m: InstanceId, step: Span) -> Vec<SpeciesId> {
         let mut made = Vec::new();

@@ -3,7 +3,7 @@
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, Severity, Span, codes};
 
-use super::world::{Before, Entry, World};
+use super::state::{Before, Entry, MixtureState};
 use super::{Coming, Pending, Walk};
 use crate::declare::SpeciesId;
 use crate::declare::compatibility::{Intended, Match, Party, Presence, intended};
@@ -29,7 +29,7 @@ impl Walk<'_, '_> {
     /// Judges a species that gets to others; `before` is what there was before the transfer that brings it.
     pub(super) fn meet(
         &mut self,
-        world: &World,
+        world: &MixtureState,
         m: InstanceId,
         s: SpeciesId,
         others: &[SpeciesId],
@@ -91,7 +91,7 @@ impl Walk<'_, '_> {
         }
     }
 
-    fn incompatible(&self, world: &World, meeting: &Meeting<'_>, found: &Match<'_>) -> Diagnostic {
+    fn incompatible(&self, world: &MixtureState, meeting: &Meeting<'_>, found: &Match<'_>) -> Diagnostic {
         let Meeting { m, a, b, certain, place } = *meeting;
         let (x, y) = (self.species(a.0), self.species(b.0));
         let vessel = self.vessel(m);
@@ -131,7 +131,7 @@ impl Walk<'_, '_> {
     }
 
     /// Judges what a species does to the wall around it.
-    pub(super) fn touch(&mut self, world: &World, m: InstanceId, s: SpeciesId, before: Option<&Before>) {
+    pub(super) fn touch(&mut self, world: &MixtureState, m: InstanceId, s: SpeciesId, before: Option<&Before>) {
         let Some(&material) = self.materials.get(&m) else { return };
         let tables = self.eyes.lab.tables;
         let Some(entry) = world.held(m).get(&s) else { return };

@@ -35,7 +35,7 @@ enum Side<'a> {
     /// These, whatever the name stands for; -1 is `nothing`.
     Targets(BTreeSet<i64>),
     /// Anything else.
-    Open,
+    FreeParameters,
 }
 
 impl<'a> Elaborator<'a> {
@@ -216,31 +216,31 @@ impl<'a> Elaborator<'a> {
             ExprKind::Name(name) => match place.scope.var(&name.text) {
                 Some(Value::Instance(i) | Value::Qualified(i, _)) => Side::Targets([i64::from(i.0)].into()),
                 Some(Value::Nothing) => Side::Targets([-1].into()),
-                Some(_) => Side::Open,
+                Some(_) => Side::FreeParameters,
                 None => match (name.text.as_str(), place.scope.this) {
                     ("nothing", _) => Side::Targets([-1].into()),
                     ("self", Some(this)) => Side::Targets([i64::from(this.0)].into()),
                     (member, Some(this)) => self.member_side(this, member),
-                    _ => Side::Open,
+                    _ => Side::FreeParameters,
                 },
             },
             ExprKind::Member(base, name) => match self.side(base, place) {
                 Side::Variable => Side::Member(&name.text),
                 Side::Targets(one) if one.len() == 1 => {
                     let of = one.first().and_then(|n| u32::try_from(*n).ok());
-                    of.map_or(Side::Open, |i| self.member_side(InstanceId(i), &name.text))
+                    of.map_or(Side::FreeParameters, |i| self.member_side(InstanceId(i), &name.text))
                 }
-                _ => Side::Open,
+                _ => Side::FreeParameters,
             },
-            _ => Side::Open,
+            _ => Side::FreeParameters,
         }
     }
 
     /// What a member of an instance may point at.
     fn member_side(&mut self, id: InstanceId, name: &str) -> Side<'a> {
         let members = self.members_of(id, name);
-        let [m] = *members else { return Side::Open };
-        self.points_at(id, m).map_or(Side::Open, Side::Targets)
+        let [m] = *members else { return Side::FreeParameters };
+        self.points_at(id, m).map_or(Side::FreeParameters, Side::Targets)
     }
 }
 

@@ -7,6 +7,7 @@ pub mod choices;
 pub mod coverings;
 pub mod extents;
 pub mod flows;
+pub mod free;
 pub mod geometry;
 pub mod given;
 pub mod grids;
@@ -17,7 +18,6 @@ pub mod lineage;
 pub mod links;
 pub mod mode;
 pub mod observed;
-pub mod open;
 pub mod origin;
 pub mod properties;
 pub mod reach;
@@ -208,7 +208,7 @@ pub struct Elaborator<'a> {
     /// Parameters of the model.
     pub params: Vec<model::Param>,
     /// What studies and fits may vary.
-    pub open: open::Open,
+    pub open: free::FreeParameters,
     /// States of the model.
     pub states: Vec<model::State>,
     /// What states that hold an instance may point at.
@@ -294,7 +294,7 @@ pub struct Elaborator<'a> {
     /// Constants being evaluated.
     pub open_consts: Vec<DeclId>,
     /// What names and expressions were found to mean, where that is asked for.
-    pub meanings: Option<Box<crate::meanings::Meanings>>,
+    pub meanings: Option<Box<crate::semantic_index::Meanings>>,
     /// Constants that were evaluated without a finding.
     pub known_consts: FxHashMap<DeclId, Value>,
 }
@@ -327,7 +327,7 @@ impl<'a> Elaborator<'a> {
             choices: Vec::new(),
             pairs: Vec::new(),
             params: Vec::new(),
-            open: open::Open::default(),
+            open: free::FreeParameters::default(),
             states: Vec::new(),
             targets: targets::Targets::default(),
             extensive: BTreeMap::new(),

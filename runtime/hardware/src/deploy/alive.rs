@@ -9,7 +9,7 @@ use matterix_runtime::fault::Fault;
 
 use super::device::Beat;
 use super::hardware::Hardware;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 
 impl Hardware<'_, '_> {
     /// Says what is due by now. What has begun to hold is said at once, what no longer holds is taken back if `over`.
@@ -131,7 +131,7 @@ impl Hardware<'_, '_> {
         said.map(|_| ()).map_err(|trouble| {
             let fault = self.trouble(device, &trouble, served.exchange.span);
             match trouble {
-                Trouble::Refused { failure, .. } => {
+                DeviceError::Refused { failure, .. } => {
                     Fault { message: format!("{}: `{failure}`", fault.message), ..fault }
                 }
                 _ => fault,

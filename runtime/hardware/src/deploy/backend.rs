@@ -14,7 +14,7 @@ use super::hardware::{Hardware, Running};
 use super::journal::{Entry, Gate, Turn};
 use super::preflight::carrier;
 use super::replay::Begun;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 
 /// How often devices are asked whether they are ready, and quantities without a period of their own are asked for, s.
 const POLL: f64 = 0.25;
@@ -299,7 +299,7 @@ impl Hardware<'_, '_> {
                             return Err(self.fault(codes::DEVICE_LOST, exchange.span, message));
                         }
                         Ok(false) => return Ok(self.polled_again()),
-                        Err(Trouble::Refused { failure, text }) => {
+                        Err(DeviceError::Refused { failure, text }) => {
                             let text = format!("`{}` has stopped: {text}", self.devices[device].name);
                             let failed = Some((failure.clone(), text.clone()));
                             self.keep(&Entry::Ended { t: now, ticket: ticket.0, failed })?;

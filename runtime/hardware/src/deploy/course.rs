@@ -20,7 +20,7 @@ use super::hardware::{Hardware, Mode, Settings, Unreached};
 use super::journal::{Entry, Journal, VERSION, digest};
 use super::preflight::preflight;
 use crate::binding;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 use crate::world::World;
 
 /// How a journal ends that was not gone on with.
@@ -330,15 +330,15 @@ pub fn of_fault(plan: &Plan, fault: Fault) -> Diagnostic {
 pub fn not_reached(unreached: &Unreached, goes_on: bool) -> Diagnostic {
     let Unreached { device, at, trouble } = unreached;
     let code = match trouble {
-        Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
-        Trouble::Garbled(_) => codes::DEVICE_GARBLED,
-        Trouble::Unsaid(_) => codes::UNSENDABLE,
-        Trouble::Refused { .. } => codes::DEVICE_REFUSED,
+        DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
+        DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
+        DeviceError::Unsaid(_) => codes::UNSENDABLE,
+        DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
     };
     let what = match trouble {
-        Trouble::Lost(_) | Trouble::Silent(_) => "cannot be reached",
-        Trouble::Unsaid(_) => "cannot be spoken to",
-        Trouble::Garbled(_) | Trouble::Refused { .. } => "is not what it is bound as",
+        DeviceError::Lost(_) | DeviceError::Silent(_) => "cannot be reached",
+        DeviceError::Unsaid(_) => "cannot be spoken to",
+        DeviceError::Garbled(_) | DeviceError::Refused { .. } => "is not what it is bound as",
     };
     let headline = format!("`{device}` {what}: {}", trouble.text());
     let d = Diagnostic::error(code, *at, headline, "bound here");

@@ -10,7 +10,7 @@ use matterix_ir::{Program, Span};
 use super::Trace;
 use super::journal::{Entry, Journal};
 use crate::codec::{Codec, shown};
-use crate::link::{Line, Overhear, SECURING, STOPPING};
+use crate::link::{Line, SECURING, STOPPING, WireTap};
 use crate::place::Place;
 
 /// What carries out what a device is told.
@@ -116,7 +116,7 @@ impl<'m> Device<'m> {
 }
 
 /// Writes down and shows what goes over a line.
-pub(super) struct Ear<'e, 't> {
+pub(super) struct Listening<'e, 't> {
     pub time: f64,
     pub device: &'e str,
     pub journal: &'e mut Journal,
@@ -127,7 +127,7 @@ pub(super) struct Ear<'e, 't> {
     pub unsaid: Option<Vec<Entry>>,
 }
 
-impl Ear<'_, '_> {
+impl Listening<'_, '_> {
     fn note(&mut self, entry: Entry) {
         match &mut self.unsaid {
             Some(unsaid) => unsaid.push(entry),
@@ -136,7 +136,7 @@ impl Ear<'_, '_> {
     }
 }
 
-impl Overhear for Ear<'_, '_> {
+impl WireTap for Listening<'_, '_> {
     fn out(&mut self, bytes: &[u8]) {
         (self.trace)(self.time, self.device, true, bytes);
         self.note(Entry::Out { t: self.time, device: self.device.to_owned(), bytes: shown(bytes) });

@@ -18,7 +18,7 @@ use super::device::Device;
 use super::exposed::Exposed;
 use super::journal::{Entry, Gate, Journal, sha256};
 use super::observe::Observed;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 use crate::shared::Shared;
 use crate::world::World;
 
@@ -59,7 +59,7 @@ pub struct Unreached {
     /// Where it is bound.
     pub at: Span,
     /// What is there instead.
-    pub trouble: Trouble,
+    pub trouble: DeviceError,
 }
 
 /// An operation that goes on.
@@ -271,14 +271,14 @@ impl<'m, 't> Hardware<'m, 't> {
     }
 
     /// A trouble as the fault of a device.
-    pub(super) fn trouble(&mut self, device: usize, trouble: &Trouble, span: Span) -> Fault {
+    pub(super) fn trouble(&mut self, device: usize, trouble: &DeviceError, span: Span) -> Fault {
         let code = match trouble {
-            Trouble::Lost(_) | Trouble::Silent(_) => codes::DEVICE_LOST,
-            Trouble::Garbled(_) => codes::DEVICE_GARBLED,
-            Trouble::Unsaid(_) => codes::UNSENDABLE,
-            Trouble::Refused { .. } => codes::DEVICE_REFUSED,
+            DeviceError::Lost(_) | DeviceError::Silent(_) => codes::DEVICE_LOST,
+            DeviceError::Garbled(_) => codes::DEVICE_GARBLED,
+            DeviceError::Unsaid(_) => codes::UNSENDABLE,
+            DeviceError::Refused { .. } => codes::DEVICE_REFUSED,
         };
-        if matches!(trouble, Trouble::Lost(_) | Trouble::Silent(_)) {
+        if matches!(trouble, DeviceError::Lost(_) | DeviceError::Silent(_)) {
             let line = self.line_of(device);
             self.devices[line].lost = Some(trouble.text().to_owned());
             self.losing = Some(self.devices[line].name.to_owned());

@@ -9,7 +9,7 @@ use matterix_runtime::fault::Fault;
 use super::hardware::{Hardware, Mode};
 use super::journal::{Entry, VERSION};
 use super::preflight::asked_for;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 
 /// So much may the clock of the machine have been set back, s, before nobody knows how long devices were alone.
 const SET_BACK: f64 = 1.0;
@@ -158,7 +158,7 @@ impl Hardware<'_, '_> {
                 let value = match self.tell(device, line) {
                     Err(fault) if fault.code == codes::DEVICE_LOST => {
                         let why = self.devices[self.line_of(device)].lost.clone();
-                        let trouble = Trouble::Lost(why.unwrap_or_else(|| fault.message.clone()));
+                        let trouble = DeviceError::Lost(why.unwrap_or_else(|| fault.message.clone()));
                         self.unreached = Some(self.not_reached(device, trouble));
                         return Err(fault);
                     }

@@ -11,7 +11,7 @@ use matterix_runtime::backend::Backend;
 use super::device::Carrier;
 use super::hardware::{Hardware, Mode, Running};
 use super::journal::Entry;
-use crate::link::Trouble;
+use crate::link::DeviceError;
 use crate::place::Place;
 
 /// Longest time until a device that took what makes it safe says that it is.
@@ -175,11 +175,11 @@ impl Hardware<'_, '_> {
         }
         self.relink(line);
         let mut done = self.say_safe(index, driver);
-        if let Err(Trouble::Lost(_) | Trouble::Silent(_) | Trouble::Garbled(_)) = done
+        if let Err(DeviceError::Lost(_) | DeviceError::Silent(_) | DeviceError::Garbled(_)) = done
             && self.devices[line].lost.is_none()
         {
             // What was said may not have come through, and a line that was lost may be there again.
-            if !matches!(done, Err(Trouble::Garbled(_))) {
+            if !matches!(done, Err(DeviceError::Garbled(_))) {
                 let link = self.devices[line].link.take();
                 self.devices[line].owed += link.map_or(0, |link| link.owed());
                 self.relink(line);
@@ -221,7 +221,7 @@ impl Hardware<'_, '_> {
     }
 
     /// Says what makes a device safe; whether there was something to say to it.
-    fn say_safe(&mut self, index: usize, driver: &Driver) -> Result<bool, Trouble> {
+    fn say_safe(&mut self, index: usize, driver: &Driver) -> Result<bool, DeviceError> {
         let line = self.line_of(index);
         let (mut said, mut heard) = (false, false);
         for exchange in &driver.safe {
@@ -256,23 +256,23 @@ impl Hardware<'_, '_> {
     }
 
     /// Messages with the values that they have now.
-    fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, Trouble> {
-        self.texts(sends).map_err(|fault| Trouble::Unsaid(fault.message))
+    fn sayable(&mut self, sends: &[Template]) -> Result<Vec<String>, DeviceError> {
+        self.texts(sends).map_err(|fault| DeviceError::Unsaid(fault.message))
     }
 
     /// With `until` it counts what the device tells in the end, not whether it took the command: a run that a person has stopped
     /// refuses to be stopped.
-    fn say_one(&mut self, index: usize, exchange: &Exchange, texts: &[String]) -> Result<(), Trouble> {
+    fn say_one(&mut self, index: usize, exchange: &Exchange, texts: &[String]) -> Result<(), DeviceError> {
         let said = self.try_say(index, texts, exchange.expects.as_ref());
         let Some(until) = exchange.until.as_ref().filter(|_| self.speaks()) else { return said.map(|_| ()) };
         match said {
             Ok(_) => self.wait_for(index, until),
-            Err(refused @ Trouble::Refused { .. }) => self.wait_for(index, until).map_err(|_| refused),
+            Err(refused @ DeviceError::Refused { .. }) => self.wait_for(index, until).map_err(|_| refused),
             Err(other) => Err(other),
         }
     }
 
-    fn wait_for(&mut self, index: usize, until: &Until) -> Result<(), Trouble> {
+    fn wait_for(&mut self, index: usize, until: &Until) -> Result<(), DeviceError> {
         let text = self.sayable(std::slice::from_ref(&until.asks))?.concat();
         let timeout = Duration::try_from_secs_f64(self.twin.engine().eval(until.timeout)).unwrap_or(SECURED);
         let begun = self.settings.world.elapsed();
@@ -284,14 +284,14 @@ impl Hardware<'_, '_> {
             let passed = self.settings.world.elapsed().saturating_sub(begun);
             if passed >= timeout.min(SECURED) {
                 let seconds = timeout.min(SECURED).as_secs_f64();
-                return Err(Trouble::Silent(format!("it did not tell within {seconds} s that it was safe")));
+                return Err(DeviceError::Silent(format!("it did not tell within {seconds} s that it was safe")));
             }
             self.settings.world.sleep(POLL);
         }
     }
 
     /// Nothing answered what makes the device safe: it is asked for anything that it tells, to know that it hears.
-    fn prove(&mut self, index: usize, driver: &Driver) -> Result<(), Trouble> {
+    fn prove(&mut self, index: usize, driver: &Driver) -> Result<(), DeviceError> {
         if driver.framing == Framing::Calls
             || self.devices[index].codec.as_ref().is_some_and(|codec| codec.acknowledges())
         {
@@ -303,7 +303,7 @@ impl Hardware<'_, '_> {
         });
         let Some(told) = applies else {
             let why = "nothing that it answers says that it heard what makes it safe".to_owned();
-            return Err(Trouble::Silent(why));
+            return Err(DeviceError::Silent(why));
         };
         let text = self.sayable(std::slice::from_ref(&told.asks))?.concat();
         let line = driver.told.iter().position(|t| std::ptr::eq(t, told)).unwrap_or_default();
@@ -312,7 +312,7 @@ impl Hardware<'_, '_> {
             None => link.ask(&text, told, driver, ear),
         });
         match asked {
-            Ok(_) | Err(Trouble::Refused { .. }) => Ok(()),
+            Ok(_) | Err(DeviceError::Refused { .. }) => Ok(()),
             Err(other) => Err(other),
         }
     }

@@ -8,7 +8,7 @@ use matterix_runtime::fault::Fault;
 use super::device::Carrier;
 use super::hardware::{Hardware, Mode, Unreached};
 use super::journal::Entry;
-use crate::link::{self, Line, Trouble};
+use crate::link::{self, DeviceError, Line};
 use crate::place::Place;
 
 /// Rounding, in units of the last digit that a device tells.
@@ -29,7 +29,7 @@ impl Hardware<'_, '_> {
         unreached
     }
 
-    pub(super) fn not_reached(&self, index: usize, trouble: Trouble) -> Unreached {
+    pub(super) fn not_reached(&self, index: usize, trouble: DeviceError) -> Unreached {
         let device = &self.devices[index];
         Unreached { device: device.name.to_owned(), at: device.binding.at, trouble }
     }
@@ -76,7 +76,7 @@ impl Hardware<'_, '_> {
         driver: &Driver,
         place: &Place,
         address: Option<&str>,
-    ) -> Result<Box<dyn Line>, Trouble> {
+    ) -> Result<Box<dyn Line>, DeviceError> {
         let mut link = link::open(&self.settings.world, place, driver, address)?;
         for (_, device, word, text) in self.kept.iter().filter(|(line, ..)| *line == index) {
             link.keep(*device, word.clone(), text.clone());

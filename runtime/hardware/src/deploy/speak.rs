@@ -8,10 +8,10 @@ use matterix_ir::{Span, codes, message};
 use matterix_runtime::backend::{Backend, Ticket};
 use matterix_runtime::fault::Fault;
 
-use super::device::Ear;
+use super::device::Listening;
 use super::hardware::{Hardware, Mode};
 use super::journal::Entry;
-use crate::link::{Line, Overhear, Trouble};
+use crate::link::{DeviceError, Line, WireTap};
 use crate::template;
 
 /// A question is put at most so often in a row.
@@ -48,7 +48,7 @@ impl<'m> Hardware<'m, '_> {
         index: usize,
         texts: &[String],
         expects: Option<&Pattern>,
-    ) -> Result<Vec<f64>, Trouble> {
+    ) -> Result<Vec<f64>, DeviceError> {
         let time = self.twin.now();
         let is_dry = self.is_dry();
         if self.devices[index].driver.is_none() || self.settings.mode == Mode::Replay {
@@ -56,11 +56,12 @@ impl<'m> Hardware<'m, '_> {
         }
         self.renew(self.line_of(index));
         if let Some(why) = &self.devices[self.line_of(index)].lost {
-            return Err(Trouble::Lost(format!("nothing more can be said to it: {why}")));
+            return Err(DeviceError::Lost(format!("nothing more can be said to it: {why}")));
         }
         let device = &mut self.devices[index];
         if is_dry {
-            let frames = device.codec.as_mut().map(|codec| codec.say(texts)).transpose().map_err(Trouble::Unsaid)?;
+            let frames =
+                device.codec.as_mut().map(|codec| codec.say(texts)).transpose().map_err(DeviceError::Unsaid)?;
             for frame in frames.into_iter().flatten() {
                 (self.trace)(time, device.name, true, &frame);
             }
@@ -80,8 +81,8 @@ impl<'m> Hardware<'m, '_> {
     pub(super) fn over<T>(
         &mut self,
         index: usize,
-        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
-    ) -> Result<T, Trouble> {
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn WireTap) -> Result<T, DeviceError>,
+    ) -> Result<T, DeviceError> {
         self.over_line(index, None, act)
     }
 
@@ -90,8 +91,8 @@ impl<'m> Hardware<'m, '_> {
     pub(super) fn inquire<T>(
         &mut self,
         index: usize,
-        act: impl FnMut(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
-    ) -> Result<T, Trouble> {
+        act: impl FnMut(&mut dyn Line, &Driver, &mut dyn WireTap) -> Result<T, DeviceError>,
+    ) -> Result<T, DeviceError> {
         self.again(index, true, act)
     }
 
@@ -101,7 +102,7 @@ impl<'m> Hardware<'m, '_> {
         index: usize,
         texts: &[String],
         expects: Option<&Pattern>,
-    ) -> Result<Vec<f64>, Trouble> {
+    ) -> Result<Vec<f64>, DeviceError> {
         let is_open = self.devices[self.line_of(index)].lost.is_none();
         let Some(driver) = self.devices[index].driver.filter(|_| is_open && self.speaks()) else {
             return self.try_say(index, texts, expects);
@@ -114,16 +115,16 @@ impl<'m> Hardware<'m, '_> {
         &mut self,
         index: usize,
         only_asks: bool,
-        mut act: impl FnMut(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
-    ) -> Result<T, Trouble> {
+        mut act: impl FnMut(&mut dyn Line, &Driver, &mut dyn WireTap) -> Result<T, DeviceError>,
+    ) -> Result<T, DeviceError> {
         let begun = self.settings.world.elapsed();
         let mut asked = 1;
         loop {
             let done = self.over_line(index, only_asks.then(Vec::new), &mut act);
             let trouble = match done {
-                Err(trouble @ (Trouble::Silent(_) | Trouble::Garbled(_))) => trouble,
-                Err(Trouble::Refused { failure, text }) if only_asks && failure == BUSY => {
-                    Trouble::Refused { failure, text }
+                Err(trouble @ (DeviceError::Silent(_) | DeviceError::Garbled(_))) => trouble,
+                Err(DeviceError::Refused { failure, text }) if only_asks && failure == BUSY => {
+                    DeviceError::Refused { failure, text }
                 }
                 other => return other,
             };
@@ -148,16 +149,16 @@ impl<'m> Hardware<'m, '_> {
         &mut self,
         index: usize,
         unsaid: Option<Vec<Entry>>,
-        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn Overhear) -> Result<T, Trouble>,
-    ) -> Result<T, Trouble> {
+        act: impl FnOnce(&mut dyn Line, &Driver, &mut dyn WireTap) -> Result<T, DeviceError>,
+    ) -> Result<T, DeviceError> {
         let (time, line) = (self.twin.now(), self.line_of(index));
         let (device, driver) = (self.devices[index].name, self.devices[index].driver);
         let (Some(link), Some(driver)) = (self.devices[line].link.as_deref_mut(), driver) else {
-            return Err(Trouble::Lost("its line is not open".to_owned()));
+            return Err(DeviceError::Lost("its line is not open".to_owned()));
         };
         let (cancel, securing) = (self.settings.control.cancel(), self.securing);
         let (journal, trace) = (&mut self.journal, &mut *self.trace);
-        let mut ear = Ear { time, device, journal, trace, cancel, securing, unsaid };
+        let mut ear = Listening { time, device, journal, trace, cancel, securing, unsaid };
         let done = act(link, driver, &mut ear);
         let unsaid = ear.unsaid.take().filter(|_| done.is_err());
         unsaid.iter().flatten().for_each(|entry| self.journal.note(entry));
@@ -229,7 +230,7 @@ impl<'m> Hardware<'m, '_> {
                 self.keep(&Entry::Started { t, ticket })?;
                 Ok(None)
             }
-            Err(Trouble::Refused { failure, text }) => {
+            Err(DeviceError::Refused { failure, text }) => {
                 let text = format!("`{}` refuses `{}`: {text}", self.devices[device].name, operation.verb);
                 self.keep(&Entry::Ended { t, ticket, failed: Some((failure.clone(), text.clone())) })?;
                 Ok(Some((failure, text)))

@@ -8,10 +8,10 @@ use matterix_ir::{Diagnostic, Program, Span};
 
 use super::beside::Moved;
 use super::course::{Cause, Course, Refusal};
+use super::diagnostics;
 use super::memory::{Memory, Outcome};
 use super::more::More;
 use super::offer::Missed;
-use super::told;
 use crate::motion::refused::Refused;
 use crate::motion::stage::Stage;
 
@@ -99,7 +99,7 @@ impl<'p, 's> Looker<'p, 's> {
                     }
                     _ => !adrift && beside.is_empty(),
                 };
-                let finding = told::finding(&course.stage, motion, &values, &why, &more, site).filter(|_| sure);
+                let finding = diagnostics::finding(&course.stage, motion, &values, &why, &more, site).filter(|_| sure);
                 let cause = cause(&course.stage, motion, &why);
                 course.drifts(robot);
                 let goal = motion.goal().filter(|_| !more.targets.is_empty()).map(|(goal, _)| goal);
@@ -189,7 +189,7 @@ impl<'p, 's> Looker<'p, 's> {
     }
 
     fn refuse(&self, course: &mut Course<'p>, motion: &Motion, why: &Refused, site: Span, unsure: bool) {
-        let finding = told::finding(&course.stage, motion, &[], why, &More::default(), site).filter(|_| !unsure);
+        let finding = diagnostics::finding(&course.stage, motion, &[], why, &More::default(), site).filter(|_| !unsure);
         let (failure, cause) = (why.failure(), cause(&course.stage, motion, why));
         course.lost = finding.map(|finding| Box::new(Refusal { failure, finding, cause, missed: None }));
     }

@@ -2,13 +2,13 @@
 
 pub(super) mod beside;
 mod course;
+mod diagnostics;
 mod look;
 mod memory;
 mod more;
 mod offer;
 pub mod seal;
 mod starts;
-mod told;
 pub(super) mod values;
 mod verdicts;
 mod walk;

@@ -21,12 +21,12 @@ struct Kept {
 
 /// What a program is known by; its plan, which is half of it, is looked at by another thread.
 fn key(program: &Program) -> Option<String> {
-    let Program { version, files, scene, model, plan, stock, drivers, offers } = program;
+    let Program { version, files, scene, model, plan, inventory, drivers, offers } = program;
     let sum = |bytes: postcard::Result<Vec<u8>>| bytes.ok().map(|bytes| seal::sum(&bytes));
     let of_plan = || sum(postcard::to_allocvec(plan));
     let (plan, rest) = std::thread::scope(|scope| {
         let aside = std::thread::Builder::new().spawn_scoped(scope, of_plan);
-        let rest = sum(postcard::to_allocvec(&(version, files, scene, model, stock, drivers, offers)));
+        let rest = sum(postcard::to_allocvec(&(version, files, scene, model, inventory, drivers, offers)));
         // Where there is no thread to be had, this one does the work.
         (aside.ok().and_then(|aside| aside.join().ok()).unwrap_or_else(of_plan), rest)
     });

@@ -9,11 +9,11 @@ use matterix_ir::{Diagnostic, NodeId, Program, Severity, Span, codes};
 
 use super::beside::{Job, Moved};
 use super::course::{Cause, Course, Refusal};
+use super::diagnostics;
 use super::look::{Looker, on_step};
 use super::memory::Memory;
 use super::offer::{self, Missed};
 use super::starts::Starts;
-use super::told;
 use super::values::Values;
 use crate::motion::carried::Carried;
 use crate::motion::refused::Refused;
@@ -321,7 +321,7 @@ impl<'p> Walk<'p, '_> {
             && (self.beside.is_empty() || stays(&course.stage, meeting.with))
         {
             let site = self.sites.last().copied().unwrap_or(span);
-            let finding = on_step(told::swing(&course.stage, id, &meeting, site), span);
+            let finding = on_step(diagnostics::swing(&course.stage, id, &meeting, site), span);
             course.lost =
                 Some(Box::new(Refusal { failure: "collision", finding, cause: Cause::default(), missed: None }));
             // Where it has been pushed to nobody knows.

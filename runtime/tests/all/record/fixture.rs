@@ -304,7 +304,7 @@ pub(super) fn lab() -> Lab {
         scene: scene(),
         model,
         plan,
-        stock: Default::default(),
+        inventory: Default::default(),
         drivers: Vec::new(),
         offers: Default::default(),
     };

@@ -8,9 +8,9 @@ use matterix_ir::model::Action;
 use matterix_ir::plan::{Step, StepId};
 use matterix_ir::{Diagnostic, Severity};
 
-use super::super::Flow;
-use super::super::facts::Facts;
-use super::super::value::{Known, Why};
+use super::super::Interpreter;
+use super::super::state::AbstractState;
+use super::super::value::{AbstractValue, Imprecision};
 use super::Lines;
 use crate::elaborate::hazards::{Hazard, Watched};
 
@@ -21,7 +21,7 @@ pub(in crate::check::flow) struct Dangers<'l> {
     pub(super) present: BTreeSet<usize>,
 }
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// The hazards on which steps side by side work from both sides, and which some of what they set may bring about.
     pub(super) fn dangers_between(
         &mut self,
@@ -52,7 +52,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// What is known at any time: states are as at the start, or as some step sets them.
-    fn with_all_set(&mut self) -> Facts {
+    fn with_all_set(&mut self) -> AbstractState {
         let plan = self.plan;
         let begun = self.start();
         let mut values: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
@@ -70,14 +70,14 @@ impl<'l> Flow<'l, '_> {
         changed.extend(self.derivatives.iter().map(|d| d.state));
         changed.extend(self.events.iter().flat_map(|event| self.changed_by(&event.actions)));
         let mut facts = begun.clone();
-        facts.time = Known::nothing();
+        facts.time = AbstractValue::top();
         for state in changed {
             facts.states[state as usize] = match (values.remove(&state), begun.states[state as usize].exact()) {
                 (Some(mut all), Some(first)) if written.contains(&state) => {
                     all.push(first);
-                    Known::of(all, Why::Unknown)
+                    AbstractValue::of(all, Imprecision::Unknown)
                 }
-                _ => Known::nothing(),
+                _ => AbstractValue::top(),
             };
         }
         facts
@@ -95,7 +95,7 @@ impl<'l> Flow<'l, '_> {
         }
     }
 
-    fn danger(&mut self, hazard: &Hazard, facts: &Facts) -> Diagnostic {
+    fn danger(&mut self, hazard: &Hazard, facts: &AbstractState) -> Diagnostic {
         let is_so = |said: &&matterix_ir::plan::Said| self.eval(said.node, facts).truth() == Some(true);
         let said = hazard.said.iter().find(is_so);
         let lab = self.lab;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use matterix_ir::Span;
 
-use super::super::Flow;
-use super::super::facts::Facts;
-use super::super::parted::Place;
+use super::super::Interpreter;
 use super::super::report::Finding;
+use super::super::state::AbstractState;
+use super::super::trace_partitioning::Place;
 
 /// How conditions come out in the order of time, by the statement that asks for them and their own place.
 #[derive(Debug, Default)]
@@ -35,7 +35,7 @@ impl Judged {
     }
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Notes how a condition comes out at the statement that is followed now.
     pub(in crate::check::flow) fn judge(&mut self, about: Span, truth: Option<bool>) {
         if self.judged.0.is_empty() {
@@ -49,7 +49,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes how limits come out after time has passed.
-    pub(super) fn judge_limits(&mut self, facts: &Facts) {
+    pub(super) fn judge_limits(&mut self, facts: &AbstractState) {
         if self.judged.0.is_empty() {
             return;
         }

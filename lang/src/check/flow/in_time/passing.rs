@@ -3,17 +3,17 @@
 use matterix_ir::plan::Condition;
 use matterix_ir::{Diagnostic, NodeId, codes};
 
-use super::super::Flow;
+use super::super::Interpreter;
 use super::super::course::Course;
 use super::super::even::Even;
-use super::super::facts::Facts;
-use super::super::value::Known;
+use super::super::state::AbstractState;
+use super::super::value::AbstractValue;
 use super::{Frame, Line, Lines, ROUNDING, State, same, takes};
 
 /// Moments in a row at which no line goes on, before the rest is left to the run.
 const MOST_IDLE: usize = 1000;
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// Time passes until the next line goes on.
     pub(super) fn until_next(&mut self, lines: &mut Lines<'l>) {
         lines.idle += 1;
@@ -101,7 +101,7 @@ impl<'l> Flow<'l, '_> {
             }
             Course::Passed => Some(next),
             Course::Left(left) if left.is_finite() => {
-                self.drift(&Known::Point(left), &mut lines.facts);
+                self.drift(&AbstractValue::Point(left), &mut lines.facts);
                 Some(next)
             }
             Course::Left(_) => None,
@@ -113,7 +113,7 @@ impl<'l> Flow<'l, '_> {
         let end = end?;
         lines.over |= std::mem::take(&mut self.stopped);
         self.limits_broken(next - now, &before, lines);
-        lines.facts.time = Known::Point(end);
+        lines.facts.time = AbstractValue::Point(end);
         self.judge_limits(&lines.facts);
         self.keeps_broken(&reached, lines);
         self.forget_lost(lines);
@@ -123,7 +123,7 @@ impl<'l> Flow<'l, '_> {
 
     /// What comes about at this moment, give or take rounding. What moves stays where it is now: who asks whether it equals what is
     /// waited for finds that open.
-    fn about_to_come(&mut self, now: f64, watched: &[(NodeId, bool)], facts: &Facts) -> Vec<NodeId> {
+    fn about_to_come(&mut self, now: f64, watched: &[(NodeId, bool)], facts: &AbstractState) -> Vec<NodeId> {
         match self.course(ROUNDING * now.max(1.0), watched, &mut facts.clone()) {
             Course::Reached(nodes) => nodes,
             _ => Vec::new(),
@@ -131,7 +131,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Reports the limits that flows have passed, at the step of a line in hand that has set them going, or else where that line waits.
-    fn limits_broken(&mut self, longest: f64, before: &Facts, lines: &mut Lines<'l>) {
+    fn limits_broken(&mut self, longest: f64, before: &AbstractState, lines: &mut Lines<'l>) {
         let tracks = self.tracks();
         let moved = tracks.list.iter().map(|t| t.state);
         let moved = moved.filter(|s| before.states[*s as usize] != lines.facts.states[*s as usize]);
@@ -151,7 +151,7 @@ impl<'l> Flow<'l, '_> {
             std::mem::swap(&mut self.sites, &mut lines.all[at].sites);
             std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
             let found = self.findings.len();
-            self.pass(&Known::Point(longest), &mut before.clone());
+            self.pass(&AbstractValue::Point(longest), &mut before.clone());
             lines.over |= std::mem::take(&mut self.stopped) || self.findings.len() > found;
             std::mem::swap(&mut self.sites, &mut lines.all[at].sites);
             std::mem::swap(&mut self.caught, &mut lines.all[at].caught);
@@ -221,7 +221,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Whether laws may change how a condition comes out while nothing is done.
-    fn moves_by_itself(&mut self, condition: &Condition, facts: &Facts) -> bool {
+    fn moves_by_itself(&mut self, condition: &Condition, facts: &AbstractState) -> bool {
         let parts = self.parts(condition.node);
         if parts.timed || !self.timed.is_empty() {
             return true;
@@ -232,7 +232,7 @@ impl<'l> Flow<'l, '_> {
     }
 
     /// Whether what a condition rests on is known at every moment from now on, as long as nothing is done.
-    fn is_followed(&mut self, condition: &Condition, facts: &Facts) -> bool {
+    fn is_followed(&mut self, condition: &Condition, facts: &AbstractState) -> bool {
         let parts = self.parts(condition.node);
         if parts.states.iter().any(|s| facts.states[*s as usize].exact().is_none()) {
             return false;

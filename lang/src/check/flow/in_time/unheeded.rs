@@ -7,12 +7,12 @@ use matterix_ir::NodeId;
 use matterix_ir::model::Action;
 use matterix_ir::plan::{Operation, Step};
 
-use super::super::Flow;
-use super::super::facts::Facts;
-use super::super::value::Known;
+use super::super::Interpreter;
+use super::super::state::AbstractState;
+use super::super::value::AbstractValue;
 use crate::elaborate::hazards::Hazard;
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// States of whose motion bounds alone are known, and what hangs on them; none where a step, a limit or one of these hazards asks
     /// for any.
     pub(super) fn unheeded(&mut self, dangers: &[&Hazard]) -> BTreeSet<u32> {
@@ -56,7 +56,7 @@ impl Flow<'_, '_> {
     }
 
     /// Whether nothing moves that anything asks for: nothing is known of it from then on.
-    pub(in crate::check::flow) fn pass_unheeded(&mut self, facts: &mut Facts) -> bool {
+    pub(in crate::check::flow) fn pass_unheeded(&mut self, facts: &mut AbstractState) -> bool {
         let moves = |i: &u32| self.unheeded.contains(&self.derivatives[*i as usize].state);
         if self.unheeded.is_empty() || !facts.moving.iter().chain(&facts.unsettled).all(moves) {
             return false;
@@ -64,7 +64,7 @@ impl Flow<'_, '_> {
         let unsettled = std::mem::take(&mut facts.unsettled);
         facts.moving.extend(unsettled);
         for state in &self.unheeded {
-            facts.states[*state as usize] = Known::nothing();
+            facts.states[*state as usize] = AbstractValue::top();
         }
         true
     }

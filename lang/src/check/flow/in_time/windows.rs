@@ -7,11 +7,11 @@ use matterix_ir::quantity::show_duration;
 use matterix_ir::scene::InstanceId;
 use matterix_ir::{Diagnostic, NodeId, codes};
 
-use super::super::Flow;
+use super::super::Interpreter;
 use super::super::report::Finding;
 use super::{Lines, same, takes};
 
-impl<'l> Flow<'l, '_> {
+impl<'l> Interpreter<'l, '_> {
     /// Whether some of these steps may wait for a claim while a window of theirs runs.
     pub(super) fn has_windows_behind_claims(&self, pairs: &[(StepId, Vec<StepId>)]) -> bool {
         if !self.plan.steps.iter().any(|s| matches!(s.step, Step::Within { .. })) {

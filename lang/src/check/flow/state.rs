@@ -8,8 +8,8 @@ use matterix_ir::{NodeId, Span};
 
 use super::bonds::Bonds;
 use super::cases::Cases;
-use super::evolve::Barrier;
-use super::value::{Known, Why};
+use super::evolve::InvariantBox;
+use super::value::{AbstractValue, Imprecision};
 
 /// One change on the way to a point of the plan.
 #[derive(Debug)]
@@ -17,7 +17,7 @@ pub struct Event {
     /// The statement that made it.
     pub span: Span,
     /// The states it changed, with what they were before.
-    pub before: Vec<(u32, Known)>,
+    pub before: Vec<(u32, AbstractValue)>,
     /// What happened earlier.
     pub earlier: History,
 }
@@ -40,13 +40,13 @@ pub struct Decided {
 
 /// What is known at one point of the plan.
 #[derive(Clone, Debug)]
-pub struct Facts {
+pub struct AbstractState {
     /// By state index, SI.
-    pub states: Pages<Known>,
+    pub states: Pages<AbstractValue>,
     /// By local index, SI.
-    pub locals: Vec<Known>,
+    pub locals: Vec<AbstractValue>,
     /// Seconds since the run began.
-    pub time: Known,
+    pub time: AbstractValue,
     /// How it came to be.
     pub history: History,
     /// Derivatives that may have changed since time last passed, by index.
@@ -56,7 +56,7 @@ pub struct Facts {
     /// Derivatives that are not known to be zero, by index.
     pub moving: BTreeSet<u32>,
     /// Bounds of what moves for all time to come, while nothing else changes.
-    pub barrier: Option<Rc<Barrier>>,
+    pub barrier: Option<Rc<InvariantBox>>,
     /// How states hang together that laws change.
     pub bonds: Option<Rc<Bonds>>,
     /// Which values states have together, where few ways lead here.
@@ -77,10 +77,10 @@ pub struct Facts {
     pub begun: BTreeMap<String, bool>,
 }
 
-impl Facts {
+impl AbstractState {
     /// These values at this time, s, and nothing else that is known.
-    pub fn new(states: Pages<Known>, locals: Vec<Known>, time: Known) -> Self {
-        Facts {
+    pub fn new(states: Pages<AbstractValue>, locals: Vec<AbstractValue>, time: AbstractValue) -> Self {
+        AbstractState {
             states,
             locals,
             time,
@@ -102,7 +102,7 @@ impl Facts {
     }
 
     /// Sets states, noting what they were.
-    pub fn write(&mut self, span: Span, changes: Vec<(u32, Known)>) {
+    pub fn write(&mut self, span: Span, changes: Vec<(u32, AbstractValue)>) {
         self.untell(changes.iter().map(|(state, _)| *state));
         let mut before = Vec::with_capacity(changes.len());
         for (state, value) in changes {
@@ -136,13 +136,13 @@ impl Facts {
     }
 
     /// Keeps a value; conditions that depend on the one before are open again.
-    pub fn keep(&mut self, local: u32, value: Known) {
+    pub fn keep(&mut self, local: u32, value: AbstractValue) {
         self.locals[local as usize] = value;
         self.decided.retain(|d| !d.locals.contains(&local));
     }
 
     /// Changes how states hang together; nothing is done where none do.
-    pub fn rebind(&mut self, how: impl FnOnce(&mut Bonds, &Facts)) {
+    pub fn rebind(&mut self, how: impl FnOnce(&mut Bonds, &AbstractState)) {
         let Some(mut bonds) = self.bonds.take() else { return };
         how(Rc::make_mut(&mut bonds), self);
         self.bonds = Some(bonds).filter(|bonds| !bonds.is_empty());
@@ -154,7 +154,7 @@ impl Facts {
     }
 
     /// Sets what is known of a state where how it hangs together with others stays.
-    pub fn set(&mut self, state: u32, known: Known) {
+    pub fn set(&mut self, state: u32, known: AbstractValue) {
         if self.hangs(state) {
             let now = known.clone();
             self.rebind(|bonds, _| {
@@ -167,7 +167,7 @@ impl Facts {
     }
 
     /// More is known of a state, which has not changed.
-    pub fn narrow(&mut self, state: u32, known: Known) {
+    pub fn narrow(&mut self, state: u32, known: AbstractValue) {
         let before = std::mem::replace(&mut self.states[state as usize], known.clone());
         let hangs = |bonds: &Rc<Bonds>| bonds.states.get(&state).is_some_and(|bond| bond.known.is(&before));
         if self.bonds.as_ref().is_some_and(hangs) {
@@ -179,7 +179,7 @@ impl Facts {
     pub fn forget(&mut self, states: &[u32]) {
         self.rebind(|bonds, _| bonds.release(states));
         for state in states {
-            self.states[*state as usize] = Known::nothing();
+            self.states[*state as usize] = AbstractValue::top();
         }
     }
 
@@ -189,15 +189,15 @@ impl Facts {
     }
 
     /// What is known whichever of two ways was taken from `self`; `span` is the statement that parts them.
-    pub fn join(&self, a: Facts, b: &Facts, span: Span, why: Why) -> Facts {
+    pub fn join(&self, a: AbstractState, b: &AbstractState, span: Span, why: Imprecision) -> AbstractState {
         let mut out = self.clone();
-        let why = if a.unsure || b.unsure { Why::Unknown } else { why };
+        let why = if a.unsure || b.unsure { Imprecision::Unknown } else { why };
         out.unsure = a.unsure && b.unsure;
         out.blurred = match (&a.blurred, &b.blurred) {
             (Some(one), Some(other)) if !Rc::ptr_eq(one, other) => Some(Rc::new(one.union(other).copied().collect())),
             (one, other) => one.clone().or_else(|| other.clone()),
         };
-        let mut changes: Vec<(Span, Vec<(u32, Known)>)> = Vec::new();
+        let mut changes: Vec<(Span, Vec<(u32, AbstractValue)>)> = Vec::new();
         let mut open: Vec<u32> = Vec::new();
         for (i, (x, y)) in a.states.iter().zip(b.states.iter()).enumerate() {
             let both = x.join(y, why);
@@ -221,7 +221,7 @@ impl Facts {
         }
         out.cases = Cases::join(&a, b, &open, &mut out, why);
         out.locals = a.locals.iter().zip(&b.locals).map(|(x, y)| x.join(y, why)).collect();
-        out.time = a.time.join(&b.time, Why::Unknown);
+        out.time = a.time.join(&b.time, Imprecision::Unknown);
         out.unsettled.extend(a.unsettled.iter().chain(&b.unsettled));
         out.unkept.extend(a.unkept.iter().chain(&b.unkept));
         out.moving.extend(a.moving.iter().chain(&b.moving));

@@ -30,7 +30,7 @@ impl fmt::Display for Unreadable {
 impl std::error::Error for Unreadable {}
 
 /// What moves and what stands around.
-pub(crate) struct Film {
+pub(crate) struct Trajectory {
     pub(crate) things: Vec<Thing>,
     pub(crate) robots: Vec<Robot>,
     /// What has a place of its own when the run begins.
@@ -83,8 +83,8 @@ pub(crate) struct Grip {
     pub(crate) items: Vec<(usize, Isometry)>,
 }
 
-impl Film {
-    pub(crate) fn read(file: &[u8]) -> Result<Film, Unreadable> {
+impl Trajectory {
+    pub(crate) fn read(file: &[u8]) -> Result<Trajectory, Unreadable> {
         let recording = matterix_recording::read(file).map_err(|damaged| Unreadable(damaged.0))?;
         let (ways, points) = frames(&recording);
         let told = topic(&recording, "/bodies").and_then(|t| t.messages.first());
@@ -120,7 +120,7 @@ impl Film {
             is_tree(&machine)?;
             robots.push(robot(machine, &recording, &ways, &things)?);
         }
-        Ok(Film { things, robots, standing: bodies.standing })
+        Ok(Trajectory { things, robots, standing: bodies.standing })
     }
 }
 

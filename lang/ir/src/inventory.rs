@@ -7,7 +7,7 @@ use crate::{NodeId, Span, Unit};
 
 /// Everything that was brought in before the run, and how to count what becomes of it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Stock {
+pub struct Inventory {
     /// What the mixtures held, line by line of the file.
     pub holdings: Vec<Holding>,
     /// Recipes of the solutions among them and of the solutions those are made of.
@@ -33,7 +33,7 @@ pub struct MeasuredOut {
     pub mass: f64,
 }
 
-impl Stock {
+impl Inventory {
     /// What the holdings are made of, `masses` (kg) being theirs in their order: each species once for each way in.
     pub fn measure_out(&self, masses: &[f64]) -> Vec<MeasuredOut> {
         let mut out = Vec::new();

@@ -9,7 +9,7 @@ use matterix_ir::{Diagnostic, Edit, FileId, Fix, Label, Missing, Span};
 use crate::ast::*;
 
 /// What has places in it.
-pub trait Moved {
+pub trait Relocate {
     /// Puts each of them where `put` says.
     fn moved(&mut self, put: &dyn Fn(Span) -> Span);
 }
@@ -20,31 +20,31 @@ pub fn shifted(file: FileId, by: i64) -> impl Fn(Span) -> Span {
     move |span| Span { file, start: at(span.start), end: at(span.end) }
 }
 
-impl Moved for Span {
+impl Relocate for Span {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         *self = put(*self);
     }
 }
 
-impl<T: Moved> Moved for Vec<T> {
+impl<T: Relocate> Relocate for Vec<T> {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         self.iter_mut().for_each(|part| part.moved(put));
     }
 }
 
-impl<T: Moved> Moved for Option<T> {
+impl<T: Relocate> Relocate for Option<T> {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         self.iter_mut().for_each(|part| part.moved(put));
     }
 }
 
-impl<T: Moved> Moved for Box<T> {
+impl<T: Relocate> Relocate for Box<T> {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         (**self).moved(put);
     }
 }
 
-impl<A: Moved, B: Moved> Moved for (A, B) {
+impl<A: Relocate, B: Relocate> Relocate for (A, B) {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         self.0.moved(put);
         self.1.moved(put);
@@ -54,7 +54,7 @@ impl<A: Moved, B: Moved> Moved for (A, B) {
 /// What has no places in it.
 macro_rules! fixed {
     ($($ty:ty)*) => {
-        $(impl Moved for $ty {
+        $(impl Relocate for $ty {
             fn moved(&mut self, _: &dyn Fn(Span) -> Span) {}
         })*
     };
@@ -65,7 +65,7 @@ fixed! { String bool f64 u8 u32 usize matterix_ir::Code matterix_ir::Severity Ro
 /// What has places in all of its parts; a part that is forgotten here does not compile.
 macro_rules! parts {
     ($($ty:ident { $($part:ident)* })*) => {
-        $(impl Moved for $ty {
+        $(impl Relocate for $ty {
             fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
                 let $ty { $($part),* } = self;
                 $($part.moved(put);)*
@@ -127,7 +127,7 @@ macro_rules! each {
     }};
 }
 
-impl Moved for ItemKind {
+impl Relocate for ItemKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             ItemKind::Error => {}
@@ -172,7 +172,7 @@ impl Moved for ItemKind {
     }
 }
 
-impl Moved for FieldValue {
+impl Relocate for FieldValue {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             FieldValue::Expr(a) => each!(put: a),
@@ -183,7 +183,7 @@ impl Moved for FieldValue {
     }
 }
 
-impl Moved for AssetLine {
+impl Relocate for AssetLine {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             AssetLine::Error(a) => each!(put: a),
@@ -199,7 +199,7 @@ impl Moved for AssetLine {
     }
 }
 
-impl Moved for MemberKind {
+impl Relocate for MemberKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             MemberKind::Error => {}
@@ -214,7 +214,7 @@ impl Moved for MemberKind {
     }
 }
 
-impl Moved for LawKind {
+impl Relocate for LawKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             LawKind::Error => {}
@@ -227,7 +227,7 @@ impl Moved for LawKind {
     }
 }
 
-impl Moved for TextPart {
+impl Relocate for TextPart {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             TextPart::Plain(a) => each!(put: a),
@@ -236,7 +236,7 @@ impl Moved for TextPart {
     }
 }
 
-impl Moved for ClauseKind {
+impl Relocate for ClauseKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             ClauseKind::Needs { cond, refusal } => each!(put: cond refusal),
@@ -256,7 +256,7 @@ impl Moved for ClauseKind {
     }
 }
 
-impl Moved for Manner {
+impl Relocate for Manner {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             Manner::Free | Manner::Straight | Manner::Driving => {}
@@ -266,7 +266,7 @@ impl Moved for Manner {
     }
 }
 
-impl Moved for Goal {
+impl Relocate for Goal {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             Goal::Home => {}
@@ -277,7 +277,7 @@ impl Moved for Goal {
     }
 }
 
-impl Moved for Effect {
+impl Relocate for Effect {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             Effect::Assign(a, b) => each!(put: a b),
@@ -287,7 +287,7 @@ impl Moved for Effect {
     }
 }
 
-impl Moved for WireKind {
+impl Relocate for WireKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             WireKind::Error => {}
@@ -305,7 +305,7 @@ impl Moved for WireKind {
     }
 }
 
-impl Moved for LabLineKind {
+impl Relocate for LabLineKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             LabLineKind::Error => {}
@@ -317,7 +317,7 @@ impl Moved for LabLineKind {
     }
 }
 
-impl Moved for Contents {
+impl Relocate for Contents {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             Contents::Expr(a) => each!(put: a),
@@ -326,7 +326,7 @@ impl Moved for Contents {
     }
 }
 
-impl Moved for StudyLine {
+impl Relocate for StudyLine {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             StudyLine::Error(a) => each!(put: a),
@@ -337,7 +337,7 @@ impl Moved for StudyLine {
     }
 }
 
-impl Moved for FitLine {
+impl Relocate for FitLine {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             FitLine::Error(a) => each!(put: a),
@@ -348,7 +348,7 @@ impl Moved for FitLine {
     }
 }
 
-impl Moved for StmtKind {
+impl Relocate for StmtKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             StmtKind::Error => {}
@@ -383,7 +383,7 @@ impl Moved for StmtKind {
     }
 }
 
-impl Moved for ExprKind {
+impl Relocate for ExprKind {
     fn moved(&mut self, put: &dyn Fn(Span) -> Span) {
         match self {
             ExprKind::Error => {}

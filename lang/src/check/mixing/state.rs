@@ -8,7 +8,7 @@ use matterix_ir::model::Action;
 use matterix_ir::pages::Pages;
 use matterix_ir::scene::InstanceId;
 
-use super::eyes::Eyes;
+use super::evaluator::NodeEvaluator;
 use crate::declare::SpeciesId;
 use crate::declare::compatibility::Presence;
 
@@ -53,7 +53,7 @@ const HISTORY: usize = 4;
 
 /// The state of the lab at one point of the plan, without the work of time: nothing warms up or reacts.
 #[derive(Clone, Debug)]
-pub struct World {
+pub struct MixtureState {
     /// By instance; nothing where it is no mixture.
     pub mixtures: Pages<Contents>,
     /// By state index; not a number where it is not known.
@@ -70,11 +70,11 @@ pub struct World {
     pub met: BTreeSet<(InstanceId, SpeciesId, SpeciesId)>,
 }
 
-impl World {
+impl MixtureState {
     /// Where the plan begins: what everything holds.
-    pub fn initial(eyes: &Eyes<'_, '_>, locals: usize) -> World {
+    pub fn initial(eyes: &NodeEvaluator<'_, '_>, locals: usize) -> MixtureState {
         let lab = eyes.lab;
-        let mut world = World {
+        let mut world = MixtureState {
             mixtures: vec![Contents::default(); lab.instances.len()].into_iter().collect(),
             states: lab.states.iter().map(|_| f64::NAN).collect(),
             locals: vec![f64::NAN; locals],
@@ -125,7 +125,7 @@ impl World {
     }
 
     /// Brings the contents of a mixture up to date with the amounts, where these are known.
-    fn weigh(&mut self, eyes: &Eyes<'_, '_>, m: InstanceId) {
+    fn weigh(&mut self, eyes: &NodeEvaluator<'_, '_>, m: InstanceId) {
         let mass = eyes.mass(m, self);
         if mass.is_nan() || mass <= 0.0 {
             return;
@@ -145,7 +145,7 @@ impl World {
     /// Takes over values of states that are known again, with what they are amounts of in these mixtures.
     pub fn settle_at(
         &mut self,
-        eyes: &Eyes<'_, '_>,
+        eyes: &NodeEvaluator<'_, '_>,
         values: &[(u32, f64)],
         mixtures: impl Iterator<Item = InstanceId>,
     ) {
@@ -174,7 +174,7 @@ impl World {
     }
 
     /// An action of an operation: assignments change states, transfers take a share of everything.
-    pub fn act(&mut self, eyes: &Eyes<'_, '_>, action: &Action, step: Span) {
+    pub fn act(&mut self, eyes: &NodeEvaluator<'_, '_>, action: &Action, step: Span) {
         match action {
             Action::Assign { state, value, .. } => {
                 let value = eyes.value(*value, self);
@@ -207,7 +207,7 @@ impl World {
     /// Takes a share, which may be not a number, from one mixture into another.
     pub fn transfer(
         &mut self,
-        eyes: &Eyes<'_, '_>,
+        eyes: &NodeEvaluator<'_, '_>,
         share: f64,
         from: InstanceId,
         to: InstanceId,
@@ -267,7 +267,7 @@ impl World {
     }
 
     /// What may be there after either of two ways.
-    pub fn join(mut self, other: World) -> World {
+    pub fn join(mut self, other: MixtureState) -> MixtureState {
         self.states.merge(&other.states, |value, o| {
             if *value != *o {
                 *value = f64::NAN;
@@ -305,9 +305,9 @@ impl World {
     }
 }
 
-impl World {
+impl MixtureState {
     /// Whether another one holds the same species everywhere, knows the same values, and has met the same pairs.
-    pub fn is_like(&self, other: &World) -> bool {
+    pub fn is_like(&self, other: &MixtureState) -> bool {
         let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
         let held = |(a, b): (&Contents, &Contents)| {
             Rc::ptr_eq(a, b)

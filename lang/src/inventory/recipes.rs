@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::Sources;
-use matterix_ir::stock::{Portion, Recipe};
+use matterix_ir::inventory::{Portion, Recipe};
 
 use crate::ast::{FieldValue, ItemKind};
 use crate::declare::SpeciesId;

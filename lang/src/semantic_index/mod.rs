@@ -1,7 +1,7 @@
 //! What names and expressions were found to mean while a text was checked. It is noted only where that is asked for, by the
 //! evaluator and the planner themselves, so that what is shown is what was checked.
 
-mod noted;
+mod resolutions;
 mod sort;
 
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use matterix_ir::{FileId, Span, Unit};
 use rustc_hash::FxHashMap;
 
-pub use noted::Noted;
+pub use resolutions::Resolutions;
 pub use sort::Sort;
 
 use crate::declare::Tables;
@@ -34,14 +34,14 @@ pub type Seeing = Option<Box<Meanings>>;
 
 /// All that a check has noted of a package, as it was noted piece by piece.
 #[derive(Clone, Debug, Default)]
-pub struct Gathered {
+pub struct SemanticIndex {
     /// What is declared.
     pub around: Around,
     /// What the checks of declarations and of each workflow have noted; of what several did the first counts.
-    pub pieces: Vec<Noted>,
+    pub pieces: Vec<Resolutions>,
 }
 
-impl Gathered {
+impl SemanticIndex {
     /// All of it as one.
     pub fn joined(&self) -> Meanings {
         let mut all = Meanings::default();

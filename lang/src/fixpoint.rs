@@ -13,7 +13,7 @@ use crate::elaborate::events::Happenings;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::reach::Reach;
 use crate::lower::{Planner, Wires};
-use crate::share;
+use crate::parallel;
 use crate::task::Task;
 
 /// So often a task is written out for just what the time before moved. A text with mistakes may go on for ever.
@@ -67,7 +67,7 @@ pub(crate) fn settled<'a>(
             };
             let of_no_use = || mistaken.load(Ordering::Relaxed);
             let write = || written(tables, sources, task, purpose, Some(foreseen), &of_no_use);
-            match share::two(judge, write) {
+            match parallel::join(judge, write) {
                 (drafted, Some(whole)) if drafted == *foreseen => match whole.reach == drafted {
                     true => return Some(whole),
                     false => whole.reach,

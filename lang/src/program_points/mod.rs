@@ -12,7 +12,7 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::{NodeId, Op, Sources, Span, Unit};
 
 use crate::ast::{MemberKind, Role};
-use crate::check::{Known, Seen};
+use crate::check::{AbstractValue, Seen};
 use crate::eval::lab::{Elaborator, MemberKey, Mode};
 use crate::eval::{Num, Value as State};
 
@@ -130,13 +130,13 @@ impl Questions {
         })
     }
 
-    fn things(&self, words: &Words<'_, '_>, values: &[(Known, bool)]) -> Vec<Thing> {
+    fn things(&self, words: &Words<'_, '_>, values: &[(AbstractValue, bool)]) -> Vec<Thing> {
         let mut values = values.iter();
         let mut out = Vec::new();
         for about in &self.things {
             let mut facts = |asked: &[Asked]| -> Vec<Fact> {
                 let known = asked.iter().zip(values.by_ref());
-                let fact = |(a, (known, changed)): (&Asked, &(Known, bool))| Fact {
+                let fact = |(a, (known, changed)): (&Asked, &(AbstractValue, bool))| Fact {
                     name: a.name.clone(),
                     value: words.value(known, &a.domain),
                     changed: *changed,
@@ -243,7 +243,7 @@ struct Words<'l, 'a> {
 
 impl Words<'_, '_> {
     /// Of the kept values that a statement sets those that the user has named.
-    fn kept(&self, plan: &Plan, sources: &Sources, label: &str, locals: &[(u32, Known)]) -> Vec<Fact> {
+    fn kept(&self, plan: &Plan, sources: &Sources, label: &str, locals: &[(u32, AbstractValue)]) -> Vec<Fact> {
         let own = |span: Span| sources.get(span.file).is_some_and(|f| !f.name.contains("::"));
         let sets = |i: u32| {
             plan.steps.iter().filter(|s| own(s.span)).any(|s| match &s.step {
@@ -266,7 +266,7 @@ impl Words<'_, '_> {
         out
     }
 
-    fn value(&self, known: &Known, domain: &Domain) -> Value {
+    fn value(&self, known: &AbstractValue, domain: &Domain) -> Value {
         let word = |v: f64| match domain {
             Domain::Bool => Some(if v == 0.0 { "false" } else { "true" }.to_string()),
             Domain::Enum(words) => words.get(v as usize).cloned(),
@@ -275,33 +275,33 @@ impl Words<'_, '_> {
         };
         match (domain, known) {
             (Domain::Quantity(unit), _) => self.quantity(known, unit),
-            (_, Known::Range(..)) => Value::Unknown,
-            (_, Known::Point(v)) => word(*v).map_or(Value::Unknown, |w| Value::Words(vec![w])),
-            (_, Known::Few(all, _)) => {
+            (_, AbstractValue::Range(..)) => Value::Unknown,
+            (_, AbstractValue::Point(v)) => word(*v).map_or(Value::Unknown, |w| Value::Words(vec![w])),
+            (_, AbstractValue::Few(all, _)) => {
                 let words: Option<Vec<String>> = all.iter().map(|v| word(*v)).collect();
                 words.map_or(Value::Unknown, Value::Words)
             }
         }
     }
 
-    fn quantity(&self, known: &Known, unit: &Unit) -> Value {
+    fn quantity(&self, known: &AbstractValue, unit: &Unit) -> Value {
         quantity(known, self.written.best(self.lab, unit, largest(known)))
     }
 }
 
 /// The largest magnitude among the bounds of a number that are known.
-fn largest(known: &Known) -> f64 {
+fn largest(known: &AbstractValue) -> f64 {
     let (low, high) = known.bounds();
     [low, high].into_iter().filter(|v| v.is_finite()).map(f64::abs).fold(0.0, f64::max)
 }
 
-fn quantity(known: &Known, unit: Unit) -> Value {
+fn quantity(known: &AbstractValue, unit: Unit) -> Value {
     let (low, high) = known.bounds();
     let largest = largest(known);
     let tidy = |v: f64| if v.abs() < ROUNDING * largest { 0.0 } else { v };
     match known {
-        Known::Point(v) if v.is_finite() => Value::Exact(*v, unit),
-        Known::Few(all, _) if all.iter().all(|v| v.is_finite()) => {
+        AbstractValue::Point(v) if v.is_finite() => Value::Exact(*v, unit),
+        AbstractValue::Few(all, _) if all.iter().all(|v| v.is_finite()) => {
             let mut all: Vec<f64> = all.iter().map(|v| tidy(*v)).collect();
             // What only rounding tells apart is the same.
             all.dedup_by(|a, b| (*a - *b).abs() <= ROUNDING * largest);

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use matterix_ir::Sources;
-use matterix_ir::stock::Substance;
+use matterix_ir::inventory::Substance;
 
 use crate::ast::{Expr, ExprKind, FieldValue, Unary};
 use crate::declare::SpeciesId;

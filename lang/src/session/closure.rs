@@ -20,12 +20,12 @@ impl Words {
 }
 
 /// What the items of a package say, by their names.
-pub(super) struct Reach<'p> {
+pub(super) struct DependencyClosure<'p> {
     named: Vec<(&'p str, &'p str)>,
     common: FxHashSet<u64>,
 }
 
-impl<'p> Reach<'p> {
+impl<'p> DependencyClosure<'p> {
     /// Of the files of a package.
     pub(super) fn of(files: &'p [File]) -> Self {
         let (mut named, mut common) = (Vec::new(), FxHashSet::default());
@@ -38,7 +38,7 @@ impl<'p> Reach<'p> {
                 }
             }
         }
-        Reach { named, common }
+        DependencyClosure { named, common }
     }
 
     /// All words that these texts lead to.

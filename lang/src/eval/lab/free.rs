@@ -24,7 +24,7 @@ pub struct Named {
 
 /// What studies and fits of one lab may vary, and what they follow.
 #[derive(Debug, Default)]
-pub struct Open {
+pub struct FreeParameters {
     named: BTreeMap<String, Vec<Named>>,
     /// Parameters of the workflow that have no value before the runs.
     left: BTreeSet<String>,
@@ -43,7 +43,7 @@ pub struct Open {
     pub matches: Vec<Matched>,
 }
 
-impl Open {
+impl FreeParameters {
     /// Adds a parameter.
     pub fn add(&mut self, name: &str, param: u32, num: &Num, span: Span) {
         let named = Named { param, dimension: num.dimension.clone(), point: num.point, span };

@@ -13,7 +13,7 @@ pub(crate) fn processors() -> usize {
 }
 
 /// Does two things at the same time, or one after the other where there is no thread to be had.
-pub(crate) fn two<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
+pub(crate) fn join<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B) -> (A, B) {
     let task = Mutex::new(Some(one));
     let perform = || task.lock().ok().and_then(|mut task| task.take()).map(|one| one()).unwrap_or_default();
     std::thread::scope(|scope| {
@@ -28,7 +28,7 @@ pub(crate) fn two<A: Send + Default, B>(one: impl FnOnce() -> A + Send, other: i
 }
 
 /// What comes of each thing, in their order. Whoever is free takes the next one, so that a long one holds up nobody.
-pub(crate) fn over<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub(crate) fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let take = || {
         let mut done = Vec::new();

@@ -8,14 +8,14 @@ use matterix_ir::scene::InstanceId;
 use matterix_ir::values::{Formulas, Rules};
 use matterix_ir::{BinaryOp, NodeId, Op, UnaryOp};
 
-use super::world::World;
+use super::state::MixtureState;
 use crate::declare::SpeciesId;
 use crate::elaborate::hazards::SHARE;
 use crate::elaborate::mixtures::{Passage, Passages};
 use crate::eval::lab::{Elaborator, ExtensiveKey};
 
 /// Evaluates nodes of the lab at states of the world.
-pub struct Eyes<'l, 'a> {
+pub struct NodeEvaluator<'l, 'a> {
     /// The lab.
     pub lab: &'l Elaborator<'a>,
     params: Vec<f64>,
@@ -36,7 +36,7 @@ pub struct Eyes<'l, 'a> {
     pub amount_of: BTreeMap<u32, (InstanceId, SpeciesId)>,
 }
 
-impl<'l, 'a> Eyes<'l, 'a> {
+impl<'l, 'a> NodeEvaluator<'l, 'a> {
     /// Looks at a lab whose states are all declared.
     pub fn new(lab: &'l Elaborator<'a>) -> Self {
         let mut amounts: BTreeMap<InstanceId, Vec<(SpeciesId, u32)>> = BTreeMap::new();
@@ -45,7 +45,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
                 amounts.entry(key.instance).or_default().push((s, *state));
             }
         }
-        Eyes {
+        NodeEvaluator {
             lab,
             params: lab.params.iter().map(|p| p.value).collect(),
             formulas: RefCell::default(),
@@ -66,24 +66,24 @@ impl<'l, 'a> Eyes<'l, 'a> {
     }
 
     /// A value at a point of the plan; not a number where it depends on what only a run knows.
-    pub fn value(&self, node: NodeId, world: &World) -> f64 {
+    pub fn value(&self, node: NodeId, world: &MixtureState) -> f64 {
         self.look(node, world, |_| false).0
     }
 
     /// Whether a condition holds at a point of the plan, if that is known there.
-    pub fn truth(&self, node: NodeId, world: &World) -> Option<bool> {
+    pub fn truth(&self, node: NodeId, world: &MixtureState) -> Option<bool> {
         let (value, known) = self.look(node, world, |state| self.moving(state));
         known.then_some(value != 0.0)
     }
 
     /// The same, with the amounts that transfers have left, whatever has reacted since.
-    pub fn nominal_truth(&self, node: NodeId, world: &World) -> Option<bool> {
+    pub fn nominal_truth(&self, node: NodeId, world: &MixtureState) -> Option<bool> {
         let (value, known) = self.look(node, world, |state| self.moving(state) && !self.counted.contains(&state));
         known.then_some(value != 0.0)
     }
 
     /// A value, and whether it is known: a comparison with what is not known is false, which says nothing.
-    fn look(&self, node: NodeId, world: &World, moving: impl Fn(u32) -> bool) -> (f64, bool) {
+    fn look(&self, node: NodeId, world: &MixtureState, moving: impl Fn(u32) -> bool) -> (f64, bool) {
         let look = Look { params: &self.params, world, moving };
         let (formulas, room) = &mut *self.formulas.borrow_mut();
         formulas.of(&self.lab.graph, node).value(&look, room).unwrap_or((f64::NAN, false))
@@ -95,7 +95,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
     }
 
     /// Sum of the masses in a mixture, kg.
-    pub fn mass(&self, mixture: InstanceId, world: &World) -> f64 {
+    pub fn mass(&self, mixture: InstanceId, world: &MixtureState) -> f64 {
         let species = &self.lab.tables.species;
         let list = self.amounts.get(&mixture).map_or(&[][..], Vec::as_slice);
         list.iter().map(|(s, state)| world.states[*state as usize] * species.get(*s).molar_mass).sum()
@@ -105,7 +105,7 @@ impl<'l, 'a> Eyes<'l, 'a> {
 /// A look at one point of the plan: values, and whether they are known.
 struct Look<'w, M> {
     params: &'w [f64],
-    world: &'w World,
+    world: &'w MixtureState,
     /// Whether a state has no value that can be known.
     moving: M,
 }

@@ -7,10 +7,10 @@ use std::collections::BTreeSet;
 use matterix_ir::Span;
 use matterix_ir::plan::StepId;
 
-use super::Flow;
+use super::Interpreter;
 use super::apart::{Meeting, Open};
-use super::facts::Facts;
-use super::value::Why;
+use super::state::AbstractState;
+use super::value::Imprecision;
 
 /// So many meetings before a finding are looked at.
 const NEAR: usize = 6;
@@ -67,7 +67,7 @@ impl Ways {
 }
 
 /// Follows a plan until what is found is found on some way that leads there; `begin` gives one that was not followed yet.
-pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
+pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Interpreter<'l, 'a>) -> Interpreter<'l, 'a> {
     let mut flow = begin();
     flow.follow();
     let mut left = MOST_STEPS;
@@ -85,7 +85,11 @@ pub(super) fn follow<'l, 'a>(begin: impl Fn() -> Flow<'l, 'a>) -> Flow<'l, 'a> {
 }
 
 /// The findings on some ways that come up on none of them, as far as the steps that are left lead.
-fn in_vain<'l, 'a>(flow: &Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>, left: &mut usize) -> BTreeSet<Place> {
+fn in_vain<'l, 'a>(
+    flow: &Interpreter<'l, 'a>,
+    begin: &impl Fn() -> Interpreter<'l, 'a>,
+    left: &mut usize,
+) -> BTreeSet<Place> {
     let mut open: Vec<(Place, usize)> = flow.findings.iter().filter_map(|f| f.open_at()).collect();
     let mut out = BTreeSet::new();
     let before = |meetings: usize| meetings.saturating_sub(NEAR)..meetings;
@@ -113,15 +117,20 @@ fn in_vain<'l, 'a>(flow: &Flow<'l, 'a>, begin: &impl Fn() -> Flow<'l, 'a>, left:
     out
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Whether a finding on some ways at the statement that is followed now comes up on none of them.
     pub(super) fn is_cleared(&self, about: Span) -> bool {
         self.ways.cleared.contains(&(self.site(), about))
     }
 
     /// What is known after one of several ways from `base`.
-    pub(super) fn meet(&mut self, id: StepId, base: &Facts, ways: impl IntoIterator<Item = Facts>) -> Option<Facts> {
-        let mut ways: Vec<Facts> = ways.into_iter().collect();
+    pub(super) fn meet(
+        &mut self,
+        id: StepId,
+        base: &AbstractState,
+        ways: impl IntoIterator<Item = AbstractState>,
+    ) -> Option<AbstractState> {
+        let mut ways: Vec<AbstractState> = ways.into_iter().collect();
         let differ = ways.windows(2).any(|two| two[0].states != two[1].states);
         if differ && let Some(way) = self.fork(id, &ways) {
             return Some(ways.swap_remove(way));
@@ -136,6 +145,6 @@ impl Flow<'_, '_> {
         }
         let span = self.plan.get(id).span;
         let span = if self.in_library(span) { self.site() } else { span };
-        ways.into_iter().reduce(|a, b| base.join(a, &b, span, Why::Paths))
+        ways.into_iter().reduce(|a, b| base.join(a, &b, span, Imprecision::Paths))
     }
 }

@@ -7,11 +7,11 @@ use matterix_ir::{FileId, Span};
 
 use super::{Meanings, Seeing};
 use crate::names::{DeclId, Names};
-use crate::syntax::moved::Moved;
+use crate::syntax::relocate::Relocate;
 
 /// What was noted, and where the items it is about are now.
 #[derive(Clone, Debug, Default)]
-pub struct Noted {
+pub struct Resolutions {
     of: Arc<Meanings>,
     /// Items as they stood, by file and start, and as they stand.
     items: BTreeMap<(FileId, u32), (u32, Span)>,
@@ -19,16 +19,16 @@ pub struct Noted {
     numbers: BTreeMap<DeclId, DeclId>,
 }
 
-impl Noted {
+impl Resolutions {
     /// What was noted of texts as they are.
-    pub fn of(seeing: Seeing, names: &Names<'_>) -> Option<Noted> {
+    pub fn of(seeing: Seeing, names: &Names<'_>) -> Option<Resolutions> {
         let mut seeing = *seeing?;
         let kinds = seeing.things.values_mut().flat_map(|things| things.values_mut()).flatten();
         let named: BTreeSet<DeclId> =
             kinds.chain(seeing.values.values_mut().flat_map(|seen| seen.sort.declared())).map(|id| *id).collect();
         let is_own = |id: &DeclId| !names.modules[names.decl(*id).module].is_library();
         let numbers = named.into_iter().filter(is_own).map(|id| (id, id)).collect();
-        let mut noted = Noted { of: Arc::new(seeing), items: BTreeMap::new(), numbers };
+        let mut noted = Resolutions { of: Arc::new(seeing), items: BTreeMap::new(), numbers };
         let own = names.modules.iter().filter(|m| !m.is_library()).flat_map(|m| &m.tree.items);
         let all: BTreeMap<(FileId, u32), Span> = own.map(|i| ((i.span.file, i.span.start), i.span)).collect();
         let named = noted.of.names.iter().flat_map(|(a, b)| [a, b]).chain(noted.of.values.keys());
@@ -82,7 +82,7 @@ impl Noted {
     }
 }
 
-impl Moved for Noted {
+impl Relocate for Resolutions {
     fn moved(&mut self, to: &dyn Fn(Span) -> Span) {
         for (_, now) in self.items.values_mut() {
             now.moved(to);

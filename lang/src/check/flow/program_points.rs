@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use matterix_ir::plan::{PlanStep, Step, StepId};
 use matterix_ir::{NodeId, Span};
 
-use super::Flow;
-use super::facts::Facts;
-use super::value::{Known, Why};
+use super::Interpreter;
+use super::state::AbstractState;
+use super::value::{AbstractValue, Imprecision};
 
 /// What is known of the nodes that were asked for.
 pub struct Seen {
@@ -26,11 +26,11 @@ pub struct Seen {
 /// What is known after a statement.
 pub struct After {
     /// Seconds since the run began.
-    pub time: Known,
+    pub time: AbstractValue,
     /// By index in the nodes asked for, with whether the statement changes it.
-    pub values: Vec<(Known, bool)>,
+    pub values: Vec<(AbstractValue, bool)>,
     /// Kept values that the statement sets, by index.
-    pub locals: Vec<(u32, Known)>,
+    pub locals: Vec<(u32, AbstractValue)>,
 }
 
 /// What is noted while a plan is followed.
@@ -40,7 +40,7 @@ pub struct Notes {
     asked: Vec<NodeId>,
     /// What is asked for that depends on a state, by index.
     asked_of: BTreeMap<u32, Vec<u32>>,
-    start: Option<(Known, Vec<Known>)>,
+    start: Option<(AbstractValue, Vec<AbstractValue>)>,
     pub(super) by_span: BTreeMap<Span, Note>,
     /// The statements followed now.
     open: Vec<Span>,
@@ -62,23 +62,23 @@ pub(super) struct Note {
     pub(super) times: u32,
     block: bool,
     /// What was known after it the last time.
-    pub(super) last: Option<Facts>,
+    pub(super) last: Option<AbstractState>,
     /// What is asked for, each time it was done, with whether it changes that.
-    values: Vec<(Known, bool)>,
+    values: Vec<(AbstractValue, bool)>,
     /// The time after it, each time.
-    time: Known,
+    time: AbstractValue,
     /// The kept values it sets, each time.
-    pub(super) locals: BTreeMap<u32, Known>,
+    pub(super) locals: BTreeMap<u32, AbstractValue>,
 }
 
 /// A statement that was begun.
 pub struct Begun {
-    before: Facts,
+    before: AbstractState,
     /// It is the statement itself, not a part of it that stands at the same place.
     whole: bool,
 }
 
-impl Flow<'_, '_> {
+impl Interpreter<'_, '_> {
     /// Takes notes of these nodes from now on.
     pub fn take_notes(&mut self, asked: &[NodeId]) {
         let mut asked_of: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
@@ -94,7 +94,7 @@ impl Flow<'_, '_> {
     }
 
     /// Notes what is known when the first statement begins.
-    pub fn note_start(&mut self, facts: &Facts) {
+    pub fn note_start(&mut self, facts: &AbstractState) {
         let Some(asked) = self.notes.as_ref().map(|n| n.asked.clone()) else { return };
         let values = asked.iter().map(|n| self.eval(*n, facts)).collect();
         if let Some(notes) = &mut self.notes {
@@ -103,7 +103,7 @@ impl Flow<'_, '_> {
     }
 
     /// Begins a statement, where notes are taken.
-    pub fn begin(&mut self, id: StepId, node: &PlanStep, facts: &Facts) -> Option<Begun> {
+    pub fn begin(&mut self, id: StepId, node: &PlanStep, facts: &AbstractState) -> Option<Begun> {
         self.notes.as_ref()?;
         let braces = matches!(node.step, Step::Sequence(_)) && self.sources.slice(node.span).starts_with('{');
         if id == self.plan.root || braces || node.span.is_empty() || self.in_library(node.span) {
@@ -124,25 +124,25 @@ impl Flow<'_, '_> {
             block: false,
             last: None,
             values: Vec::new(),
-            time: Known::nothing(),
+            time: AbstractValue::top(),
             locals: BTreeMap::new(),
         });
         Some(Begun { before: bare(facts), whole })
     }
 
     /// Ends a statement.
-    pub fn end(&mut self, node: &PlanStep, begun: Begun, after: Option<&Facts>) {
+    pub fn end(&mut self, node: &PlanStep, begun: Begun, after: Option<&AbstractState>) {
         let Some(notes) = &mut self.notes else { return };
         notes.open.pop();
         let Some(note) = notes.by_span.get_mut(&node.span).filter(|_| begun.whole) else { return };
         note.times += u32::from(notes.again == 0);
         let (mut before, Some(mut after)) = (begun.before, after.map(bare)) else { return };
         for state in notes.busy.iter().flat_map(|(_, states)| states).chain(&notes.lost) {
-            before.states[*state as usize] = Known::nothing();
-            after.states[*state as usize] = Known::nothing();
+            before.states[*state as usize] = AbstractValue::top();
+            after.states[*state as usize] = AbstractValue::top();
         }
         if notes.untimed {
-            after.time = Known::nothing();
+            after.time = AbstractValue::top();
         } else if notes.late {
             after.time = at_least(&after.time);
         }
@@ -150,7 +150,7 @@ impl Flow<'_, '_> {
     }
 
     /// Takes in what is known after a statement, beside what is known of the other times it is done.
-    pub(super) fn known_after(&mut self, span: Span, before: Option<&Facts>, after: Facts) {
+    pub(super) fn known_after(&mut self, span: Span, before: Option<&AbstractState>, after: AbstractState) {
         let Some(mut notes) = self.notes.take() else { return };
         if let Some(note) = notes.by_span.get_mut(&span) {
             let behind = |states: Vec<u32>| -> BTreeSet<u32> {
@@ -163,21 +163,21 @@ impl Flow<'_, '_> {
             };
             let first = note.values.is_empty();
             if first {
-                note.values = vec![(Known::nothing(), false); notes.asked.len()];
+                note.values = vec![(AbstractValue::top(), false); notes.asked.len()];
             }
             for i in new.union(&changed) {
                 let node = notes.asked[*i as usize];
                 let is = self.eval(node, &after);
                 let (value, ever) = &mut note.values[*i as usize];
                 *ever |= changed.contains(i) && before.is_some_and(|b| self.eval(node, b) != is);
-                *value = if first { is } else { value.join(&is, Why::Unknown) };
+                *value = if first { is } else { value.join(&is, Imprecision::Unknown) };
             }
-            note.time = if first { after.time.clone() } else { note.time.join(&after.time, Why::Unknown) };
+            note.time = if first { after.time.clone() } else { note.time.join(&after.time, Imprecision::Unknown) };
             let set = before.map(|b| differing(b.locals.iter(), after.locals.iter())).unwrap_or_default();
             for i in set {
                 let is = &after.locals[i as usize];
                 let known = note.locals.entry(i).or_insert_with(|| is.clone());
-                *known = known.join(is, Why::Unknown);
+                *known = known.join(is, Imprecision::Unknown);
             }
             note.last = Some(after);
         }
@@ -203,18 +203,18 @@ impl Flow<'_, '_> {
 }
 
 /// Where values differ, by index.
-fn differing<'k>(a: impl Iterator<Item = &'k Known>, b: impl Iterator<Item = &'k Known>) -> Vec<u32> {
+fn differing<'k>(a: impl Iterator<Item = &'k AbstractValue>, b: impl Iterator<Item = &'k AbstractValue>) -> Vec<u32> {
     a.zip(b).enumerate().filter(|(_, (x, y))| x != y).map(|(i, _)| i as u32).collect()
 }
 
 /// A time or any later one.
-pub(super) fn at_least(time: &Known) -> Known {
-    Known::Range(time.bounds().0, f64::INFINITY, Why::Unknown)
+pub(super) fn at_least(time: &AbstractValue) -> AbstractValue {
+    AbstractValue::Range(time.bounds().0, f64::INFINITY, Imprecision::Unknown)
 }
 
 /// The values alone.
-fn bare(facts: &Facts) -> Facts {
-    let mut bare = Facts::new(facts.states.clone(), facts.locals.clone(), facts.time.clone());
+fn bare(facts: &AbstractState) -> AbstractState {
+    let mut bare = AbstractState::new(facts.states.clone(), facts.locals.clone(), facts.time.clone());
     bare.bonds.clone_from(&facts.bonds);
     if let Some(blurred) = &facts.blurred {
         bare.forget(&blurred.iter().copied().collect::<Vec<_>>());

@@ -5,9 +5,9 @@ mod substances;
 
 use std::collections::BTreeSet;
 
+use matterix_ir::inventory::{Count, Holding, Inventory, Tally};
 use matterix_ir::model::Mixture;
 use matterix_ir::scene::InstanceId;
-use matterix_ir::stock::{Count, Holding, Stock, Tally};
 use matterix_ir::{BinaryOp, Sources};
 
 use crate::ast::{ExprKind, ItemKind, MemberKind, NamedExpr};
@@ -28,7 +28,7 @@ pub fn count_of(option: &NamedExpr) -> Option<Count> {
 }
 
 /// Everything of a lab that a bill is about; `mixtures` are those of its model.
-pub fn stock(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], workflow: DeclId) -> Stock {
+pub fn inventory(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], workflow: DeclId) -> Inventory {
     let held = lab.held.clone();
     let mut holdings = Vec::new();
     let mut species = BTreeSet::new();
@@ -60,7 +60,7 @@ pub fn stock(lab: &mut Elaborator<'_>, sources: &Sources, mixtures: &[Mixture], 
     let at = |id: InstanceId| mixtures.iter().position(|m| m.instance == id).map(|i| i as u32);
     let streams: BTreeSet<(u32, u32)> =
         lab.streams.keys().filter_map(|(_, from, to)| Some((at(*from)?, at(*to)?))).collect();
-    Stock {
+    Inventory {
         holdings,
         recipes,
         substances: substances::substances(lab, sources, &species),
