@@ -20,8 +20,11 @@ fn code(path: &Path) -> String {
     code.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// Adds what the files under `path` use.
+/// Adds what the files under `path` use, but for those that tests are made of.
 fn read(path: &Path, own: &str, uses: &mut Uses) {
+    if path.file_name().is_some_and(|name| name == "tests.rs") {
+        return;
+    }
     if path.is_dir() {
         fs::read_dir(path).expect("a folder").for_each(|entry| read(&entry.expect("an entry").path(), own, uses));
         return;

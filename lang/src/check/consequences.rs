@@ -125,3 +125,26 @@ fn line_text<'s>(sources: &'s Sources, p: &Place) -> &'s str {
 fn words(line: &str) -> BTreeSet<&str> {
     line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use matterix_ir::Span;
+
+    use super::*;
+
+    #[test]
+    fn what_a_line_that_cannot_be_read_would_have_said_is_not_missed_as_well() {
+        let mut sources = Sources::default();
+        let text = "species A {\n    formul \"CO2\"\n}\nspecies B {\n}\n";
+        let file = sources.add("text.mtx", text);
+        let at = |word: &str| text.find(word).map(|i| Span::new(file, i, i + word.len())).expect("it stands there");
+        let error = |code, span, headline: &str| Diagnostic::error(code, span, headline, "here");
+        let all = vec![
+            error(codes::SYNTAX, at("formul"), "no field"),
+            error(codes::MISSING_FIELD, at("A"), "`A` has no formula"),
+            error(codes::MISSING_FIELD, at("B"), "`B` has no formula"),
+        ];
+        let kept = without_consequences(all, &sources);
+        assert_eq!(kept.iter().map(|d| d.headline.as_str()).collect::<Vec<_>>(), ["no field", "`B` has no formula"]);
+    }
+}

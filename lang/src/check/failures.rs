@@ -226,3 +226,22 @@ fn bodies<'a>(plan: &'a Plan, awaited: &'a str) -> impl Iterator<Item = StepId> 
         _ => None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::check::tests::found;
+
+    const LAB: &str = "lab bench { ambient: 25 degC }\n";
+
+    #[test]
+    fn what_follows_a_failure_in_its_block_is_never_done() {
+        let after = |steps: &str| {
+            found(&format!("{LAB}workflow w in bench {{ {steps} }}"), |bench| {
+                let plan = bench.subject().plan;
+                super::beyond(plan, plan.span())
+            })
+        };
+        assert_eq!(after("wait 1 s; fail broken \"it broke\""), [""; 0]);
+        assert_eq!(after("fail broken \"it broke\"; wait 1 s"), ["dead-branch: what follows a `fail` is never done"]);
+    }
+}

@@ -221,3 +221,41 @@ pub fn rates(lab: &mut Elaborator<'_>) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::check::tests::found;
+
+    fn bench(holding: &str) -> String {
+        format!(
+            r#"use std::glassware::Beaker250mL
+            species P {{ formula: "C2H4O2", density: 1 g/mL, specific_heat: 4 J/(g*K) }}
+            species Q {{ formula: "C2H4O2", density: 1 g/mL, specific_heat: 4 J/(g*K) }}
+            reaction decay: P -> Q {{ rate: 1e-3 1/s, order: {{ P: 1 }} }}
+            lab bench {{
+                ambient: 25 degC
+                cup = Beaker250mL at (0, 0, 0) m holding 10 g of water{holding}
+            }}
+            workflow w in bench {{ wait 1 s }}"#
+        )
+    }
+
+    fn never(holding: &str) -> Vec<String> {
+        found(&bench(holding), |bench| {
+            let (module, lab) = bench.at;
+            let starts = super::starts(bench.lab, lab);
+            super::never_starts(bench.tables, module, &[starts])
+        })
+    }
+
+    #[test]
+    fn a_reaction_whose_reactant_is_there_starts() {
+        assert_eq!(never(" + 1 mmol of P"), [""; 0]);
+    }
+
+    #[test]
+    fn a_reaction_whose_reactant_is_nowhere_never_starts() {
+        let found = "reaction-never-starts: `decay` can never start: there is no `P` anywhere in the workflow";
+        assert_eq!(never(""), [found]);
+    }
+}

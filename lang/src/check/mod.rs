@@ -11,6 +11,8 @@ mod ignored;
 mod kinetics;
 mod mixing;
 mod returns;
+#[cfg(test)]
+mod tests;
 mod time;
 mod unused;
 
@@ -79,6 +81,21 @@ pub struct Judged {
     pub hazards: Option<Arc<[Hazard]>>,
 }
 
+/// A plan in its lab, with the laws that hold there: what each analysis looks at, and none changes.
+#[derive(Clone, Copy)]
+pub struct Subject<'l, 'a> {
+    /// The lab.
+    pub lab: &'l Elaborator<'a>,
+    /// The texts that both come from.
+    pub sources: &'l Sources,
+    /// The plan.
+    pub plan: &'l Plan,
+    /// The rates of change of the lab's states.
+    pub derivatives: &'l [Derivative],
+    /// What happens by itself.
+    pub events: &'l [Event],
+}
+
 /// Checks the plan against what is known before the run, and tells what is known of the nodes in `asked`.
 pub fn plan(
     lab: &mut Elaborator<'_>,
@@ -93,11 +110,11 @@ pub fn plan(
     let is_whole = lab.diagnostics.iter().all(whole);
     let ready = mixing::ready(lab);
     let hazards = ready.as_ref().map(mixing::Ready::hazards);
-    let about = &*lab;
-    let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(about, plan, derivatives, events, ready));
-    let takes = || time::plan(about, plan, derivatives, events, time::Told::default());
+    let subject = Subject { lab, sources, plan, derivatives, events };
+    let meets = move || ready.map_or_else(Vec::new, |ready| mixing::mixing(subject, ready));
+    let takes = || time::plan(subject, time::Told::default());
     let dangers = hazards.as_deref().unwrap_or_default();
-    let follow = || is_whole.then(|| flow::check(about, sources, plan, (events, derivatives), dangers, asked));
+    let follow = || is_whole.then(|| flow::check(subject, dangers, asked));
     let (met, (taken, followed)) = match plan.steps.len() >= LARGE {
         true => parallel::join(meets, || parallel::join(takes, follow)),
         false => (meets(), (takes(), None)),
@@ -107,20 +124,18 @@ pub fn plan(
         taken.into_iter().for_each(|d| lab.report(d));
         return Judged { hazards, ..Judged::default() };
     }
-    let about = &*lab;
-    let follow = || flow::check(about, sources, plan, (events, derivatives), dangers, asked);
+    let subject = Subject { lab, sources, plan, derivatives, events };
+    let follow = || flow::check(subject, dangers, asked);
     let flow::Followed { found, windows, seen, lasting, never } = followed.unwrap_or_else(follow);
     // Times are compared again where following the plan tells how long steps last.
-    let again = |met: &[[Span; 2]]| {
-        time::plan(about, plan, derivatives, events, time::Told { lasting: &lasting, met, never: &never })
-    };
+    let again = |met: &[[Span; 2]]| time::plan(subject, time::Told { lasting: &lasting, met, never: &never });
     let clashes = |d: &Diagnostic| d.code == codes::CLAIMED_TWICE;
     let vain = !never.is_empty() && taken.iter().any(clashes);
     let mut taken = if lasting.is_empty() && !vain { taken } else { again(&[]) };
     // Where the order of all steps is known, nothing is in doubt.
     let doubted = |d: &Diagnostic| clashes(d) && !d.is_error();
     if taken.iter().all(|d| !d.is_error()) && taken.iter().any(doubted) {
-        match flow::turns(about, sources, plan, events, derivatives) {
+        match flow::turns(subject) {
             flow::Turns::Taken => taken.retain(|d| !doubted(d)),
             flow::Turns::Clash(met) => taken = again(&[met]),
             flow::Turns::Unknown => {}

@@ -359,3 +359,39 @@ fn is_word(c: char) -> bool {
 fn is_of_species(c: char) -> bool {
     is_word(c) || c == '^'
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::check::tests::found;
+
+    fn idle(steps: &str) -> Vec<String> {
+        let text = format!(
+            "use std::glassware::Beaker250mL
+            use std::heating::IkaRetControl
+            lab bench {{
+                ambient: 25 degC
+                plate = IkaRetControl at (0, 0, 0) m
+                other = IkaRetControl at (1, 0, 0) m
+                cup = Beaker250mL on plate holding 10 g of water
+            }}
+            workflow w in bench {{ {steps} }}"
+        );
+        found(&text, |bench| {
+            let subject = bench.subject();
+            let uses = super::uses(subject.lab, subject.sources, bench.at.1, subject.plan);
+            super::things(subject.sources, &[uses.expect("the lab stands in the text")])
+        })
+    }
+
+    #[test]
+    fn a_thing_that_no_step_has_to_do_with_is_not_used() {
+        assert_eq!(
+            idle("heat plate to 30 degC; heat other to 30 degC; stop heating plate; stop heating other"),
+            [""; 0]
+        );
+        assert_eq!(
+            idle("heat plate to 30 degC; stop heating plate"),
+            ["unused: `other` is not used by any workflow of this file"]
+        );
+    }
+}

@@ -72,6 +72,7 @@ pub use self::evolve::Window;
 pub use self::program_points::{After, Seen};
 use self::state::AbstractState;
 pub use self::value::AbstractValue;
+use super::Subject;
 use crate::declare::ReactionId;
 use crate::elaborate::hazards::Hazard;
 use crate::elaborate::mixtures::Passages;
@@ -247,15 +248,8 @@ pub struct Followed {
 
 /// Follows the plan and reports what would go wrong; what is known of the nodes in `asked` is kept at every statement. `hazards` are
 /// those that steps side by side may bring about.
-pub fn check(
-    lab: &Elaborator<'_>,
-    sources: &Sources,
-    plan: &Plan,
-    (events, derivatives): (&[Event], &[Derivative]),
-    hazards: &[Hazard],
-    asked: Option<&[NodeId]>,
-) -> Followed {
-    let begin = || Interpreter::new(lab, sources, plan, events, derivatives);
+pub fn check(subject: Subject<'_, '_>, hazards: &[Hazard], asked: Option<&[NodeId]>) -> Followed {
+    let begin = || Interpreter::new(subject);
     let noting = || {
         let mut flow = begin();
         if let Some(asked) = asked {
@@ -277,7 +271,7 @@ pub fn check(
             flow.params[other.param as usize] = AbstractValue::point(other.value);
             flow
         };
-        let new = otherwise::said_of(lab, &other, jobs::follow(supposing).diagnostics());
+        let new = otherwise::said_of(subject.lab, &other, jobs::follow(supposing).diagnostics());
         let is_new = |d: &Diagnostic| !found.iter().any(|f| f.code == d.code && f.span() == d.span());
         let new: Vec<Diagnostic> = new.into_iter().filter(is_new).collect();
         found.extend(new);
@@ -296,14 +290,8 @@ pub enum Turns {
 }
 
 /// Follows branches and jobs in the order of time to tell whether two of them use one thing at the same time.
-pub fn turns(
-    lab: &Elaborator<'_>,
-    sources: &Sources,
-    plan: &Plan,
-    events: &[Event],
-    derivatives: &[Derivative],
-) -> Turns {
-    let follow = |backward| Interpreter::new(lab, sources, plan, events, derivatives).follow_in_time(backward);
+pub fn turns(subject: Subject<'_, '_>) -> Turns {
+    let follow = |backward| Interpreter::new(subject).follow_in_time(backward);
     match follow(false) {
         Turns::Taken if matches!(follow(true), Turns::Taken) => Turns::Taken,
         Turns::Clash([a, b]) => match follow(true) {
@@ -315,13 +303,8 @@ pub fn turns(
 }
 
 impl<'l, 'a> Interpreter<'l, 'a> {
-    fn new(
-        lab: &'l Elaborator<'a>,
-        sources: &'l Sources,
-        plan: &'l Plan,
-        events: &'l [Event],
-        derivatives: &'l [Derivative],
-    ) -> Self {
+    fn new(subject: Subject<'l, 'a>) -> Self {
+        let Subject { lab, sources, plan, derivatives, events } = subject;
         let mut flow = Interpreter {
             lab,
             sources,
@@ -520,4 +503,68 @@ pub fn forbidden_on_any_way(code: Code) -> bool {
 /// Whether a finding of this kind is a warning even where it happens on every way: what is done twice does no harm.
 fn only_advice(code: Code) -> bool {
     code.family == "T3"
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::check::tests::found;
+
+    /// A counter that is set, with a need and a limit.
+    const BENCH: &str = r#"
+capability Counter {
+    state count: Ratio = 2
+    keeps count <= 10 else too_much "count less"
+    command add(v: Ratio)
+        needs count < 9
+        takes v * 1 s
+        effect count = count + v
+    process falls while count > 100 { count' -= 1 1/s }
+}
+asset C: Counter {}
+lab bench {
+    ambient: 25 degC
+    c = C
+}
+"#;
+
+    fn followed(steps: &str) -> Vec<String> {
+        let text = format!("{BENCH}workflow w(more: Bool) in bench {{\n{steps}\n}}\n");
+        found(&text, |bench| super::check(bench.subject(), &[], None).found)
+    }
+
+    #[test]
+    fn what_is_right_has_no_findings() {
+        assert_eq!(followed("add 5 by c\nexpect c.count == 7 and elapsed == 5 s"), [""; 0]);
+    }
+
+    #[test]
+    fn needs_limits_waits_and_expectations_are_judged_by_what_is_known() {
+        let found = "need-unmet: `add 1 by c` cannot be done: it needs `count < 9`";
+        assert_eq!(followed("add 7 by c\nadd 1 by c"), [found]);
+        assert_eq!(followed("add 9 by c"), ["need-unmet: `add 9 by c` cannot be done: too much"]);
+        assert_eq!(
+            followed("wait until c.count >= 5 timeout 1 min"),
+            ["waits-for-ever: `c.count >= 5` never comes true: nothing changes it"]
+        );
+        assert_eq!(followed("add 1 by c\nexpect c.count == 4"), ["expectation-failed: `c.count == 4` does not hold"]);
+    }
+
+    #[test]
+    fn on_some_ways_is_a_warning_and_loops_are_followed() {
+        let found = "need-unmet: `add 1 by c` cannot be done: it needs `count < 9`, on some ways through the plan";
+        assert_eq!(followed("if more { add 7 by c }\nadd 1 by c"), [found]);
+        assert_eq!(followed("repeat 4 times { add 2 by c }"), [""; 0]);
+        assert_eq!(
+            followed("repeat 5 times { add 2 by c }"),
+            ["need-unmet: `add 2 by c` cannot be done: it needs `count < 9`"]
+        );
+    }
+
+    #[test]
+    fn branches_are_followed_beside_each_other() {
+        assert_eq!(
+            followed("parallel { sequence { add 3 by c } sequence { wait 1 s } }\nexpect c.count == 6"),
+            ["expectation-failed: `c.count == 6` does not hold"]
+        );
+    }
 }

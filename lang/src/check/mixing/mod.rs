@@ -23,11 +23,12 @@ mod uses;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use matterix_ir::model::{Action, Derivative, Event};
+use matterix_ir::model::{Action, Event};
 use matterix_ir::plan::{Caught, Plan, PlanStep, Step, StepId};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, FileId, NodeId, Severity, Span};
+use matterix_ir::{Diagnostic, FileId, NodeId, Severity, Sources, Span};
 
+use super::Subject;
 use super::time::Times;
 use crate::ast::{MemberKind, Role};
 use crate::declare::SpeciesId;
@@ -61,7 +62,8 @@ pub fn contents(lab: &mut Elaborator<'_>) {
         ends: Vec::new(),
     };
     if let Some(ready) = ready(lab) {
-        let found = mixing(lab, &plan, &[], &[], ready);
+        let sources = Sources::default();
+        let found = mixing(Subject { lab, sources: &sources, plan: &plan, derivatives: &[], events: &[] }, ready);
         found.into_iter().for_each(|d| lab.report(d));
     }
 }
@@ -108,13 +110,8 @@ pub fn ready(lab: &mut Elaborator<'_>) -> Option<Ready> {
 }
 
 /// Judges what a plan brings together.
-pub fn mixing(
-    lab: &Elaborator<'_>,
-    plan: &Plan,
-    derivatives: &[Derivative],
-    events: &[Event],
-    ready: Ready,
-) -> Vec<Diagnostic> {
+pub fn mixing(subject: Subject<'_, '_>, ready: Ready) -> Vec<Diagnostic> {
+    let Subject { lab, plan, events, .. } = subject;
     let eyes = NodeEvaluator::new(lab);
     let library: BTreeSet<FileId> =
         lab.tables.names.modules.iter().filter(|m| m.is_library()).map(|m| m.file).collect();
@@ -152,7 +149,7 @@ pub fn mixing(
     walk.endanger(&mut world);
     let begun = world.clone();
     walk.step(plan.root, world);
-    orders::orders(&mut walk, &begun, || Times::of(lab, plan, derivatives, events));
+    orders::orders(&mut walk, &begun, || Times::of(subject));
     walk.found
 }
 
@@ -589,5 +586,37 @@ impl Walk<'_, '_> {
         }
         self.settle();
         self.note_certain(world);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::check::tests::found;
+
+    fn met(holding: &str, steps: &str) -> Vec<String> {
+        let text = format!(
+            "use std::glassware::Beaker250mL
+            lab bench {{
+                ambient: 25 degC
+                a = Beaker250mL at (0, 0, 0) m holding 50 mL of water + {holding}
+                b = Beaker250mL at (1, 0, 0) m holding 50 mL of water + 1 mmol of NaCl
+            }}
+            workflow w in bench {{\n{steps}\n}}\n"
+        );
+        found(&text, |bench| {
+            let ready = super::ready(bench.lab).expect("contents are right");
+            super::mixing(bench.subject(), ready)
+        })
+    }
+
+    #[test]
+    fn what_may_meet_meets() {
+        assert_eq!(met("1 mmol of KCl", "wait 1 s"), [""; 0]);
+    }
+
+    #[test]
+    fn what_must_not_meet_is_found_where_it_stands() {
+        let found = "incompatible-mix: `NaOCl` and `HCl` come together in `a`: toxic gas";
+        assert_eq!(met("1 mmol of NaOCl + 1 mmol of HCl", "wait 1 s"), [found]);
     }
 }

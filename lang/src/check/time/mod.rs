@@ -13,14 +13,13 @@ mod windows;
 use std::cell::{Cell, RefCell};
 use std::collections::{BTreeMap, BTreeSet};
 
-use matterix_ir::model::{Derivative, Event};
 use matterix_ir::plan::{Caught, Plan, Step, StepId};
 use matterix_ir::{Diagnostic, Span, codes};
 use matterix_timing::network::WHOLE;
 use matterix_timing::walk::Durations;
 use matterix_timing::{Interval, Known, Point, ROUNDING, Scope, Timing, Visit};
 
-use crate::eval::lab::Elaborator;
+use super::Subject;
 
 /// Least times that are kept at most (eight bytes each); when they are full, what is asked for again is searched again.
 const MOST_KEPT: usize = 8_000_000;
@@ -49,13 +48,8 @@ impl Default for Told<'_> {
 }
 
 /// Reports contradictions in the times of a plan and in the use of instances.
-pub fn plan(
-    lab: &Elaborator<'_>,
-    plan: &Plan,
-    derivatives: &[Derivative],
-    events: &[Event],
-    told: Told<'_>,
-) -> Vec<Diagnostic> {
+pub fn plan(subject: Subject<'_, '_>, told: Told<'_>) -> Vec<Diagnostic> {
+    let Subject { lab, plan, derivatives, events, .. } = subject;
     let Told { lasting, met, never } = told;
     let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
     let mut known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
@@ -124,7 +118,8 @@ pub struct Times<'p> {
 
 impl<'p> Times<'p> {
     /// Walks through a plan; what its times contradict is left out.
-    pub fn of(lab: &Elaborator<'_>, plan: &'p Plan, derivatives: &[Derivative], events: &[Event]) -> Self {
+    pub fn of(subject: Subject<'p, '_>) -> Self {
+        let Subject { lab, plan, derivatives, events, .. } = subject;
         let params: Vec<f64> = lab.params.iter().map(|p| p.value).collect();
         let known = Known::new(&lab.graph, params, &lab.states, derivatives, events, plan);
         timed(plan, &known).1
@@ -229,4 +224,50 @@ fn expected(plan: &Plan, timing: &Timing, step: StepId, failure: &str) -> bool {
         }
         _ => false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Told;
+    use crate::check::tests::found;
+
+    const BENCH: &str = "
+capability Worker {
+    state done: Ratio = 0
+    command work(t: Duration)
+        takes t
+        effect done = done + 1
+}
+asset W: Worker {}
+lab bench {
+    ambient: 25 degC
+    a = W
+    b = W
+}
+";
+
+    fn timed(steps: &str) -> Vec<String> {
+        let text = format!("{BENCH}workflow w in bench {{\n{steps}\n}}\n");
+        found(&text, |bench| super::plan(bench.subject(), Told::default()))
+    }
+
+    #[test]
+    fn one_after_the_other_is_no_clash() {
+        assert_eq!(timed("work 5 s by a\nwork 5 s by a"), [""; 0]);
+    }
+
+    #[test]
+    fn one_thing_used_twice_at_a_time_is_found() {
+        let found = "claimed-twice: `work 5 s by a` and `work 5 s by a` use `a` at the same time";
+        assert_eq!(timed("parallel { sequence { work 5 s by a } sequence { wait 1 s; work 5 s by a } }"), [found]);
+    }
+
+    #[test]
+    fn claims_that_cross_are_found() {
+        let cross = "parallel {
+            claim a { wait 1 s; claim b { work 1 s by b } }
+            claim b { wait 1 s; claim a { work 1 s by a } }
+        }";
+        assert_eq!(timed(cross), ["deadlock: claims of `b` and `a` can wait for each other for ever"]);
+    }
 }
