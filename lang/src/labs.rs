@@ -82,7 +82,7 @@ pub fn lab<'a>(
             let all = tables.names.visible(root).filter(|(_, id)| is_lab(&tables.names.decl(*id).item.kind));
             let near = near::nearest(wanted, all.map(|(n, _)| n));
             let headline = format!("there is no lab `{wanted}`");
-            let mut d = Diagnostic::error(codes::UNKNOWN_NAME, name.span, headline, "asked for with `--lab`");
+            let mut d = Diagnostic::about(wanted, codes::UNKNOWN_NAME, name.span, headline, "asked for with `--lab`");
             d.help.extend(near::question(&near));
             Box::new(d)
         });

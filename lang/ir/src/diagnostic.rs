@@ -82,6 +82,9 @@ pub struct Diagnostic {
     pub help: Vec<String>,
     /// Corrections an editor can apply.
     pub fixes: Vec<Fix>,
+    /// The name that it is about, where one is unknown or used in a wrong way: what else uses that name may follow from it.
+    #[serde(skip)]
+    pub about: Option<String>,
     /// The import whose absence it is about.
     #[serde(skip)]
     pub missing: Option<Missing>,
@@ -97,8 +100,14 @@ impl Diagnostic {
             labels: vec![Label { span, text: label.into(), primary: true }],
             help: Vec::new(),
             fixes: Vec::new(),
+            about: None,
             missing: None,
         }
+    }
+
+    /// An error about a name at `span`, whose label says `label`.
+    pub fn about(name: &str, code: Code, span: Span, headline: impl Into<String>, label: impl Into<String>) -> Self {
+        Diagnostic { about: Some(name.to_owned()), ..Diagnostic::error(code, span, headline, label) }
     }
 
     /// A warning at `span`, whose label says `label`.

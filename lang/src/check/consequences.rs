@@ -4,14 +4,12 @@ use std::collections::BTreeSet;
 
 use matterix_ir::{Diagnostic, FileId, Sources, codes};
 
-/// Where a finding stands and what it is about.
+/// Where a finding stands.
 struct Place {
     file: FileId,
     line: usize,
     /// First and last line of the declaration around it: from one line without indentation to the next.
     block: (usize, usize),
-    /// The first word in backticks of its headline.
-    subject: String,
 }
 
 /// Leaves out what follows from a syntax mistake, a misspelt name or a broken declaration.
@@ -36,8 +34,7 @@ fn place(d: &Diagnostic, sources: &Sources) -> Place {
     let at = line.min(lines.len());
     let first = (0..at).rev().find(|i| starts(&lines[*i])).map_or(1, |i| i + 1);
     let last = (at..lines.len()).find(|i| starts(&lines[*i])).unwrap_or(lines.len());
-    let subject = d.headline.split('`').nth(1).unwrap_or("").to_string();
-    Place { file: span.file, line, block: (first, last), subject }
+    Place { file: span.file, line, block: (first, last) }
 }
 
 fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) -> bool {
@@ -83,10 +80,7 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
         return true;
     }
     // A name from a line above with a mistake of its own may be fine.
-    if d.code == codes::UNKNOWN_NAME
-        || d.code == codes::UNKNOWN_VERB
-        || (d.code == codes::WRONG_ARGUMENTS && !p.subject.is_empty())
-    {
+    if let Some(name) = &d.about {
         let names = |e: &Diagnostic| {
             let family = e.code.family;
             if d.code == codes::WRONG_ARGUMENTS { syntax(e) } else { family == "P0" || family == "N0" }
@@ -95,8 +89,8 @@ fn follows(i: usize, all: &[Diagnostic], places: &[Place], sources: &Sources) ->
             names(e)
                 && q.file == p.file
                 && q.line < p.line
-                && (words(line_text(sources, q)).contains(p.subject.as_str()) || suggests(e, &p.subject))
-                && !all.iter().zip(places).any(|(o, r)| o.code == d.code && r.line == q.line && r.subject == p.subject)
+                && (words(line_text(sources, q)).contains(name.as_str()) || suggests(e, name))
+                && !all.iter().zip(places).any(|(o, r)| o.code == d.code && r.line == q.line && o.about == d.about)
         });
     }
     // That weak acids and bases make no ions is said where these are missing.

@@ -85,7 +85,7 @@ fn unknown(what: &str, given: &[NamedExpr], known: &[&str]) -> Vec<Diagnostic> {
     let words = words.map(|o| {
         let all: Vec<String> = Count::ALL.iter().map(|(word, _)| format!("`{word}`")).collect();
         let headline = format!("`{COUNTS_AS}` is one of {}", all.join(", "));
-        Diagnostic::error(codes::UNKNOWN_NAME, o.value.span, headline, "not one of them")
+        Diagnostic::about(COUNTS_AS, codes::UNKNOWN_NAME, o.value.span, headline, "not one of them")
     });
     unknown
         .map(|o| {

@@ -130,7 +130,8 @@ impl Tables<'_> {
     }
 
     fn unknown_type(&self, name: &ast::Name, module: usize) -> Diagnostic {
-        let mut d = Diagnostic::error(
+        let mut d = Diagnostic::about(
+            &name.text,
             codes::UNKNOWN_NAME,
             name.span,
             format!("there is no type `{}`", name.text),

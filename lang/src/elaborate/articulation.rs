@@ -71,7 +71,7 @@ impl<'a> Elaborator<'a> {
         if found.is_none() {
             let close = nearest(text, robot.links.iter().map(|l| l.name.as_str()));
             let headline = format!("`{}` has no link `{text}`", robot.name);
-            let d = Diagnostic::error(codes::UNKNOWN_NAME, e.span, headline, "no link of this robot");
+            let d = Diagnostic::about(&robot.name, codes::UNKNOWN_NAME, e.span, headline, "no link of this robot");
             self.report(match question(&close) {
                 Some(asked) => d.help(asked),
                 None => d,

@@ -44,7 +44,7 @@ impl<'a> Elaborator<'a> {
         if found.is_none() {
             let close = nearest(text, frames.iter().map(|f| f.name.as_str()));
             let headline = format!("what it is a part of has no frame `{text}`");
-            let d = Diagnostic::error(codes::UNKNOWN_NAME, e.span, headline, "no such frame");
+            let d = Diagnostic::about(text, codes::UNKNOWN_NAME, e.span, headline, "no such frame");
             self.report(match question(&close) {
                 Some(asked) => d.help(asked),
                 None => d,
@@ -112,7 +112,13 @@ impl<'a> Elaborator<'a> {
     fn no_joint(&mut self, name: &Name, robot: &Robot) {
         let close = nearest(&name.text, robot.joints.iter().map(|j| j.name.as_str()));
         let headline = format!("no joint `{}`", name.text);
-        let d = Diagnostic::error(codes::UNKNOWN_NAME, name.span, headline, "not a joint that stands before it");
+        let d = Diagnostic::about(
+            &name.text,
+            codes::UNKNOWN_NAME,
+            name.span,
+            headline,
+            "not a joint that stands before it",
+        );
         self.report(match question(&close) {
             Some(asked) => d.help(asked),
             None => d,

@@ -418,8 +418,14 @@ impl<'a> Elaborator<'a> {
         {
             let [arg] = args.as_slice() else {
                 self.report(
-                    Diagnostic::error(codes::WRONG_ARGUMENTS, call.span, "`rinse` needs one vessel", "rinse what?")
-                        .help("write `rinse(vessel)`"),
+                    Diagnostic::about(
+                        "rinse",
+                        codes::WRONG_ARGUMENTS,
+                        call.span,
+                        "`rinse` needs one vessel",
+                        "rinse what?",
+                    )
+                    .help("write `rinse(vessel)`"),
                 );
                 return Vec::new();
             };
@@ -489,8 +495,14 @@ impl<'a> Elaborator<'a> {
 
     fn soil_form(&mut self, at: Span) -> Vec<Action> {
         self.report(
-            Diagnostic::error(codes::WRONG_ARGUMENTS, at, "`soil` needs a thing and `from` another", "soil what?")
-                .help("write `soil(thing, from: other)`"),
+            Diagnostic::about(
+                "soil",
+                codes::WRONG_ARGUMENTS,
+                at,
+                "`soil` needs a thing and `from` another",
+                "soil what?",
+            )
+            .help("write `soil(thing, from: other)`"),
         );
         Vec::new()
     }
@@ -546,7 +558,8 @@ impl<'a> Elaborator<'a> {
         }
         let (Some((q, at)), Some(&from), Some(&to)) = (quantity, ends.get("from"), ends.get("to")) else {
             self.report(
-                Diagnostic::error(
+                Diagnostic::about(
+                    "move",
                     codes::WRONG_ARGUMENTS,
                     call.span,
                     "`move` needs a quantity, `from` and `to`",

@@ -233,7 +233,8 @@ impl<'a> Elaborator<'a> {
                     .name
                     .as_ref()
                     .map_or_else(Vec::new, |n| near::nearest(&n.text, params.iter().map(|p| &p.name.text)));
-                let mut d = Diagnostic::error(
+                let mut d = Diagnostic::about(
+                    callee,
                     codes::WRONG_ARGUMENTS,
                     at,
                     match &arg.name {
@@ -276,7 +277,8 @@ impl<'a> Elaborator<'a> {
                     // A parameter that is not known may be meant for the one that is missing.
                     None if !good => Value::Error,
                     None => {
-                        self.report(Diagnostic::error(
+                        self.report(Diagnostic::about(
+                            callee,
                             codes::WRONG_ARGUMENTS,
                             span,
                             format!("`{callee}` needs `{}`", param.name.text),
@@ -362,7 +364,8 @@ impl<'a> Elaborator<'a> {
 
     /// Reports arguments that fit no form of a function.
     pub fn wrong_arguments(&mut self, name: &str, span: Span) -> Value {
-        self.report(Diagnostic::error(
+        self.report(Diagnostic::about(
+            name,
             codes::WRONG_ARGUMENTS,
             span,
             format!("`{name}` cannot be called with these arguments"),

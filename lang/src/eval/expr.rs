@@ -366,8 +366,13 @@ impl<'a> Elaborator<'a> {
         }
         let is_unit = self.tables.units.find(&n.text).is_some();
         let near = if is_unit { Vec::new() } else { near::nearest(&n.text, candidates) };
-        let mut d =
-            Diagnostic::error(codes::UNKNOWN_NAME, n.span, format!("there is no `{}` here", n.text), "not declared");
+        let mut d = Diagnostic::about(
+            &n.text,
+            codes::UNKNOWN_NAME,
+            n.span,
+            format!("there is no `{}` here", n.text),
+            "not declared",
+        );
         if is_unit {
             d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
         }
@@ -567,7 +572,8 @@ impl<'a> Elaborator<'a> {
                     Some(v) => v,
                     None => {
                         self.report(
-                            Diagnostic::error(
+                            Diagnostic::about(
+                                &fold.text,
                                 codes::UNKNOWN_NAME,
                                 fold.span,
                                 format!("there is no fold `{}`", fold.text),

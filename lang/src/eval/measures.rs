@@ -19,7 +19,8 @@ impl Elaborator<'_> {
     pub(super) fn measures(&mut self, id: InstanceId, what: &str, at: Span) -> Value {
         if !MEASURES.contains(&what) {
             let known: Vec<String> = MEASURES.iter().map(|m| format!("`{m}`")).collect();
-            let d = Diagnostic::error(codes::UNKNOWN_NAME, at, format!("there is no measure `{what}`"), "not one");
+            let d =
+                Diagnostic::about(what, codes::UNKNOWN_NAME, at, format!("there is no measure `{what}`"), "not one");
             self.report(d.help(format!("one of {}", known.join(", "))));
             return Value::Error;
         }

@@ -42,7 +42,7 @@ impl<'a> Elaborator<'a> {
         }
         let near = near::nearest(&n.text, words.iter());
         let headline = format!("`{}` is not one of {}", n.text, list(words));
-        let mut d = Diagnostic::error(codes::UNKNOWN_NAME, n.span, headline, "no such word");
+        let mut d = Diagnostic::about(&n.text, codes::UNKNOWN_NAME, n.span, headline, "no such word");
         d = near::proposed(d, &near, n.span);
         self.report(d);
         Value::Error
@@ -137,7 +137,7 @@ impl<'a> Elaborator<'a> {
             let near = near::nearest(&word.text, members.iter().flat_map(|(_, words)| words));
             let best = near.first()?.clone();
             let headline = format!("`{name}` is never `{}`", word.text);
-            let d = Diagnostic::error(codes::UNKNOWN_NAME, word.span, headline, "no state of it");
+            let d = Diagnostic::about(&name, codes::UNKNOWN_NAME, word.span, headline, "no state of it");
             let d = d.guess(format!("replace with `{best}`"), word.span, best);
             Diagnostic { help: near::question(&near).into_iter().collect(), ..d }
         } else {

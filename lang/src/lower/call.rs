@@ -197,7 +197,8 @@ impl<'a> Planner<'a, '_> {
         let steps = self.step_words(&text, call);
         all.extend(steps.iter().cloned());
         let span = words.first().map_or(call.span, |w| w.span.to(words[words.len() - 1].span));
-        let mut d = Diagnostic::error(
+        let mut d = Diagnostic::about(
+            &text,
             codes::UNKNOWN_VERB,
             span,
             format!("no skill or command is called `{text}`"),
@@ -254,7 +255,7 @@ impl<'a> Planner<'a, '_> {
         let words: Vec<String> = missing.iter().map(|label| format!("`{label}`")).collect();
         let at = Span { end: object.span.start, ..object.span };
         let headline = format!("{} is missing before `{value}`", words.join(" or "));
-        let d = Diagnostic::error(codes::WRONG_ARGUMENTS, object.span, headline, "what is this to be?");
+        let d = Diagnostic::about(&first, codes::WRONG_ARGUMENTS, object.span, headline, "what is this to be?");
         self.lab.report(d.guess(format!("add `{first}`"), at, format!("{first} ")));
         true
     }
@@ -335,7 +336,7 @@ impl<'a> Planner<'a, '_> {
         let Some(import) = names.import_of(module, &text, fits) else { return false };
         let headline = format!("another `{text}` is meant, which is not imported");
         let place = format!("`{}` does not fit this", self.form(sig));
-        self.lab.report(import.offered(Diagnostic::error(codes::UNKNOWN_VERB, span, headline, place)));
+        self.lab.report(import.offered(Diagnostic::about(&text, codes::UNKNOWN_VERB, span, headline, place)));
         true
     }
 
@@ -432,7 +433,8 @@ impl<'a> Planner<'a, '_> {
             (Some(p), None) => {
                 let ty = p.ty.as_ref().map(|t| self.lab.resolve_parameter_type(t, module));
                 let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
-                self.lab.report(Diagnostic::error(
+                self.lab.report(Diagnostic::about(
+                    &what,
                     codes::WRONG_ARGUMENTS,
                     call.span,
                     format!("`{what}` needs {wanted} after it"),
@@ -441,7 +443,8 @@ impl<'a> Planner<'a, '_> {
                 good = false;
             }
             (None, Some((_, span))) if !device => {
-                self.lab.report(Diagnostic::error(
+                self.lab.report(Diagnostic::about(
+                    &what,
                     codes::WRONG_ARGUMENTS,
                     span,
                     format!("`{what}` takes nothing after it"),
@@ -454,7 +457,8 @@ impl<'a> Planner<'a, '_> {
         let mut unknown = false;
         for (i, (label, e)) in call.labelled.iter().enumerate() {
             if call.labelled[..i].iter().any(|(l, _)| l.text == label.text) {
-                self.lab.report(Diagnostic::error(
+                self.lab.report(Diagnostic::about(
+                    &label.text,
                     codes::WRONG_ARGUMENTS,
                     label.span.to(e.span),
                     format!("`{}` is given twice", label.text),
@@ -505,7 +509,8 @@ impl<'a> Planner<'a, '_> {
                     let ty = p.ty.as_ref().map(|t| self.lab.resolve_parameter_type(t, module));
                     let wanted = ty.map_or_else(|| p.name.text.clone(), |t| self.lab.tables.type_name(&t));
                     self.lab.report(
-                        Diagnostic::error(
+                        Diagnostic::about(
+                            &what,
                             codes::WRONG_ARGUMENTS,
                             call.span,
                             format!("`{what}` needs `{} ...`: {wanted}", label.text),
@@ -548,7 +553,7 @@ impl<'a> Planner<'a, '_> {
                     other => other.what().to_string(),
                 };
                 let headline = format!("`{what}` takes {} values here, found {found}", many.len());
-                let d = Diagnostic::error(codes::WRONG_ARGUMENTS, span, headline, format!("this is {found}"));
+                let d = Diagnostic::about(what, codes::WRONG_ARGUMENTS, span, headline, format!("this is {found}"));
                 self.lab.report(d.help(format!("write them in brackets: `({})`", names.join(", "))));
                 false
             }
@@ -584,7 +589,13 @@ impl<'a> Planner<'a, '_> {
 
     fn unknown_label(&mut self, sig: &Sig, label: &Name, span: Span, missing: Option<&str>) {
         let headline = format!("`{}` does not take `{}`", verb_text(&sig.verb), label.text);
-        let mut d = Diagnostic::error(codes::WRONG_ARGUMENTS, label.span.to(span), headline, "not expected");
+        let mut d = Diagnostic::about(
+            &verb_text(&sig.verb),
+            codes::WRONG_ARGUMENTS,
+            label.span.to(span),
+            headline,
+            "not expected",
+        );
         if let Some(missing) = missing {
             d.help.push(format!("did you mean `{missing}`?"));
             d = d.guess(format!("replace with `{missing}`"), label.span, missing);
@@ -637,7 +648,8 @@ impl<'a> Planner<'a, '_> {
                 Some(p) => good &= self.argument_of(p, &o.value, module, scope, out),
                 None => {
                     let near = near::nearest(&o.name.text, declared.iter().map(|p| &p.name.text));
-                    let mut d = Diagnostic::error(
+                    let mut d = Diagnostic::about(
+                        what,
                         codes::WRONG_ARGUMENTS,
                         o.name.span,
                         format!("`{what}` has no option `{}`", o.name.text),
@@ -658,7 +670,8 @@ impl<'a> Planner<'a, '_> {
                 Some(e) => good &= self.argument_of(p, e, module, &mut Scope::module(module), out),
                 None => {
                     self.lab.report(
-                        Diagnostic::error(
+                        Diagnostic::about(
+                            what,
                             codes::WRONG_ARGUMENTS,
                             span,
                             format!("`{what}` needs the option `{}`", p.name.text),

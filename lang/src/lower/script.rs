@@ -261,7 +261,7 @@ impl<'a> Planner<'a, '_> {
     fn no_command(&mut self, sig: &Sig, device: &Path) {
         let kind = device.segments.last().map_or("", |n| n.text.as_str());
         let headline = format!("`{kind}` has no command of the form `{}`", self.form(sig));
-        let d = Diagnostic::error(codes::UNKNOWN_VERB, sig.span, headline, "not one of its commands");
+        let d = Diagnostic::about(kind, codes::UNKNOWN_VERB, sig.span, headline, "not one of its commands");
         self.lab.report(d.help("a line has the words, labels and numbers of parameters of the command"));
     }
 }

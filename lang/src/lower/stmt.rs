@@ -221,7 +221,8 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Await { name } => {
                 if !self.jobs.contains(&name.text) {
                     let near = crate::near::nearest(&name.text, &self.jobs);
-                    let mut d = Diagnostic::error(
+                    let mut d = Diagnostic::about(
+                        &name.text,
                         codes::UNKNOWN_NAME,
                         name.span,
                         format!("no job `{}` was started", name.text),

@@ -207,7 +207,8 @@ impl<'a> Planner<'a, '_> {
             return;
         }
         let near = near::nearest(&name.text, self.failures.iter());
-        let mut d = Diagnostic::error(
+        let mut d = Diagnostic::about(
+            &name.text,
             codes::UNKNOWN_NAME,
             name.span,
             format!("nothing fails with `{}`", name.text),

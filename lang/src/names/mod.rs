@@ -214,7 +214,8 @@ impl<'a> Names<'a> {
 
     fn not_in_module(&self, name: &Name, module: usize) -> Diagnostic {
         let from = &self.modules[module].name;
-        let mut d = Diagnostic::error(
+        let mut d = Diagnostic::about(
+            from,
             codes::UNKNOWN_NAME,
             name.span,
             format!("`{from}` declares no `{}`", name.text),
@@ -240,7 +241,7 @@ impl<'a> Names<'a> {
         }
         let near = near::nearest(&front, self.modules.iter().map(|m| &m.name));
         let headline = format!("there is no module `{front}` here");
-        let mut d = Diagnostic::error(codes::UNKNOWN_NAME, path.span, headline, "not imported");
+        let mut d = Diagnostic::about(&front, codes::UNKNOWN_NAME, path.span, headline, "not imported");
         d.help.extend(near::question(&near));
         Some(d.help(format!("import it: `use {front}`")))
     }
@@ -319,7 +320,8 @@ impl<'a> Names<'a> {
     pub fn unknown(&self, module: usize, name: &Name, what: &str, fits: impl Fn(&ItemKind) -> bool) -> Diagnostic {
         let candidates = self.visible(module).filter(|(_, id)| fits(&self.decl(*id).item.kind)).map(|(n, _)| n);
         let near = near::nearest(&name.text, candidates);
-        let mut d = Diagnostic::error(
+        let mut d = Diagnostic::about(
+            &name.text,
             codes::UNKNOWN_NAME,
             name.span,
             format!("there is no {what} `{}`", name.text),

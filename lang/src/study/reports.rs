@@ -137,7 +137,7 @@ impl Elaborator<'_> {
         };
         if self.graph.depends(n.node, |op| matches!(op, Op::Local(i) if *i >= first)) {
             let headline = format!("`{name}` cannot follow what is itself known only when the run has ended");
-            let d = Diagnostic::error(codes::WRONG_ARGUMENTS, at, headline, "one over time within another");
+            let d = Diagnostic::about(name, codes::WRONG_ARGUMENTS, at, headline, "one over time within another");
             self.report(d);
             return Value::Error;
         }

@@ -79,7 +79,7 @@ parts! {
     Edit { span text }
     Fix { title edits sure asks }
     Missing { module name below list only }
-    Diagnostic { code severity headline labels help fixes missing }
+    Diagnostic { code severity headline labels help fixes about missing }
     Name { text span }
     Path { segments span }
     UnitText { text span }

@@ -19,6 +19,10 @@ use crate::fault::Fault;
 /// Comparisons that change within this share of the time change together: they are located to a few units of rounding only.
 const TOGETHER: f64 = 16.0 * f64::EPSILON;
 
+/// What changes within this share of the time after the end of a stretch changes at its end: it was to be met there exactly, and states are
+/// off by their last digits as well.
+const AT_END: f64 = 64.0 * f64::EPSILON;
+
 /// How a stretch without a discontinuity was left.
 enum Left {
     /// At the time asked for, or where the observer or somebody else stops.
@@ -58,7 +62,7 @@ impl Engine<'_> {
                 continue;
             }
             if let Left::Jump(due) = self.follow(until, observer)? {
-                self.jump(&due, observer)?;
+                self.jump(&due, until, observer)?;
             }
             if observer.stops() {
                 self.check_suspects()?;
@@ -86,14 +90,18 @@ impl Engine<'_> {
     /// Goes through the steps of all parts in the order of time, up to the next discontinuity.
     fn follow(&mut self, until: f64, observer: &mut dyn Observer) -> Result<Left, Fault> {
         while let Some((time, who)) = self.course.queue.first() {
-            if time > until || time == until && !self.is_stop(who, time) {
-                break;
+            if time >= until {
+                // What changes at the end changes before whoever waits for it goes on; a step that ends there may be followed by it.
+                let jumps = self.jumps_until(until + AT_END * until);
+                if !jumps.is_empty() {
+                    return Ok(Left::Jump(jumps));
+                }
+                if time > until {
+                    break;
+                }
             }
             if self.jumps(who, time) {
-                let together = time + TOGETHER * time;
-                let mut jumps = self.course.queue.until(together);
-                jumps.retain(|who| self.jumps(*who, together));
-                return Ok(Left::Jump(jumps));
+                return Ok(Left::Jump(self.jumps_until(time + TOGETHER * time)));
             }
             match who {
                 Who::Part(id) if self.is_within(id) => self.show_within(id, observer)?,
@@ -113,9 +121,11 @@ impl Engine<'_> {
         Ok(Left::Target)
     }
 
-    /// Whether a comparison of the time itself changes.
-    fn is_stop(&self, who: Who, time: f64) -> bool {
-        matches!(who, Who::Lookout(id) if self.course.lookouts.get(id).is_some_and(|lookout| lookout.stops(time)))
+    /// The discontinuities that are found up to `time`, s.
+    fn jumps_until(&self, time: f64) -> Vec<Who> {
+        let mut jumps = self.course.queue.until(time);
+        jumps.retain(|who| self.jumps(*who, time));
+        jumps
     }
 
     /// Whether what is due is a discontinuity.
@@ -194,8 +204,8 @@ impl Engine<'_> {
         self.check_states(part.moving())
     }
 
-    /// Comparisons change at one instant: what rests on them is due.
-    fn jump(&mut self, due: &[Who], observer: &mut dyn Observer) -> Result<(), Fault> {
+    /// Comparisons change at one instant, at `until`, s, at the latest: what rests on them is due.
+    fn jump(&mut self, due: &[Who], until: f64, observer: &mut dyn Observer) -> Result<(), Fault> {
         let (mut found, mut concerned): (Vec<Crossing>, Vec<u32>) = (Vec::new(), Vec::new());
         let mut time = self.time;
         for who in due {
@@ -224,7 +234,7 @@ impl Engine<'_> {
                 }
             }
         }
-        self.arrive(time);
+        self.arrive(time.min(until));
         concerned.sort_unstable();
         concerned.dedup();
         for &part in &concerned {

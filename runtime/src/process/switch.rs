@@ -19,6 +19,9 @@ const CLEAR: f64 = 1e-9;
 /// A difference smaller than this many units of rounding is no evidence that a comparison has changed.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
+/// A time at which two clocks have changed places if they ever do, s.
+const FAR: f64 = 1e200;
+
 /// Times below this one are located as closely as this one, s.
 const LEAST: f64 = 1e-30;
 
@@ -505,17 +508,32 @@ fn stop(analysis: &Analysis<'_>, (a, b): (NodeId, NodeId), switch: &Switch, now:
         return Some(None);
     }
     let changed = |t: f64| switch.changed(a.at(t), b.at(t));
-    let mut time = ((b.offset - a.offset) / rate).max(now);
-    for _ in 0..8 {
-        if time.next_down() > now && changed(time.next_down()) {
-            time = time.next_down();
-        } else if time <= now || !changed(time) {
-            time = time.next_up();
-        } else {
-            return Some(Some(time));
-        }
+    if !changed(FAR) {
+        return Some(None);
     }
-    Some((time > now && changed(time)).then_some(time))
+    // Both clocks are rounded on the way, by far more than the time where their offsets are larger than it: the instant is looked for
+    // from where it would be without.
+    let guess = ((b.offset - a.offset) / rate).max(now);
+    let (mut low, mut high) = (now, guess.next_up());
+    let mut step = rounding(guess);
+    while !changed(high) {
+        (low, high) = (high, high + step);
+        step *= 2.0;
+    }
+    step = rounding(guess);
+    while low < high - step && changed(high - step) {
+        high -= step;
+        step *= 2.0;
+    }
+    low = low.max(high - step);
+    if changed(low) {
+        low = now;
+    }
+    while low.next_up() < high {
+        let middle = low + 0.5 * (high - low);
+        if changed(middle) { high = middle } else { low = middle }
+    }
+    Some(Some(high))
 }
 
 /// Whether a step is a wave.

@@ -60,7 +60,7 @@ impl<'s> Design<'s> {
                     sequence += 1;
                     between(low, high, sobol(run, sequence - 1, self.seed))
                 }
-                Draw::Grid(n) => between(low, high, place as f64 / f64::from(n.saturating_sub(1).max(1))),
+                Draw::Grid(n) => on_grid(low, high, place as f64, f64::from(n.saturating_sub(1).max(1))),
                 Draw::Normal(mean, sd) => normal(low, high, mean, sd, even()),
             });
         }
@@ -70,6 +70,11 @@ impl<'s> Design<'s> {
 
 /// Keeps the numbers of a study apart from those of the readings' noise.
 const STREAM: u64 = 0x5354_5544_5900_0001;
+
+/// One of a grid's values, of which the last has the number `last`: whole numbers between whole numbers stay whole.
+fn on_grid(low: f64, high: f64, place: f64, last: f64) -> f64 {
+    (low * (last - place) + high * place) / last
+}
 
 fn between(low: f64, high: f64, part: f64) -> f64 {
     if part == 1.0 { high } else { low + (high - low) * part }
@@ -136,6 +141,12 @@ mod tests {
         // The middle half of a range of four deviations: the deviation of a normal distribution cut at two of them.
         let (mean, sd) = moments(Draw::Normal(4.0, 1.0), 20_000);
         assert!((mean - 4.0).abs() < 0.03 && (sd - 0.8796).abs() < 0.02, "{mean} {sd}");
+    }
+
+    #[test]
+    fn a_grid_between_whole_numbers_has_whole_numbers() {
+        let all: Vec<f64> = (0..40).map(|place| on_grid(1.0, 40.0, f64::from(place), 39.0)).collect();
+        assert_eq!(all, (1..=40).map(f64::from).collect::<Vec<_>>());
     }
 
     #[test]

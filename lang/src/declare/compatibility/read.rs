@@ -136,7 +136,8 @@ impl<'a> Reader<'_, 'a> {
         let found = Consequence::named(&word.text);
         if found.is_none() {
             let near = near::nearest(&word.text, Consequence::names());
-            let mut d = Diagnostic::error(
+            let mut d = Diagnostic::about(
+                &word.text,
                 codes::UNKNOWN_NAME,
                 word.span,
                 format!("there is no consequence `{}`", word.text),

@@ -175,7 +175,8 @@ impl<'a> Elaborator<'a> {
             // Without an asset's own lines, the frame it starts from may be one that only an asset gives.
             if let Some(from) = at.from.as_ref().filter(|f| self.frame_is_missing(id, f)) {
                 let close = nearest(&from.text, done.frames.iter().map(|f| f.name.as_str()));
-                let d = Diagnostic::error(
+                let d = Diagnostic::about(
+                    &from.text,
                     codes::UNKNOWN_NAME,
                     from.span,
                     format!("no frame `{}` to start from", from.text),
@@ -322,7 +323,8 @@ impl<'a> Elaborator<'a> {
             }
         };
         if shape.is_none() {
-            self.report(Diagnostic::error(
+            self.report(Diagnostic::about(
+                name,
                 codes::WRONG_ARGUMENTS,
                 e.span,
                 format!("`{name}` is given {given}"),
@@ -354,7 +356,8 @@ impl<'a> Elaborator<'a> {
             (Some(unit), _) => unit,
             (None, Some(true)) => 1.0,
             (None, _) => {
-                let d = Diagnostic::error(
+                let d = Diagnostic::about(
+                    name,
                     codes::WRONG_ARGUMENTS,
                     span,
                     format!("`{name}` does not say its unit"),
