@@ -49,6 +49,12 @@ fn whole_numbers_of_what_moves_go_up_and_down_in_steps() {
 }
 
 #[test]
+fn what_follows_the_clock_is_met_however_it_is_written() {
+    let all = ["counts_down", "waits_for_the_countdown", "ends_with_an_event", "waits_to_the_last_moment", "fades"];
+    pass_cases("numerics/clock.mtx", &all);
+}
+
+#[test]
 fn short_waits_add_up_exactly() {
     pass_cases("numerics/moments.mtx", &["adds_up_waits"]);
 }

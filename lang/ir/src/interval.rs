@@ -107,8 +107,9 @@ fn wave((low, high): Interval, crest: f64, at_low: f64, at_high: f64) -> Interva
     let meets = |at: f64| ((low - slack - at) / TAU).ceil() <= ((high + slack - at) / TAU).floor();
     let (least, most) = (at_low.min(at_high), at_low.max(at_high));
     let crosses = |at: f64| meets(at) || !(high - low).is_finite();
-    let bottom = if crosses(crest + 0.5 * TAU) { -1.0 } else { least - ROUNDING };
-    let top = if crosses(crest) { 1.0 } else { most + ROUNDING };
+    let (least, most) = widened(least, most);
+    let bottom = if crosses(crest + 0.5 * TAU) { -1.0 } else { least };
+    let top = if crosses(crest) { 1.0 } else { most };
     (bottom, top)
 }
 

@@ -89,18 +89,21 @@ impl Engine<'_> {
 
     /// Goes through the steps of all parts in the order of time, up to the next discontinuity.
     fn follow(&mut self, until: f64, observer: &mut dyn Observer) -> Result<Left, Fault> {
-        while let Some((time, who)) = self.course.queue.first() {
+        while let Some((time, mut who)) = self.course.queue.first() {
             if time >= until {
-                // What changes at the end changes before whoever waits for it goes on; a step that ends there may be followed by it.
-                let jumps = self.jumps_until(until + AT_END * until);
-                if !jumps.is_empty() {
-                    return Ok(Left::Jump(jumps));
+                // What changes at the end changes before whoever waits for it goes on: once all steps that end there are taken, as another
+                // one may begin with it.
+                match self.course.queue.until(until).into_iter().find(|who| !self.jumps(*who, until)) {
+                    Some(step) => who = step,
+                    None => {
+                        let jumps = self.jumps_until(until + AT_END * until);
+                        if !jumps.is_empty() {
+                            return Ok(Left::Jump(jumps));
+                        }
+                        break;
+                    }
                 }
-                if time > until {
-                    break;
-                }
-            }
-            if self.jumps(who, time) {
+            } else if self.jumps(who, time) {
                 return Ok(Left::Jump(self.jumps_until(time + TOGETHER * time)));
             }
             match who {

@@ -147,10 +147,25 @@ impl Tape {
 
     /// Bounds of all results over a span of time, s, and of the moving states.
     pub(super) fn enclose(&self, time: Interval, moving: impl Iterator<Item = Interval>, bounds: &mut [Interval]) {
+        self.enclose_knowing(time, moving, |_| None, bounds);
+    }
+
+    /// The same where bounds of some registers are known besides.
+    pub(super) fn enclose_knowing(
+        &self,
+        time: Interval,
+        moving: impl Iterator<Item = Interval>,
+        known: impl Fn(usize) -> Option<Interval>,
+        bounds: &mut [Interval],
+    ) {
         let first = self.first_result();
         bounds[self.time()] = time;
         bounds[self.time() + 1..first].iter_mut().zip(moving).for_each(|(place, state)| *place = state);
         for (i, step) in self.steps.iter().enumerate() {
+            if let Some(known) = known(first + i) {
+                bounds[first + i] = known;
+                continue;
+            }
             bounds[first + i] = match *step {
                 Step::Unary(op, a) => interval::of_unary(op, bounds[a as usize]),
                 // A number times itself is a square.
@@ -168,6 +183,28 @@ impl Tape {
                 }),
             };
         }
+    }
+
+    /// How large what each register is made of by sums is at most: what it is rounded by is a share of that.
+    pub(super) fn sizes(&self, registers: &[f64]) -> Vec<f64> {
+        let mut sizes: Vec<f64> = registers.iter().map(|value| value.abs()).collect();
+        let first = self.first_result();
+        for (i, step) in self.steps.iter().enumerate() {
+            let of = |register: u32| sizes[register as usize];
+            let size = match *step {
+                Step::Unary(UnaryOp::Neg | UnaryOp::Abs, a) => of(a),
+                Step::Binary(BinaryOp::Add | BinaryOp::Sub | BinaryOp::Min | BinaryOp::Max, a, b) => of(a).max(of(b)),
+                Step::Binary(BinaryOp::Mul, a, b) => of(a) * of(b),
+                Step::Binary(BinaryOp::Div, a, b) => of(a) / registers[b as usize].abs(),
+                Step::Select(_, a, b) => of(a).max(of(b)),
+                Step::Sum(first, count) => self.summed(first, count).map(|t| t.factor.abs() * of(t.register)).sum(),
+                _ => continue,
+            };
+            if size.is_finite() {
+                sizes[first + i] = sizes[first + i].max(size);
+            }
+        }
+        sizes
     }
 
     /// The terms of a sum.

@@ -20,6 +20,9 @@ const FINEST: f64 = 1e-9;
 /// A change by this share of what is there is rounding.
 const SLIGHT: f64 = 1e-9;
 
+/// Rounding of a sum, as a share of the largest number in it.
+const ROUNDED: f64 = 16.0 * f64::EPSILON;
+
 /// A value below this is nothing.
 const NOTHING: f64 = 1e-40;
 
@@ -37,6 +40,8 @@ pub(super) struct Timed {
     tape: Tape,
     /// The pace of the states that grow evenly; absent for others.
     paces: Vec<Option<f64>>,
+    /// By register of the tape, whether it follows the clock in a straight line.
+    straight: Vec<bool>,
 }
 
 impl Timed {
@@ -64,7 +69,10 @@ impl Timed {
         }
         outputs.sort_unstable();
         outputs.dedup();
-        Some(Timed { tape: tape.only(outputs), paces })
+        let tape = tape.only(outputs);
+        let kinds = self::kinds(&tape, 1, |i| if paces[i].is_some() { 1 } else { 3 });
+        let straight = kinds.into_iter().map(|kind| kind == 1).collect();
+        Some(Timed { tape, paces, straight })
     }
 
     /// How far a step from `time`, s, of `length` s may go so that nothing that follows the clock happens unseen within it; none
@@ -84,8 +92,10 @@ impl Timed {
                 *hull = (hull.0.min(value), hull.1.max(value));
             }
         }
-        for (low, high) in &mut hulls {
-            let slack = (*high - *low) + SLIGHT * low.abs().max(high.abs()) + NOTHING;
+        let sizes = self.tape.sizes(&registers);
+        for ((low, high), output) in hulls.iter_mut().zip(&self.tape.outputs) {
+            let rounded = ROUNDED * sizes[*output as usize];
+            let slack = (*high - *low) + SLIGHT * low.abs().max(high.abs()) + 4.0 * rounded + NOTHING;
             (*low, *high) = (*low - slack, *high + slack);
         }
         let mut bounds = self.tape.intervals();
@@ -131,12 +141,23 @@ impl Timed {
         self.tape.run(time + after, moving, registers);
     }
 
+    /// Bounds over a piece of a step. What follows the clock in a straight line lies between its ends, however it is written.
     fn bound(&self, time: f64, (from, to): Interval, values: &[f64], bounds: &mut [Interval]) {
+        let (mut moving, mut ends) = (values.to_vec(), [self.tape.registers(), self.tape.registers()]);
+        for (after, registers) in [from, to].into_iter().zip(&mut ends) {
+            self.point(time, after, values, &mut moving, registers);
+        }
+        let sizes = self.tape.sizes(&ends[1]);
+        let known = |register: usize| {
+            let (a, b) = (ends[0][register], ends[1][register]);
+            let rounded = ROUNDED * sizes[register];
+            self.straight[register].then_some((a.min(b) - rounded, a.max(b) + rounded))
+        };
         let states = values.iter().zip(&self.paces).map(|(value, pace)| {
             let (a, b) = (value + pace.unwrap_or(0.0) * from, value + pace.unwrap_or(0.0) * to);
             (a.min(b), a.max(b))
         });
-        self.tape.enclose((time + from, time + to), states, bounds);
+        self.tape.enclose_knowing((time + from, time + to), states, known, bounds);
     }
 }
 
