@@ -16,7 +16,7 @@ fn what_lasts_a_moment_is_not_stepped_over() {
 fn what_passes_between_two_steps_is_seen() {
     pass_cases(
         "numerics/passing.mtx",
-        &["meets_a_bell", "meets_a_moment", "adds_up_beside_others", "meets_beside_others"],
+        &["meets_a_bell", "meets_a_moment", "adds_up_beside_others", "meets_beside_others", "outlives_what_was_fast"],
     );
     let (code, text) = run_case("numerics/passing.mtx", "is_dangerous_for_a_second", &[]);
     assert!(code == 1 && text.contains("between_two") && text.contains("at 100 s"), "{text}");
@@ -52,6 +52,9 @@ fn whole_numbers_of_what_moves_go_up_and_down_in_steps() {
 fn what_follows_the_clock_is_met_however_it_is_written() {
     let all = ["counts_down", "waits_for_the_countdown", "ends_with_an_event", "waits_to_the_last_moment", "fades"];
     pass_cases("numerics/clock.mtx", &all);
+    pass_cases("numerics/clock.mtx", &["touches"]);
+    let (code, text) = run_case("numerics/clock.mtx", "meets", &[]);
+    assert!(code == 1 && text.contains("`t.x < 6`"), "{text}");
 }
 
 #[test]

@@ -96,7 +96,7 @@ impl Engine<'_> {
                 match self.course.queue.until(until).into_iter().find(|who| !self.jumps(*who, until)) {
                     Some(step) => who = step,
                     None => {
-                        let jumps = self.jumps_until(until + AT_END * until);
+                        let jumps = self.jumps_at_end(until);
                         if !jumps.is_empty() {
                             return Ok(Left::Jump(jumps));
                         }
@@ -129,6 +129,26 @@ impl Engine<'_> {
         let mut jumps = self.course.queue.until(time);
         jumps.retain(|who| self.jumps(*who, time));
         jumps
+    }
+
+    /// The discontinuities at `until`, s: those found up to then, and what is found a little later by rounding alone.
+    fn jumps_at_end(&self, until: f64) -> Vec<Who> {
+        let mut jumps = self.course.queue.until(until + AT_END * until);
+        jumps.retain(|who| self.jumps(*who, until) && self.meets_at(*who, until));
+        jumps
+    }
+
+    /// Whether what is found is there at `until`, s, but for rounding.
+    fn meets_at(&self, who: Who, until: f64) -> bool {
+        match who {
+            Who::Part(id) => self.course.parts.get(id).is_some_and(|part| {
+                let meets = matches!(part.ending(), Some(Ending::Crossed(crossing)) if crossing.meets);
+                part.until() <= until || meets
+            }),
+            Who::Lookout(id) | Who::Sooner(id) => self.course.lookouts.get(id).is_some_and(|lookout| {
+                lookout.due() <= until || lookout.found.is_some_and(|(crossing, _)| crossing.meets)
+            }),
+        }
     }
 
     /// Whether what is due is a discontinuity.

@@ -279,10 +279,12 @@ impl Integrator {
         length.filter(|length| self.tolerance.is_outgrown(values, *length))
     }
 
-    /// Sets tolerances anew after a step of `length`, s, if there is one.
+    /// Sets tolerances anew after a step of `length`, s, if there is one: for the rounding of the law as it is now, which may be far less than
+    /// where it began.
     fn renew(&mut self, length: Option<f64>) {
         if let Some(length) = length {
             let (field, end, values) = (&self.field, self.dense.end, self.dense.last());
+            self.tolerance.listen(&field.rates, self.dense.clock.lab(end), values);
             self.tolerance.renew(values, length, &mut |state| field.damping(values, end, state));
         }
     }

@@ -93,6 +93,16 @@ impl Switch {
         }
     }
 
+    /// Whether it has its new truth where both sides are equal; `left` is beyond that.
+    fn meets(&self, left: f64) -> bool {
+        match self.is {
+            Is::Compared { op: BinaryOp::Le, truth, .. } => !truth,
+            Is::Compared { op: BinaryOp::Lt, truth, .. } => truth,
+            Is::Compared { .. } => true,
+            Is::Whole(number) => left >= number,
+        }
+    }
+
     /// The sign that left minus right has while the comparison keeps its truth; none where it is true at one instant only.
     fn keeps(&self) -> Option<f64> {
         match self.is {
@@ -188,6 +198,8 @@ pub(super) struct Crossing {
     pub(super) node: NodeId,
     /// Whether it is an equality, true at this instant only.
     pub(super) touch: bool,
+    /// Whether it has its new truth where both sides are equal, and not only beyond: `x >= 5` comes true there, `x <= 5` ends after it.
+    pub(super) meets: bool,
 }
 
 impl Switches {
@@ -303,7 +315,8 @@ impl Switches {
         let first = located.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
         Ok(first.map(|(time, i)| {
             let time = self.settled(i, time, to, moving, path);
-            Crossing { time, node: self.list[i].node, touch: self.list[i].touches() }
+            let switch = &self.list[i];
+            Crossing { time, node: switch.node, touch: switch.touches(), meets: switch.meets(self.sides(i).0) }
         }))
     }
 

@@ -9,6 +9,7 @@ use super::Interpreter;
 use super::actions::Asked;
 use super::report::shown;
 use super::state::AbstractState;
+use super::value::CLOSE;
 
 /// Steps that a run takes at one moment, and no more.
 const MOST_AT_ONCE: f64 = 100_000.0;
@@ -26,6 +27,12 @@ impl Interpreter<'_, '_> {
         let mut nodes: Vec<NodeId> = self.unbroken.iter().map(|(condition, _)| condition.node).collect();
         nodes.retain(|node| !self.is_shared(*node) && self.eval(*node, facts).truth() == Some(true));
         nodes.into_iter().map(|node| (node, false)).collect()
+    }
+
+    /// Whether it is the time `end`, s, and none of these is broken there, but would be beyond.
+    pub(super) fn only_touches(&mut self, conditions: &[NodeId], end: Option<f64>, facts: &AbstractState) -> bool {
+        let is_end = facts.time.exact().zip(end).is_some_and(|(now, end)| (now - end).abs() <= CLOSE * end.abs());
+        is_end && conditions.iter().all(|condition| self.eval(*condition, facts).truth() != Some(false))
     }
 
     /// Some of these are broken now: where a handler takes that, the step goes no further. Otherwise it ends just behind that moment,

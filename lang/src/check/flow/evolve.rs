@@ -127,9 +127,12 @@ impl Interpreter<'_, '_> {
             return;
         }
         let watched = self.may_break_here(facts);
+        let end = facts.time.exact().zip(duration.exact()).map(|(begin, lasts)| begin + lasts);
         let course = duration.exact().map(|exact| self.course(exact, &watched, facts));
         let rest = match course {
             Some(Course::Passed) => return,
+            // What is only touched at the end holds.
+            Some(Course::Reached(nodes)) if self.only_touches(&nodes, end, facts) => return,
             Some(Course::Reached(nodes)) => return self.ends_broken(&nodes, facts),
             Some(Course::Left(left)) if left < longest => AbstractValue::Point(left),
             _ => duration.clone(),
