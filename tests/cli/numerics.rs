@@ -16,7 +16,14 @@ fn what_lasts_a_moment_is_not_stepped_over() {
 fn what_passes_between_two_steps_is_seen() {
     pass_cases(
         "numerics/passing.mtx",
-        &["meets_a_bell", "meets_a_moment", "adds_up_beside_others", "meets_beside_others", "outlives_what_was_fast"],
+        &[
+            "meets_a_bell",
+            "meets_a_moment",
+            "adds_up_beside_others",
+            "meets_beside_others",
+            "outlives_what_was_fast",
+            "dies_out",
+        ],
     );
     let (code, text) = run_case("numerics/passing.mtx", "is_dangerous_for_a_second", &[]);
     assert!(code == 1 && text.contains("between_two") && text.contains("at 100 s"), "{text}");

@@ -9,6 +9,9 @@ const DEGREE: usize = 5;
 pub(super) const POINTS: [f64; DEGREE + 1] =
     [0.0, 0.095_491_502_812_526_27, 0.345_491_502_812_526_3, 0.654_508_497_187_473_7, 0.904_508_497_187_473_7, 1.0];
 
+/// What has died out is off by this share of its largest value.
+const ROUNDED: f64 = 8.0 * f64::EPSILON;
+
 /// Barycentric weights of [`POINTS`].
 const WEIGHTS: [f64; DEGREE + 1] = [0.5, -1.0, 1.0, -1.0, 1.0, -0.5];
 
@@ -19,13 +22,25 @@ pub(super) struct Dense {
     pub(super) start: f64,
     pub(super) end: f64,
     values: [Vec<f64>; DEGREE + 1],
+    /// By moving state, how far below nothing it may come by rounding alone.
+    least: Vec<f64>,
 }
 
 impl Dense {
     /// An empty interval at the lab time `time`, s.
     pub(super) fn still(time: f64, states: &[f64]) -> Self {
         let values = std::array::from_fn(|_| states.to_vec());
-        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, values }
+        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, values, least: vec![0.0; states.len()] }
+    }
+
+    /// The moving states are as large as this: what has died out is known to a share of that, and would be of either sign.
+    pub(super) fn measured_by(&mut self, sizes: &[f64]) {
+        self.least.iter_mut().zip(sizes).for_each(|(least, size)| *least = ROUNDED * size);
+    }
+
+    /// A value of a state, by its place: nothing where only rounding puts it below.
+    fn told(&self, place: usize, value: f64) -> f64 {
+        if value < 0.0 && value > -self.least[place] { 0.0 } else { value }
     }
 
     /// Counts time from the end on; what was before is forgotten.
@@ -88,7 +103,7 @@ impl Dense {
     /// The moving states at the local `time`, s, within the interval.
     pub(super) fn at(&self, time: f64, out: &mut [f64]) {
         match self.shares(time) {
-            Shares::At(k) => out.copy_from_slice(&self.values[k]),
+            Shares::At(k) => out.iter_mut().enumerate().for_each(|(i, out)| *out = self.told(i, self.values[k][i])),
             Shares::Of(shares) => out.iter_mut().enumerate().for_each(|(i, out)| *out = self.mixed(&shares, i)),
         }
     }
@@ -98,14 +113,14 @@ impl Dense {
         let shares = self.shares(time);
         for (out, place) in out.iter_mut().zip(places) {
             *out = match &shares {
-                Shares::At(k) => self.values[*k][*place as usize],
+                Shares::At(k) => self.told(*place as usize, self.values[*k][*place as usize]),
                 Shares::Of(shares) => self.mixed(shares, *place as usize),
             };
         }
     }
 
     fn mixed(&self, shares: &[f64; DEGREE + 1], place: usize) -> f64 {
-        (0..=DEGREE).map(|k| shares[k] * self.values[k][place]).sum()
+        self.told(place, (0..=DEGREE).map(|k| shares[k] * self.values[k][place]).sum())
     }
 
     fn shares(&self, time: f64) -> Shares {

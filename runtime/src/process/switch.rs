@@ -293,13 +293,12 @@ impl Switches {
         for i in 0..self.list.len() {
             for (before, after) in self.sampled_changes(i).into_iter().flatten() {
                 let [before, after] = [before, after].map(|share| instant(piece, share));
-                if !self.straight[i] {
-                    // The polynomial through the points of a curved side is not the side itself.
-                    path(after, moving);
-                    self.run(after, moving);
-                    if !self.is_changed(i, Switch::clearly_changed) {
-                        continue;
-                    }
+                // The polynomial through the points is not a curved side itself, nor a state that has died out.
+                path(after, moving);
+                self.run(after, moving);
+                let test = if self.straight[i] { Switch::changed } else { Switch::clearly_changed };
+                if !self.is_changed(i, test) {
+                    continue;
                 }
                 located.push((self.locate(i, before, after, moving, path), i));
                 break;
