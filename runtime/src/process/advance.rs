@@ -234,10 +234,10 @@ impl Engine<'_> {
         for who in due {
             match *who {
                 Who::Part(id) => {
-                    let Some(part) = self.course.parts.get_mut(id) else { continue };
+                    let Some(part) = self.course.parts.get(id) else { continue };
                     let Some(Ending::Crossed(crossing)) = part.ending() else { continue };
                     time = time.max(part.until());
-                    part.reach(crossing.time, &mut self.states);
+                    self.reach_crossing(id, crossing, until)?;
                     found.push(crossing);
                     concerned.push(id);
                 }
@@ -249,10 +249,8 @@ impl Engine<'_> {
                     self.suspects.extend(&lookout.nodes);
                     let Some((crossing, _)) = lookout.found else { continue };
                     found.push(crossing);
-                    if let [part] = lookout.parts[..]
-                        && let Some(part) = self.course.parts.get_mut(part)
-                    {
-                        part.reach(crossing.time, &mut self.states);
+                    if let [part] = lookout.parts[..] {
+                        self.reach_crossing(part, crossing, until)?;
                     }
                 }
             }
@@ -272,6 +270,24 @@ impl Engine<'_> {
         self.cross(&found)?;
         self.show(observer);
         self.settle(None, observer)
+    }
+
+    /// Follows a part to where a comparison changes that it decides; not beyond `until`, s, where it has changed there already.
+    fn reach_crossing(&mut self, id: u32, crossing: Crossing, until: f64) -> Result<(), Fault> {
+        let Some(part) = self.course.parts.get_mut(id) else { return Ok(()) };
+        if part.dense().clock.lab(crossing.time) > until {
+            part.reach_lab(until, &mut self.states);
+            self.arrive(until);
+            self.followed(id)?;
+            let before = self.facts.of(&self.model.graph).now(crossing.node);
+            if self.eval(crossing.node) != before {
+                return Ok(());
+            }
+        }
+        if let Some(part) = self.course.parts.get_mut(id) {
+            part.reach(crossing.time, &mut self.states);
+        }
+        Ok(())
     }
 
     /// These comparisons have changed, and with them perhaps others that rest on the same.

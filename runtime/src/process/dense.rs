@@ -30,12 +30,14 @@ impl Dense {
     /// An empty interval at the lab time `time`, s.
     pub(super) fn still(time: f64, states: &[f64]) -> Self {
         let values = std::array::from_fn(|_| states.to_vec());
-        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, values, least: vec![0.0; states.len()] }
+        let least = states.iter().map(|value| ROUNDED * value.abs()).collect();
+        Dense { clock: Clock::from(time), start: 0.0, end: 0.0, values, least }
     }
 
-    /// The moving states are as large as this: what has died out is known to a share of that, and would be of either sign.
-    pub(super) fn measured_by(&mut self, sizes: &[f64]) {
-        self.least.iter_mut().zip(sizes).for_each(|(least, size)| *least = ROUNDED * size);
+    /// Notes how large the moving states have been: what has died out is known to a share of that, and would be of either sign.
+    fn measure(&mut self) {
+        let ends = self.least.iter_mut().zip(&self.values[DEGREE]);
+        ends.for_each(|(least, value)| *least = least.max(ROUNDED * value.abs()));
     }
 
     /// A value of a state, by its place: nothing where only rounding puts it below.
@@ -66,6 +68,7 @@ impl Dense {
         for k in 1..=DEGREE {
             sample(self.time(k), &mut self.values[k])?;
         }
+        self.measure();
         Ok(())
     }
 
@@ -74,6 +77,7 @@ impl Dense {
         self.values.swap(0, DEGREE);
         (self.start, self.end) = (self.end, self.end + length);
         self.values[1..].iter_mut().zip(states).for_each(|(value, state)| value.copy_from_slice(state));
+        self.measure();
     }
 
     /// The moving states at the end.

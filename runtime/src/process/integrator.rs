@@ -187,8 +187,7 @@ pub(super) struct Integrator {
 impl Integrator {
     /// Prepares to integrate `rates` of the states `moving` from `time`, s, and `values` on.
     pub(super) fn new(rates: Tape, moving: Vec<u32>, time: f64, values: &[f64], tolerance: Tolerance) -> Self {
-        let mut dense = Dense::still(time, values);
-        dense.measured_by(tolerance.sizes());
+        let dense = Dense::still(time, values);
         let field = Field::new(rates, dense.clock);
         let exact = Bent::of(&field.rates, values);
         let (state, first) = (None, None);
@@ -287,7 +286,6 @@ impl Integrator {
             let (field, end, values) = (&self.field, self.dense.end, self.dense.last());
             self.tolerance.listen(&field.rates, self.dense.clock.lab(end), values);
             self.tolerance.renew(values, length, &mut |state| field.damping(values, end, state));
-            self.dense.measured_by(self.tolerance.sizes());
         }
     }
 
