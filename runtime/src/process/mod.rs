@@ -115,7 +115,7 @@ pub trait Observer {
     /// Within a step of a part, where [`Options::curves`] asks for it: states, ascending, that are on a curve there. Straight lines between
     /// all that is shown of a state lie close to it.
     fn curve(&mut self, _time: f64, _engine: &Engine<'_>, _changed: &[u32]) {}
-    /// What these states, ascending, have followed since they were last shown is looked at no more: [`Engine::leaf_at`] will not know it.
+    /// What these states, ascending, have followed since they were last shown is forgotten after this: only now can it be asked for.
     fn leaves(&mut self, _time: f64, _engine: &Engine<'_>, _states: &[u32]) {}
     /// An event has fired, by its index in the model.
     fn event(&mut self, time: f64, event: usize);
