@@ -1,6 +1,13 @@
-//! Did you mean.
+//! Names that are not known, and did you mean.
 
-use matterix_ir::{Diagnostic, Span};
+use matterix_ir::{Diagnostic, Span, codes};
+
+use crate::ast::Name;
+
+/// A name that stands for nothing where it is written, whose label says `label`.
+pub fn unknown(name: &Name, headline: impl Into<String>, label: impl Into<String>) -> Diagnostic {
+    Diagnostic::about(&name.text, codes::UNKNOWN_NAME, name.span, headline, label)
+}
 
 /// The candidates closest to `word`, best first, at most three; none where nothing is close.
 pub fn nearest<S: AsRef<str>>(word: &str, candidates: impl IntoIterator<Item = S>) -> Vec<String> {

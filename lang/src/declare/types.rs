@@ -130,13 +130,8 @@ impl Tables<'_> {
     }
 
     fn unknown_type(&self, name: &ast::Name, module: usize) -> Diagnostic {
-        let mut d = Diagnostic::about(
-            &name.text,
-            codes::UNKNOWN_NAME,
-            name.span,
-            format!("there is no type `{}`", name.text),
-            "not a dimension, capability or asset",
-        );
+        let mut d =
+            near::unknown(name, format!("there is no type `{}`", name.text), "not a dimension, capability or asset");
         let kinds = self.names.visible(module).filter(|(_, id)| self.kinds.contains_key(id)).map(|(n, _)| n);
         let names: Vec<&str> = kinds.chain(self.units.dimension_names()).chain(BUILT_IN.iter().copied()).collect();
         let near = near::nearest(&name.text, names);

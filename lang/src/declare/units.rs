@@ -132,7 +132,7 @@ fn declared_twice(what: &str, again: Span, first: Span) -> Diagnostic {
 
 fn unknown_dimension(units: &Units, n: &Name) -> Diagnostic {
     let headline = format!("there is no dimension `{}`", n.text);
-    let mut d = Diagnostic::about(&n.text, codes::UNKNOWN_NAME, n.span, headline, "not declared above");
+    let mut d = near::unknown(n, headline, "not declared above");
     d.help.extend(near::question(&near::nearest(&n.text, units.dimension_names())));
     d
 }

@@ -363,7 +363,7 @@ impl<'a> Elaborator<'a> {
         let known = names.visible(module).filter(|(_, id)| is_hazard(&names.decl(*id).item.kind)).map(|(n, _)| n);
         let near = near::nearest(&name.text, known);
         let headline = format!("there is no hazard or caution `{}`", name.text);
-        let d = Diagnostic::about(&name.text, codes::UNKNOWN_NAME, name.span, headline, "nothing to allow");
+        let d = near::unknown(name, headline, "nothing to allow");
         self.report(near::proposed(d, &near, name.span));
     }
 }

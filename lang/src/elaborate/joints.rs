@@ -9,7 +9,7 @@ use crate::declare::Type;
 use crate::eval::lab::Elaborator;
 use crate::eval::lab::geometry::Geometry;
 use crate::eval::{Scope, Value};
-use crate::near::{nearest, question};
+use crate::near::{nearest, question, unknown};
 
 /// The joints of an asset's lines do not move by themselves: the states that they follow have the limits.
 const FREE: JointLimits =
@@ -112,13 +112,7 @@ impl<'a> Elaborator<'a> {
     fn no_joint(&mut self, name: &Name, robot: &Robot) {
         let close = nearest(&name.text, robot.joints.iter().map(|j| j.name.as_str()));
         let headline = format!("no joint `{}`", name.text);
-        let d = Diagnostic::about(
-            &name.text,
-            codes::UNKNOWN_NAME,
-            name.span,
-            headline,
-            "not a joint that stands before it",
-        );
+        let d = unknown(name, headline, "not a joint that stands before it");
         self.report(match question(&close) {
             Some(asked) => d.help(asked),
             None => d,

@@ -366,13 +366,7 @@ impl<'a> Elaborator<'a> {
         }
         let is_unit = self.tables.units.find(&n.text).is_some();
         let near = if is_unit { Vec::new() } else { near::nearest(&n.text, candidates) };
-        let mut d = Diagnostic::about(
-            &n.text,
-            codes::UNKNOWN_NAME,
-            n.span,
-            format!("there is no `{}` here", n.text),
-            "not declared",
-        );
+        let mut d = near::unknown(n, format!("there is no `{}` here", n.text), "not declared");
         if is_unit {
             d = d.help(format!("`{}` is a unit: a unit is one word without blanks, such as `W/K`", n.text));
         }
@@ -572,14 +566,8 @@ impl<'a> Elaborator<'a> {
                     Some(v) => v,
                     None => {
                         self.report(
-                            Diagnostic::about(
-                                &fold.text,
-                                codes::UNKNOWN_NAME,
-                                fold.span,
-                                format!("there is no fold `{}`", fold.text),
-                                "not a fold",
-                            )
-                            .help("use `sum`, `product`, `min`, `max`, `all` or `any`"),
+                            near::unknown(fold, format!("there is no fold `{}`", fold.text), "not a fold")
+                                .help("use `sum`, `product`, `min`, `max`, `all` or `any`"),
                         );
                         return Value::Error;
                     }

@@ -42,7 +42,7 @@ impl<'a> Elaborator<'a> {
         }
         let near = near::nearest(&n.text, words.iter());
         let headline = format!("`{}` is not one of {}", n.text, list(words));
-        let mut d = Diagnostic::about(&n.text, codes::UNKNOWN_NAME, n.span, headline, "no such word");
+        let mut d = near::unknown(n, headline, "no such word");
         d = near::proposed(d, &near, n.span);
         self.report(d);
         Value::Error

@@ -221,13 +221,8 @@ impl<'a> Planner<'a, '_> {
             StmtKind::Await { name } => {
                 if !self.jobs.contains(&name.text) {
                     let near = crate::near::nearest(&name.text, &self.jobs);
-                    let mut d = Diagnostic::about(
-                        &name.text,
-                        codes::UNKNOWN_NAME,
-                        name.span,
-                        format!("no job `{}` was started", name.text),
-                        "not started above",
-                    );
+                    let mut d =
+                        crate::near::unknown(name, format!("no job `{}` was started", name.text), "not started above");
                     d.help.extend(crate::near::question(&near));
                     self.lab.report(d);
                     return None;

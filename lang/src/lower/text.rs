@@ -2,7 +2,7 @@
 
 use matterix_ir::plan::{Comparison, Condition, Refusal, Said};
 use matterix_ir::scene::InstanceId;
-use matterix_ir::{Diagnostic, NodeId, Span, codes};
+use matterix_ir::{NodeId, Span};
 
 use super::Planner;
 use super::call::Bound;
@@ -207,10 +207,8 @@ impl<'a> Planner<'a, '_> {
             return;
         }
         let near = near::nearest(&name.text, self.failures.iter());
-        let mut d = Diagnostic::about(
-            &name.text,
-            codes::UNKNOWN_NAME,
-            name.span,
+        let mut d = near::unknown(
+            name,
             format!("nothing fails with `{}`", name.text),
             "no step or skill declares this failure",
         );

@@ -320,13 +320,7 @@ impl<'a> Names<'a> {
     pub fn unknown(&self, module: usize, name: &Name, what: &str, fits: impl Fn(&ItemKind) -> bool) -> Diagnostic {
         let candidates = self.visible(module).filter(|(_, id)| fits(&self.decl(*id).item.kind)).map(|(n, _)| n);
         let near = near::nearest(&name.text, candidates);
-        let mut d = Diagnostic::about(
-            &name.text,
-            codes::UNKNOWN_NAME,
-            name.span,
-            format!("there is no {what} `{}`", name.text),
-            "not declared",
-        );
+        let mut d = near::unknown(name, format!("there is no {what} `{}`", name.text), "not declared");
         if let Some(import) = self.import_of(module, &name.text, &fits) {
             d = import.offered(d);
         } else {

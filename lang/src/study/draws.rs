@@ -83,7 +83,7 @@ pub(super) fn draw<'a>(
         _ => {
             let near = near::nearest(&word.text, DRAWS.iter().copied());
             let headline = format!("there is no way to draw called `{}`", word.text);
-            let mut d = Diagnostic::about(&word.text, codes::UNKNOWN_NAME, word.span, headline, "not a way to draw");
+            let mut d = near::unknown(word, headline, "not a way to draw");
             d.help.extend(near::question(&near));
             lab.report(d.help("there are `uniform`, `sobol`, `grid(n)` and `normal(mean: ..., sd: ...)`"));
             None

@@ -93,7 +93,7 @@ impl Engine<'_> {
             if time >= until {
                 // What changes at the end changes before whoever waits for it goes on: once all steps that end there are taken, as another
                 // one may begin with it.
-                match self.course.queue.until(until).into_iter().find(|who| !self.jumps(*who, until)) {
+                match self.course.queue.until(until).find(|who| !self.jumps(*who, until)) {
                     Some(step) => who = step,
                     None => {
                         let jumps = self.jumps_at_end(until);
@@ -126,16 +126,13 @@ impl Engine<'_> {
 
     /// The discontinuities that are found up to `time`, s.
     fn jumps_until(&self, time: f64) -> Vec<Who> {
-        let mut jumps = self.course.queue.until(time);
-        jumps.retain(|who| self.jumps(*who, time));
-        jumps
+        self.course.queue.until(time).filter(|who| self.jumps(*who, time)).collect()
     }
 
     /// The discontinuities at `until`, s: those found up to then, and what is found a little later by rounding alone.
     fn jumps_at_end(&self, until: f64) -> Vec<Who> {
-        let mut jumps = self.course.queue.until(until + AT_END * until);
-        jumps.retain(|who| self.jumps(*who, until) && self.meets_at(*who, until));
-        jumps
+        let due = self.course.queue.until(until + AT_END * until);
+        due.filter(|who| self.jumps(*who, until) && self.meets_at(*who, until)).collect()
     }
 
     /// Whether what is found is there at `until`, s, but for rounding.

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use matterix_ir::interval::Interval;
 use nalgebra::{Matrix6, Vector6};
 
 use super::dense::POINTS;
@@ -19,7 +20,13 @@ pub(super) fn control(sampled: Vector6<f64>) -> Vector6<f64> {
     matrix * sampled
 }
 
-/// Those of its first and of its second half (de Casteljau).
+/// Bounds of a polynomial that is given at [`POINTS`].
+pub(super) fn hull(sampled: Vector6<f64>) -> Interval {
+    let points = control(sampled);
+    (points.min(), points.max())
+}
+
+/// The control points of the first and of the second half of a polynomial (de Casteljau).
 pub(super) fn halved(mut control: Vector6<f64>) -> (Vector6<f64>, Vector6<f64>) {
     let (mut left, mut right) = (control, control);
     for level in 1..6 {

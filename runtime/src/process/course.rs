@@ -112,8 +112,8 @@ impl Queue {
     }
 
     /// All that is due until `time`, s, in order.
-    pub(super) fn until(&self, time: f64) -> Vec<Who> {
-        self.order.iter().take_while(|(bits, _)| *bits <= time.to_bits()).map(|(_, who)| *who).collect()
+    pub(super) fn until(&self, time: f64) -> impl Iterator<Item = Who> {
+        self.order.iter().take_while(move |(bits, _)| *bits <= time.to_bits()).map(|(_, who)| *who)
     }
 }
 

@@ -6,7 +6,7 @@ use matterix_ir::NodeId;
 use matterix_ir::interval::Interval;
 use nalgebra::Vector6;
 
-use super::bernstein::control;
+use super::bernstein::hull;
 use super::dense::{Dense, POINTS};
 use super::integrator::{Integrator, Next, Stuck};
 use super::mode::Piece;
@@ -140,24 +140,25 @@ impl Part {
         if clock.lab(self.at) >= time {
             return None;
         }
-        let local = clock.local(time).clamp(self.at, self.leg.dense.end);
-        let mut value = [0.0];
-        self.leg.dense.some(local, &[self.place(state)], &mut value);
-        Some(value[0])
+        Some(self.value_within(state, time, self.at))
     }
 
     /// What a state was at the lab time `time`, s, within the present step.
     pub(super) fn value_at(&self, state: u32, time: f64) -> f64 {
+        self.value_within(state, time, self.leg.dense.start)
+    }
+
+    /// What a state is at the lab time `time`, s, within the present step from `from`, s on its clock, on.
+    fn value_within(&self, state: u32, time: f64, from: f64) -> f64 {
         let dense = &self.leg.dense;
         let mut value = [0.0];
-        dense.some(dense.clock.local(time).clamp(dense.start, dense.end), &[self.place(state)], &mut value);
+        dense.some(dense.clock.local(time).clamp(from, dense.end), &[self.place(state)], &mut value);
         value[0]
     }
 
     /// Bounds of a state over a piece of lab time, s, within the present step.
     pub(super) fn value_over(&self, state: u32, (from, to): Interval) -> Interval {
-        let points = control(Vector6::from_fn(|k, _| self.value_at(state, from + POINTS[k] * (to - from))));
-        (points.min(), points.max())
+        hull(Vector6::from_fn(|k, _| self.value_at(state, from + POINTS[k] * (to - from))))
     }
 
     /// Its integration is given up: what states were worth is kept in `sizes`.

@@ -7,7 +7,7 @@ use matterix_ir::{BinaryOp, NodeId, Op};
 use nalgebra::Vector6;
 
 use super::analysis::Analysis;
-use super::bernstein::{control, halved};
+use super::bernstein::{control, halved, hull};
 use super::clock::Clock;
 use super::dense::POINTS;
 use super::tape::{Step, Tape};
@@ -493,10 +493,7 @@ fn draw(ends: &mut [Vec<f64>; POINTS.len()], piece: Interval, path: &mut dyn FnM
 
 /// Bounds of states that are polynomials through their values at [`POINTS`].
 fn hulls(ends: &[Vec<f64>; POINTS.len()]) -> impl Iterator<Item = Interval> {
-    (0..ends[0].len()).map(|state| {
-        let points = control(Vector6::from_fn(|k, _| ends[k][state]));
-        (points.min(), points.max())
-    })
+    (0..ends[0].len()).map(|state| hull(Vector6::from_fn(|k, _| ends[k][state])))
 }
 
 /// The sign of left minus right.

@@ -186,8 +186,9 @@ impl Tape {
     }
 
     /// How large what each register is made of by sums is at most: what it is rounded by is a share of that.
-    pub(super) fn sizes(&self, registers: &[f64]) -> Vec<f64> {
-        let mut sizes: Vec<f64> = registers.iter().map(|value| value.abs()).collect();
+    pub(super) fn sizes(&self, registers: &[f64], sizes: &mut Vec<f64>) {
+        sizes.clear();
+        sizes.extend(registers.iter().map(|value| value.abs()));
         let first = self.first_result();
         for (i, step) in self.steps.iter().enumerate() {
             let of = |register: u32| sizes[register as usize];
@@ -204,7 +205,6 @@ impl Tape {
                 sizes[first + i] = sizes[first + i].max(size);
             }
         }
-        sizes
     }
 
     /// The terms of a sum.

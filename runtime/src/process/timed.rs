@@ -29,6 +29,22 @@ const NOTHING: f64 = 1e-40;
 /// A step that begins where something happens is this part of the time until then.
 const CLOSER: f64 = 1.0 / 16.0;
 
+/// What bounds are worked out in, from piece to piece.
+struct Room {
+    moving: Vec<f64>,
+    /// Registers at both ends of a piece.
+    ends: [Vec<f64>; 2],
+    sizes: Vec<f64>,
+    bounds: Vec<Interval>,
+}
+
+impl Room {
+    fn new(tape: &Tape, states: usize) -> Room {
+        let ends = [tape.registers(), tape.registers()];
+        Room { moving: vec![0.0; states], ends, sizes: Vec::new(), bounds: tape.intervals() }
+    }
+}
+
 /// The clock changes something more often than can be followed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Busy;
@@ -51,7 +67,8 @@ impl Timed {
         let constant = |register: u32| tape.constants.get(register as usize).copied();
         let paces: Vec<Option<f64>> = tape.outputs.iter().map(|o| constant(*o)).collect();
         // What each register follows: 0 nothing, 1 the clock in a straight line, 2 the clock in a curve, 3 more than the clock.
-        let kinds = kinds(tape, 1, |i| if paces[i].is_some() { 1 } else { 3 });
+        let of_state = |i: usize| if paces[i].is_some() { 1 } else { 3 };
+        let kinds = kinds(tape, 1, of_state);
         let mut outputs: Vec<u32> = Vec::new();
         let mut ask = |register: u32| {
             if kinds[register as usize] == 2 {
@@ -70,8 +87,7 @@ impl Timed {
         outputs.sort_unstable();
         outputs.dedup();
         let tape = tape.only(outputs);
-        let kinds = self::kinds(&tape, 1, |i| if paces[i].is_some() { 1 } else { 3 });
-        let straight = kinds.into_iter().map(|kind| kind == 1).collect();
+        let straight = self::kinds(&tape, 1, of_state).into_iter().map(|kind| kind == 1).collect();
         Some(Timed { tape, paces, straight })
     }
 
@@ -92,13 +108,13 @@ impl Timed {
                 *hull = (hull.0.min(value), hull.1.max(value));
             }
         }
-        let sizes = self.tape.sizes(&registers);
+        let mut room = Room::new(&self.tape, values.len());
+        self.tape.sizes(&registers, &mut room.sizes);
         for ((low, high), output) in hulls.iter_mut().zip(&self.tape.outputs) {
-            let rounded = ROUNDED * sizes[*output as usize];
+            let rounded = ROUNDED * room.sizes[*output as usize];
             let slack = (*high - *low) + SLIGHT * low.abs().max(high.abs()) + 4.0 * rounded + NOTHING;
             (*low, *high) = (*low - slack, *high + slack);
         }
-        let mut bounds = self.tape.intervals();
         let mut todo = vec![(0.0, length)];
         let mut quiet = 0.0;
         let mut pieces = 0;
@@ -107,9 +123,9 @@ impl Timed {
             if pieces > MOST_PIECES {
                 return Err(Busy);
             }
-            self.bound(time, (from, to), values, &mut bounds);
+            self.bound(time, (from, to), values, &mut room);
             let within = |(output, hull): (&u32, &Interval)| {
-                let (low, high) = bounds[*output as usize];
+                let (low, high) = room.bounds[*output as usize];
                 low >= hull.0 && high <= hull.1
             };
             if self.tape.outputs.iter().zip(&hulls).all(within) || to - from < FINEST * length {
@@ -142,12 +158,12 @@ impl Timed {
     }
 
     /// Bounds over a piece of a step. What follows the clock in a straight line lies between its ends, however it is written.
-    fn bound(&self, time: f64, (from, to): Interval, values: &[f64], bounds: &mut [Interval]) {
-        let (mut moving, mut ends) = (values.to_vec(), [self.tape.registers(), self.tape.registers()]);
-        for (after, registers) in [from, to].into_iter().zip(&mut ends) {
-            self.point(time, after, values, &mut moving, registers);
+    fn bound(&self, time: f64, (from, to): Interval, values: &[f64], room: &mut Room) {
+        let Room { moving, ends, sizes, bounds } = room;
+        for (after, registers) in [from, to].into_iter().zip(ends.iter_mut()) {
+            self.point(time, after, values, moving, registers);
         }
-        let sizes = self.tape.sizes(&ends[1]);
+        self.tape.sizes(&ends[1], sizes);
         let known = |register: usize| {
             let (a, b) = (ends[0][register], ends[1][register]);
             let rounded = ROUNDED * sizes[register];

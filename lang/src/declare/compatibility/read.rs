@@ -136,13 +136,7 @@ impl<'a> Reader<'_, 'a> {
         let found = Consequence::named(&word.text);
         if found.is_none() {
             let near = near::nearest(&word.text, Consequence::names());
-            let mut d = Diagnostic::about(
-                &word.text,
-                codes::UNKNOWN_NAME,
-                word.span,
-                format!("there is no consequence `{}`", word.text),
-                "not known",
-            );
+            let mut d = near::unknown(word, format!("there is no consequence `{}`", word.text), "not known");
             d.help.extend(near::question(&near));
             if let Some(best) = near.first() {
                 d = d.guess(format!("replace with `{best}`"), word.span, best.clone());

@@ -13,7 +13,7 @@ use super::instances::Setting;
 use crate::ast::{Arg, AssetLine, At, Expr, ExprKind, FieldValue, MemberKind, Name};
 use crate::eval::{Scope, Value};
 use crate::names::DeclId;
-use crate::near::{nearest, question};
+use crate::near::{nearest, question, unknown};
 
 /// The shapes and what they are given.
 const SHAPES: &[(&str, &str)] = &[
@@ -175,13 +175,7 @@ impl<'a> Elaborator<'a> {
             // Without an asset's own lines, the frame it starts from may be one that only an asset gives.
             if let Some(from) = at.from.as_ref().filter(|f| self.frame_is_missing(id, f)) {
                 let close = nearest(&from.text, done.frames.iter().map(|f| f.name.as_str()));
-                let d = Diagnostic::about(
-                    &from.text,
-                    codes::UNKNOWN_NAME,
-                    from.span,
-                    format!("no frame `{}` to start from", from.text),
-                    "not a frame of this asset",
-                );
+                let d = unknown(from, format!("no frame `{}` to start from", from.text), "not a frame of this asset");
                 self.report(match question(&close) {
                     Some(asked) => d.help(asked),
                     None => d,
