@@ -141,7 +141,7 @@ impl Stage<'_> {
         let at = |t: f64| performed.at(&joints, t).unwrap_or_default();
         let speed = meet::speed(&Mover { figure: &figure, at: &at }, 0.0, performed.duration());
         let (begin, load, performed) = (self.now, self.held(robot), performed.clone());
-        self.flights.insert(robot, Flight { begin, performed, joints, figure: Arc::new(figure), load, speed });
+        self.flights.insert(robot, Flight { begin, performed, joints, figure, load, speed });
     }
 
     /// The others that are under way after a time.

@@ -6,7 +6,7 @@ use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointKind;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::pose::{distance, pose};
-use matterix_motion::spheres::{Checker, Contact, Figure, Held};
+use matterix_motion::spheres::{Checker, Contact, Held};
 use matterix_motion::{Chain, Variable};
 
 use super::approach::is_clear;
@@ -144,8 +144,7 @@ impl Stage<'_> {
             touching: (0..actor.assembly.robot.links.len() as u32).collect(),
         };
         let base = pose(&self.pose(robot));
-        let figure =
-            Figure::new(actor.to_plan(), &base, &actor.arm, &actor.joints, &[tool]).map_err(|_| Refused::NoRobot)?;
+        let figure = self.figures.of((robot, actor), base, &actor.arm, vec![tool])?;
         let mut checker = Checker::new(&figure, &around.world, 1.0 / HANGING);
         let last = now.len().saturating_sub(1);
         let (up, top) = self.upwards(actor, now);

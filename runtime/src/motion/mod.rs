@@ -8,6 +8,7 @@ mod drive;
 mod effort;
 pub mod exact;
 mod fall;
+mod figures;
 pub mod fingers;
 pub mod fixture;
 pub mod flight;

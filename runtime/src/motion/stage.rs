@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::assembly::{Assembly, assemble};
 use super::carried::{Carried, Carrying, write_number, write_stand};
+use super::figures::Figures;
 use super::fingers::Fingers;
 use super::fixture::{Fixture, following, initial};
 use super::flight::Flight;
@@ -79,6 +80,8 @@ pub struct Stage<'p> {
     /// What cannot be told: empty in a run.
     pub unknown: Unknown,
     /// Shared by all copies of a stage.
+    pub(super) figures: Figures,
+    /// Shared by all copies of a stage.
     bodies: Arc<OnceLock<Vec<Option<Body>>>>,
 }
 
@@ -135,6 +138,7 @@ impl<'p> Stage<'p> {
             changes: 0,
             effort: Cell::default(),
             unknown: Unknown::default(),
+            figures: Figures::default(),
             bodies: Arc::default(),
         }
     }

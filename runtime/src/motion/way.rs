@@ -1,5 +1,7 @@
 //! Ways of a robot's joints: free ones, and straight lines of its tip; and how fast they are gone.
 
+use std::sync::Arc;
+
 use matterix_ir::pose::Pose;
 use matterix_ir::robot::JointLimits;
 use matterix_ir::scene::InstanceId;
@@ -137,10 +139,10 @@ impl Stage<'_> {
         if self.around_sweeps { checker } else { checker.overruled_by(exact) }
     }
 
-    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor, moved: &[usize]) -> Result<Figure, Refused> {
+    pub(super) fn figure(&self, robot: InstanceId, actor: &Actor, moved: &[usize]) -> Result<Arc<Figure>, Refused> {
         let base = pose(&self.pose(robot));
         let held = held(self, robot, actor);
-        Figure::new(actor.to_plan(), &base, moved, &actor.joints, &held).map_err(|_| Refused::NoRobot)
+        self.figures.of((robot, actor), base, moved, held)
     }
 
     /// Joints of a robot stand like this from now on.

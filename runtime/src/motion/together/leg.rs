@@ -4,7 +4,7 @@ use matterix_ir::Span;
 use matterix_ir::plan::StepId;
 use matterix_ir::scene::InstanceId;
 use matterix_motion::meet::{self, Gap, Mover};
-use matterix_motion::spheres::{Figure, Placed};
+use matterix_motion::spheres::Placed;
 
 use crate::motion::performed::Performed;
 use crate::motion::stage::Stage;
@@ -47,7 +47,7 @@ impl Leg {
         if joints.is_empty() {
             return None;
         }
-        let figure: Figure = stage.figure(robot, actor, &joints).ok()?;
+        let figure = stage.figure(robot, actor, &joints).ok()?;
         let at = |t: f64| performed.at(&joints, t).unwrap_or_default();
         let duration = performed.duration();
         let way = meet::speed(&Mover { figure: &figure, at: &at }, 0.0, duration) * duration;
